@@ -1,0 +1,78 @@
+"""The types that cross the borders of the flight stack; the C port has the same ones in ``fs_types.h``.
+
+World frame NED, body frame FRD, quaternions Hamilton, scalar first, body to world. SI units, radians.
+
+Each type has an array form, the fields in order as float64, which kernels exchange with Python and with the C
+backends (``flightstack.arrays``).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+FloatArray: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
+
+MAX_ROTORS = 8
+STATE_SIZE = 13
+SETPOINT_SIZE = 11
+ATTITUDE_TARGET_SIZE = 5
+
+
+class Vector3(NamedTuple):
+    """A vector; its name tells frame and unit."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Quaternion(NamedTuple):
+    """A unit quaternion, Hamilton convention, body FRD to world NED."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
+class VehicleState(NamedTuple):
+    """Rigid-body state of the vehicle at one instant."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    attitude: Quaternion
+    rates_frd_rad_s: Vector3
+
+
+class PositionSetpoint(NamedTuple):
+    """What guidance asks of the outer loop: a point of a trajectory and the heading."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    acceleration_ned_m_s2: Vector3
+    yaw_rad: float
+    yaw_rate_rad_s: float
+
+
+class AttitudeTarget(NamedTuple):
+    """What the outer loop asks of the inner loop: an attitude and the collective thrust."""
+
+    attitude: Quaternion
+    thrust_n: float
+
+
+class AttitudeReference(NamedTuple):
+    """The attitude target after the reference filter, with its derivatives in the body frame."""
+
+    attitude: Quaternion
+    rates_frd_rad_s: Vector3
+    acceleration_frd_rad_s2: Vector3
+
+
+class Wrench(NamedTuple):
+    """Collective thrust along −z of the body and torque about the body axes."""
+
+    thrust_n: float
+    torque_frd_n_m: Vector3

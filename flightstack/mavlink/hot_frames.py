@@ -1,0 +1,128 @@
+"""The two messages of the lockstep exchange, encoded in place: no copy and no object per step.
+
+Each keeps its frame in one buffer, laid out so that the doubles of the payload are aligned: the array handed to
+the kernels *is* the payload. The bytes equal pymavlink's (a test holds them to it).
+"""
+
+from __future__ import annotations
+
+import struct
+import sys
+
+import numpy as np
+from fastcrc import crc16
+
+from flightstack.contract import MAX_ROTORS, STATE_SIZE, FloatArray
+from flightstack.mavlink.dialect import LAYOUT_BY_NAME
+
+if sys.byteorder != "little":  # the payload is used in place
+    raise ImportError("flightstack needs a little-endian machine")
+
+HEADER_SIZE = 10
+CHECKSUM_SIZE = 2
+_ALIGNMENT = 6  # the payload starts at 16 in the buffer
+_TIME = struct.Struct("<Q")
+_HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, incompat, compat, seq, system, component, id (24 bits)
+_CRC = struct.Struct("<H")
+_crc16 = crc16.mcrf4xx
+
+VALID_FLAG = 1
+GROUND_CONTACT_FLAG = 2  # FS_PLANT_STATE
+ARMED_FLAG = 2  # FS_ACTUATORS
+LOCKSTEP_FLAG = 4  # FS_ACTUATORS
+
+
+class _HotFrame:
+    """One message of fixed length. Its last byte, the flags, is never zero, so that nothing is truncated."""
+
+    name = ""
+
+    def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
+        layout = LAYOUT_BY_NAME[self.name]
+        self.payload_size = struct.calcsize(layout.format)
+        self.size = HEADER_SIZE + self.payload_size + CHECKSUM_SIZE
+        self._extra = bytes([layout.crc_extra])
+        self._buffer = bytearray(_ALIGNMENT + self.size)
+        self.frame = memoryview(self._buffer)[_ALIGNMENT:]
+        self._checked = self.frame[1 : HEADER_SIZE + self.payload_size]
+        self._header_after_seq = bytes([layout.message_id & 255, layout.message_id >> 8 & 255, layout.message_id >> 16])
+        _HEADER.pack_into(
+            self.frame, 0, 0xFD, self.payload_size, 0, 0, 0, system_id, component_id,
+            layout.message_id & 0xFFFF, layout.message_id >> 16,
+        )  # fmt: skip
+        self._seq = 0
+        self._crc_at = HEADER_SIZE + self.payload_size
+        self._flags_at = self._crc_at - 1
+        self.frame[self._flags_at] = VALID_FLAG
+
+    def _doubles(self, offset: int, count: int) -> FloatArray:
+        return np.frombuffer(self._buffer, "<f8", count, _ALIGNMENT + HEADER_SIZE + offset)
+
+    @property
+    def time_us(self) -> int:
+        """Time of the message held."""
+        return int(_TIME.unpack_from(self.frame, HEADER_SIZE)[0])
+
+    @property
+    def flags(self) -> int:
+        """Flags of the message held."""
+        return self.frame[self._flags_at]
+
+    def seal(self, time_us: int, flags: int) -> memoryview:
+        """Complete the frame around the payload in place and return its bytes, valid until the next call."""
+        frame = self.frame
+        frame[4] = self._seq
+        self._seq = (self._seq + 1) & 255
+        _TIME.pack_into(frame, HEADER_SIZE, time_us)
+        frame[self._flags_at] = flags | VALID_FLAG
+        _CRC.pack_into(frame, self._crc_at, _crc16(self._extra, _crc16(self._checked)))
+        return frame
+
+    def open(self, data: bytes | bytearray | memoryview) -> bool:
+        """Take over ``data`` if it is exactly one intact frame of this message; else leave all as it was.
+
+        Signed or truncated frames are legal MAVLink too: those take the general codec's way.
+        """
+        if (
+            len(data) != self.size
+            or data[0] != 0xFD
+            or data[1] != self.payload_size
+            or data[2] != 0
+            or bytes(data[7:10]) != self._header_after_seq
+        ):
+            return False
+        crc = _crc16(self._extra, _crc16(data[1 : self._crc_at]))
+        if _CRC.unpack_from(data, self._crc_at)[0] != crc:
+            return False
+        self.frame[:] = data
+        return True
+
+
+class PlantStateFrame(_HotFrame):
+    """FS_PLANT_STATE: ``state`` is the array form of ``VehicleState``, in the payload itself."""
+
+    name = "FS_PLANT_STATE"
+
+    def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
+        super().__init__(system_id, component_id)
+        self.state = self._doubles(8, STATE_SIZE)
+        offset = _ALIGNMENT + HEADER_SIZE + 8 + 8 * STATE_SIZE
+        self.rotor_speed_rad_s = np.frombuffer(self._buffer, "<f4", MAX_ROTORS, offset)
+
+    def set_rotor_count(self, count: int) -> None:
+        """Say how many rotors are in use."""
+        self.frame[self._flags_at - 1] = count
+
+
+class ActuatorsFrame(_HotFrame):
+    """FS_ACTUATORS: ``rotor_speed_rad_s`` are the commands, in the payload itself."""
+
+    name = "FS_ACTUATORS"
+
+    def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
+        super().__init__(system_id, component_id)
+        self.rotor_speed_rad_s = self._doubles(8, MAX_ROTORS)
+
+    def set_rotor_count(self, count: int) -> None:
+        """Say how many rotors are in use."""
+        self.frame[self._flags_at - 1] = count

@@ -1,0 +1,11 @@
+"""The error of every configuration file: what is wrong, where, and what is allowed."""
+
+from __future__ import annotations
+
+
+class ConfigError(Exception):
+    """A bad configuration file; its text is one sentence fit for the user."""
+
+    def __init__(self, file: object, key: str, problem: str) -> None:
+        where = f"{file}: {key}: " if key else f"{file}: "
+        super().__init__(where + problem)

@@ -1,0 +1,103 @@
+"""Read TOML with checks: each value is asked for once, with its range, and unknown keys are errors."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from flightstack.params.errors import ConfigError
+
+
+class Table:
+    """A table of a TOML file that remembers which keys were read."""
+
+    def __init__(self, file: object, values: dict[str, Any], path: str = "") -> None:
+        self.file = file
+        self._values = values
+        self._path = path
+        self._read: set[str] = set()
+
+    def _name(self, key: str) -> str:
+        return f"{self._path}.{key}" if self._path else key
+
+    def error(self, key: str, problem: str) -> ConfigError:
+        """Return the error to raise for ``key``."""
+        return ConfigError(self.file, self._name(key), problem)
+
+    def _get(self, key: str, default: Any) -> Any:
+        self._read.add(key)
+        if key not in self._values:
+            if default is None:
+                raise self.error(key, "is missing")
+            return default
+        return self._values[key]
+
+    def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
+        """Return a finite number in [low, high]."""
+        return self._in_range(key, self._get(key, default), low, high)
+
+    def _in_range(self, key: str, value: Any, low: float, high: float) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.error(key, f"{value!r} is not a number")
+        if not math.isfinite(value) or not low <= value <= high:
+            raise self.error(key, f"{value:g} is outside the allowed range {low:g} to {high:g}")
+        return float(value)
+
+    def numbers(
+        self, key: str, count: int, low: float, high: float, default: tuple[float, ...] | None = None
+    ) -> tuple[float, ...]:
+        """Return a list of ``count`` finite numbers in [low, high]."""
+        value = self._get(key, default)
+        if not isinstance(value, list | tuple) or len(value) != count:
+            raise self.error(key, f"must be a list of {count} numbers")
+        return tuple(self._in_range(key, item, low, high) for item in value)
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Return a string."""
+        value = self._get(key, default)
+        if not isinstance(value, str):
+            raise self.error(key, f"{value!r} is not a string")
+        return value
+
+    def choice(self, key: str, choices: tuple[str, ...]) -> str:
+        """Return one of ``choices``."""
+        value = self.text(key)
+        if value not in choices:
+            raise self.error(key, f"{value!r} is not one of {', '.join(choices)}")
+        return value
+
+    def table(self, key: str) -> Table:
+        """Return the table under ``key``."""
+        value = self._get(key, None)
+        if not isinstance(value, dict):
+            raise self.error(key, "must be a table")
+        return Table(self.file, value, self._name(key))
+
+    def tables(self, key: str) -> list[Table]:
+        """Return the array of tables under ``key``."""
+        value = self._get(key, None)
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            raise self.error(key, "must be an array of tables")
+        return [Table(self.file, item, f"{self._name(key)}[{index}]") for index, item in enumerate(value)]
+
+    def has(self, key: str) -> bool:
+        """Tell whether ``key`` is given."""
+        return key in self._values
+
+    def finish(self) -> None:
+        """Raise for keys that nobody asked for: a misspelt key must not be ignored."""
+        unknown = sorted(set(self._values) - self._read)
+        if unknown:
+            raise self.error(unknown[0], "is not a known key")
+
+
+def read_toml(path: Path) -> Table:
+    """Read a TOML file; raise ConfigError when it is missing or malformed."""
+    try:
+        return Table(path, tomllib.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(path, "", f"is not valid TOML: {error}") from error

@@ -1,0 +1,149 @@
+"""The vehicle: mass, inertia and rotor set, read from a TOML file, validated and immutable."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from flightstack.contract import MAX_ROTORS, FloatArray
+from flightstack.params.errors import ConfigError
+from flightstack.params.toml_reader import Table, read_toml
+
+BUILT_IN = Path(__file__).parent / "vehicles"
+DEFAULT_VEHICLE = "paper_quad"
+GRAVITY_M_S2 = 9.81  # the paper's Table I
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """One rotor. ``spin`` is +1 clockwise seen from above (about +z of FRD), −1 counter-clockwise."""
+
+    position_frd_m: tuple[float, float, float]
+    spin: int
+    thrust_coefficient_n_s2: float
+    torque_coefficient_n_m_s2: float
+    inertia_kg_m2: float
+    lag_s: float
+    min_speed_rad_s: float
+    max_speed_rad_s: float
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A multirotor. Body axes are principal axes, the origin is the centre of gravity."""
+
+    name: str
+    description: str
+    mass_kg: float
+    inertia_kg_m2: tuple[float, float, float]
+    linear_drag_n_s_m: tuple[float, float, float]
+    leg_height_m: float
+    rotors: tuple[Rotor, ...]
+    ideal_rotors: bool = False
+
+    @property
+    def weight_n(self) -> float:
+        """Weight at the paper's gravity."""
+        return self.mass_kg * GRAVITY_M_S2
+
+    @property
+    def max_thrust_n(self) -> float:
+        """Thrust of all rotors at their largest speed."""
+        return sum(r.thrust_coefficient_n_s2 * r.max_speed_rad_s**2 for r in self.rotors)
+
+    def effectiveness(self) -> FloatArray:
+        """Return the matrix from Ω² [rad²/s²] to (thrust [N], torque FRD [N m]), shape (4, rotors)."""
+        matrix = np.zeros((4, len(self.rotors)))
+        for column, rotor in enumerate(self.rotors):
+            x, y, _ = rotor.position_frd_m
+            b = rotor.thrust_coefficient_n_s2
+            # r × F with F = (0, 0, −bΩ²); the body feels the reaction of the rotor's drag
+            matrix[:, column] = (b, -y * b, x * b, -rotor.spin * rotor.torque_coefficient_n_m_s2)
+        return matrix
+
+    def with_ideal_rotors(self) -> Vehicle:
+        """Return the vehicle with rotors that follow at once and have no limits, as the paper assumes."""
+        rotors = tuple(
+            replace(r, lag_s=0.0, min_speed_rad_s=-math.inf, max_speed_rad_s=math.inf) for r in self.rotors
+        )
+        return replace(self, rotors=rotors, ideal_rotors=True)
+
+
+def built_in_vehicles() -> list[str]:
+    """Names of the vehicles that come with the package."""
+    return sorted(path.stem for path in BUILT_IN.glob("*.toml"))
+
+
+def load_vehicle(name_or_path: str) -> Vehicle:
+    """Read a vehicle by the name of a built-in one or by the path of a TOML file; raise ConfigError."""
+    path = Path(name_or_path)
+    if not path.suffix and not path.exists():
+        if name_or_path not in built_in_vehicles():
+            known = ", ".join(built_in_vehicles())
+            raise ConfigError(name_or_path, "", f"is neither a file nor a built-in vehicle ({known})")
+        path = BUILT_IN / f"{name_or_path}.toml"
+    return _vehicle(read_toml(path))
+
+
+def _vehicle(top: Table) -> Vehicle:
+    body, rotor_type = top.table("body"), top.table("rotor_type")
+    mass_kg = body.number("mass_kg", 1e-3, 1e3)
+    inertia = body.numbers("inertia_kg_m2", 3, 1e-8, 1e4)
+    ix, iy, iz = inertia
+    if ix + iy < iz or iy + iz < ix or iz + ix < iy:
+        raise body.error("inertia_kg_m2", "no rigid body has it: each must be at most the sum of the other two")
+    vehicle = Vehicle(
+        name=top.text("name"),
+        description=top.text("description", ""),
+        mass_kg=mass_kg,
+        inertia_kg_m2=(ix, iy, iz),
+        linear_drag_n_s_m=body.numbers("linear_drag_n_s_m", 3, 0.0, 1e3, (0.0, 0.0, 0.0)),  # type: ignore[arg-type]
+        leg_height_m=body.number("leg_height_m", 0.0, 10.0, 0.1),
+        rotors=_rotors(top, rotor_type, mass_kg),
+    )
+    for table in (top, body, rotor_type):
+        table.finish()
+    _check_geometry(top, vehicle)
+    return vehicle
+
+
+def _rotors(top: Table, rotor_type: Table, mass_kg: float) -> tuple[Rotor, ...]:
+    entries = top.tables("rotor")
+    if not 4 <= len(entries) <= MAX_ROTORS:
+        raise top.error("rotor", f"{len(entries)} rotors given, 4 to {MAX_ROTORS} are allowed")
+    thrust_coefficient = rotor_type.number("thrust_coefficient_n_s2", 1e-12, 1.0)
+    min_speed = rotor_type.number("min_speed_rad_s", 0.0, 1e5, 0.0)
+    if rotor_type.has("max_speed_rad_s"):
+        max_speed = rotor_type.number("max_speed_rad_s", 1.0, 1e5)
+    else:
+        ratio = rotor_type.number("thrust_to_weight", 1.05, 20.0)
+        max_speed = math.sqrt(ratio * mass_kg * GRAVITY_M_S2 / (len(entries) * thrust_coefficient))
+    if min_speed >= max_speed:
+        raise rotor_type.error("min_speed_rad_s", f"{min_speed:g} is not below the largest speed {max_speed:g}")
+    torque_coefficient = rotor_type.number("torque_coefficient_n_m_s2", 1e-15, 1.0)
+    inertia = rotor_type.number("inertia_kg_m2", 0.0, 1.0, 0.0)
+    lag_s = rotor_type.number("lag_s", 0.0, 1.0, 0.0)
+    rotors = []
+    for entry in entries:
+        x, y, z = entry.numbers("position_frd_m", 3, -10.0, 10.0)
+        spin = 1 if entry.choice("spin", ("cw", "ccw")) == "cw" else -1
+        entry.finish()
+        rotors.append(
+            Rotor((x, y, z), spin, thrust_coefficient, torque_coefficient, inertia, lag_s, min_speed, max_speed)
+        )
+    return tuple(rotors)
+
+
+def _check_geometry(top: Table, vehicle: Vehicle) -> None:
+    matrix = vehicle.effectiveness()
+    scaled = matrix / np.maximum(np.abs(matrix).max(axis=1, keepdims=True), 1e-300)
+    if np.linalg.matrix_rank(scaled, tol=1e-6) < 4:
+        raise top.error(
+            "rotor", "the rotor geometry is singular: it cannot make thrust, roll, pitch and yaw independently"
+        )
+    hover = np.linalg.pinv(matrix) @ np.array([vehicle.weight_n, 0.0, 0.0, 0.0])
+    if hover.min() <= 0.0 or vehicle.max_thrust_n <= vehicle.weight_n:
+        raise top.error("rotor", "the rotors cannot hold the vehicle in hover")

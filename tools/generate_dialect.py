@@ -1,0 +1,67 @@
+"""Write flightstack/mavlink/dialect_generated.py from flightstack.xml, read with pymavlink's own parser.
+
+Only the layouts of our messages are generated; those of common.xml come with pymavlink. ``--check`` fails when
+the file is stale.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from pymavlink.generator import mavparse
+
+FOLDER = Path(__file__).resolve().parent.parent / "flightstack" / "mavlink"
+HEADER = '''"""Generated from flightstack.xml by tools/generate_dialect.py: do not edit."""
+
+from flightstack.mavlink.layout import Field, Layout
+
+LAYOUTS = (
+'''
+FORMATS = {"uint64_t": "Q", "uint32_t": "I", "uint16_t": "H", "uint8_t": "B", "double": "d", "float": "f"}
+
+
+def layout_source(message: Any) -> str:
+    """Return the source text of one message's layout; fields in wire order, as the checksum demands."""
+    names = [field.name for field in message.fields]
+    rows = [
+        f'            Field("{field.name}", "{FORMATS[field.type]}", {max(1, field.array_length)}, '
+        f'{bool(field.array_length)}, "{field.type}", "{field.units.strip("[]")}", {names.index(field.name)}),'
+        for field in message.ordered_fields
+    ]
+    return "\n".join(
+        [
+            "    Layout(",
+            f"        {message.id},",
+            f'        "{message.name}",',
+            f"        {message.crc_extra},",
+            "        (",
+            *rows,
+            "        ),",
+            "    ),",
+        ]
+    )
+
+
+def generated() -> str:
+    """Return the text of the generated module."""
+    xml = mavparse.MAVXML(str(FOLDER / "flightstack.xml"), mavparse.PROTOCOL_2_0)
+    return HEADER + "\n".join(layout_source(message) for message in xml.message) + "\n)\n"
+
+
+def main() -> int:
+    """Write or check the file."""
+    target = FOLDER / "dialect_generated.py"
+    text = generated()
+    if "--check" in sys.argv:
+        if target.exists() and target.read_text() == text:
+            return 0
+        print("dialect_generated.py is stale: run `make generate`", file=sys.stderr)
+        return 1
+    target.write_text(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
