@@ -19,7 +19,15 @@ from flightstack.mavlink.layout import Field, Layout
 
 LAYOUTS = (
 '''
-FORMATS = {"uint64_t": "Q", "uint32_t": "I", "uint16_t": "H", "uint8_t": "B", "double": "d", "float": "f"}
+FORMATS = {
+    "uint64_t": "Q",
+    "uint32_t": "I",
+    "uint16_t": "H",
+    "uint8_t": "B",
+    "int32_t": "i",
+    "double": "d",
+    "float": "f",
+}
 
 
 def layout_source(message: Any) -> str:

@@ -18,6 +18,7 @@ LAYOUT_BY_NAME: dict[str, Layout] = {layout.name: layout for layout in LAYOUTS}
 for _layout in LAYOUTS:
     mavlink.mavlink_map[_layout.message_id] = message_class(_layout)
 
+EscStatus: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["ESC_STATUS"].message_id]
 FsLoopTiming: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["FS_LOOP_TIMING"].message_id]
 FsPlantState: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["FS_PLANT_STATE"].message_id]
 FsActuators: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["FS_ACTUATORS"].message_id]
@@ -31,6 +32,7 @@ __all__ = [
     "FS_LOOP_TIMING_ID",
     "FS_PLANT_STATE_ID",
     "LAYOUT_BY_NAME",
+    "EscStatus",
     "FsActuators",
     "FsLoopTiming",
     "FsPlantState",

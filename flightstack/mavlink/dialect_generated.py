@@ -4,6 +4,18 @@ from flightstack.mavlink.layout import Field, Layout
 
 LAYOUTS = (
     Layout(
+        291,
+        "ESC_STATUS",
+        10,
+        (
+            Field("time_usec", "Q", 1, False, "uint64_t", "us", 1),
+            Field("rpm", "i", 4, True, "int32_t", "rpm", 2),
+            Field("voltage", "f", 4, True, "float", "V", 3),
+            Field("current", "f", 4, True, "float", "A", 4),
+            Field("index", "B", 1, False, "uint8_t", "", 0),
+        ),
+    ),
+    Layout(
         53000,
         "FS_PLANT_STATE",
         176,
