@@ -20,6 +20,35 @@ SETPOINT_SIZE = 11
 ATTITUDE_TARGET_SIZE = 5
 
 
+class LoopRow:
+    """Columns of what the inner loop writes in each tick: its inputs, each stage's output, and a status.
+
+    Logs, processor-in-the-loop checks and tests read the loops through this row.
+    """
+
+    STATE = slice(0, 13)
+    REFERENCE_ATTITUDE = slice(13, 17)
+    REFERENCE_RATES = slice(17, 20)
+    REFERENCE_ACCELERATION = slice(20, 23)
+    WRENCH = slice(23, 27)
+    WRENCH_ACHIEVED = slice(27, 31)
+    ROTOR_COMMAND = slice(31, 31 + MAX_ROTORS)
+    ROTOR_SPEED = slice(39, 39 + MAX_ROTORS)
+    STATUS = 47
+    SIZE = 48
+
+
+class LoopStatus:
+    """Bits of the status column."""
+
+    INPUT_NOT_FINITE = 1
+    ROLL_SATURATED = 2
+    PITCH_SATURATED = 4
+    YAW_SATURATED = 8
+    THRUST_SATURATED = 16
+    IDLE = 32
+
+
 class Vector3(NamedTuple):
     """A vector; its name tells frame and unit."""
 

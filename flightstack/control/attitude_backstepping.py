@@ -1,0 +1,87 @@
+"""Backstepping attitude control, the paper's nonlinear inner loop (section II.B.2, printing errors corrected)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flightstack.compiled import compiled
+from flightstack.contract import Vector3
+from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
+from flightstack.params.toml_reader import Table
+from flightstack.params.vehicle import Vehicle
+
+
+class BacksteppingMemory(NamedTuple):
+    """The law has no memory; a NamedTuple of floats needs one field."""
+
+    unused: float
+
+
+class BacksteppingParams(NamedTuple):
+    """c1 … c6 [1/s] of the paper's Table III, inertias, and how much of ẋ_d and ẍ_d is fed in (0 or 1)."""
+
+    c1: float
+    c2: float
+    c3: float
+    c4: float
+    c5: float
+    c6: float
+    rate_feedforward: float
+    acceleration_feedforward: float
+    ix_kg_m2: float
+    iy_kg_m2: float
+    iz_kg_m2: float
+    rotor_inertia_kg_m2: float
+
+
+@compiled
+def _axis(error: float, rate: float, rate_d: float, acceleration_d: float, c_outer: float, c_inner: float) -> float:
+    """Angular acceleration demanded on one axis before the cancelling terms [rad/s²].
+
+    ε1 = x_d − x, ε2 = ẋ − ẋ_d − c1 ε1, and ε1 − c2 ε2 − c1 (c1 ε1 + ε2) + ẍ_d.
+    """
+    e1 = error
+    e2 = rate - rate_d - c_outer * e1
+    return e1 - c_inner * e2 - c_outer * (c_outer * e1 + e2) + acceleration_d
+
+
+@compiled
+def attitude_backstepping_step(
+    memory: BacksteppingMemory, inputs: AttitudeInputs, params: BacksteppingParams, dt_s: float
+) -> tuple[BacksteppingMemory, Vector3]:
+    """Return the torque [N m, FRD]: the law of each axis, with coupling and gyroscopic torque cancelled."""
+    error, rates, reference = inputs.error_rad, inputs.rates_frd_rad_s, inputs.reference
+    ff, fa = params.rate_feedforward, params.acceleration_feedforward
+    ahead, push = reference.rates_frd_rad_s, reference.acceleration_frd_rad_s2
+    roll = _axis(error.x, rates.x, ff * ahead.x, fa * push.x, params.c1, params.c2)
+    pitch = _axis(error.y, rates.y, ff * ahead.y, fa * push.y, params.c3, params.c4)
+    yaw = _axis(error.z, rates.z, ff * ahead.z, fa * push.z, params.c5, params.c6)
+    ix, iy, iz = params.ix_kg_m2, params.iy_kg_m2, params.iz_kg_m2
+    p, q, r = rates.x, rates.y, rates.z
+    momentum = params.rotor_inertia_kg_m2 * inputs.relative_rotor_speed_rad_s  # J_r Ω_r
+    torque = Vector3(
+        ix * roll - (iy - iz) * q * r - momentum * q,
+        iy * pitch - (iz - ix) * p * r + momentum * p,
+        iz * yaw - (ix - iy) * p * q,
+    )
+    return memory, torque
+
+
+def read_backstepping_params(vehicle: Vehicle, gains: Table | None) -> BacksteppingParams:
+    """Read ``[attitude_backstepping]``: c = [c1 … c6] and the feed-forward switches."""
+    assert gains is not None
+    c = gains.numbers("c", 6, 0.0, 1e4)
+    feedforward = gains.number("rate_feedforward", 0.0, 1.0), gains.number("acceleration_feedforward", 0.0, 1.0)
+    gains.finish()
+    rotor_inertia = sum(r.inertia_kg_m2 for r in vehicle.rotors) / len(vehicle.rotors)
+    return BacksteppingParams(*c, *feedforward, *vehicle.inertia_kg_m2, rotor_inertia)
+
+
+CONTROLLER = AttitudeController(
+    "backstepping",
+    attitude_backstepping_step,
+    BacksteppingMemory,
+    BacksteppingParams,
+    (0.0,),
+    read_backstepping_params,
+)

@@ -1,0 +1,102 @@
+"""Smooth the attitude target and differentiate it: the reference that the attitude controllers track."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flightstack.compiled import compiled
+from flightstack.contract import AttitudeReference, Quaternion, Vector3
+from flightstack.geometry import conjugate, normalised, quaternion_product, rotate, rotation_vector
+
+
+class ReferenceMemory(NamedTuple):
+    """State of the filter: attitude and body rates of the reference."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+    p_rad_s: float
+    q_rad_s: float
+    r_rad_s: float
+
+
+class ReferenceParams(NamedTuple):
+    """Second-order filter: natural frequency (0: pass the target through) and limits."""
+
+    bandwidth_rad_s: float
+    damping: float
+    max_rate_rad_s: float
+    max_acceleration_rad_s2: float
+
+
+@compiled
+def _clipped(v: Vector3, limit: float) -> Vector3:
+    norm = math.sqrt(v.x * v.x + v.y * v.y + v.z * v.z)
+    if norm <= limit:
+        return v
+    scale = limit / norm
+    return Vector3(v.x * scale, v.y * scale, v.z * scale)
+
+
+@compiled
+def attitude_reference_step(
+    memory: ReferenceMemory, target: Quaternion, params: ReferenceParams, dt_s: float
+) -> tuple[ReferenceMemory, AttitudeReference]:
+    """Advance the reference by ``dt_s`` towards ``target``.
+
+    The outer loop moves its target in steps; a stiff attitude loop would answer each with a saturated rotor.
+    The filter gives the rate and acceleration that feed-forward and backstepping (ẋ_d, ẍ_d) need. It is a
+    critically damped oscillator on the rotation group: error by the quaternion logarithm, exact integration
+    of the rotation over a step.
+    """
+    if params.bandwidth_rad_s <= 0.0:
+        zero = Vector3(0.0, 0.0, 0.0)
+        passed = ReferenceMemory(target.w, target.x, target.y, target.z, 0.0, 0.0, 0.0)
+        return passed, AttitudeReference(target, zero, zero)
+    attitude = Quaternion(memory.w, memory.x, memory.y, memory.z)
+    error = rotation_vector(quaternion_product(conjugate(attitude), target))
+    stiffness = params.bandwidth_rad_s * params.bandwidth_rad_s
+    friction = 2.0 * params.damping * params.bandwidth_rad_s
+    acceleration = _clipped(
+        Vector3(
+            stiffness * error.x - friction * memory.p_rad_s,
+            stiffness * error.y - friction * memory.q_rad_s,
+            stiffness * error.z - friction * memory.r_rad_s,
+        ),
+        params.max_acceleration_rad_s2,
+    )
+    rates = _clipped(
+        Vector3(
+            memory.p_rad_s + acceleration.x * dt_s,
+            memory.q_rad_s + acceleration.y * dt_s,
+            memory.r_rad_s + acceleration.z * dt_s,
+        ),
+        params.max_rate_rad_s,
+    )
+    attitude = normalised(quaternion_product(attitude, _rotation_over(rates, dt_s)))
+    advanced = ReferenceMemory(
+        attitude.w, attitude.x, attitude.y, attitude.z, rates.x, rates.y, rates.z
+    )
+    return advanced, AttitudeReference(attitude, rates, acceleration)
+
+
+@compiled
+def _rotation_over(rates: Vector3, dt_s: float) -> Quaternion:
+    """Rotation that constant body rates make in ``dt_s``."""
+    norm = math.sqrt(rates.x * rates.x + rates.y * rates.y + rates.z * rates.z)
+    half = 0.5 * norm * dt_s
+    scale = 0.5 * dt_s if half < 1e-9 else math.sin(half) / norm
+    return Quaternion(math.cos(half), rates.x * scale, rates.y * scale, rates.z * scale)
+
+
+@compiled
+def in_body_frame(reference: AttitudeReference, attitude: Quaternion) -> AttitudeReference:
+    """Turn the reference's rates and acceleration from its own body frame into the vehicle's."""
+    turn = quaternion_product(conjugate(attitude), reference.attitude)
+    return AttitudeReference(
+        reference.attitude,
+        rotate(turn, reference.rates_frd_rad_s),
+        rotate(turn, reference.acceleration_frd_rad_s2),
+    )

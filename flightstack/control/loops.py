@@ -1,0 +1,283 @@
+"""The control loops in Python: outer kernel, inner kernel, and the backend that runs them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from flightstack.arrays import attitude_target, position_setpoint, store_attitude_target, vehicle_state
+from flightstack.compiled import as_tuple, compiled, specialise, store
+from flightstack.contract import (
+    ATTITUDE_TARGET_SIZE,
+    STATE_SIZE,
+    AttitudeReference,
+    FloatArray,
+    LoopRow,
+    LoopStatus,
+    Vector3,
+    Wrench,
+)
+from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
+from flightstack.control.attitude_reference import (
+    ReferenceMemory,
+    ReferenceParams,
+    attitude_reference_step,
+    in_body_frame,
+)
+from flightstack.control.mixer import Mixer, mix, mixer_for, relative_rotor_speed
+from flightstack.control.position_pid import (
+    PositionMemory,
+    PositionParams,
+    position_pid_step,
+    read_position_params,
+)
+from flightstack.geometry import conjugate, quaternion_product, rotation_vector
+from flightstack.params.toml_reader import Table
+from flightstack.params.vehicle import Vehicle
+
+POSITION_MEMORY_SIZE = 3
+POSITION_PARAMS_SIZE = 12
+REFERENCE_MEMORY_SIZE = 7
+REFERENCE_PARAMS_SIZE = 4
+
+REFERENCE_AT = LoopRow.REFERENCE_ATTITUDE.start
+WRENCH_AT = LoopRow.WRENCH.start
+ACHIEVED_AT = LoopRow.WRENCH_ACHIEVED.start
+COMMAND_AT = LoopRow.ROTOR_COMMAND.start
+SPEED_AT = LoopRow.ROTOR_SPEED.start
+STATUS_AT = LoopRow.STATUS
+INPUT_NOT_FINITE = LoopStatus.INPUT_NOT_FINITE
+
+# bound by ``specialise`` to the chosen controller
+controller_step: Any = None
+ControllerMemory: Any = None
+ControllerParams: Any = None
+CONTROLLER_MEMORY_SIZE = 0
+CONTROLLER_PARAMS_SIZE = 0
+
+
+@compiled
+def all_finite(values: FloatArray) -> bool:
+    """Tell whether no value is infinite or not a number."""
+    for value in values:
+        if not math.isfinite(value):
+            return False
+    return True
+
+
+@compiled
+def outer_kernel(
+    state: FloatArray, setpoint: FloatArray, memory: FloatArray, params: FloatArray, dt_s: float, target: FloatArray
+) -> None:
+    """Run the position loop on arrays: write ``memory`` (3,) and ``target`` (5,); keep both if an input is bad."""
+    if not (all_finite(state) and all_finite(setpoint)):
+        return
+    advanced, aim = position_pid_step(
+        PositionMemory(*as_tuple(memory, POSITION_MEMORY_SIZE)),
+        vehicle_state(state),
+        position_setpoint(setpoint),
+        PositionParams(*as_tuple(params, POSITION_PARAMS_SIZE)),
+        dt_s,
+    )
+    store(memory, advanced)
+    store_attitude_target(target, aim)
+
+
+@compiled
+def _lag(demanded: float, achieved: float, resolution: float) -> float:
+    """Direction in which the mixer could not follow: −1, 0 or +1."""
+    if demanded - achieved > resolution:
+        return 1.0
+    if achieved - demanded > resolution:
+        return -1.0
+    return 0.0
+
+
+@compiled
+def _store_reference(row: FloatArray, reference: AttitudeReference) -> None:
+    store(row[REFERENCE_AT:], reference.attitude)
+    store(row[REFERENCE_AT + 4 :], reference.rates_frd_rad_s)
+    store(row[REFERENCE_AT + 7 :], reference.acceleration_frd_rad_s2)
+
+
+@compiled
+def _store_wrenches(row: FloatArray, demanded: Wrench, achieved: Wrench) -> None:
+    row[WRENCH_AT] = demanded.thrust_n
+    store(row[WRENCH_AT + 1 :], demanded.torque_frd_n_m)
+    row[ACHIEVED_AT] = achieved.thrust_n
+    store(row[ACHIEVED_AT + 1 :], achieved.torque_frd_n_m)
+
+
+@compiled
+def _saturation(row: FloatArray) -> Vector3:
+    """Saturation of each axis in the tick that wrote ``row``."""
+    return Vector3(
+        _lag(row[WRENCH_AT + 1], row[ACHIEVED_AT + 1], 1e-9),
+        _lag(row[WRENCH_AT + 2], row[ACHIEVED_AT + 2], 1e-9),
+        _lag(row[WRENCH_AT + 3], row[ACHIEVED_AT + 3], 1e-9),
+    )
+
+
+@compiled
+def _status(row: FloatArray) -> int:
+    s = _saturation(row)
+    thrust = _lag(row[WRENCH_AT], row[ACHIEVED_AT], 1e-9)
+    status = 2 * int(s.x != 0.0) + 4 * int(s.y != 0.0) + 8 * int(s.z != 0.0) + 16 * int(thrust != 0.0)
+    return status
+
+
+def inner_kernel(
+    state: FloatArray,
+    target: FloatArray,
+    rotor_speed_rad_s: FloatArray,
+    reference_memory: FloatArray,
+    reference_params: FloatArray,
+    memory: FloatArray,
+    params: FloatArray,
+    mixer: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
+    last: FloatArray,
+    dt_s: float,
+    row: FloatArray,
+) -> None:
+    """Run reference filter, attitude controller and mixer on arrays; write ``row`` and a copy to ``last``.
+
+    ``last`` (48,) is the row of the previous tick: anti-windup and Ω_r come from it, and it is repeated, with
+    a status bit, when an input is not finite. A template: ``specialise`` binds the controller.
+    """
+    if not (all_finite(state) and all_finite(target)):
+        row[:] = last
+        row[STATUS_AT] = INPUT_NOT_FINITE
+        return
+    allocation, effectiveness, low, high, spin, work = mixer
+    n = spin.size
+    now, aim = vehicle_state(state), attitude_target(target)
+    filtered, reference = attitude_reference_step(
+        ReferenceMemory(*as_tuple(reference_memory, REFERENCE_MEMORY_SIZE)),
+        aim.attitude,
+        ReferenceParams(*as_tuple(reference_params, REFERENCE_PARAMS_SIZE)),
+        dt_s,
+    )
+    reference = in_body_frame(reference, now.attitude)
+    inputs = AttitudeInputs(
+        now.attitude,
+        now.rates_frd_rad_s,
+        reference,
+        rotation_vector(quaternion_product(conjugate(now.attitude), reference.attitude)),
+        relative_rotor_speed(last[COMMAND_AT:], spin),
+        _saturation(last),
+    )
+    advanced, torque = controller_step(
+        ControllerMemory(*as_tuple(memory, CONTROLLER_MEMORY_SIZE)),
+        inputs,
+        ControllerParams(*as_tuple(params, CONTROLLER_PARAMS_SIZE)),
+        dt_s,
+    )
+    demanded = Wrench(aim.thrust_n, torque)
+    achieved = mix(demanded, Mixer(allocation, effectiveness, low, high, spin), row[COMMAND_AT:], work)
+    store(reference_memory, filtered)
+    store(memory, advanced)
+    row[:STATE_SIZE] = state
+    _store_reference(row, reference)
+    _store_wrenches(row, demanded, achieved)
+    row[COMMAND_AT + n : SPEED_AT] = 0.0
+    row[SPEED_AT:STATUS_AT] = rotor_speed_rad_s
+    row[STATUS_AT] = _status(row)
+    last[:] = row
+
+
+def read_reference_params(gains: Table) -> ReferenceParams:
+    """Read ``[attitude_reference]``."""
+    table = gains.table("attitude_reference")
+    params = ReferenceParams(
+        table.number("bandwidth_rad_s", 0.0, 1e3),
+        table.number("damping", 0.1, 5.0),
+        table.number("max_rate_rad_s", 0.1, 100.0),
+        table.number("max_acceleration_rad_s2", 0.1, 1e5),
+    )
+    table.finish()
+    return params
+
+
+class PythonLoops:
+    """The loops as compiled Python; implements ``ControlBackend``."""
+
+    name = "python"
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        controller: AttitudeController,
+        gains: Table,
+        inner_hz: float,
+        outer_hz: float,
+        max_tilt_rad: float,
+    ) -> None:
+        self._inner_dt_s, self._outer_dt_s = 1.0 / inner_hz, 1.0 / outer_hz
+        self._position_params = np.array(read_position_params(vehicle, gains, max_tilt_rad))
+        self._reference_params = np.array(read_reference_params(gains))
+        section = f"attitude_{controller.name}"
+        table = gains.table(section) if gains.has(section) else None
+        self._controller_params = np.array(controller.read_params(vehicle, table), dtype=np.float64)
+        self._initial_memory = np.array(controller.initial_memory, dtype=np.float64)
+        mixer = mixer_for(vehicle)
+        self._mixer = (*mixer, np.zeros((2, len(vehicle.rotors))))
+        self._idle_speed = np.array([max(0.0, r.min_speed_rad_s) for r in vehicle.rotors])
+        self._kernel = specialise(
+            inner_kernel,
+            controller.key,
+            controller_step=controller.step,
+            ControllerMemory=controller.memory_type,
+            ControllerParams=controller.params_type,
+            CONTROLLER_MEMORY_SIZE=len(controller.initial_memory),
+            CONTROLLER_PARAMS_SIZE=len(self._controller_params),
+        )
+        self.attitude_target = np.zeros(ATTITUDE_TARGET_SIZE)
+        self._position_memory = np.zeros(POSITION_MEMORY_SIZE)
+        self._reference_memory = np.zeros(REFERENCE_MEMORY_SIZE)
+        self._controller_memory = self._initial_memory.copy()
+        self._last = np.zeros(LoopRow.SIZE)
+        self.reset(np.array([0.0] * 6 + [1.0] + [0.0] * 6))
+
+    def reset(self, state: FloatArray) -> None:
+        """Forget the past: integrators zero, the reference at the present attitude, at rest."""
+        self._position_memory[:] = 0.0
+        self._controller_memory[:] = self._initial_memory
+        self._reference_memory[:4] = state[6:10]
+        self._reference_memory[4:] = 0.0
+        self.attitude_target[:4] = state[6:10]
+        self.attitude_target[4] = 0.0
+        self._last[:] = 0.0
+
+    def step(
+        self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray, outer_due: bool, row: FloatArray
+    ) -> None:
+        """Run the outer loop if it is due, then the inner loop; write ``row`` with the rotor commands."""
+        if outer_due:
+            outer_kernel(
+                state, setpoint, self._position_memory, self._position_params, self._outer_dt_s, self.attitude_target
+            )
+        self._kernel(
+            state,
+            self.attitude_target,
+            rotor_speed_rad_s,
+            self._reference_memory,
+            self._reference_params,
+            self._controller_memory,
+            self._controller_params,
+            self._mixer,
+            self._last,
+            self._inner_dt_s,
+            row,
+        )
+
+    def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
+        """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""
+        row[:] = 0.0
+        row[LoopRow.STATE] = state
+        row[LoopRow.REFERENCE_ATTITUDE] = state[6:10]
+        if armed:
+            row[COMMAND_AT : COMMAND_AT + self._idle_speed.size] = self._idle_speed
+        row[LoopRow.ROTOR_SPEED] = rotor_speed_rad_s
+        row[LoopRow.STATUS] = LoopStatus.IDLE

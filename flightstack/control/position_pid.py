@@ -1,0 +1,140 @@
+"""Position and altitude control: the outer loop, from a trajectory point to attitude and thrust."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flightstack.compiled import compiled
+from flightstack.contract import AttitudeTarget, PositionSetpoint, Vector3, VehicleState
+from flightstack.geometry import quaternion_from_euler
+from flightstack.params.toml_reader import Table
+from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
+
+
+class PositionMemory(NamedTuple):
+    """Integral of the position error, as acceleration [m/s²], NED."""
+
+    x: float
+    y: float
+    z: float
+
+
+class PositionParams(NamedTuple):
+    """Gains in acceleration per error (1/s², 1/s³, 1/s) and limits."""
+
+    kp_xy: float
+    ki_xy: float
+    kd_xy: float
+    kp_z: float
+    ki_z: float
+    kd_z: float
+    mass_kg: float
+    gravity_m_s2: float
+    min_thrust_n: float
+    max_thrust_n: float
+    max_tilt_rad: float
+    max_integral_m_s2: float
+
+
+@compiled
+def _horizontal_demand(
+    memory: PositionMemory, state: VehicleState, setpoint: PositionSetpoint, params: PositionParams
+) -> tuple[float, float]:
+    p, v = state.position_ned_m, state.velocity_ned_m_s
+    p_d, v_d, a_d = setpoint.position_ned_m, setpoint.velocity_ned_m_s, setpoint.acceleration_ned_m_s2
+    north = a_d.x + params.kp_xy * (p_d.x - p.x) + params.kd_xy * (v_d.x - v.x) + memory.x
+    east = a_d.y + params.kp_xy * (p_d.y - p.y) + params.kd_xy * (v_d.y - v.y) + memory.y
+    return north, east
+
+
+@compiled
+def _bounded(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+@compiled
+def position_pid_step(
+    memory: PositionMemory, state: VehicleState, setpoint: PositionSetpoint, params: PositionParams, dt_s: float
+) -> tuple[PositionMemory, AttitudeTarget]:
+    """Return the attitude and the thrust that accelerate the vehicle along the setpoint.
+
+    PID on position in NED with feed-forward; the desired specific force f = a − g is turned into roll and
+    pitch by inverting eq. 7 (NED signs corrected): θ = atan2(−f_x', −f_z), φ = atan2(f_y', √(f_x'² + f_z²)),
+    f' in the frame turned by the yaw setpoint. Thrust carries the weight at the present tilt. Integrators
+    stop while tilt or thrust is at its limit.
+    """
+    north, east = _horizontal_demand(memory, state, setpoint, params)
+    z, vz = state.position_ned_m.z, state.velocity_ned_m_s.z
+    error_z = setpoint.position_ned_m.z - z
+    down = (
+        setpoint.acceleration_ned_m_s2.z
+        + params.kp_z * error_z
+        + params.kd_z * (setpoint.velocity_ned_m_s.z - vz)
+        + memory.z
+    )
+    lift = params.gravity_m_s2 - down  # specific force upwards
+    most, least = params.max_thrust_n / params.mass_kg, params.min_thrust_n / params.mass_kg
+    vertical_free = least < lift < most
+    lift = min(max(lift, least), most)
+    tilt_force = math.tan(params.max_tilt_rad) * max(lift, 0.5 * params.gravity_m_s2)
+    demand = math.sqrt(north * north + east * east)
+    horizontal_free = demand <= tilt_force
+    if not horizontal_free:
+        north, east = north * tilt_force / demand, east * tilt_force / demand
+    target = _target_for(north, east, lift, setpoint.yaw_rad, state, params)
+    limit, gain_xy = params.max_integral_m_s2, params.ki_xy * dt_s if horizontal_free else 0.0
+    error = setpoint.position_ned_m
+    memory = PositionMemory(
+        _bounded(memory.x + gain_xy * (error.x - state.position_ned_m.x), limit),
+        _bounded(memory.y + gain_xy * (error.y - state.position_ned_m.y), limit),
+        _bounded(memory.z + (params.ki_z * dt_s * error_z if vertical_free else 0.0), limit),
+    )
+    return memory, target
+
+
+@compiled
+def _target_for(
+    north: float, east: float, lift: float, yaw_rad: float, state: VehicleState, params: PositionParams
+) -> AttitudeTarget:
+    # below half the weight the direction of a falling vehicle's thrust would swing about: bound it
+    upward = max(lift, 0.5 * params.gravity_m_s2)
+    cos_yaw, sin_yaw = math.cos(yaw_rad), math.sin(yaw_rad)
+    forward, right = cos_yaw * north + sin_yaw * east, cos_yaw * east - sin_yaw * north
+    pitch = math.atan2(-forward, upward)
+    roll = math.atan2(right, math.sqrt(forward * forward + upward * upward))
+    q = state.attitude
+    cos_tilt = 1.0 - 2.0 * (q.x * q.x + q.y * q.y)
+    thrust = params.mass_kg * lift / max(cos_tilt, 0.5)
+    thrust = min(max(thrust, params.min_thrust_n), params.max_thrust_n)
+    return AttitudeTarget(quaternion_from_euler(roll, pitch, yaw_rad), thrust)
+
+
+def read_position_params(vehicle: Vehicle, gains: Table, max_tilt_rad: float) -> PositionParams:
+    """Read ``[position]`` and ``[altitude]``.
+
+    Horizontal gains are accelerations (1/s², 1/s³, 1/s). ``[altitude] convention = "paper"`` means ΣΩ² per
+    metre, turned into acceleration by b/m; ``"acceleration"`` takes them as they are.
+    """
+    position, altitude = gains.table("position"), gains.table("altitude")
+    scale = 1.0
+    if altitude.choice("convention", ("acceleration", "paper")) == "paper":
+        scale = vehicle.rotors[0].thrust_coefficient_n_s2 / vehicle.mass_kg
+    highest = 1e7
+    params = PositionParams(
+        kp_xy=position.number("kp", 0.0, 1e3),
+        ki_xy=position.number("ki", 0.0, 1e3),
+        kd_xy=position.number("kd", 0.0, 1e3),
+        kp_z=altitude.number("kp", 0.0, highest) * scale,
+        ki_z=altitude.number("ki", 0.0, highest) * scale,
+        kd_z=altitude.number("kd", 0.0, highest) * scale,
+        mass_kg=vehicle.mass_kg,
+        gravity_m_s2=GRAVITY_M_S2,
+        min_thrust_n=0.08 * vehicle.weight_n,
+        max_thrust_n=10.0 * vehicle.weight_n if vehicle.ideal_rotors else 0.95 * vehicle.max_thrust_n,
+        max_tilt_rad=max_tilt_rad,
+        max_integral_m_s2=position.number("max_integral_m_s2", 0.0, 20.0),
+    )
+    position.finish()
+    altitude.finish()
+    return params
