@@ -1,0 +1,1 @@
+"""The flight's log: a streaming ULog writer."""

@@ -1,0 +1,142 @@
+"""What the log holds: the columns of the traces that the loops fill, and the topics made from them.
+
+Topics and fields have PX4's names where they mean the same. Fields come largest type first, as PX4
+lays them out, so that no padding is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
+
+from flightstack.contract import FloatArray
+from flightstack.geometry_bulk import heading_from_quaternions
+
+Derived: TypeAlias = Callable[[FloatArray], FloatArray]
+
+
+class InnerColumns(NamedTuple):
+    """First column of each group in a row of the inner loop's trace; ``size`` is the length of a row."""
+
+    state: int = 0  # VehicleState, 13
+    reference_attitude: int = 13  # quaternion, 4
+    reference_rates: int = 17  # FRD, rad/s, 3
+    reference_acceleration: int = 20  # FRD, rad/s², 3
+    wrench: int = 23  # commanded: thrust [N], torque FRD [N m], 4
+    wrench_achieved: int = 27  # after the mixer, 4
+    rotor_command: int = 31  # rad/s, 8
+    rotor_speed: int = 39  # measured, rad/s, 8
+    status: int = 47  # status bits, an integer as float
+    size: int = 48
+
+
+class OuterColumns(NamedTuple):
+    """First column of each group in a row of the outer loop's trace; ``size`` is the length of a row."""
+
+    state: int = 0  # VehicleState, 13
+    setpoint: int = 13  # PositionSetpoint, 11
+    target_attitude: int = 24  # AttitudeTarget: quaternion, 4
+    target_thrust: int = 28  # AttitudeTarget: thrust [N]
+    size: int = 29
+
+
+INNER = InnerColumns()
+OUTER = OuterColumns()
+
+
+class Field(NamedTuple):
+    """One field, an array if it has a ``length``.
+
+    ``source``: first column of the trace, a function of its rows, or None for a constant.
+    """
+
+    type: str
+    name: str
+    length: int = 0
+    source: int | Derived | None = None
+    default: float = 0.0
+
+
+class Topic(NamedTuple):
+    """A topic; every topic starts with ``uint64_t timestamp`` [µs]."""
+
+    name: str
+    fields: tuple[Field, ...]
+
+
+def _outer_heading(rows: FloatArray) -> FloatArray:
+    return heading_from_quaternions(rows[:, OUTER.state + 6 : OUTER.state + 10])
+
+
+def inner_topics(rotors: int) -> tuple[Topic, ...]:
+    """Topics written at the inner loop's rate, for a vehicle with ``rotors`` rotors."""
+    return (
+        Topic("vehicle_attitude", (Field("float", "q", 4, INNER.state + 6),)),
+        Topic("vehicle_angular_velocity", (Field("float", "xyz", 3, INNER.state + 10),)),
+        Topic(
+            "attitude_reference",
+            (
+                Field("float", "q", 4, INNER.reference_attitude),
+                Field("float", "rates_rad_s", 3, INNER.reference_rates),
+                Field("float", "acceleration_rad_s2", 3, INNER.reference_acceleration),
+            ),
+        ),
+        Topic(
+            "wrench",
+            (
+                Field("float", "thrust_n", 0, INNER.wrench),
+                Field("float", "torque_n_m", 3, INNER.wrench + 1),
+                Field("float", "thrust_achieved_n", 0, INNER.wrench_achieved),
+                Field("float", "torque_achieved_n_m", 3, INNER.wrench_achieved + 1),
+                Field("uint16_t", "status", 0, INNER.status),
+            ),
+        ),
+        Topic(
+            "rotor_speeds",
+            (
+                Field("float", "command_rad_s", rotors, INNER.rotor_command),
+                Field("float", "speed_rad_s", rotors, INNER.rotor_speed),
+            ),
+        ),
+    )
+
+
+OUTER_TOPICS = (
+    Topic(
+        "vehicle_local_position",
+        (
+            Field("double", "ref_lat"),
+            Field("double", "ref_lon"),
+            Field("float", "x", 0, OUTER.state),
+            Field("float", "y", 0, OUTER.state + 1),
+            Field("float", "z", 0, OUTER.state + 2),
+            Field("float", "vx", 0, OUTER.state + 3),
+            Field("float", "vy", 0, OUTER.state + 4),
+            Field("float", "vz", 0, OUTER.state + 5),
+            Field("float", "heading", 0, _outer_heading),
+            Field("float", "ref_alt"),
+            Field("bool", "xy_valid", default=1),
+            Field("bool", "z_valid", default=1),
+            Field("bool", "v_xy_valid", default=1),
+            Field("bool", "v_z_valid", default=1),
+            Field("bool", "heading_good_for_control", default=1),
+            Field("bool", "xy_global", default=1),
+            Field("bool", "z_global", default=1),
+        ),
+    ),
+    Topic(
+        "trajectory_setpoint",
+        (
+            Field("float", "position", 3, OUTER.setpoint),
+            Field("float", "velocity", 3, OUTER.setpoint + 3),
+            Field("float", "acceleration", 3, OUTER.setpoint + 6),
+            Field("float", "yaw", 0, OUTER.setpoint + 9),
+            Field("float", "yawspeed", 0, OUTER.setpoint + 10),
+        ),
+    ),
+    Topic(
+        "vehicle_attitude_setpoint",
+        # PX4's thrust_body is normalised; ours is in newtons, so it has a name of its own
+        (Field("float", "q_d", 4, OUTER.target_attitude), Field("float", "thrust_n", 0, OUTER.target_thrust)),
+    ),
+)
