@@ -1,0 +1,144 @@
+"""Which missions the vehicle takes: the vehicle refuses the others on upload, the ground station before it.
+
+Pure functions. Items are named by their number on the wire, which starts at 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.plan.item import MissionItem
+from flightstack.plan.jumps import find_idle_loop
+from flightstack.plan.parameter_rules import Fault, parameter_fault
+from flightstack.plan.vocabulary import (
+    GLOBAL_FRAMES,
+    MAX_MISSION_ITEMS,
+    NAV_COMMANDS,
+    OPEN_POSITION_COMMANDS,
+    POSITION_COMMANDS,
+    Command,
+    Frame,
+    MissionResult,
+    command_name,
+)
+
+_ALTITUDE_TOLERANCE_M = 0.01  # a 32-bit float of an altitude above sea level is good to half a millimetre
+
+
+class Limits(NamedTuple):
+    """What a mission may ask for; PX4's parameter of the same meaning in brackets. Zero or less: no limit."""
+
+    max_first_distance_m: float = 900.0
+    """Horizontal distance from home to the first position [MIS_DIST_1WP]."""
+    max_distance_m: float = 900.0
+    """Horizontal distance from one position to the next [MIS_DIST_WPS]."""
+    max_altitude_m: float = 500.0
+    """Altitude above home [GF_MAX_VER_DIST]."""
+    min_takeoff_altitude_m: float = 0.3
+    """Altitude above home that a takeoff must reach, or landing would be detected at once."""
+    max_items: int = MAX_MISSION_ITEMS
+
+
+class Rejection(NamedTuple):
+    """Why a mission is refused."""
+
+    result: MissionResult
+    seq: int | None
+    """Number of the item at fault; None when it is the mission as a whole."""
+    reason: str
+    """One sentence, naming the item."""
+
+
+DEFAULT_LIMITS = Limits()
+
+
+def check_mission(
+    items: Sequence[MissionItem], home: GeoPoint, limits: Limits = DEFAULT_LIMITS
+) -> Rejection | None:
+    """Return why the vehicle refuses ``items``, or None if it takes them."""
+    if len(items) > limits.max_items:
+        reason = f"the mission has {len(items)} items, and at most {limits.max_items} are allowed"
+        return Rejection(MissionResult.NO_SPACE, None, reason)
+    for seq, item in enumerate(items):
+        fault = _item_fault(item, seq, len(items)) or _altitude_fault(item, home, limits)
+        if fault:
+            return _rejection(seq, item, fault)
+    if not any(item.command in NAV_COMMANDS for item in items):
+        reason = "the mission has no item to fly to (takeoff, waypoint, loiter, land or return)"
+        return Rejection(MissionResult.INVALID, None, reason)
+    loop = find_idle_loop(items)
+    if loop is not None:
+        fault = Fault(MissionResult.INVALID_PARAM1, "jumps in a loop that holds no item to fly")
+        return _rejection(loop, items[loop], fault)
+    return _distance_rejection(items, home, limits)
+
+
+def _rejection(seq: int, item: MissionItem, fault: Fault) -> Rejection:
+    return Rejection(fault.result, seq, f"item {seq} ({command_name(item.command)}): {fault.reason}")
+
+
+def _item_fault(item: MissionItem, seq: int, count: int) -> Fault | None:
+    """Return the fault of one item that can be seen without the others."""
+    if item.command not in Command.__members__.values():
+        supported = ", ".join(f"{command.value} {command.name}" for command in Command)
+        return Fault(MissionResult.UNSUPPORTED, f"is not supported; supported are {supported}")
+    if item.frame not in Frame.__members__.values():
+        frames = ", ".join(f"{frame.value} {frame.name}" for frame in Frame)
+        return Fault(MissionResult.UNSUPPORTED_FRAME, f"frame {item.frame} is not one of {frames}")
+    if item.command in POSITION_COMMANDS and item.frame not in GLOBAL_FRAMES:
+        return Fault(MissionResult.UNSUPPORTED_FRAME, "needs a global frame (0, 3, 5 or 6), not MISSION")
+    return parameter_fault(item, seq, count) or _position_fault(item)
+
+
+def _position_fault(item: MissionItem) -> Fault | None:
+    if item.command not in POSITION_COMMANDS:
+        return None
+    if item.position_deg is None:
+        if item.command in OPEN_POSITION_COMMANDS:
+            return None
+        return Fault(MissionResult.INVALID_PARAM5_X, "latitude and longitude must be given")
+    latitude, longitude = item.position_deg
+    if abs(latitude) > 90.0:
+        reason = f"latitude {latitude:.7f} is outside -90 to 90 degrees"
+        return Fault(MissionResult.INVALID_PARAM5_X, reason)
+    if abs(longitude) > 180.0:
+        reason = f"longitude {longitude:.7f} is outside -180 to 180 degrees"
+        return Fault(MissionResult.INVALID_PARAM6_Y, reason)
+    return None
+
+
+def _altitude_fault(item: MissionItem, home: GeoPoint, limits: Limits) -> Fault | None:
+    """Return the fault of an item's altitude; a landing's is free, since it ends on the ground."""
+    if item.command not in POSITION_COMMANDS or item.command == Command.NAV_LAND:
+        return None
+    if math.isnan(item.z):
+        if item.command in OPEN_POSITION_COMMANDS:
+            return None
+        return Fault(MissionResult.INVALID_PARAM7, "altitude must be given")
+    above_home_m = item.z if item.altitude_is_relative else item.z - home.altitude_m
+    low_m = limits.min_takeoff_altitude_m if item.command == Command.NAV_TAKEOFF else 0.0
+    high_m = limits.max_altitude_m if limits.max_altitude_m > 0.0 else math.inf
+    if not low_m - _ALTITUDE_TOLERANCE_M <= above_home_m <= high_m + _ALTITUDE_TOLERANCE_M:
+        reason = f"altitude {above_home_m:g} m above home is outside {low_m:g} to {high_m:g} m"
+        return Fault(MissionResult.INVALID_PARAM7, reason)
+    return None
+
+
+def _distance_rejection(items: Sequence[MissionItem], home: GeoPoint, limits: Limits) -> Rejection | None:
+    frame = LocalFrame(home)
+    north_m, east_m = 0.0, 0.0
+    limit_m, start = limits.max_first_distance_m, "home"
+    for seq, item in enumerate(items):
+        if item.position_deg is None:
+            continue
+        there = frame.to_ned(GeoPoint(*item.position_deg, home.altitude_m))
+        distance_m = math.hypot(there.x - north_m, there.y - east_m)
+        if limit_m > 0.0 and distance_m > limit_m:
+            reason = f"is {distance_m:.0f} m from {start}, and at most {limit_m:g} m are allowed"
+            return _rejection(seq, item, Fault(MissionResult.INVALID, reason))
+        north_m, east_m = there.x, there.y
+        limit_m, start = limits.max_distance_m, "the position before it"
+    return None

@@ -1,0 +1,74 @@
+"""Plan files: read, and written so that an old file is never lost half-way."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from flightstack.params.errors import ConfigError
+from flightstack.plan.plan import Plan
+from flightstack.plan.qgc_plan import read_plan
+from flightstack.plan.qgc_plan_writer import plan_to_json
+from flightstack.plan.waypoints import WAYPOINTS_HEADER, plan_to_waypoints, read_waypoints
+
+MAX_FILE_BYTES = 50_000_000
+PLAN_SUFFIXES = (".plan", ".json")
+WAYPOINTS_SUFFIXES = (".waypoints", ".txt", ".mission")
+
+
+def load_plan(path: str | Path) -> Plan:
+    """Read a QGC ``.plan`` or a ``QGC WPL 110`` file, told apart by their content.
+
+    Raises ConfigError, one sentence with file, item, field, value and what is allowed.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_FILE_BYTES + 1)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        problem = error.strerror if isinstance(error, OSError) else error
+        raise ConfigError(path, "", f"cannot be read: {problem}") from error
+    if len(data) > MAX_FILE_BYTES:
+        raise ConfigError(path, "", f"is larger than the allowed {MAX_FILE_BYTES // 1_000_000} MB")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ConfigError(path, "", "is neither a .plan nor a .waypoints file: it is not text") from error
+    if text.startswith("QGC WPL"):
+        return read_waypoints(text, path)
+    if path.suffix in WAYPOINTS_SUFFIXES:
+        raise ConfigError(path, "line 1", f"must be {WAYPOINTS_HEADER!r}")
+    return read_plan(text, path)
+
+
+def save_plan(path: str | Path, plan: Plan) -> None:
+    """Write ``plan`` in the format of the file's suffix; the file is replaced whole or not at all.
+
+    Raises ConfigError for an unknown suffix, a file that cannot be written, or a plan that the format cannot
+    hold.
+    """
+    path = Path(path)
+    if path.suffix in PLAN_SUFFIXES:
+        text = plan_to_json(plan)
+    elif path.suffix in WAYPOINTS_SUFFIXES:
+        text = plan_to_waypoints(plan, path)
+    else:
+        allowed = ", ".join(PLAN_SUFFIXES + WAYPOINTS_SUFFIXES)
+        raise ConfigError(path, "", f"the suffix {path.suffix!r} must be one of {allowed}")
+    try:
+        _replace_file(path.resolve(), text)  # the target of a link is replaced, not the link
+    except (OSError, ValueError) as error:
+        problem = error.strerror if isinstance(error, OSError) else error
+        raise ConfigError(path, "", f"cannot be written: {problem}") from error
+
+
+def _replace_file(path: Path, text: str) -> None:
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with temporary.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,131 @@
+"""QGroundControl's ``.plan``: JSON, version 1.
+
+Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html. A DO_JUMP in the file
+names the ``doJumpId`` of its target; in memory, as on the wire, it names the target's number.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from flightstack.geodesy import GeoPoint
+from flightstack.params.errors import ConfigError
+from flightstack.plan import values
+from flightstack.plan.item import MissionItem
+from flightstack.plan.plan import Plan
+from flightstack.plan.vocabulary import GLOBAL_FRAMES, Command
+
+
+class _Entry(NamedTuple):
+    where: str
+    item: MissionItem
+    jump_id: int | None
+
+
+def read_plan(text: str, file: object) -> Plan:
+    """Read the text of a ``.plan``; ``file`` is its name in errors (ConfigError)."""
+    return plan_of_document(_document(text, file), file)
+
+
+def plan_of_document(document: Mapping[str, Any], file: object) -> Plan:
+    """Return the plan of a JSON document whose type and version are right."""
+    mission = document.get("mission")
+    if not isinstance(mission, dict):
+        raise ConfigError(file, "mission", "must be an object with the mission's items")
+    listed = mission.get("items")
+    if not isinstance(listed, list):
+        raise ConfigError(file, "mission.items", "must be a list")
+    values.check_count(file, len(listed))
+    entries: list[_Entry] = []
+    for listed_item in listed:
+        _append(entries, listed_item, file)
+    values.check_count(file, len(entries))
+    home = _home(mission.get("plannedHomePosition"), file)
+    return Plan(_with_jump_targets(entries, file), home, document)
+
+
+def _document(text: str, file: object) -> dict[str, Any]:
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError) as error:  # ValueError: also an integer of thousands of digits
+        raise ConfigError(file, "", f"is not valid JSON: {error}") from error
+    if not isinstance(document, dict) or document.get("fileType") != "Plan":
+        found = document.get("fileType") if isinstance(document, dict) else None
+        raise ConfigError(file, "fileType", f"{found!r:.40} must be 'Plan'")
+    if document.get("version") != 1:
+        raise ConfigError(file, "version", f"{document.get('version')!r:.40} must be 1")
+    return document
+
+
+def _append(entries: list[_Entry], listed: Any, file: object) -> None:
+    """Append the item, or the simple items that a complex item (a survey, say) stands for."""
+    where = f"item {len(entries)}"
+    if not isinstance(listed, dict):
+        raise ConfigError(file, where, "must be an object")
+    kind = listed.get("type")
+    if kind == "SimpleItem":
+        entries.append(_simple_item(listed, where, file))
+        return
+    if kind != "ComplexItem":
+        raise ConfigError(file, f"{where}, type", f"{kind!r:.40} must be 'SimpleItem' or 'ComplexItem'")
+    transect = listed.get("TransectStyleComplexItem")
+    inner = transect.get("Items") if isinstance(transect, dict) else None
+    if not isinstance(inner, list):
+        name = listed.get("complexItemType")
+        problem = f"the complex item {name!r:.40} has no list of simple items; convert it to waypoints"
+        raise ConfigError(file, where, problem)
+    values.check_count(file, len(entries) + len(inner))
+    for simple in inner:
+        if not isinstance(simple, dict):
+            raise ConfigError(file, f"item {len(entries)}", "must be an object")
+        entries.append(_simple_item(simple, f"item {len(entries)}", file))
+
+
+def _simple_item(listed: dict[str, Any], where: str, file: object) -> _Entry:
+    code = values.command(file, f"{where}, command", listed.get("command"))
+    frame = values.frame(file, f"{where}, frame", listed.get("frame"))
+    params = listed.get("params")
+    if not isinstance(params, list) or len(params) != 7:
+        raise ConfigError(file, f"{where}, params", "must be a list of 7 numbers")
+    is_global = frame in GLOBAL_FRAMES
+    numbers = [
+        values.number(file, f"{where}, {values.field_name(index, is_global)}", value)
+        for index, value in enumerate(params)
+    ]
+    autocontinue = listed.get("autoContinue", True)
+    if not isinstance(autocontinue, bool):
+        raise ConfigError(file, f"{where}, autoContinue", f"{autocontinue!r:.40} must be true or false")
+    jump_id = listed.get("doJumpId")
+    if jump_id is not None:
+        jump_id = values.integer(file, f"{where}, doJumpId", jump_id, 2**31 - 1)
+    item = values.mission_item(file, where, code, frame, numbers, autocontinue=autocontinue)
+    return _Entry(where, item, jump_id)
+
+
+def _with_jump_targets(entries: list[_Entry], file: object) -> tuple[MissionItem, ...]:
+    seq_by_id: dict[float, int] = {}
+    for seq, entry in enumerate(entries):
+        if entry.jump_id is not None:
+            seq_by_id.setdefault(entry.jump_id, seq)
+    items = []
+    for where, item, _ in entries:
+        target = item
+        if item.command == Command.DO_JUMP:
+            if item.param1 not in seq_by_id:
+                problem = f"jumps to doJumpId {item.param1:g}, which no item has"
+                raise ConfigError(file, f"{where}, param 1", problem)
+            target = replace(item, param1=float(seq_by_id[item.param1]))
+        items.append(target)
+    return tuple(items)
+
+
+def _home(value: Any, file: object) -> GeoPoint | None:
+    key = "mission.plannedHomePosition"
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 3:
+        raise ConfigError(file, key, "must be a list of latitude, longitude and altitude")
+    return values.home_position(file, key, [values.number(file, key, part) for part in value])

@@ -1,0 +1,112 @@
+"""Checks of the values of plan files, shared by both formats. Errors name file, item and field."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from flightstack.geodesy import GeoPoint
+from flightstack.params.errors import ConfigError
+from flightstack.plan.item import MissionItem, as_float32, integer_coordinate
+from flightstack.plan.vocabulary import (
+    GLOBAL_FRAMES,
+    MAX_MISSION_ITEMS,
+    OPEN_POSITION_COMMANDS,
+    POSITION_COMMANDS,
+    Command,
+    Frame,
+    command_name,
+)
+
+_FIELDS = ("param 1", "param 2", "param 3", "param 4", "latitude", "longitude", "altitude")
+_PLAIN_FIELDS = (*_FIELDS[:4], "param 5", "param 6", "param 7")
+_RANGE_DEG = {4: 90.0, 5: 180.0}
+
+
+def check_count(file: object, count: int) -> None:
+    """Raise ConfigError when there are more items than any vehicle of ours takes."""
+    if count > MAX_MISSION_ITEMS:
+        problem = f"has {count} items, and at most {MAX_MISSION_ITEMS} are allowed"
+        raise ConfigError(file, "mission", problem)
+
+
+def number(file: object, key: str, value: Any) -> float:
+    """Return a JSON number as a float that MAVLink can carry; null is NaN."""
+    if value is None:
+        return math.nan
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ConfigError(file, key, f"{value!r:.40} must be a number or null")
+    try:
+        result = float(value)
+    except OverflowError:  # an integer beyond the floats
+        result = math.inf
+    if math.isinf(as_float32(result)):
+        raise ConfigError(file, key, f"{result:g} must be a finite 32-bit number")
+    return result
+
+
+def integer(file: object, key: str, value: Any, high: int) -> int:
+    """Return a whole number from 0 to ``high``."""
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= high:
+        raise ConfigError(file, key, f"{value!r:.40} must be a whole number from 0 to {high}")
+    return value
+
+
+def command(file: object, key: str, value: Any) -> Command:
+    """Return a supported command."""
+    code = integer(file, key, value, 65535)
+    try:
+        return Command(code)
+    except ValueError:
+        allowed = ", ".join(f"{known.value} {known.name}" for known in Command)
+        raise ConfigError(file, key, f"{code} is not supported; supported are {allowed}") from None
+
+
+def frame(file: object, key: str, value: Any) -> Frame:
+    """Return a supported coordinate frame."""
+    code = integer(file, key, value, 255)
+    try:
+        return Frame(code)
+    except ValueError:
+        allowed = ", ".join(f"{known.value} {known.name}" for known in Frame)
+        raise ConfigError(file, key, f"{code} is not supported; supported are {allowed}") from None
+
+
+def mission_item(
+    file: object, where: str, code: Command, frame_code: Frame, values: list[float], *, autocontinue: bool
+) -> MissionItem:
+    """Return the item of seven parameters, after a check of its position."""
+    is_global = frame_code in GLOBAL_FRAMES
+    for index, limit_deg in _RANGE_DEG.items() if is_global else ():
+        value = values[index]
+        if math.isnan(value):
+            if code in POSITION_COMMANDS - OPEN_POSITION_COMMANDS:
+                problem = f"is NaN (null), and a {command_name(code)} needs -{limit_deg:g} to {limit_deg:g}"
+                raise ConfigError(file, f"{where}, {_FIELDS[index]}", problem)
+        elif not abs(value) <= limit_deg:
+            problem = f"{value:.9g} is outside the allowed range -{limit_deg:g} to {limit_deg:g}"
+            raise ConfigError(file, f"{where}, {_FIELDS[index]}", problem)
+    x, y = (integer_coordinate(values[index], is_global) for index in (4, 5))
+    param1, param2, param3, param4 = values[:4]
+    return MissionItem(
+        int(code), int(frame_code), param1, param2, param3, param4, x, y, values[6], autocontinue
+    )
+
+
+def field_name(index: int, is_global: bool) -> str:
+    """Return the name of a parameter (0 to 6) in error messages."""
+    return (_FIELDS if is_global else _PLAIN_FIELDS)[index]
+
+
+def home_position(file: object, key: str, values: list[float]) -> GeoPoint:
+    """Return the home position of latitude, longitude [deg] and altitude [m]."""
+    for index, name in enumerate(("latitude", "longitude", "altitude")):
+        if not math.isfinite(values[index]):
+            raise ConfigError(file, key, f"{name} {values[index]} must be a finite number")
+    for index, (name, limit_deg) in enumerate((("latitude", 90.0), ("longitude", 180.0))):
+        if abs(values[index]) > limit_deg:
+            allowed = f"the allowed range -{limit_deg:g} to {limit_deg:g}"
+            raise ConfigError(file, key, f"{name} {values[index]:.9g} is outside {allowed}")
+    return GeoPoint(*values)
