@@ -28,6 +28,11 @@ class Link:
         self.sent += 1
         return bytes(frame)
 
+    @property
+    def has_partial(self) -> bool:
+        """Tell whether the decoder holds the beginning of a frame."""
+        return int(self._codec.buf_len()) > 0
+
     def decode(self, data: bytes) -> Iterator[Message]:
         """Yield the messages that ``data`` completes; what is not a message is counted in ``bad``."""
         try:

@@ -1,0 +1,124 @@
+"""Arming and modes as a table: each event, what it needs, and where it leads. Pure.
+
+Read ``RULES`` from top to bottom: that is the whole behaviour. A need that is not met refuses the event with the
+sentence that stands beside it, and nothing changes.
+"""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+from typing import NamedTuple
+
+from flightstack.modes import Mode
+
+
+class Event(Enum):
+    """What can happen to mode and arming."""
+
+    ARM = auto()
+    DISARM = auto()
+    FORCE_DISARM = auto()
+    SELECT_TAKEOFF = auto()
+    SELECT_MISSION = auto()
+    SELECT_HOLD = auto()
+    SELECT_RETURN = auto()
+    SELECT_LAND = auto()
+    TAKEOFF_REACHED = auto()
+    MISSION_FINISHED = auto()
+    MISSION_ASKS_RETURN = auto()
+    LANDED_LONG_ENOUGH = auto()
+    NO_TAKEOFF = auto()
+
+
+class Facts(NamedTuple):
+    """What the commander knows of the vehicle when an event comes."""
+
+    state_is_valid: bool
+    upright: bool
+    landed: bool
+    has_mission: bool
+    mission_begins_with_takeoff: bool
+
+
+class Status(NamedTuple):
+    """Mode and arming."""
+
+    armed: bool = False
+    mode: Mode = Mode.HOLD
+
+
+class Need(Enum):
+    """A condition of a rule; the value is the refusal."""
+
+    STATE = "no valid position and attitude yet"
+    UPRIGHT = "the vehicle is tilted by more than 30 degrees"
+    ON_GROUND = "the vehicle is in the air"
+    IN_AIR = "the vehicle is on the ground"
+    ARMED = "the vehicle is disarmed"
+    MISSION = "no mission is loaded"
+    TAKEOFF_ITEM = "the vehicle is on the ground and the mission does not begin with a takeoff"
+
+
+def is_met(need: Need, status: Status, facts: Facts) -> bool:
+    """Tell whether ``need`` holds."""
+    return {
+        Need.STATE: facts.state_is_valid,
+        Need.UPRIGHT: facts.upright,
+        Need.ON_GROUND: facts.landed or not status.armed,
+        Need.IN_AIR: status.armed and not facts.landed,
+        Need.ARMED: status.armed,
+        Need.MISSION: facts.has_mission,
+        Need.TAKEOFF_ITEM: not facts.landed or facts.mission_begins_with_takeoff,
+    }[need]
+
+
+class Rule(NamedTuple):
+    """One row: in these modes (None: any) the event needs this and leads there (None: unchanged)."""
+
+    event: Event
+    modes: tuple[Mode, ...] | None
+    needs: tuple[Need, ...]
+    armed: bool | None
+    mode: Mode | None
+
+
+RULES = (
+    Rule(Event.ARM, None, (Need.STATE, Need.UPRIGHT), True, None),
+    Rule(Event.DISARM, None, (Need.ON_GROUND,), False, Mode.HOLD),
+    Rule(Event.FORCE_DISARM, None, (), False, Mode.HOLD),
+    Rule(Event.SELECT_TAKEOFF, None, (Need.STATE, Need.ON_GROUND), None, Mode.TAKEOFF),
+    Rule(Event.SELECT_MISSION, None, (Need.STATE, Need.MISSION, Need.TAKEOFF_ITEM), None, Mode.MISSION),
+    Rule(Event.SELECT_HOLD, None, (Need.STATE,), None, Mode.HOLD),
+    Rule(Event.SELECT_RETURN, None, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.RETURN),
+    Rule(Event.SELECT_LAND, None, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.LAND),
+    Rule(Event.TAKEOFF_REACHED, (Mode.TAKEOFF,), (Need.ARMED,), None, Mode.HOLD),
+    Rule(Event.MISSION_FINISHED, (Mode.MISSION,), (), None, Mode.HOLD),
+    Rule(Event.MISSION_ASKS_RETURN, (Mode.MISSION,), (Need.ARMED,), None, Mode.RETURN),
+    Rule(Event.LANDED_LONG_ENOUGH, None, (Need.ON_GROUND,), False, Mode.HOLD),
+    Rule(Event.NO_TAKEOFF, None, (Need.ON_GROUND,), False, Mode.HOLD),
+)
+
+
+class Outcome(NamedTuple):
+    """The status after an event, and why it was refused (None: it was not)."""
+
+    status: Status
+    refusal: str | None
+
+
+def transition(status: Status, facts: Facts, event: Event) -> Outcome:
+    """Apply ``event``: the first rule for it and the present mode decides."""
+    for rule in RULES:
+        if rule.event is not event or (rule.modes is not None and status.mode not in rule.modes):
+            continue
+        for need in rule.needs:
+            if not is_met(need, status, facts):
+                return Outcome(status, need.value)
+        return Outcome(
+            Status(
+                status.armed if rule.armed is None else rule.armed,
+                status.mode if rule.mode is None else rule.mode,
+            ),
+            None,
+        )
+    return Outcome(status, f"not possible in mode {status.mode.name.lower()}")

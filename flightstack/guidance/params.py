@@ -1,0 +1,61 @@
+"""The numbers of guidance in the form its compiled code takes."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flightstack.params.behaviour import Behaviour
+
+FAR_BELOW_M = 1e4
+"""Down coordinate of a goal that stands for "descend until the ground stops you"."""
+
+
+class GuidanceParams(NamedTuple):
+    """Flat copy of what guidance needs of ``Behaviour``, angles in radians."""
+
+    cruise_speed_m_s: float
+    max_speed_m_s: float
+    climb_speed_m_s: float
+    descent_speed_m_s: float
+    takeoff_speed_m_s: float
+    land_speed_m_s: float
+    land_slow_altitude_m: float
+    acceleration_m_s2: float
+    vertical_acceleration_m_s2: float
+    jerk_m_s3: float
+    yaw_rate_rad_s: float
+    yaw_mode: float
+    acceptance_radius_m: float
+    altitude_acceptance_m: float
+    yaw_acceptance_rad: float
+    return_altitude_m: float
+    return_min_distance_m: float
+    weight_n: float
+    far_below_m: float
+
+
+def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:
+    """Collect the numbers of guidance."""
+    b = behaviour
+    return GuidanceParams(
+        cruise_speed_m_s=b.cruise_speed_m_s,
+        max_speed_m_s=b.max_speed_m_s,
+        climb_speed_m_s=b.climb_speed_m_s,
+        descent_speed_m_s=b.descent_speed_m_s,
+        takeoff_speed_m_s=b.takeoff_speed_m_s,
+        land_speed_m_s=b.land_speed_m_s,
+        land_slow_altitude_m=b.land_slow_altitude_m,
+        acceleration_m_s2=b.acceleration_m_s2,
+        vertical_acceleration_m_s2=b.vertical_acceleration_m_s2,
+        jerk_m_s3=b.jerk_m_s3,
+        yaw_rate_rad_s=math.radians(b.yaw_rate_deg_s),
+        yaw_mode=b.yaw_mode,
+        acceptance_radius_m=b.acceptance_radius_m,
+        altitude_acceptance_m=b.altitude_acceptance_m,
+        yaw_acceptance_rad=math.radians(b.yaw_acceptance_deg),
+        return_altitude_m=b.return_altitude_m,
+        return_min_distance_m=b.return_min_distance_m,
+        weight_n=weight_n,
+        far_below_m=FAR_BELOW_M,
+    )

@@ -1,0 +1,121 @@
+"""From the autopilot's events to flight logs: one log for each flight, from arming to disarming."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from flightstack.commander.transitions import Status
+from flightstack.contract import FloatArray, LoopRow
+from flightstack.geodesy import GeoPoint
+from flightstack.guidance.navigator import MissionProgress
+from flightstack.logging.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
+from flightstack.logging.flight_log import FlightLog
+from flightstack.logging.topics import OUTER
+from flightstack.modes import NAVIGATION_STATE
+
+OpenLog = Callable[[], FlightLog | None]
+
+
+class FlightRecorder:
+    """Implements the autopilot's ``Recorder``. While no log is open, rows go to a scratch row."""
+
+    def __init__(
+        self,
+        open_log: OpenLog,
+        info: Mapping[str, str | int | float],
+        parameters: Mapping[str, float],
+        home: GeoPoint,
+    ) -> None:
+        self._open_log = open_log
+        self._info = info
+        self._parameters = parameters
+        self._home = home
+        self._log: FlightLog | None = None
+        self._scratch = np.zeros(LoopRow.SIZE)
+        self._mission = (MissionProgress(0, -1, False, False), 0)
+        self._missions = 0
+        self.error: OSError | None = None
+
+    def inner_row(self, time_us: int) -> FloatArray:
+        """Return the row that the inner loop fills in this tick."""
+        return self._scratch if self._log is None else self._log.inner.append(time_us)
+
+    def outer(self, time_us: int, state: FloatArray, setpoint: FloatArray, attitude_target: FloatArray) -> None:
+        """Record one outer tick."""
+        if self._log is None:
+            return
+        row = self._log.outer.append(time_us)
+        row[OUTER.state : OUTER.setpoint] = state
+        row[OUTER.setpoint : OUTER.target_attitude] = setpoint
+        row[OUTER.target_attitude :] = attitude_target
+
+    def status(self, time_us: int, status: Status) -> None:
+        """Record mode and arming; arming begins a log, disarming ends it."""
+        if status.armed and self._log is None:
+            self._begin(time_us)
+        if self._log is None:
+            return
+        self._log.event(
+            "vehicle_status",
+            time_us,
+            nav_state_timestamp=time_us,
+            arming_state=ARMING_STATE_ARMED if status.armed else ARMING_STATE_DISARMED,
+            nav_state=NAVIGATION_STATE[status.mode],
+            pre_flight_checks_pass=1,
+        )
+        if not status.armed:
+            self.close()
+
+    def _begin(self, time_us: int) -> None:
+        self._log = self._open_log()
+        if self._log is None:
+            return
+        self._log.start(time_us, self._info, self._parameters, self._home)
+        self.landed(time_us, True)
+        self._write_mission(time_us)
+
+    def landed(self, time_us: int, landed: bool) -> None:
+        """Record a change of the land detector."""
+        if self._log is not None:
+            self._log.event("vehicle_land_detected", time_us, landed=int(landed), ground_contact=int(landed))
+
+    def mission(self, time_us: int, progress: MissionProgress, count: int) -> None:
+        """Record progress of the mission."""
+        if count != self._mission[1] or progress.reached < self._mission[0].reached:
+            self._missions += 1
+        self._mission = (progress, count)
+        self._write_mission(time_us)
+
+    def _write_mission(self, time_us: int) -> None:
+        if self._log is None:
+            return
+        progress, count = self._mission
+        self._log.event(
+            "mission_result",
+            time_us,
+            seq_reached=progress.reached,
+            seq_current=min(progress.current, max(0, count - 1)),
+            seq_total=count,
+            mission_update_counter=self._missions,
+            valid=int(count > 0),
+            finished=int(progress.finished),
+        )
+
+    def timing(self, time_us: int, **figures: float) -> None:
+        """Record the timing of the loops; only what is the same in every run of the same flight, in lockstep."""
+        if self._log is not None:
+            self._log.event("loop_timing", time_us, **figures)
+
+    def text(self, time_us: int, severity: int, text: str) -> None:
+        """Record a text."""
+        if self._log is not None:
+            self._log.message(time_us, severity, text)
+
+    def close(self) -> None:
+        """End the log in good order; a later flight opens the next."""
+        if self._log is not None:
+            self._log.close()
+            self.error = self.error or self._log.error
+            self._log = None

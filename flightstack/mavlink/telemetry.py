@@ -1,0 +1,301 @@
+"""Telemetry of one link: which message how often, and how each is made from the vehicle's snapshot. Pure.
+
+Rates count simulated time, and never more than the same rate on the link's own clock: at fifty times real time a
+client gets 50 attitudes a second, not 2 500. In lockstep at speed 1, and over a memory link, both clocks are one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+
+from flightstack.contract import FloatArray, LoopRow
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
+from flightstack.mavlink.link import Message
+from flightstack.modes import CUSTOM_MODE, Mode
+
+NAN = math.nan
+RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
+
+# messages per second: PX4's defaults on its two links for what this vehicle has
+GROUND_RATES_HZ: dict[int, float] = {
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: 10.0,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 10.0,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
+    EscStatus.id: 10.0,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: 4.0,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+    FS_LOOP_TIMING_ID: 2.0,
+}
+API_RATES_HZ: dict[int, float] = {
+    **GROUND_RATES_HZ,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 100.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50.0,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: 10.0,
+}
+
+
+class VehicleFacts(Protocol):
+    """What telemetry reads."""
+
+    time_us: int
+    armed: bool
+    mode: Mode
+    landed: bool
+    climbing: bool
+    """Whether a takeoff is under way."""
+    descending: bool
+    """Whether a landing is under way."""
+    mission_current: int
+    mission_count: int
+    mission_state: int
+    can_arm: bool
+    has_state: bool
+    state: FloatArray
+    setpoint: FloatArray
+    attitude_target: FloatArray
+    row: FloatArray
+    rotors: int
+    weight_n: float
+    max_thrust_n: float
+    home: GeoPoint
+    frame: LocalFrame
+
+    def loop_timing(self) -> Message:
+        """Return FS_LOOP_TIMING."""
+
+
+def euler(q: list[float]) -> tuple[float, float, float]:
+    """Roll, pitch, yaw of a quaternion w, x, y, z (plain Python: telemetry needs no compiled code)."""
+    w, x, y, z = q
+    sin_pitch = min(1.0, max(-1.0, 2.0 * (w * y - z * x)))
+    return (
+        math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        math.asin(sin_pitch),
+        math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )
+
+
+def _whole(value: float, low: int, high: int) -> int:
+    """Round into an integer field; what is not finite becomes 0."""
+    return max(low, min(high, round(value))) if math.isfinite(value) else 0
+
+
+def _int16(value: float) -> int:
+    return _whole(value, -32768, 32767)
+
+
+def _int32(value: float) -> int:
+    return _whole(value, -(2**31), 2**31 - 1)
+
+
+def boot_ms(f: VehicleFacts) -> int:
+    """Time since boot in the 32-bit field that wraps."""
+    return (f.time_us // 1000) & 0xFFFFFFFF
+
+
+def heartbeat(f: VehicleFacts, leaving: bool = False) -> Message:
+    """HEARTBEAT."""
+    base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_HIL_ENABLED
+    base |= mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
+    base |= mavlink.MAV_MODE_FLAG_AUTO_ENABLED
+    if f.armed:
+        base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    system = mavlink.MAV_STATE_ACTIVE if f.armed else mavlink.MAV_STATE_STANDBY
+    if leaving:
+        system = mavlink.MAV_STATE_POWEROFF
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4, base, CUSTOM_MODE[f.mode], system, 3
+    )
+
+
+def _attitude(f: VehicleFacts) -> Message:
+    x = f.state.tolist()
+    return mavlink.MAVLink_attitude_message(boot_ms(f), *euler(x[6:10]), *x[10:13])
+
+
+def _attitude_quaternion(f: VehicleFacts) -> Message:
+    return mavlink.MAVLink_attitude_quaternion_message(boot_ms(f), *f.state.tolist()[6:13])
+
+
+def _attitude_target(f: VehicleFacts) -> Message:
+    target = f.attitude_target.tolist()
+    rates = f.row[LoopRow.REFERENCE_RATES].tolist()
+    thrust = min(1.0, max(0.0, target[4] / f.max_thrust_n)) if math.isfinite(target[4]) else 0.0
+    return mavlink.MAVLink_attitude_target_message(boot_ms(f), 0, target[:4], *rates, thrust)
+
+
+def _local_position(f: VehicleFacts) -> Message:
+    return mavlink.MAVLink_local_position_ned_message(boot_ms(f), *f.state.tolist()[:6])
+
+
+def _position_target(f: VehicleFacts) -> Message:
+    s = f.setpoint.tolist()
+    return mavlink.MAVLink_position_target_local_ned_message(boot_ms(f), mavlink.MAV_FRAME_LOCAL_NED, 0, *s)
+
+
+def _global_position(f: VehicleFacts) -> Message:
+    x = f.state.tolist()
+    point = f.frame.to_geo(x[:3])
+    heading = math.degrees(euler(x[6:10])[2]) % 360.0 if math.isfinite(x[6]) else 0.0
+    return mavlink.MAVLink_global_position_int_message(
+        boot_ms(f),
+        _int32(point.latitude_deg * 1e7),
+        _int32(point.longitude_deg * 1e7),
+        _int32(point.altitude_m * 1e3),
+        _int32(-x[2] * 1e3),
+        *(_int16(v * 100.0) for v in x[3:6]),
+        _whole(heading * 100.0, 0, 35999),
+    )
+
+
+def _esc_status(f: VehicleFacts) -> Message:
+    speeds = f.row[LoopRow.ROTOR_SPEED].tolist()[:4]
+    rpm = [_int32(speed * RPM_PER_RAD_S) for speed in speeds]
+    return EscStatus(0, f.time_us, rpm, [NAN] * 4, [NAN] * 4)
+
+
+def _vfr_hud(f: VehicleFacts) -> Message:
+    x = f.state.tolist()
+    speed = math.hypot(x[3], x[4])
+    heading = math.degrees(euler(x[6:10])[2]) % 360.0 if math.isfinite(x[6]) else 0.0
+    throttle = 100.0 * float(f.row[LoopRow.WRENCH_ACHIEVED][0]) / f.max_thrust_n
+    return mavlink.MAVLink_vfr_hud_message(
+        speed, speed, _int16(heading), _whole(throttle, 0, 100), f.home.altitude_m - x[2], -x[5]
+    )
+
+
+def _extended_state(f: VehicleFacts) -> Message:
+    landed = mavlink.MAV_LANDED_STATE_IN_AIR
+    if f.landed:
+        landed = mavlink.MAV_LANDED_STATE_ON_GROUND
+    elif f.climbing:
+        landed = mavlink.MAV_LANDED_STATE_TAKEOFF
+    elif f.descending:
+        landed = mavlink.MAV_LANDED_STATE_LANDING
+    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed)
+
+
+def _mission_current(f: VehicleFacts) -> Message:
+    # a finished mission's current item would be one past its last
+    current = min(f.mission_current, max(0, f.mission_count - 1))
+    mission_mode = 1 if f.mode is Mode.MISSION else 2
+    return mavlink.MAVLink_mission_current_message(current, f.mission_count, f.mission_state, mission_mode)
+
+
+def _sys_status(f: VehicleFacts) -> Message:
+    present = (
+        mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+        | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+        | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+        | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+        | mavlink.MAV_SYS_STATUS_SENSOR_GPS
+        | mavlink.MAV_SYS_STATUS_AHRS
+        | mavlink.MAV_SYS_STATUS_GEOFENCE
+    )
+    present |= mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    healthy = present if f.has_state else 0
+    if not f.can_arm:
+        healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    no_battery = (0xFFFF, -1, -1)  # voltage, current, remaining: not known
+    return mavlink.MAVLink_sys_status_message(present, present, healthy, 0, *no_battery, 0, 0, 0, 0, 0, 0)
+
+
+def _system_time(f: VehicleFacts) -> Message:
+    return mavlink.MAVLink_system_time_message(0, boot_ms(f))
+
+
+def _home(f: VehicleFacts) -> Message:
+    home = f.home
+    return mavlink.MAVLink_home_position_message(
+        _int32(home.latitude_deg * 1e7),
+        _int32(home.longitude_deg * 1e7),
+        _int32(home.altitude_m * 1e3),
+        0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], NAN, NAN, NAN, f.time_us,
+    )  # fmt: skip
+
+
+def _origin(f: VehicleFacts) -> Message:
+    home = f.home
+    return mavlink.MAVLink_gps_global_origin_message(
+        _int32(home.latitude_deg * 1e7), _int32(home.longitude_deg * 1e7), _int32(home.altitude_m * 1e3), f.time_us
+    )
+
+
+MAKERS: dict[int, Callable[[VehicleFacts], Message]] = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: _attitude,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude_quaternion,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: _attitude_target,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: _position_target,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _global_position,
+    EscStatus.id: _esc_status,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: _vfr_hud,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_state,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: _mission_current,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: _sys_status,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: _home,
+    mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: _origin,
+    FS_LOOP_TIMING_ID: lambda f: f.loop_timing(),
+}
+
+
+class Streams:
+    """The messages that one link sends by itself."""
+
+    def __init__(self, rates_hz: dict[int, float]) -> None:
+        self._default = rates_hz
+        self._interval_s = {message_id: 1.0 / rate for message_id, rate in rates_hz.items()}
+        self._next: dict[int, tuple[float, float]] = {}
+        self._soonest_s = -math.inf
+
+    def interval_us(self, message_id: int) -> int:
+        """Interval of a message; −1 if it is not sent, 0 if it is not known."""
+        if message_id in self._interval_s:
+            return round(self._interval_s[message_id] * 1e6)
+        return -1 if message_id in MAKERS else 0
+
+    def set_interval(self, message_id: int, interval_us: float) -> bool:
+        """Set an interval as SET_MESSAGE_INTERVAL says (−1 stop, 0 default); tell whether that can be done."""
+        if message_id not in MAKERS or not math.isfinite(interval_us):
+            return False
+        if interval_us == 0 and message_id in self._default:
+            self._interval_s[message_id] = 1.0 / self._default[message_id]
+        elif interval_us <= 0:
+            self._interval_s.pop(message_id, None)
+        else:
+            self._interval_s[message_id] = interval_us * 1e-6
+        self._next.pop(message_id, None)
+        self._soonest_s = -math.inf
+        return True
+
+    def due(self, facts: VehicleFacts, link_now_s: float) -> Iterator[Message]:
+        """Yield the messages that are due by the vehicle's time and by the link's."""
+        now_s = facts.time_us * 1e-6
+        if now_s < self._soonest_s:
+            return
+        for message_id, interval_s in self._interval_s.items():
+            vehicle_s, link_s = self._next.get(message_id, (-math.inf, -math.inf))
+            if now_s >= vehicle_s and link_now_s >= link_s:
+                # keep the phase, unless a whole interval was missed
+                upcoming = vehicle_s + interval_s
+                self._next[message_id] = (
+                    upcoming if upcoming > now_s else now_s + interval_s,
+                    max(link_s + interval_s, link_now_s + 0.5 * interval_s),
+                )
+                yield MAKERS[message_id](facts)
+        self._soonest_s = min((times[0] for times in self._next.values()), default=math.inf)
+
+

@@ -1,0 +1,35 @@
+"""Flight modes, and their numbers in PX4's custom mode and in its logs."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Mode(IntEnum):
+    """What the vehicle is asked to do; armed or not is a matter of its own."""
+
+    HOLD = 0
+    TAKEOFF = 1
+    MISSION = 2
+    RETURN = 3
+    LAND = 4
+
+
+_AUTO = 4 << 16
+CUSTOM_MODE: dict[Mode, int] = {
+    Mode.TAKEOFF: _AUTO | 2 << 24,
+    Mode.HOLD: _AUTO | 3 << 24,
+    Mode.MISSION: _AUTO | 4 << 24,
+    Mode.RETURN: _AUTO | 5 << 24,
+    Mode.LAND: _AUTO | 6 << 24,
+}
+MODE_OF_CUSTOM: dict[int, Mode] = {number: mode for mode, number in CUSTOM_MODE.items()}
+
+NAVIGATION_STATE: dict[Mode, int] = {
+    Mode.MISSION: 3,
+    Mode.HOLD: 4,
+    Mode.RETURN: 5,
+    Mode.TAKEOFF: 17,
+    Mode.LAND: 18,
+}
+"""``vehicle_status.nav_state`` of PX4's logs."""

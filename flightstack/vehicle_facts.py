@@ -1,0 +1,97 @@
+"""The autopilot as telemetry sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from flightstack.autopilot import Autopilot
+from flightstack.commander.transitions import Event, transition
+from flightstack.contract import FloatArray
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.modes import Mode
+from flightstack.params.vehicle import Vehicle
+
+class AutopilotFacts:
+    """Implements ``telemetry.VehicleFacts``; every property reads the present."""
+
+    def __init__(self, autopilot: Autopilot, vehicle: Vehicle, loop_timing: Callable[[], Message]) -> None:
+        self._autopilot = autopilot
+        self._now = autopilot.now
+        self.loop_timing = loop_timing
+        self.rotors = len(vehicle.rotors)
+        self.weight_n = vehicle.weight_n
+        self.max_thrust_n = vehicle.weight_n * 2.0 if vehicle.ideal_rotors else vehicle.max_thrust_n
+        self.home: GeoPoint = autopilot.home
+        self.frame = LocalFrame(autopilot.home)
+        self.state: FloatArray = self._now.state
+        self.setpoint: FloatArray = self._now.setpoint
+        self.attitude_target: FloatArray = self._now.attitude_target
+
+    @property
+    def row(self) -> FloatArray:
+        """The newest row of the inner loop."""
+        return self._now.row
+
+    @property
+    def time_us(self) -> int:
+        """Time of the newest tick."""
+        return self._now.time_us
+
+    @property
+    def armed(self) -> bool:
+        """Whether the vehicle is armed."""
+        return self._now.status.armed
+
+    @property
+    def mode(self) -> Mode:
+        """The mode."""
+        return self._now.status.mode
+
+    @property
+    def landed(self) -> bool:
+        """Whether the vehicle stands on the ground."""
+        return self._now.landed
+
+    @property
+    def climbing(self) -> bool:
+        """Whether a takeoff is under way."""
+        return self.mode is Mode.TAKEOFF
+
+    @property
+    def descending(self) -> bool:
+        """Whether a landing is under way."""
+        return self.mode is Mode.LAND
+
+    @property
+    def mission_current(self) -> int:
+        """Number of the current item."""
+        return self._now.progress.current
+
+    @property
+    def mission_count(self) -> int:
+        """Number of items."""
+        return self._now.mission_count
+
+    @property
+    def mission_state(self) -> int:
+        """MISSION_STATE of the common dialect."""
+        if not self._now.mission_count:
+            return int(mavlink.MISSION_STATE_NO_MISSION)
+        if self._now.mission_complete:
+            return int(mavlink.MISSION_STATE_COMPLETE)
+        if self.mode is Mode.MISSION:
+            return int(mavlink.MISSION_STATE_ACTIVE if self.armed else mavlink.MISSION_STATE_NOT_STARTED)
+        begun = self._now.progress.reached >= 0
+        return int(mavlink.MISSION_STATE_PAUSED if begun else mavlink.MISSION_STATE_NOT_STARTED)
+
+    @property
+    def has_state(self) -> bool:
+        """Whether the simulator has sent a state."""
+        return self._autopilot.has_state
+
+    @property
+    def can_arm(self) -> bool:
+        """Whether an arm command would be accepted."""
+        return self.armed or transition(self._now.status, self._autopilot.facts, Event.ARM).refusal is None
