@@ -1,0 +1,1 @@
+"""The plant simulator: vehicle, rotors, wind and ground, served to a flight stack in lockstep."""

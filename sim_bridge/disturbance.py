@@ -1,0 +1,39 @@
+"""What disturbs the flight: wind, gusts, a constant force and a constant torque."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flightstack.contract import Vector3
+from flightstack.params.vehicle import Vehicle
+
+GUST_TIME_S = 1.5
+"""Correlation time of the gusts."""
+
+GUST_DOWN_RATIO = 0.5
+"""Vertical over horizontal gusts; near the ground MIL-F-8785C has about this ratio."""
+
+_STILL = Vector3(0.0, 0.0, 0.0)
+
+
+class Disturbance(NamedTuple):
+    """Disturbances of the plant; all zero by default."""
+
+    wind_ned_m_s: Vector3 = _STILL
+    gust_m_s: float = 0.0  # standard deviation of the north and the east gust
+    force_ned_n: Vector3 = _STILL
+    torque_frd_n_m: Vector3 = _STILL
+
+
+NO_DISTURBANCE = Disturbance()
+
+
+def wind_warning(vehicle: Vehicle, plant: str, disturbance: Disturbance) -> str | None:
+    """Return a sentence when wind is asked for and cannot act, else None."""
+    if disturbance.wind_ned_m_s == _STILL and disturbance.gust_m_s == 0.0:
+        return None
+    if plant == "paper":
+        return "the wind has no effect: the paper's model has no drag; use --plant rigid or --force"
+    if not any(vehicle.linear_drag_n_s_m):
+        return f"the wind has no effect: the vehicle {vehicle.name} has no drag; use --force for a push"
+    return None

@@ -1,0 +1,108 @@
+"""The integrator that the compiled plants share: classic fixed-step Runge-Kutta of order 4.
+
+The rotors are not part of the Runge-Kutta state: between two commands their first-order lag has an exact
+solution, which gives their speeds at the start, the middle and the end of each step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from flightstack.compiled import compiled, specialise
+from flightstack.contract import STATE_SIZE, FloatArray
+from sim_bridge import paper, rigid
+from sim_bridge.layout import DIVERGED, Record, RecordArray
+from sim_bridge.rotors import half_step, rotor_forces, take_commands
+
+# what ``specialise`` binds in the templates below; these make the templates themselves a valid program
+derivative = rigid.derivative
+before_step = rigid.before_step
+after_step = rigid.after_step
+show = rigid.show
+
+
+@compiled
+def _stage(x: FloatArray, scale: float, slope: FloatArray, out: FloatArray) -> None:
+    for i in range(STATE_SIZE):
+        out[i] = x[i] + scale * slope[i]
+
+
+@compiled
+def _combine(x: FloatArray, h: float, a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> None:
+    for i in range(STATE_SIZE):
+        x[i] += h / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i])
+
+
+@compiled
+def _next_gust(m: Record) -> None:
+    """First-order Gauss-Markov process, exact for its value at the steps, held over each step."""
+    gust, scale, noise, row = m["gust"], m["gust_scale"], m["noise"], m["noise_row"]
+    for i in range(3):
+        gust[i] = m["gust_decay"] * gust[i] + scale[i] * noise[row, i]
+    m["noise_row"] += 1
+
+
+def _advance(memory: RecordArray, command: FloatArray, flags: int, steps: int, output: RecordArray) -> int:
+    """Advance by ``steps`` steps with the commands [rad/s] held; write the result to ``output``.
+
+    ``memory`` has dtype ``MEMORY``, shape (1,), ``output`` ``OUTPUT``, shape (1,); ``flags`` are those of
+    FS_ACTUATORS. Returns bits CONTACT and DIVERGED.
+    """
+    m, o = memory[0], output[0]
+    x, stage, slopes = m["body"], m["stage"], m["slope"]
+    k1, k2, k3, k4 = slopes[0], slopes[1], slopes[2], slopes[3]
+    h = m["step_s"]
+    gusty = m["gust_scale"][0] > 0.0
+    if steps > 0:
+        take_commands(m, command, flags)
+    at_end = rotor_forces(m)
+    for _ in range(steps):
+        if gusty:
+            _next_gust(m)
+        before_step(x, m)
+        at_start = at_end
+        half_step(m)
+        at_middle = rotor_forces(m)
+        half_step(m)
+        at_end = rotor_forces(m)
+        derivative(x, at_start, m, k1)
+        _stage(x, 0.5 * h, k1, stage)
+        derivative(stage, at_middle, m, k2)
+        _stage(x, 0.5 * h, k2, stage)
+        derivative(stage, at_middle, m, k3)
+        _stage(x, h, k3, stage)
+        derivative(stage, at_end, m, k4)
+        _combine(x, h, k1, k2, k3, k4)
+        after_step(x)
+    result = show(m, o["state"])
+    total = 0.0
+    for i in range(STATE_SIZE):
+        total += abs(x[i])
+    speeds, shown = m["rotor_speed"], o["rotor_speed"]
+    for i in range(m["rotor_count"]):
+        shown[i] = speeds[i]
+    return result if math.isfinite(total) else result | DIVERGED
+
+
+def _slope_at(memory: RecordArray) -> None:
+    """Write the derivative of the present state to the first row of ``slope``."""
+    m = memory[0]
+    derivative(m["body"], rotor_forces(m), m, m["slope"][0])
+
+
+def _join(template: Callable[..., Any], plant: str) -> Callable[..., Any]:
+    module = {"rigid": rigid, "paper": paper}[plant]
+    parts = ("derivative", "before_step", "after_step", "show")
+    return specialise(template, plant, **{name: getattr(module, name) for name in parts})
+
+
+def advance_kernel(plant: str) -> Callable[[RecordArray, FloatArray, int, int, RecordArray], int]:
+    """Return the compiled ``_advance`` of a plant, "rigid" or "paper"."""
+    return _join(_advance, plant)
+
+
+def slope_kernel(plant: str) -> Callable[[RecordArray], None]:
+    """Return the compiled ``_slope_at`` of a plant."""
+    return _join(_slope_at, plant)
