@@ -123,6 +123,11 @@ class ActuatorsFrame(_HotFrame):
         super().__init__(system_id, component_id)
         self.rotor_speed_rad_s = self._doubles(8, MAX_ROTORS)
 
+    @property
+    def rotor_count(self) -> int:
+        """Rotors in use."""
+        return self.frame[self._flags_at - 1]
+
     def set_rotor_count(self, count: int) -> None:
         """Say how many rotors are in use."""
         self.frame[self._flags_at - 1] = count

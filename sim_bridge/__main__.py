@@ -1,0 +1,188 @@
+"""The command `sim-bridge`: the simulator as a process, and `sim-bridge open-loop`."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+from typing import Annotated, Any
+
+import typer
+
+from flightstack.contract import Vector3
+from flightstack.params.errors import ConfigError
+from sim_bridge import arguments
+from sim_bridge.arguments import UsageProblemError
+
+app = typer.Typer(add_completion=False, rich_markup_mode=None)
+
+# typer brings its own copy of click in some versions: the base of all complaints about usage in either
+_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+
+_ZERO = "0,0,0"
+_VehicleOption = Annotated[str, typer.Option(help="Built-in vehicle (paper_quad, x_quad) or a TOML file.")]
+_PlantOption = Annotated[str, typer.Option(help="rigid, or paper: the paper's small-angle model.")]
+_WindOption = Annotated[str, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")]
+_GustOption = Annotated[float, typer.Option(help="Standard deviation of the gusts, m/s.")]
+_ForceOption = Annotated[str, typer.Option(metavar="N,E,D", help="Constant external force, N.")]
+_TorqueOption = Annotated[str, typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")]
+_SeedOption = Annotated[int, typer.Option(help="Seed of the gusts.")]
+
+
+def _disturbance(wind: str, gust: float, force: str, torque: str) -> Any:
+    from sim_bridge.disturbance import Disturbance  # noqa: PLC0415
+
+    return Disturbance(
+        arguments.wind("--wind", wind),
+        arguments.in_range("--gust", gust, 0.0, 50.0),
+        arguments.vector("--force", force),
+        arguments.vector("--torque", torque),
+    )
+
+
+@app.callback(invoke_without_command=True)
+def run(
+    context: typer.Context,
+    vehicle: _VehicleOption = "paper_quad",
+    plant: _PlantOption = "rigid",
+    speed: Annotated[
+        str, typer.Option(metavar="max|N", help="N times real time, or as fast as it goes.")
+    ] = "1",
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[
+        int | None, typer.Option(help="TCP port; 0 takes a free one.  [default: 4560 + instance]")
+    ] = None,
+    instance: Annotated[int, typer.Option(help="Number of the vehicle, from 0.")] = 0,
+    seed: _SeedOption = 1,
+    wind: _WindOption = "0,0",
+    gust: _GustOption = 0.0,
+    force: _ForceOption = _ZERO,
+    torque: _TorqueOption = _ZERO,
+    ideal_rotors: Annotated[bool, typer.Option("--ideal-rotors", help="No rotor lag, no limits.")] = False,
+    physics_hz: Annotated[float, typer.Option(help="Lowest rate of the integration steps.")] = 1000.0,
+    home: Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Where the vehicle stands.")] = (
+        "47.397742,8.545594,488.0"
+    ),
+    timeout: Annotated[
+        float | None,
+        typer.Option(
+            help="Seconds to wait for the flight stack.  [default: for ever to connect, then 30 to answer]"
+        ),
+    ] = None,
+) -> None:
+    """Simulate a vehicle for one flight stack that connects over TCP; Ctrl-C ends."""
+    if context.invoked_subcommand is not None:
+        return
+    arguments.plant(plant)
+    arguments.in_range("--instance", instance, 0, 250)
+    arguments.in_range("--seed", seed, 0, 2**63)
+    from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
+    from sim_bridge.plant import PlantOptions  # noqa: PLC0415
+    from sim_bridge.server import ServerOptions, serve  # noqa: PLC0415
+    from sim_bridge.simulator import FASTEST_PHYSICS_HZ, SLOWEST_PHYSICS_HZ  # noqa: PLC0415
+
+    options = ServerOptions(
+        vehicle=load_vehicle(vehicle),
+        plant=plant,
+        plant_options=PlantOptions(_disturbance(wind, gust, force, torque), seed),
+        home=arguments.home(home),
+        speed=arguments.speed(speed),
+        host=host,
+        port=4560 + instance if port is None else int(arguments.in_range("--port", port, 0, 65535)),
+        system_id=instance + 1,
+        ideal_rotors=ideal_rotors,
+        physics_hz=arguments.in_range("--physics-hz", physics_hz, SLOWEST_PHYSICS_HZ, FASTEST_PHYSICS_HZ),
+        timeout_s=None if timeout is None else arguments.in_range("--timeout", timeout, 0.001, 1e6),
+    )
+    raise typer.Exit(serve(options))
+
+
+@app.command("open-loop")
+def open_loop(
+    rotors: Annotated[str, typer.Option(metavar="W1,W2,…", help="Rotor speeds, rad/s, held constant.")],
+    seconds: Annotated[float, typer.Option(help="Time to fly.")],
+    vehicle: _VehicleOption = "paper_quad",
+    plant: _PlantOption = "rigid",
+    pos: Annotated[str, typer.Option(metavar="N,E,D", help="Position at the start, m.")] = _ZERO,
+    vel: Annotated[str, typer.Option(metavar="N,E,D", help="Velocity at the start, m/s.")] = _ZERO,
+    euler_deg: Annotated[str, typer.Option(metavar="ROLL,PITCH,YAW", help="Attitude at the start.")] = _ZERO,
+    rates: Annotated[str, typer.Option(metavar="P,Q,R", help="Body rates FRD at the start, rad/s.")] = _ZERO,
+    dt: Annotated[float, typer.Option(help="Step of the integration, s.")] = 0.001,
+    no_ground: Annotated[bool, typer.Option("--no-ground", help="Fly without a ground.")] = False,
+    no_lag: Annotated[
+        bool, typer.Option("--no-lag", help="Rotors turn at their speeds from the start.")
+    ] = False,
+    wind: _WindOption = "0,0",
+    gust: _GustOption = 0.0,
+    force: _ForceOption = _ZERO,
+    torque: _TorqueOption = _ZERO,
+    seed: _SeedOption = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Print the state after some time at constant rotor speeds (taken as given, without limits)."""
+    arguments.plant(plant)
+    arguments.in_range("--seconds", seconds, 0.0, 1e5)
+    arguments.in_range("--dt", dt, 1e-6, 1.0)
+    arguments.in_range("--seed", seed, 0, 2**63)
+    roll, pitch, yaw = (math.radians(angle) for angle in arguments.vector("--euler-deg", euler_deg))
+    position = arguments.vector("--pos", pos)
+    if position.z > 0.0 and not no_ground:
+        raise UsageProblemError(f"--pos: {position.z:g} m down is below the ground; add --no-ground")
+    from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
+    from sim_bridge.disturbance import wind_warning  # noqa: PLC0415
+    from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
+    from sim_bridge.plant import InitialState  # noqa: PLC0415
+    from sim_bridge.server import complain  # noqa: PLC0415
+
+    loaded = load_vehicle(vehicle)
+    disturbance = _disturbance(wind, gust, force, torque)
+    warning = wind_warning(loaded, plant, disturbance)
+    if warning:
+        complain(warning)
+    velocity, rates_frd = arguments.vector("--vel", vel), arguments.vector("--rates", rates)
+    state = run_open_loop(
+        OpenLoop(
+            loaded, plant, arguments.rotor_speeds(rotors, loaded),
+            InitialState(position, velocity, Vector3(roll, pitch, yaw), rates_frd),
+            seconds, dt, not no_ground, not no_lag, disturbance, seed,
+        )
+    )  # fmt: skip
+    typer.echo(json.dumps(state) if as_json else _table(state))
+
+
+def _table(state: dict[str, Any]) -> str:
+    lines = []
+    for name, value in state.items():
+        values = value if isinstance(value, list) else [value]
+        lines.append(f"{name:<20}" + "".join(f"{number:>16.9g}" for number in values))
+    return "\n".join(lines)
+
+
+def _main(argv: list[str] | None) -> int:
+    from sim_bridge.simulator import PlantDivergedError  # noqa: PLC0415
+
+    try:
+        return app(argv, standalone_mode=False) or 0
+    except PlantDivergedError as error:
+        print(f"sim-bridge: {error}", file=sys.stderr)
+        return 1
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line; return the exit code."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # until the server takes over
+    try:
+        return _main(argv)
+    except (KeyboardInterrupt, typer.Abort):
+        return 0
+    except _UsageError as error:
+        message: str = getattr(error, "format_message", error.__str__)()
+        print(f"sim-bridge: {message}", file=sys.stderr)
+    except (UsageProblemError, ConfigError) as error:
+        print(f"sim-bridge: {error}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,85 @@
+"""Text of the command line -> checked values; a bad one raises UsageProblemError with one sentence."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack.contract import Vector3
+from flightstack.geodesy import GeoPoint
+from flightstack.params.vehicle import Vehicle
+
+PLANT_NAMES = ("rigid", "paper")
+
+
+class UsageProblemError(Exception):
+    """A bad argument."""
+
+
+def numbers(flag: str, text: str, counts: tuple[int, ...]) -> tuple[float, ...]:
+    """Read finite numbers separated by commas, as many as one of ``counts``."""
+    wanted = " or ".join(str(count) for count in counts)
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise UsageProblemError(f"{flag}: {text!r} is not {wanted} numbers separated by commas") from None
+    if len(values) not in counts:
+        raise UsageProblemError(f"{flag}: {text!r} has {len(values)} numbers, {wanted} are needed")
+    for value in values:
+        in_range(flag, value, -1e9, 1e9)
+    return values
+
+
+def vector(flag: str, text: str) -> Vector3:
+    """Read three numbers."""
+    x, y, z = numbers(flag, text, (3,))
+    return Vector3(x, y, z)
+
+
+def wind(flag: str, text: str) -> Vector3:
+    """Read north, east and, if given, down."""
+    north, east, down = (*numbers(flag, text, (2, 3)), 0.0)[:3]
+    for value in (north, east, down):
+        in_range(flag, value, -200.0, 200.0)
+    return Vector3(north, east, down)
+
+
+def in_range(flag: str, value: float, low: float, high: float) -> float:
+    """Return ``value`` when it is a number in [low, high]."""
+    if not math.isfinite(value) or not low <= value <= high:
+        raise UsageProblemError(f"{flag}: {value:g} is outside the allowed range {low:g} to {high:g}")
+    return value
+
+
+def plant(name: str) -> str:
+    """Check the name of a plant."""
+    if name not in PLANT_NAMES:
+        raise UsageProblemError(f"--plant: {name!r} is not one of {', '.join(PLANT_NAMES)}")
+    return name
+
+
+def speed(text: str) -> float:
+    """Read a speed; "max" is infinite."""
+    if text == "max":
+        return math.inf
+    try:
+        value = float(text)
+    except ValueError:
+        raise UsageProblemError(f"--speed: {text!r} is neither a number nor max") from None
+    return in_range("--speed", value, 1e-3, 1e4)
+
+
+def home(text: str) -> GeoPoint:
+    """Read latitude and longitude in degrees and altitude in metres."""
+    latitude, longitude, altitude = numbers("--home", text, (3,))
+    in_range("--home latitude", latitude, -89.9, 89.9)
+    in_range("--home longitude", longitude, -180.0, 180.0)
+    in_range("--home altitude", altitude, -1000.0, 20000.0)
+    return GeoPoint(latitude, longitude, altitude)
+
+
+def rotor_speeds(text: str, vehicle: Vehicle) -> tuple[float, ...]:
+    """Read one speed [rad/s] for each rotor of the vehicle."""
+    speeds = numbers("--rotors", text, (len(vehicle.rotors),))
+    for value in speeds:
+        in_range("--rotors", value, -1e5, 1e5)
+    return speeds

@@ -1,0 +1,185 @@
+"""The simulator's side of the simulator link, without I/O: bytes in, bytes out, and when a step is due.
+
+The flight stack asks for a message and an interval with SET_MESSAGE_INTERVAL: FS_PLANT_STATE, answered by
+FS_ACTUATORS, or the standard HIL_STATE_QUATERNION, answered by HIL_ACTUATOR_CONTROLS. In lockstep each state
+is answered by actuators of the same time. Actuators without the lockstep flag say that the flight stack runs
+on its own clock: then the simulator does so too and uses the newest commands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, TypeAlias
+
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.mavlink.dialect import FS_ACTUATORS_ID, FS_PLANT_STATE_ID, mavlink
+from flightstack.mavlink.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame
+from flightstack.mavlink.link import Link, Message
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.hil import HilControls, hil_state
+from sim_bridge.simulator import (
+    DEFAULT_INTERVAL_US,
+    LONGEST_INTERVAL_US,
+    SHORTEST_INTERVAL_US,
+    SIMULATOR_COMPONENT,
+    Simulator,
+)
+
+Bytes: TypeAlias = bytes | bytearray | memoryview
+
+HIL_STATE_QUATERNION_ID = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
+HIL_ACTUATOR_CONTROLS_ID = mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
+_SET_INTERVAL = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+
+
+def split_frames(data: bytearray) -> Iterator[bytes]:
+    """Take the complete MAVLink frames, and junk between them, off the front of ``data``."""
+    while data:
+        if data[0] == 0xFD:
+            if len(data) < 3:
+                return
+            size = 12 + data[1] + (13 if data[2] & 1 else 0)
+        elif data[0] == 0xFE:
+            if len(data) < 2:
+                return
+            size = 8 + data[1]
+        else:
+            size = next((i for i, byte in enumerate(data) if byte in (0xFD, 0xFE)), len(data))
+        if len(data) < size:
+            return
+        yield bytes(data[:size])
+        del data[:size]
+
+
+class SimulatorLink:
+    """One client's session. ``vehicle`` is the vehicle with its limits, for the HIL controls."""
+
+    def __init__(self, simulator: Simulator, vehicle: Vehicle, home: GeoPoint, system_id: int = 1) -> None:
+        self.simulator = simulator
+        self.actuators = ActuatorsFrame()
+        self._spare = ActuatorsFrame()
+        self.answered = False  # in lockstep: the actuators for the present state have come
+        self.free_running = False  # the flight stack runs on its own clock
+        self.ready = False  # the flight stack has asked for a state message
+        self.said_goodbye = False
+        self.fault: str | None = None
+        self.stale = 0
+        self._link = Link(system_id, SIMULATOR_COMPONENT)
+        self._frame = LocalFrame(home)
+        self._controls = HilControls(vehicle)
+        self._rotor_count = len(vehicle.rotors)
+        self._requested = 0  # id of the message asked for
+        self._pending = bytearray()
+        self._replies: list[bytes] = []
+
+    @property
+    def bad(self) -> int:
+        """Frames that were no message."""
+        return self._link.bad
+
+    def receive(self, data: memoryview) -> None:
+        """Take in what arrived: any bytes, cut anywhere."""
+        if not self._pending and self.actuators.open(data):
+            self._take_actuators()
+            return
+        self._pending += data
+        for frame in split_frames(self._pending):
+            if self._is_answered():
+                if self._spare.open(frame):
+                    self.stale += 1
+                    continue
+            elif self.actuators.open(frame):
+                self._take_actuators()
+                continue
+            for message in self._link.decode(frame):
+                self._take(message)
+
+    def _is_answered(self) -> bool:
+        """Whether further actuators would replace an answer that still has to be applied."""
+        return self.answered and not self.free_running
+
+    def replies(self) -> list[bytes]:
+        """Return the frames to send besides the state, once."""
+        replies, self._replies = self._replies, []
+        return replies
+
+    def state(self) -> Bytes:
+        """Return the message to send for the present state; it awaits its answer from now on."""
+        self.answered = False
+        if self._requested == FS_PLANT_STATE_ID:
+            return self.simulator.state_frame()
+        return self._link.encode(hil_state(self.simulator, self._frame))
+
+    def step(self) -> None:
+        """Advance the plant with the newest commands; raise PlantDivergedError."""
+        self.simulator.apply(self.actuators)
+
+    def goodbye(self) -> bytes:
+        """Return the heartbeat that says that the simulator ends in order."""
+        heartbeat = mavlink.MAVLink_heartbeat_message(
+            mavlink.MAV_TYPE_GENERIC,
+            mavlink.MAV_AUTOPILOT_INVALID,
+            0,
+            0,
+            mavlink.MAV_STATE_POWEROFF,
+            3,
+        )
+        return self._link.encode(heartbeat)
+
+    def _take_actuators(self) -> None:
+        actuators = self.actuators
+        if actuators.rotor_count != self._rotor_count:
+            self.fault = (
+                f"the flight stack commands {actuators.rotor_count} rotors, the simulated vehicle has "
+                f"{self._rotor_count}: start both with the same --vehicle"
+            )
+        self.free_running = not actuators.flags & LOCKSTEP_FLAG
+        if self.ready and actuators.time_us == self.simulator.time_us:
+            self.answered = True
+        elif not self.free_running:
+            self.stale += 1
+
+    def _take(self, message: Message) -> None:
+        kind, by = message.get_msgId(), message.get_srcSystem()
+        is_actuators = kind in (FS_ACTUATORS_ID, HIL_ACTUATOR_CONTROLS_ID)
+        if is_actuators and self._is_answered():
+            self.stale += 1
+        elif kind == FS_ACTUATORS_ID:  # signed or cut short
+            self.actuators.rotor_speed_rad_s[:] = message.rotor_speed_rad_s
+            self.actuators.set_rotor_count(message.rotor_count)
+            self.actuators.seal(message.time_us, message.flags)
+            self._take_actuators()
+        elif kind == HIL_ACTUATOR_CONTROLS_ID:
+            self._controls.write(message, self.actuators)
+            self._take_actuators()
+        elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            self.said_goodbye = message.system_status == mavlink.MAV_STATE_POWEROFF
+        elif kind in (mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT):
+            result = self._command(message)
+            self._replies.append(
+                self._link.encode(
+                    mavlink.MAVLink_command_ack_message(
+                        message.command, result, 0, 0, by, message.get_srcComponent()
+                    )
+                )
+            )
+
+    def _command(self, message: Any) -> int:
+        """Carry out SET_MESSAGE_INTERVAL; return the MAV_RESULT of any command."""
+        if message.command != _SET_INTERVAL:
+            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+        kind, interval = message.param1, message.param2
+        if kind not in (FS_PLANT_STATE_ID, HIL_STATE_QUATERNION_ID):
+            return int(mavlink.MAV_RESULT_DENIED)
+        if interval == -1.0:  # MAVLink: no longer
+            self.ready = False
+            return int(mavlink.MAV_RESULT_ACCEPTED)
+        if interval == 0.0:  # MAVLink: the default rate
+            interval = DEFAULT_INTERVAL_US
+        if not math.isfinite(interval) or not SHORTEST_INTERVAL_US <= round(interval) <= LONGEST_INTERVAL_US:
+            return int(mavlink.MAV_RESULT_DENIED)
+        self.simulator.set_interval_us(round(interval))
+        self._requested = int(kind)
+        self.ready = True
+        return int(mavlink.MAV_RESULT_ACCEPTED)
