@@ -1,0 +1,1 @@
+"""MAVLink services as state machines without I/O: receive, poll, next_deadline, events."""

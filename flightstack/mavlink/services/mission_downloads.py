@@ -1,0 +1,74 @@
+"""The downloads under way. Each serves the mission as it was when the client asked for its count.
+
+So a mission that is replaced meanwhile never reaches a client half old and half new.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.services.mission_messages import message_from_item
+from flightstack.mavlink.services.mission_upload import Client
+from flightstack.plan.item import MissionItem
+from flightstack.plan.vocabulary import MissionType
+
+_FORGET_AFTER_S = 30.0
+_MAX_DOWNLOADS = 64  # a bound on memory, should clients never end theirs
+
+
+class _Download(NamedTuple):
+    items: tuple[MissionItem, ...]
+    heard_s: float
+
+
+class Downloads:
+    """The downloads of all clients."""
+
+    def __init__(self) -> None:
+        self._by_client: dict[tuple[Client, int], _Download] = {}
+
+    def begin(self, client: Client, kind: int, items: tuple[MissionItem, ...], now_s: float) -> int:
+        """Begin a download of ``items``, and return their count."""
+        self._keep(client, kind, items, now_s)
+        return len(items)
+
+    def end(self, client: Client, kind: int) -> None:
+        """Forget a download."""
+        self._by_client.pop((client, kind), None)
+
+    def answer(
+        self,
+        request: Message,
+        client: Client,
+        stored: tuple[MissionItem, ...],
+        current_seq: int,
+        now_s: float,
+    ) -> Message | None:
+        """Return the item asked for, or None if there is none of that number.
+
+        Without a download under way it is the stored mission's. A client that asks with the deprecated
+        MISSION_REQUEST gets a MISSION_ITEM, as from PX4: those that still ask so know no other.
+        """
+        kind = request.mission_type
+        items = stored
+        download = self._by_client.get((client, kind))
+        if download is not None and now_s - download.heard_s < _FORGET_AFTER_S:
+            items = download.items
+            self._keep(client, kind, items, now_s)
+        if request.seq >= len(items):
+            return None
+        return message_from_item(
+            items[request.seq],
+            request.seq,
+            client.address,
+            kind,
+            is_current=kind == MissionType.MISSION and request.seq == current_seq,
+            is_int=request.get_type() == "MISSION_REQUEST_INT",
+        )
+
+    def _keep(self, client: Client, kind: int, items: tuple[MissionItem, ...], now_s: float) -> None:
+        self._by_client.pop((client, kind), None)  # the order of the dictionary is that of the last request
+        self._by_client[client, kind] = _Download(items, now_s)
+        if len(self._by_client) > _MAX_DOWNLOADS:
+            del self._by_client[next(iter(self._by_client))]
