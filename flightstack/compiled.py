@@ -26,10 +26,12 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 F = TypeVar("F", bound=Callable[..., Any])
 
 _KEPT_CACHES = 4
+_WITHOUT_KERNELS = ("mavlink", "services", "logging", "transport", "plan", "commander")
+"""Packages that neither hold compiled code nor are used by it."""
 
 
 def _sources_digest() -> str:
-    """Digest of every Python source beside this package.
+    """Digest of every Python source that compiled code may be made from.
 
     Numba's cache notices a change in the file of a function, not in a file it calls into. One directory for
     each state of the sources closes that hole: a stale kernel cannot fly.
@@ -38,6 +40,8 @@ def _sources_digest() -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     for package in ("flightstack", "sim_bridge"):
         for source in sorted((top / package).rglob("*.py")):
+            if source.parent.name in _WITHOUT_KERNELS:
+                continue
             digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 

@@ -1,0 +1,83 @@
+"""Arguments of the ``flightstack`` command."""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
+
+
+@app.command()
+def run(
+    vehicle: Annotated[str, typer.Option(help="Built-in vehicle or TOML file.")] = "paper_quad",
+    controller: Annotated[str, typer.Option(help="Attitude controller: pid, backstepping or an installed one.")] = "pid",
+    gains: Annotated[str, typer.Option(help="Gains: tuned, paper or a TOML file.")] = "tuned",
+    inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop [Hz].")] = 500.0,
+    outer_hz: Annotated[float, typer.Option(help="Rate of the outer loop [Hz]; divides the inner rate.")] = 100.0,
+    clock: Annotated[str, typer.Option(help="lockstep (the simulator owns time) or realtime.")] = "lockstep",
+    loops: Annotated[str, typer.Option(help="Which loops fly: python.")] = "python",
+    sim_host: Annotated[str, typer.Option(help="Host of the simulator.")] = "127.0.0.1",
+    sim_port: Annotated[int | None, typer.Option(help="Port of the simulator [4560 + instance].")] = None,
+    sim_timeout: Annotated[float, typer.Option(help="Longest wait for the simulator [s].")] = 30.0,
+    instance: Annotated[int, typer.Option(min=0, max=250, help="Number of this vehicle; shifts ports and id.")] = 0,
+    gcs_port: Annotated[int, typer.Option(help="UDP port of the ground station.")] = 14550,
+    api_port: Annotated[int | None, typer.Option(help="UDP port of the API client [14540 + instance].")] = None,
+    log: Annotated[str | None, typer.Option(help="Log file [runs/<stamp>-flight.ulg]; 'none' for no log.")] = None,
+    param: Annotated[list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")] = None,
+    home: Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of the local origin.")] = None,
+    ideal_rotors: Annotated[bool, typer.Option(help="Rotors without lag and limits, as the paper assumes.")] = False,
+    wait_for_start: Annotated[bool, typer.Option(help="Keep time at zero until a mission is started.")] = False,
+    exit_on_gcs_loss: Annotated[float | None, typer.Option(help="End when no ground station is heard [s].")] = None,
+) -> None:
+    """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
+    from flightstack.app import EXIT_USAGE, App, ProcessConfig
+    from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
+    from flightstack.params.behaviour import Behaviour, with_assignments
+    from flightstack.params.errors import ConfigError
+    from flightstack.transport.udp import PortBusyError
+
+    try:
+        if clock not in ("lockstep", "realtime"):
+            raise ConfigError("--clock", clock, "is not one of lockstep, realtime")
+        config = StackConfig(
+            vehicle, controller, gains, loops, inner_hz, outer_hz, ideal_rotors, clock == "lockstep",
+            DEFAULT_HOME if home is None else parse_home(home), instance + 1,
+            with_assignments(Behaviour(), param or []),
+        )  # fmt: skip
+        stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
+        path = Path("runs") / f"{stamp}-flight.ulg" if log is None else Path(log)
+        process = ProcessConfig(
+            sim_host,
+            4560 + instance if sim_port is None else sim_port,
+            sim_timeout,
+            gcs_port,
+            14540 + instance if api_port is None else api_port,
+            instance,
+            None if log == "none" else path,
+            wait_for_start,
+            exit_on_gcs_loss,
+        )
+        stack = App(config, process)
+    except (ConfigError, PortBusyError) as error:
+        print(f"flightstack: {error}", file=sys.stderr)
+        sys.exit(EXIT_USAGE)
+    print(
+        f"flightstack: {stack.stack.vehicle.name}, {controller} ({gains}), {inner_hz:g}/{outer_hz:g} Hz, {clock}; "
+        f"simulator {sim_host}:{process.simulator_port}, ground station UDP {gcs_port}, API UDP {process.api_port}",
+        flush=True,
+    )
+    sys.exit(stack.run())
+
+
+def main() -> None:
+    """Run the command."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,310 @@
+"""The flight stack process: the only place where clock, transports and autopilot meet."""
+
+from __future__ import annotations
+
+import math
+import select
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+from flightstack.assembly import Stack, build
+from flightstack.clock import DeadlineScheduler
+from flightstack.config import StackConfig
+from flightstack.ground_hub import API, GROUND
+from flightstack.logging.flight_log import FlightLog
+from flightstack.modes import Mode
+from flightstack.transport.tcp import LinkClosedError, TcpClient
+from flightstack.transport.udp import PortBusyError, UdpSocket
+
+EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
+GROUND_POLL_NS = 500_000
+GROUND_LOCAL_PORT, API_LOCAL_PORT = 18570, 14580
+FIRST_CONTACT_S = 60.0
+"""How long a process that must not outlive its ground station waits for the first word from it."""
+
+
+@dataclass(frozen=True)
+class ProcessConfig:
+    """What concerns the process and not the flight."""
+
+    simulator_host: str
+    simulator_port: int
+    simulator_timeout_s: float
+    ground_port: int
+    api_port: int
+    instance: int
+    log: Path | None
+    wait_for_start: bool
+    exit_on_ground_loss_s: float | None
+
+
+class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops
+    """The process ends, with this exit code and sentence."""
+
+    def __init__(self, code: int, sentence: str) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+
+class Ports:
+    """The vehicle's UDP sockets, one for each channel."""
+
+    def __init__(self, process: ProcessConfig) -> None:
+        host = "127.0.0.1"
+        self.sockets = {GROUND: UdpSocket(host, GROUND_LOCAL_PORT + process.instance)}
+        try:
+            self.sockets[API] = UdpSocket(host, API_LOCAL_PORT + process.instance)
+        except PortBusyError:
+            self.close()
+            raise
+        self.peers = {GROUND: (host, process.ground_port), API: (host, process.api_port)}
+
+    def close(self) -> None:
+        """Close the sockets."""
+        for socket in self.sockets.values():
+            socket.close()
+
+
+class App:
+    """Runs one flight stack until it is told to stop or loses someone it needs."""
+
+    def __init__(self, config: StackConfig, process: ProcessConfig) -> None:
+        self._process = process
+        self._log_count = 0
+        self.stack: Stack = build(config, self._open_log)
+        self._ports = Ports(process)
+        self._lockstep = config.lockstep
+        self._stop_signal = 0
+        self._poller = select.poll()
+        for channel, socket in self._ports.sockets.items():
+            self.stack.ground.add_peer((channel, self._ports.peers[channel]), channel, permanent=True)
+            self._poller.register(socket, select.POLLIN)
+        self._began_s = time.monotonic()
+        self._next_report_s = self._began_s + 1.0
+        self._next_log_us = 0
+        self._next_ground_ns = 0
+
+    # ------------------------------------------------------------------ life
+
+    def run(self) -> int:
+        """Run to the end; return the exit code."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+        simulator: TcpClient | None = None
+        try:
+            simulator = self._connect()
+            simulator.send(self.stack.simulator.hello(self.stack.rates.interval_us))
+            self._wait_for_state(simulator)
+            if self._process.wait_for_start:
+                self._hold_time(simulator)
+            if self._lockstep:
+                self._run_lockstep(simulator)
+            else:
+                self._run_real_time(simulator)
+        except Ended as ended:
+            if str(ended):
+                print(f"flightstack: {ended}", file=sys.stderr, flush=True)
+            return ended.code
+        except LinkClosedError:
+            return self._simulator_gone()
+        finally:
+            self._close(simulator)
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self._stop_signal = number
+
+    def _simulator_gone(self) -> int:
+        now = self.stack.autopilot.now
+        if self._stop_signal:
+            return EXIT_OK
+        at = f"at t={now.time_us * 1e-6:.3f} s"
+        if self.stack.simulator.peer_said_goodbye and not now.status.armed:
+            print(f"flightstack: the simulator was shut down {at}", file=sys.stderr, flush=True)
+            return EXIT_OK
+        print(f"flightstack: simulator lost {at}: it closed the connection", file=sys.stderr, flush=True)
+        return EXIT_LOST
+
+    def _close(self, simulator: TcpClient | None) -> None:
+        self.stack.recorder.close()
+        for (channel, peer), _, data in self.stack.ground.farewell():
+            self._ports.sockets[channel].send(data, peer)
+        if simulator is not None:
+            try:
+                simulator.send(self.stack.simulator.heartbeat(self.stack.autopilot.now.status.armed, leaving=True))
+            except LinkClosedError:
+                pass
+            simulator.close()
+        self._ports.close()
+        if self.stack.recorder.error is not None:
+            print(f"flightstack: the log is incomplete: {self.stack.recorder.error}", file=sys.stderr, flush=True)
+
+    def _open_log(self) -> FlightLog | None:
+        path = self._process.log
+        if path is None:
+            return None
+        self._log_count += 1
+        if self._log_count > 1:
+            path = path.with_name(f"{path.stem}-{self._log_count}{path.suffix}")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            return FlightLog(open(path, "wb", buffering=0), len(self.stack.vehicle.rotors))  # noqa: SIM115
+        except OSError as error:
+            self.stack.autopilot.say(3, f"No log: {path}: {error.strerror}")
+            print(f"flightstack: no log can be written to {path}: {error.strerror}", file=sys.stderr, flush=True)
+            return None
+
+    # ------------------------------------------------------------------ start
+
+    def _connect(self) -> TcpClient:
+        p = self._process
+        try:
+            return TcpClient.connect(p.simulator_host, p.simulator_port, p.simulator_timeout_s, self._between_tries)
+        except (TimeoutError, OSError):
+            raise Ended(
+                EXIT_TIMEOUT,
+                f"no simulator at {p.simulator_host}:{p.simulator_port} within {p.simulator_timeout_s:g} s: "
+                "start sim-bridge, or name its port with --sim-port",
+            ) from None
+
+    def _between_tries(self) -> None:
+        self._check_stop()
+        self._serve_ground()
+
+    def _wait_for_state(self, simulator: TcpClient) -> None:
+        deadline_s = time.monotonic() + self._process.simulator_timeout_s
+        while True:
+            self._check_stop()
+            self._serve_ground()
+            data = simulator.receive(0.05)
+            if data is not None and self.stack.simulator.receive(data):
+                break
+            self._check_simulator(deadline_s)
+        self.stack.autopilot.has_state = True
+
+    def _hold_time(self, simulator: TcpClient) -> None:
+        """Keep time at zero until the vehicle flies a mission; the ground links go on meanwhile."""
+        poller = select.poll()
+        poller.register(simulator, select.POLLIN)
+        for socket in self._ports.sockets.values():
+            poller.register(socket, select.POLLIN)
+        now = self.stack.autopilot.now
+        next_sign_s = 0.0
+        while not (now.status.armed and now.status.mode is Mode.MISSION):
+            self._check_stop()
+            self._serve_ground()
+            if time.monotonic() >= next_sign_s:  # the simulator waits for an answer: say that we are here
+                next_sign_s = time.monotonic() + 1.0
+                simulator.send(self.stack.simulator.heartbeat(now.status.armed))
+            poller.poll(20)
+            data = simulator.receive_now()
+            if data is not None:
+                self.stack.simulator.receive(data)
+
+    # ------------------------------------------------------------------ loops
+
+    def _run_lockstep(self, simulator: TcpClient) -> None:
+        """Answer each state with actuators; the simulator owns time."""
+        link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
+        receive, clock_ns = simulator.receive, time.monotonic_ns
+        divisor, tick = self.stack.rates.divisor, 0
+        fresh = True  # the state that came before the start
+        while True:
+            if fresh:
+                began_ns = clock_ns()
+                commands = autopilot.tick(link.time_us)
+                simulator.send(link.answer(commands, autopilot.now.status.armed))
+                timing.tick(began_ns, clock_ns())
+                tick += 1
+                if tick % divisor == 0:
+                    self._between_ticks()
+            data = receive(0.02)
+            if data is None:
+                fresh = self._wait_slowly(simulator)
+            else:
+                fresh = link.receive(data)
+
+    def _wait_slowly(self, simulator: TcpClient) -> bool:
+        """Serve the ground links while the simulator takes its time; return whether a state came."""
+        deadline_s = time.monotonic() + self._process.simulator_timeout_s
+        while True:
+            self._check_stop()
+            self._serve_ground()
+            data = simulator.receive(0.02)
+            if data is not None:
+                return self.stack.simulator.receive(data)
+            self._check_simulator(deadline_s)
+
+    def _run_real_time(self, simulator: TcpClient) -> None:
+        """Tick at fixed deadlines on the newest state; the machine's clock owns time."""
+        link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
+        scheduler = DeadlineScheduler(timing)
+        interval_us, tick, time_us = self.stack.rates.interval_us, 0, 0
+        heard_s = time.monotonic()
+        while True:
+            time_us += interval_us * scheduler.wait()
+            began_ns = time.monotonic_ns()
+            data = simulator.receive_now()
+            if data is not None and link.receive(data):
+                heard_s = began_ns * 1e-9
+            commands = autopilot.tick(time_us)
+            simulator.send(link.answer(commands, autopilot.now.status.armed))
+            timing.tick(began_ns, time.monotonic_ns())
+            tick += 1
+            if tick % self.stack.rates.divisor == 0:
+                self._between_ticks()
+                self._check_simulator(heard_s + self._process.simulator_timeout_s)
+
+    def _between_ticks(self) -> None:
+        """Do what is due between two ticks: ground links, timing report, reasons to stop."""
+        time_us = self.stack.autopilot.now.time_us
+        if time_us >= self._next_log_us:
+            self._next_log_us = time_us + 1_000_000
+            fields = self.stack.report.log_fields(time_us // self.stack.rates.interval_us)
+            self.stack.recorder.timing(time_us, **fields)
+        now_ns = time.monotonic_ns()
+        if now_ns < self._next_ground_ns:
+            return
+        self._next_ground_ns = now_ns + GROUND_POLL_NS
+        self._serve_ground()
+        self._check_stop()
+
+    # ------------------------------------------------------------------ ground links
+
+    def _serve_ground(self) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._next_report_s:
+            self._next_report_s = now_s + 1.0
+            self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
+        ground = self.stack.ground
+        for channel, socket in self._ports.sockets.items():
+            for data, peer in socket.receive():
+                ground.receive((channel, peer), channel, data, now_s)
+        for (channel, peer), _, data in ground.poll(now_s):
+            self._ports.sockets[channel].send(data, peer)
+
+    # ------------------------------------------------------------------ reasons to stop
+
+    def _check_stop(self) -> None:
+        if self._stop_signal:
+            raise Ended(EXIT_OK, "stopped")
+        if self.stack.ground.shutdown_requested:
+            raise Ended(EXIT_OK, "shut down by the ground station")
+        limit_s = self._process.exit_on_ground_loss_s
+        if limit_s is None:
+            return
+        heard_s = self.stack.ground.last_heard_s
+        now_s = time.monotonic()
+        if heard_s > -math.inf and now_s - heard_s > limit_s:
+            raise Ended(EXIT_LOST, f"ground station lost: nothing heard for {limit_s:g} s")
+        if heard_s == -math.inf and now_s - self._began_s > FIRST_CONTACT_S:
+            raise Ended(EXIT_TIMEOUT, f"no ground station within {FIRST_CONTACT_S:g} s")
+
+    def _check_simulator(self, deadline_s: float) -> None:
+        if time.monotonic() > deadline_s:
+            at = f"t={self.stack.autopilot.now.time_us * 1e-6:.3f} s"
+            timeout_s = self._process.simulator_timeout_s
+            raise Ended(EXIT_LOST, f"simulator lost at {at}: no state for {timeout_s:g} s")

@@ -1,0 +1,105 @@
+"""Put a flight stack together from its configuration: everything but clock and transports.
+
+The process (``app``) and the tests that fly in one process build the same stack here.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flightstack import __version__
+from flightstack.autopilot import Autopilot
+from flightstack.clock import LoopTiming, Rates, rates
+from flightstack.config import LOOPS, StackConfig
+from flightstack.contract import LoopRow
+from flightstack.control.attitude_controller import load_controller
+from flightstack.control.backend import ControlBackend
+from flightstack.control.loops import PythonLoops
+from flightstack.ground_hub import GroundHub
+from flightstack.guidance.navigator import Navigator
+from flightstack.guidance.params import guidance_params
+from flightstack.logging.flight_log import vehicle_info
+from flightstack.logging.recorder import FlightRecorder, OpenLog
+from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.modes import Mode
+from flightstack.params.errors import ConfigError
+from flightstack.params.gains_file import open_gains
+from flightstack.params.vehicle import Vehicle, load_vehicle
+from flightstack.timing_report import TimingReport
+from flightstack.vehicle_facts import AutopilotFacts
+
+
+class Stack(NamedTuple):
+    """The parts that a process or a test drives."""
+
+    vehicle: Vehicle
+    rates: Rates
+    simulator: SimulatorLink
+    autopilot: Autopilot
+    ground: GroundHub
+    recorder: FlightRecorder
+    timing: LoopTiming
+    report: TimingReport
+
+
+def vehicle_of(config: StackConfig) -> Vehicle:
+    """Load the vehicle; raise ConfigError."""
+    vehicle = load_vehicle(config.vehicle)
+    return vehicle.with_ideal_rotors() if config.ideal_rotors else vehicle
+
+
+def build(config: StackConfig, open_log: OpenLog) -> Stack:
+    """Build a stack; raise ConfigError for anything in the configuration that cannot fly."""
+    if config.loops not in LOOPS:
+        raise ConfigError("--loops", config.loops, f"is not one of {', '.join(LOOPS)}")
+    vehicle = vehicle_of(config)
+    pace = rates(config.inner_hz, config.outer_hz)
+    backend = PythonLoops(
+        vehicle,
+        load_controller(config.controller),
+        open_gains(config.gains),
+        pace.inner_hz,
+        pace.outer_hz,
+        math.radians(config.behaviour.max_tilt_deg),
+    )
+    info: dict[str, str | int | float] = {
+        "sys_name": "flightstack",
+        "ver_sw": __version__,
+        **vehicle_info(vehicle),
+        "controller": config.controller,
+        "gains": config.gains,
+        "loops": config.loops,
+        "inner_hz": pace.inner_hz,
+        "outer_hz": pace.outer_hz,
+    }
+    recorder = FlightRecorder(open_log, info, config.behaviour.by_name(), config.home)
+    simulator = SimulatorLink(vehicle, config.home, config.lockstep, config.system_id)
+    autopilot = Autopilot(
+        vehicle,
+        backend,
+        config.behaviour,
+        config.home,
+        pace.divisor,
+        pace.outer_hz,
+        recorder,
+        simulator.state,
+        simulator.rotor_speed_rad_s,
+    )
+    warm_up(backend, Navigator(guidance_params(config.behaviour, vehicle.weight_n), pace.outer_hz), simulator)
+    timing = LoopTiming(round(1e9 / pace.inner_hz))
+    report = TimingReport(timing, pace, config.lockstep)
+    facts = AutopilotFacts(autopilot, vehicle, report.message)
+    ground = GroundHub(autopilot, facts, config.system_id)
+    return Stack(vehicle, pace, simulator, autopilot, ground, recorder, timing, report)
+
+
+def warm_up(backend: ControlBackend, navigator: Navigator, simulator: SimulatorLink) -> None:
+    """Compile every kernel now, or load it from the cache: the first tick must not take a second."""
+    row = np.zeros(LoopRow.SIZE)
+    navigator.rest_at(simulator.state)
+    navigator.step(Mode.HOLD, simulator.state, backend.attitude_target)
+    backend.step(simulator.state, navigator.setpoint, simulator.rotor_speed_rad_s, True, row)
+    backend.reset(simulator.state)
