@@ -5,16 +5,10 @@ from __future__ import annotations
 from math import nan
 
 from flightstack.logging.topics import Field, Topic
+from flightstack.modes import NAVIGATION_STATE, Mode
 
 ARMING_STATE_DISARMED = 1
 ARMING_STATE_ARMED = 2
-
-NAV_STATE_POSITION_CONTROL = 2
-NAV_STATE_MISSION = 3
-NAV_STATE_HOLD = 4
-NAV_STATE_RETURN = 5
-NAV_STATE_TAKEOFF = 17
-NAV_STATE_LAND = 18
 
 _ROTARY_WING = 1
 _MAV_TYPE_QUADROTOR = 2
@@ -25,7 +19,7 @@ EVENT_TOPICS = (
         (
             Field("uint64_t", "nav_state_timestamp"),
             Field("uint8_t", "arming_state", default=ARMING_STATE_DISARMED),
-            Field("uint8_t", "nav_state", default=NAV_STATE_HOLD),
+            Field("uint8_t", "nav_state", default=NAVIGATION_STATE[Mode.HOLD]),
             Field("uint8_t", "vehicle_type", default=_ROTARY_WING),
             Field("uint8_t", "system_type", default=_MAV_TYPE_QUADROTOR),
             Field("uint8_t", "system_id", default=1),

@@ -13,12 +13,12 @@ from typing import Protocol
 
 import numpy as np
 
-from flightstack.contract import FloatArray
+from flightstack.contract import FloatArray, LoopRow
 from flightstack.geodesy import GeoPoint
 from flightstack.logging import ulog
 from flightstack.logging.event_topics import EVENT_TOPICS
 from flightstack.logging.row_block import RowBlock, TimeArray, content_size
-from flightstack.logging.topics import INNER, OUTER, OUTER_TOPICS, Topic, inner_topics
+from flightstack.logging.topics import OUTER, OUTER_TOPICS, Topic, inner_topics
 from flightstack.params.vehicle import Vehicle
 
 DEFAULT_CAPACITY = 256
@@ -90,7 +90,7 @@ class FlightLog:
     def __init__(self, file: LogFile, rotors: int, capacity: int = DEFAULT_CAPACITY) -> None:
         self._file = file
         self._inner_topics = inner_topics(rotors)
-        self.inner = Trace(capacity, INNER.size, self.flush)
+        self.inner = Trace(capacity, LoopRow.SIZE, self.flush)
         self.outer = Trace(capacity, OUTER.size, self.flush)
         self.error: OSError | None = None
         self._closed = False

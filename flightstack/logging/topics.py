@@ -1,4 +1,4 @@
-"""What the log holds: the columns of the traces that the loops fill, and the topics made from them.
+"""What the log holds: the columns of the traces (the inner loop's: ``LoopRow``) and the topics made of them.
 
 Topics and fields have PX4's names where they mean the same. Fields come largest type first, as PX4
 lays them out, so that no padding is needed.
@@ -9,25 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
-from flightstack.contract import FloatArray
+from flightstack.contract import FloatArray, LoopRow
 from flightstack.geometry_bulk import heading_from_quaternions
 
 Derived: TypeAlias = Callable[[FloatArray], FloatArray]
-
-
-class InnerColumns(NamedTuple):
-    """First column of each group in a row of the inner loop's trace; ``size`` is the length of a row."""
-
-    state: int = 0  # VehicleState, 13
-    reference_attitude: int = 13  # quaternion, 4
-    reference_rates: int = 17  # FRD, rad/s, 3
-    reference_acceleration: int = 20  # FRD, rad/s², 3
-    wrench: int = 23  # commanded: thrust [N], torque FRD [N m], 4
-    wrench_achieved: int = 27  # after the mixer, 4
-    rotor_command: int = 31  # rad/s, 8
-    rotor_speed: int = 39  # measured, rad/s, 8
-    status: int = 47  # status bits, an integer as float
-    size: int = 48
 
 
 class OuterColumns(NamedTuple):
@@ -40,7 +25,6 @@ class OuterColumns(NamedTuple):
     size: int = 29
 
 
-INNER = InnerColumns()
 OUTER = OuterColumns()
 
 
@@ -71,31 +55,31 @@ def _outer_heading(rows: FloatArray) -> FloatArray:
 def inner_topics(rotors: int) -> tuple[Topic, ...]:
     """Topics written at the inner loop's rate, for a vehicle with ``rotors`` rotors."""
     return (
-        Topic("vehicle_attitude", (Field("float", "q", 4, INNER.state + 6),)),
-        Topic("vehicle_angular_velocity", (Field("float", "xyz", 3, INNER.state + 10),)),
+        Topic("vehicle_attitude", (Field("float", "q", 4, LoopRow.STATE.start + 6),)),
+        Topic("vehicle_angular_velocity", (Field("float", "xyz", 3, LoopRow.STATE.start + 10),)),
         Topic(
             "attitude_reference",
             (
-                Field("float", "q", 4, INNER.reference_attitude),
-                Field("float", "rates_rad_s", 3, INNER.reference_rates),
-                Field("float", "acceleration_rad_s2", 3, INNER.reference_acceleration),
+                Field("float", "q", 4, LoopRow.REFERENCE_ATTITUDE.start),
+                Field("float", "rates_rad_s", 3, LoopRow.REFERENCE_RATES.start),
+                Field("float", "acceleration_rad_s2", 3, LoopRow.REFERENCE_ACCELERATION.start),
             ),
         ),
         Topic(
             "wrench",
             (
-                Field("float", "thrust_n", 0, INNER.wrench),
-                Field("float", "torque_n_m", 3, INNER.wrench + 1),
-                Field("float", "thrust_achieved_n", 0, INNER.wrench_achieved),
-                Field("float", "torque_achieved_n_m", 3, INNER.wrench_achieved + 1),
-                Field("uint16_t", "status", 0, INNER.status),
+                Field("float", "thrust_n", 0, LoopRow.WRENCH.start),
+                Field("float", "torque_n_m", 3, LoopRow.WRENCH.start + 1),
+                Field("float", "thrust_achieved_n", 0, LoopRow.WRENCH_ACHIEVED.start),
+                Field("float", "torque_achieved_n_m", 3, LoopRow.WRENCH_ACHIEVED.start + 1),
+                Field("uint16_t", "status", 0, LoopRow.STATUS),
             ),
         ),
         Topic(
             "rotor_speeds",
             (
-                Field("float", "command_rad_s", rotors, INNER.rotor_command),
-                Field("float", "speed_rad_s", rotors, INNER.rotor_speed),
+                Field("float", "command_rad_s", rotors, LoopRow.ROTOR_COMMAND.start),
+                Field("float", "speed_rad_s", rotors, LoopRow.ROTOR_SPEED.start),
             ),
         ),
     )

@@ -10,17 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from flightstack.contract import LoopRow
 from flightstack.geodesy import GeoPoint
-from flightstack.logging.event_topics import (
-    ARMING_STATE_ARMED,
-    ARMING_STATE_DISARMED,
-    NAV_STATE_HOLD,
-    NAV_STATE_LAND,
-    NAV_STATE_MISSION,
-    NAV_STATE_TAKEOFF,
-)
+from flightstack.logging.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
 from flightstack.logging.flight_log import FlightLog
-from flightstack.logging.topics import INNER, OUTER
+from flightstack.logging.topics import OUTER
+from flightstack.modes import NAVIGATION_STATE, Mode
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 CORNERS_NED_M = [(10.0, 0.0, -3.0), (10.0, 10.0, -4.0), (0.0, 10.0, -5.0), (0.0, 0.0, -3.0)]
@@ -77,10 +72,10 @@ def _fill_inner(row: np.ndarray[Any, Any], time_s: float, noise: np.ndarray[Any,
     row[:3] = position
     row[6:10] = _attitude(time_s - 0.05)
     row[10:13] = 0.1 * noise[3:6]
-    row[INNER.reference_attitude : INNER.reference_attitude + 4] = _attitude(time_s - 0.02)
-    row[INNER.wrench] = row[INNER.wrench_achieved] = 5.4 + 0.1 * noise[0]
-    row[INNER.rotor_command : INNER.rotor_command + 4] = 214.0 + 8.0 * noise[:4]
-    row[INNER.rotor_speed : INNER.rotor_speed + 4] = 214.0 + 6.0 * noise[:4]
+    row[LoopRow.REFERENCE_ATTITUDE] = _attitude(time_s - 0.02)
+    row[LoopRow.WRENCH.start] = row[LoopRow.WRENCH_ACHIEVED.start] = 5.4 + 0.1 * noise[0]
+    row[LoopRow.ROTOR_COMMAND][:4] = 214.0 + 8.0 * noise[:4]
+    row[LoopRow.ROTOR_SPEED][:4] = 214.0 + 6.0 * noise[:4]
 
 
 def _fill_outer(row: np.ndarray[Any, Any], time_s: float, state: np.ndarray[Any, Any]) -> None:
@@ -93,24 +88,39 @@ def _fill_outer(row: np.ndarray[Any, Any], time_s: float, state: np.ndarray[Any,
 def _events(log: FlightLog, tick_ms: int, total: int) -> None:
     time_us = tick_ms * 1000
     if tick_ms == 0:
-        log.event("vehicle_status", time_us, arming_state=ARMING_STATE_DISARMED, nav_state=NAV_STATE_HOLD)
+        log.event(
+            "vehicle_status",
+            time_us,
+            arming_state=ARMING_STATE_DISARMED,
+            nav_state=NAVIGATION_STATE[Mode.HOLD],
+        )
         log.event("vehicle_land_detected", time_us, landed=True, ground_contact=True)
         log.event("mission_result", time_us, seq_total=6, valid=True)
     elif tick_ms == 1000:
         log.message(time_us, 6, "Armed")
-        log.event("vehicle_status", time_us, arming_state=ARMING_STATE_ARMED, nav_state=NAV_STATE_TAKEOFF)
+        log.event(
+            "vehicle_status",
+            time_us,
+            arming_state=ARMING_STATE_ARMED,
+            nav_state=NAVIGATION_STATE[Mode.TAKEOFF],
+        )
         log.event("vehicle_land_detected", time_us, landed=False)
     elif tick_ms == total - 1000:
         log.message(time_us, 6, "Landed, disarming")
         log.event("vehicle_land_detected", time_us, landed=True)
-        log.event("vehicle_status", time_us, arming_state=ARMING_STATE_DISARMED, nav_state=NAV_STATE_LAND)
+        log.event(
+            "vehicle_status",
+            time_us,
+            arming_state=ARMING_STATE_DISARMED,
+            nav_state=NAVIGATION_STATE[Mode.LAND],
+        )
         log.event(
             "mission_result", time_us, seq_reached=5, seq_current=5, seq_total=6, valid=True, finished=True
         )
     for seq in range(5):
         reached_ms = 1000 + round(1000 * (CLIMB_S + LEG_S * seq)) + 200
         if tick_ms == reached_ms:
-            state = NAV_STATE_LAND if seq == 4 else NAV_STATE_MISSION
+            state = NAVIGATION_STATE[Mode.LAND] if seq == 4 else NAVIGATION_STATE[Mode.MISSION]
             log.event("vehicle_status", time_us, arming_state=ARMING_STATE_ARMED, nav_state=state)
             log.event(
                 "mission_result", time_us, seq_reached=seq, seq_current=seq + 1, seq_total=6, valid=True

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyulog import ULog
 
-from flightstack.contract import Quaternion
+from flightstack.contract import LoopRow, Quaternion
 from flightstack.geodesy import GeoPoint
 from flightstack.geometry import euler_from_quaternion
 from flightstack.geometry_bulk import euler_from_quaternions, heading_from_quaternions
@@ -20,7 +20,7 @@ from flightstack.logging import ulog
 from flightstack.logging.event_topics import EVENT_TOPICS
 from flightstack.logging.flight_log import FlightLog, vehicle_info
 from flightstack.logging.row_block import RowBlock
-from flightstack.logging.topics import INNER, OUTER, OUTER_TOPICS, inner_topics
+from flightstack.logging.topics import OUTER, OUTER_TOPICS, inner_topics
 from flightstack.params.vehicle import load_vehicle
 from tests.support.synthetic_flight import HOME, INFO, PARAMETERS, KeptBytes, synthetic_flight_bytes
 
@@ -62,8 +62,8 @@ def random_log(inner_rows: np.ndarray, outer_rows: np.ndarray, capacity: int = 1
 @pytest.fixture(scope="module")
 def traces() -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(7)
-    inner, outer = rng.normal(size=(103, INNER.size)), rng.normal(size=(21, OUTER.size))
-    inner[:, INNER.status] = rng.integers(0, 2**16, 103)
+    inner, outer = rng.normal(size=(103, LoopRow.SIZE)), rng.normal(size=(21, OUTER.size))
+    inner[:, LoopRow.STATUS] = rng.integers(0, 2**16, 103)
     return inner, outer
 
 
@@ -98,7 +98,7 @@ def test_every_loop_topic_and_field_reads_back(traces: tuple[np.ndarray, np.ndar
 def test_columns_of_the_traces_neither_overlap_nor_leave_gaps() -> None:
     used = [(f.source, max(1, f.length)) for topic in inner_topics(8) for f in topic.fields]
     covered = sorted(column for source, length in used for column in range(source, source + length))
-    assert covered == list(range(6, INNER.size))  # position and velocity are logged at the outer rate
+    assert covered == list(range(6, LoopRow.SIZE))  # position and velocity are logged at the outer rate
     assert (OUTER.setpoint, OUTER.target_attitude, OUTER.target_thrust, OUTER.size) == (13, 24, 28, 29)
 
 
@@ -204,7 +204,7 @@ def test_a_loop_may_write_its_rows_in_place() -> None:
     log.start(0, {}, {}, HOME)
     trace = log.inner
     for tick in range(11):
-        trace.rows[trace.n, INNER.wrench] = tick
+        trace.rows[trace.n, LoopRow.WRENCH.start] = tick
         trace.times_us[trace.n] = tick
         trace.n += 1
         if trace.n == trace.capacity:
@@ -215,7 +215,7 @@ def test_a_loop_may_write_its_rows_in_place() -> None:
 
 def test_values_that_do_not_fit_neither_raise_nor_warn() -> None:
     block = RowBlock(inner_topics(4), 0, 4)
-    rows = np.array([[math.nan], [1e300], [-1e300], [math.inf]]) * np.ones((4, INNER.size))
+    rows = np.array([[math.nan], [1e300], [-1e300], [math.inf]]) * np.ones((4, LoopRow.SIZE))
     assert len(block.encode(np.arange(4, dtype=np.uint64), rows)) == 4 * block.row_size
 
 
