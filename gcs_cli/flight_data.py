@@ -1,0 +1,134 @@
+"""A flight as immutable arrays: what the summary and the report are made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from flightstack.contract import FloatArray
+from flightstack.geodesy import GeoPoint
+
+FlagArray: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
+
+_REAL_TIME = 1  # clock of a loop timing
+
+
+class Series(NamedTuple):
+    """Samples over time: ``time_s`` of shape (n,) since the start of the log, ``values`` of shape (n, k)."""
+
+    time_s: FloatArray
+    values: FloatArray
+
+
+class Status(NamedTuple):
+    """What ``vehicle_status`` said from ``time_s`` on."""
+
+    time_s: float
+    nav_state: int
+    armed: bool
+
+
+class MissionProgress(NamedTuple):
+    """What ``mission_result`` said from ``time_s`` on; ``reached`` is −1 before the first item is."""
+
+    time_s: float
+    current: int
+    reached: int
+    total: int
+    finished: bool
+
+
+class Text(NamedTuple):
+    """A status text; ``level`` is its MAV_SEVERITY."""
+
+    time_s: float
+    level: int
+    text: str
+
+
+class LoopTiming(NamedTuple):
+    """Figures of one second of wall time; ``time_s`` is the flight's, the others are in µs of wall time."""
+
+    time_s: float
+    period_us: float
+    execution_mean_us: float
+    execution_p99_us: float
+    execution_max_us: float
+    lateness_mean_us: float
+    lateness_p99_us: float
+    lateness_max_us: float
+    real_time: bool
+
+
+def loop_timing(time_s: float, inner_hz: float, figures: Sequence[float], clock: int) -> LoopTiming:
+    """Return the loop timing of the figures of a message: execution, then lateness; mean, 99 %, largest."""
+    period_us = 1e6 / inner_hz if inner_hz > 0.0 else math.nan
+    return LoopTiming(time_s, period_us, *figures, clock == _REAL_TIME)
+
+
+def empty_series(columns: int) -> Series:
+    """Return a series without samples, of ``columns`` values each."""
+    return series(np.zeros(0), np.zeros((0, columns)))
+
+
+def series(time_s: FloatArray, values: FloatArray) -> Series:
+    """Return a series of two arrays that nobody can change any more."""
+    time_s.flags.writeable = values.flags.writeable = False
+    return Series(time_s, values)
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One flight. Positions NED [m] from home, angles roll, pitch, yaw [rad], rotor speeds [rad/s]."""
+
+    duration_s: float = 0.0
+    info: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    home: GeoPoint | None = None
+    position: Series = field(default_factory=lambda: empty_series(3))
+    position_setpoint: Series = field(default_factory=lambda: empty_series(3))
+    attitude: Series = field(default_factory=lambda: empty_series(3))
+    attitude_target: Series = field(default_factory=lambda: empty_series(3))
+    rotor_speed: Series = field(default_factory=lambda: empty_series(0))
+    statuses: tuple[Status, ...] = ()
+    landed: tuple[tuple[float, bool], ...] = ()
+    mission: tuple[MissionProgress, ...] = ()
+    texts: tuple[Text, ...] = ()
+    overruns: int | None = None
+    loop_timing: tuple[LoopTiming, ...] = ()
+
+    def flying(self, time_s: FloatArray) -> FlagArray:
+        """Tell for each time whether the vehicle was armed and off the ground."""
+        armed = _step(((status.time_s, status.armed) for status in self.statuses), time_s)
+        if not self.landed:
+            return armed
+        return armed & ~_step(self.landed, time_s)
+
+    def tracking_error(self) -> Series:
+        """Distance [m] between position and setpoint while flying, shape (n, 1)."""
+        time_s, position = self.position
+        if not len(time_s) or not len(self.position_setpoint.time_s):
+            return empty_series(1)
+        setpoint = self.position_setpoint.values
+        if not np.array_equal(time_s, self.position_setpoint.time_s):
+            setpoint = _interpolated(self.position_setpoint, time_s)
+        error = np.linalg.norm(position - setpoint, axis=1)
+        kept = self.flying(time_s) & np.isfinite(error)  # a setpoint may leave an axis free: NaN
+        return series(time_s[kept], error[kept][:, None])
+
+
+def _step(changes: Iterable[tuple[float, bool]], time_s: FloatArray) -> FlagArray:
+    """Value of a flag given by its changes (time, value) at the given times; False before the first."""
+    listed = list(changes)
+    times = np.array([time for time, _ in listed])
+    values = np.array([False, *(value for _, value in listed)])
+    return values[np.searchsorted(times, time_s, side="right")]
+
+
+def _interpolated(series: Series, time_s: FloatArray) -> FloatArray:
+    columns = [np.interp(time_s, series.time_s, column) for column in series.values.T]
+    return np.column_stack(columns)

@@ -1,0 +1,257 @@
+"""The figures of a flight, against cases computed by hand."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flightstack.geometry_bulk import euler_from_quaternions
+from flightstack.modes import NAVIGATION_STATE, Mode
+from flightstack.params.errors import ConfigError
+from flightstack.plan import Command, Frame, MissionItem, Plan
+from gcs_cli.analysis import read_flight
+from gcs_cli.flight_data import Flight, MissionProgress, Series, Status, series
+from gcs_cli.summary import RunInfo, item_ned_m, summarise, waypoint_rows, write_summary
+from tests.support.square_plan import item_at, square_plan
+from tests.support.synthetic_flight import CORNERS_NED_M, HOME, INFO, PARAMETERS, synthetic_flight_bytes
+
+REQUIRED = {
+    "outcome", "plan", "vehicle", "controller", "gains", "plant", "loops", "seed", "inner_hz", "outer_hz",
+    "sim_time_s", "wall_time_s", "real_time_factor", "waypoints", "rms_tracking_error_m",
+    "max_tracking_error_m", "overruns", "log_sha256",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def log_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("log") / "flight.ulg"
+    path.write_bytes(synthetic_flight_bytes(inner_ms=10, outer_ms=20))
+    return path
+
+
+def samples(time_s: list[float], values: list[Any]) -> Series:
+    return series(np.array(time_s, dtype=float), np.array(values, dtype=float))
+
+
+def armed_from(time_s: float, until_s: float = math.inf) -> tuple[Status, ...]:
+    hold = NAVIGATION_STATE[Mode.HOLD]
+    return (Status(0.0, hold, False), Status(time_s, hold, True), Status(until_s, hold, False))
+
+
+def test_the_log_reads_back_into_arrays_that_cannot_change(log_path: Path) -> None:
+    flight = read_flight(log_path)
+    assert flight.duration_s == pytest.approx(35.99)
+    assert dict(flight.info) == INFO
+    assert dict(flight.parameters) == PARAMETERS
+    assert flight.home == HOME
+    assert flight.position.values.shape == flight.position_setpoint.values.shape == (1800, 3)
+    assert flight.attitude.values.shape == (3600, 3)
+    assert flight.rotor_speed.values.shape == (3600, 4)
+    assert [status.armed for status in flight.statuses] == [False, True, True, True, True, True, True, False]
+    assert flight.landed == ((0.0, True), (1.0, False), (35.0, True))
+    assert flight.mission[-1] == MissionProgress(35.0, 5, 5, 6, True)
+    assert flight.texts[0] == (1.0, 6, "Armed")
+    assert (flight.overruns, flight.loop_timing) == (0, ())
+    with pytest.raises(ValueError, match="read-only"):
+        flight.position.values[0, 0] = 1.0
+
+
+def test_attitude_is_that_of_the_quaternion(log_path: Path) -> None:
+    flight = read_flight(log_path)
+    # the fixture's roll is 0.12 sin 2t, 50 ms late; 1e-7 is what float32 leaves of it
+    expected = 0.12 * np.sin(2.0 * (flight.attitude.time_s - 1.05))
+    assert np.abs(flight.attitude.values[:, 0] - expected).max() < 1e-6
+    assert euler_from_quaternions(np.array([[math.cos(0.25), 0.0, 0.0, math.sin(0.25)]]))[0, 2] == 0.5
+
+
+def test_the_summary_of_a_whole_flight(log_path: Path) -> None:
+    flight = read_flight(log_path)
+    run = RunInfo("completed", "missions/square.plan", 1.5, plant="rigid", seed=3, log_path=log_path)
+    summary = summarise(flight, square_plan(), run)
+    assert set(summary) >= REQUIRED
+    assert summary["real_time_factor"] == pytest.approx(35.99 / 1.5, abs=1e-6)
+    assert (summary["vehicle"], summary["plant"], summary["seed"]) == ("paper_quad", "rigid", 3)
+    assert summary["log_sha256"] == hashlib.sha256(log_path.read_bytes()).hexdigest()
+    rows = summary["waypoints"]
+    assert [row["seq"] for row in rows] == [0, 1, 2, 3, 4, 5]
+    assert [row["time_s"] for row in rows] == [6.2, 12.2, 18.2, 24.2, 30.2, 35.0]
+    assert all(row["reached"] for row in rows)
+    # noise of 1 cm on the path, 0.7 cm of rounding to 1e-7 degrees; the largest measured is 1.3 cm
+    assert max(row["miss_distance_m"] for row in rows) < 0.03
+    # the path is the setpoint 0.15 s late: a cubic blend of 10 m in 6 s moves at 2.5 m/s at most, or 0.375 m
+    assert 0.36 < summary["max_tracking_error_m"] < 0.43
+    assert 0.0 < summary["rms_tracking_error_m"] < summary["max_tracking_error_m"]
+
+
+def test_what_the_run_knows_goes_before_what_the_log_says(log_path: Path) -> None:
+    run = RunInfo("vehicle lost", "p.plan", controller="backstepping", inner_hz=250.0, overruns=7)
+    summary = summarise(read_flight(log_path), square_plan(), run)
+    assert (summary["controller"], summary["inner_hz"], summary["overruns"]) == ("backstepping", 250.0, 7)
+    assert (summary["gains"], summary["real_time_factor"], summary["log_sha256"]) == ("tuned", None, None)
+
+
+def test_tracking_error_by_hand() -> None:
+    flight = Flight(
+        position=samples([0, 1, 2, 3, 4], [[0, 0, 0], [3, 0, 0], [0, 4, 0], [0, 0, 0], [9, 9, 9]]),
+        position_setpoint=samples(
+            [0, 1, 2, 3, 4], [[9, 9, 9], [0, 0, 0], [0, 0, 0], [math.nan, 0, 0], [0, 0, 0]]
+        ),
+        statuses=armed_from(1.0, 5.0),
+        landed=((0.0, True), (1.0, False), (4.0, True)),
+    )
+    # at 0 s on the ground, at 3 s without a setpoint, at 4 s landed: 3 m and 4 m remain
+    summary = summarise(flight, Plan(()), RunInfo("completed", "x.plan"))
+    assert summary["max_tracking_error_m"] == 4.0
+    assert summary["rms_tracking_error_m"] == pytest.approx(math.sqrt(12.5), abs=1e-6)
+
+
+def test_a_setpoint_at_other_times_is_interpolated() -> None:
+    flight = Flight(
+        position=samples([1, 2], [[1, 0, 0], [2, 0, 0]]),
+        position_setpoint=samples([0, 4], [[0, 0, 0], [4, 0, 0]]),
+        statuses=armed_from(0.5),
+    )
+    assert flight.tracking_error().values[:, 0].tolist() == [0.0, 0.0]
+
+
+def miss(position: Series, mission: list[MissionProgress], items: list[MissionItem]) -> list[float | None]:
+    flight = Flight(
+        home=HOME, position=position, mission=tuple(mission), statuses=armed_from(0.0), landed=((0.0, False),)
+    )
+    return [row["miss_distance_m"] for row in waypoint_rows(flight, Plan(tuple(items)))]
+
+
+def test_miss_distance_counts_only_while_the_item_is_current() -> None:
+    waypoints = [
+        item_at(Command.NAV_WAYPOINT, (10.0, 0.0, -3.0)),
+        item_at(Command.NAV_WAYPOINT, (0.0, 0.0, -3.0)),
+    ]
+    position = samples([0, 1, 2, 3], [[0, 0, -3], [4, 0, -3], [4, 0, -3], [5, 0, -3]])
+    mission = [MissionProgress(1.0, 0, -1, 2, False), MissionProgress(2.0, 1, 0, 2, False)]
+    # item 0 while at 4 m north of it: 6 m away; item 1: at best 4 m, though the flight began on it
+    assert miss(position, mission, waypoints) == [pytest.approx(6.0, abs=0.01), pytest.approx(4.0, abs=0.01)]
+
+
+def test_miss_distance_is_to_the_line_between_samples_in_three_dimensions() -> None:
+    waypoint = item_at(Command.NAV_WAYPOINT, (0.0, 0.0, -10.0))
+    position = samples([0, 1], [[-5, 3, -14], [5, 3, -14]])
+    mission = [MissionProgress(0.0, 0, -1, 1, False)]
+    [distance] = miss(position, mission, [waypoint])  # passes at 3 m east and 4 m above
+    assert distance == pytest.approx(5.0, abs=0.01)
+
+
+def test_an_item_flown_twice_counts_its_better_pass_and_its_first_time() -> None:
+    waypoints = [
+        item_at(Command.NAV_WAYPOINT, (10.0, 0.0, 0.0)),
+        item_at(Command.NAV_WAYPOINT, (0.0, 0.0, 0.0)),
+    ]
+    position = samples([0, 1, 2, 3], [[8, 0, 0], [0, 0, 0], [0, 0, 0], [9, 0, 0]])
+    mission = [
+        MissionProgress(0.0, 0, -1, 2, False),
+        MissionProgress(0.5, 1, 0, 2, False),
+        MissionProgress(2.5, 0, 1, 2, False),
+        MissionProgress(3.0, 0, 0, 2, True),
+    ]
+    flight = Flight(home=HOME, position=position, mission=tuple(mission), statuses=armed_from(0.0))
+    first, _ = waypoint_rows(flight, Plan(tuple(waypoints)))
+    assert first["time_s"] == 0.5
+    assert first["miss_distance_m"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_items_without_position_and_items_never_flown_have_no_distance() -> None:
+    items = [
+        MissionItem(Command.NAV_RETURN_TO_LAUNCH, Frame.MISSION),
+        MissionItem(Command.DO_CHANGE_SPEED, Frame.MISSION),
+        item_at(Command.NAV_WAYPOINT, (1.0, 0.0, 0.0)),
+    ]
+    flight = Flight(
+        home=HOME, position=samples([0], [[0, 0, 0]]), mission=(MissionProgress(0.0, 0, -1, 3, False),)
+    )
+    assert waypoint_rows(flight, Plan(tuple(items))) == [
+        {"seq": 0, "reached": False, "time_s": None, "miss_distance_m": None},
+        {"seq": 2, "reached": False, "time_s": None, "miss_distance_m": None},
+    ]
+
+
+def test_a_flight_without_mission_has_no_distances() -> None:
+    position = samples([0, 1], [[0, 0, 0], [1, 0, 0]])
+    assert miss(position, [], [item_at(Command.NAV_WAYPOINT, (0.0, 0.0, 0.0))]) == [None]
+
+
+def test_altitudes_above_sea_level_and_above_home() -> None:
+    relative = item_at(Command.NAV_WAYPOINT, CORNERS_NED_M[1])
+    absolute = MissionItem(16, Frame.GLOBAL, x=relative.x, y=relative.y, z=HOME.altitude_m + 4.0)
+    flight = Flight(home=HOME)
+    for item in (relative, absolute):
+        assert item_ned_m(item, flight) == pytest.approx(CORNERS_NED_M[1], abs=0.01)
+    assert item_ned_m(relative, Flight()) is None
+
+
+def test_a_run_without_a_log_still_has_a_summary(tmp_path: Path) -> None:
+    run = RunInfo("sim-bridge ended early", "p.plan", log_path=tmp_path / "flight.ulg", inner_hz=math.nan)
+    summary = summarise(Flight(), square_plan(), run)
+    assert set(summary) >= REQUIRED
+    write_summary(tmp_path / "summary.json", summary)
+    got = json.loads((tmp_path / "summary.json").read_text())
+    assert got["outcome"] == "sim-bridge ended early"
+    assert got["rms_tracking_error_m"] is got["log_sha256"] is got["inner_hz"] is None
+    assert len(got["waypoints"]) == 6
+    assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
+
+
+def test_a_summary_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+    path = tmp_path / "summary.json"
+    write_summary(path, {"outcome": "old"})
+    with pytest.raises(ValueError, match="JSON"):
+        write_summary(path, {"outcome": math.nan})
+    assert json.loads(path.read_text()) == {"outcome": "old"}
+
+
+@pytest.mark.parametrize("content", [b"", b"ULog", b"not a log at all, but text", bytes(5000)])
+def test_a_file_that_is_no_log_is_one_sentence(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(content)
+    with pytest.raises(ConfigError, match=r"flight\.ulg: is not a readable flight log"):
+        read_flight(path)
+
+
+def test_a_missing_log_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot be read: No such file"):
+        read_flight(tmp_path / "flight.ulg")
+
+
+def test_a_log_cut_anywhere_is_read_as_far_as_it_goes(log_path: Path, tmp_path: Path) -> None:
+    content = log_path.read_bytes()
+    path = tmp_path / "cut.ulg"
+    durations = []
+    for size in np.linspace(4000, len(content), 23, dtype=int):  # the definitions take less than 4000 bytes
+        path.write_bytes(content[:size])
+        durations.append(read_flight(path).duration_s)
+    assert durations == sorted(durations)
+    assert durations[-1] == pytest.approx(35.99)
+
+
+def test_damage_is_never_printed_or_raised_as_anything_else(
+    log_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = bytearray(log_path.read_bytes()[:60_000])
+    path = tmp_path / "damaged.ulg"
+    rng = np.random.default_rng(5)
+    outcomes = set()
+    for _ in range(60):
+        damaged = content.copy()
+        for position in rng.integers(0, 8000, 12):
+            damaged[position] = rng.integers(0, 256)
+        path.write_bytes(damaged)
+        try:
+            outcomes.add(type(read_flight(path)))
+        except ConfigError:
+            outcomes.add(ConfigError)
+    assert outcomes <= {Flight, ConfigError}
+    assert capsys.readouterr().out == ""
