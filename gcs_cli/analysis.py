@@ -77,6 +77,7 @@ class _Reader:
             parameters=MappingProxyType(dict(log.initial_parameters)),
             home=self._home(),
             position=self._series("vehicle_local_position", ["x", "y", "z"]),
+            velocity=self._series("vehicle_local_position", ["vx", "vy", "vz"]),
             position_setpoint=self._series("trajectory_setpoint", _elements("position", 3)),
             attitude=self._euler("vehicle_attitude", "q"),
             attitude_target=self._euler("vehicle_attitude_setpoint", "q_d"),

@@ -14,6 +14,7 @@ from flightstack.geodesy import GeoPoint
 
 FlagArray: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
 
+_STILL_M_S = 0.1  # slower than any descent: a vehicle that is about to be found landed stands already
 _REAL_TIME = 1  # clock of a loop timing
 
 
@@ -67,7 +68,9 @@ class LoopTiming(NamedTuple):
 def loop_timing(time_s: float, inner_hz: float, figures: Sequence[float], clock: int) -> LoopTiming:
     """Return the loop timing of the figures of a message: execution, then lateness; mean, 99 %, largest."""
     period_us = 1e6 / inner_hz if inner_hz > 0.0 else math.nan
-    return LoopTiming(time_s, period_us, *figures, clock == _REAL_TIME)
+    mean, p99, largest, late_mean, late_p99, late_most = figures
+    real_time = clock == _REAL_TIME
+    return LoopTiming(time_s, period_us, mean, p99, largest, late_mean, late_p99, late_most, real_time)
 
 
 def empty_series(columns: int) -> Series:
@@ -83,13 +86,14 @@ def series(time_s: FloatArray, values: FloatArray) -> Series:
 
 @dataclass(frozen=True)
 class Flight:
-    """One flight. Positions NED [m] from home, angles roll, pitch, yaw [rad], rotor speeds [rad/s]."""
+    """One flight. Positions NED [m] from home, velocities NED [m/s], angles roll, pitch, yaw [rad]."""
 
     duration_s: float = 0.0
     info: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     home: GeoPoint | None = None
     position: Series = field(default_factory=lambda: empty_series(3))
+    velocity: Series = field(default_factory=lambda: empty_series(3))
     position_setpoint: Series = field(default_factory=lambda: empty_series(3))
     attitude: Series = field(default_factory=lambda: empty_series(3))
     attitude_target: Series = field(default_factory=lambda: empty_series(3))
@@ -102,11 +106,24 @@ class Flight:
     loop_timing: tuple[LoopTiming, ...] = ()
 
     def flying(self, time_s: FloatArray) -> FlagArray:
-        """Tell for each time whether the vehicle was armed and off the ground."""
+        """Tell for each time whether the vehicle was armed and off the ground.
+
+        A landing counts from the touchdown, not from its detection: in between the setpoint sinks into the
+        ground, and that is no error of tracking.
+        """
         armed = _step(((status.time_s, status.armed) for status in self.statuses), time_s)
         if not self.landed:
             return armed
-        return armed & ~_step(self.landed, time_s)
+        on_ground = [(self._touchdown_s(at_s) if landed else at_s, landed) for at_s, landed in self.landed]
+        return armed & ~_step(on_ground, time_s)
+
+    def _touchdown_s(self, landed_s: float) -> float:
+        """Return since when the vehicle, found to be landed at ``landed_s``, had been standing still."""
+        before = int(np.searchsorted(self.velocity.time_s, landed_s, side="right"))
+        moving = np.flatnonzero(np.linalg.norm(self.velocity.values[:before], axis=1) > _STILL_M_S)
+        if not len(moving) or moving[-1] + 1 == before:
+            return landed_s
+        return float(self.velocity.time_s[moving[-1] + 1])
 
     def tracking_error(self) -> Series:
         """Distance [m] between position and setpoint while flying, shape (n, 1)."""

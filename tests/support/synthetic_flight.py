@@ -70,6 +70,7 @@ def _attitude(time_s: float) -> tuple[float, float, float, float]:
 def _fill_inner(row: np.ndarray[Any, Any], time_s: float, noise: np.ndarray[Any, Any]) -> None:
     position = _path(time_s - 0.15) + 0.01 * noise[:3]
     row[:3] = position
+    row[3:6] = (_path(time_s - 0.149) - _path(time_s - 0.151)) / 0.002
     row[6:10] = _attitude(time_s - 0.05)
     row[10:13] = 0.1 * noise[3:6]
     row[LoopRow.REFERENCE_ATTITUDE] = _attitude(time_s - 0.02)

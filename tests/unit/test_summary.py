@@ -111,6 +111,29 @@ def test_tracking_error_by_hand() -> None:
     assert summary["rms_tracking_error_m"] == pytest.approx(math.sqrt(12.5), abs=1e-6)
 
 
+def test_a_landing_counts_from_the_touchdown() -> None:
+    time_s = [0, 1, 2, 3, 4, 5]
+    flight = Flight(
+        position=samples(time_s, [[0, 0, z] for z in (-2, -1, 0, 0, 0, 0)]),
+        velocity=samples(time_s, [[0, 0, v] for v in (1, 1, 0.01, 0, 0, 0)]),
+        position_setpoint=samples(time_s, [[0, 0, z] for z in (-2, -1, 0, 1, 2, 2)]),
+        statuses=armed_from(0.0),
+        landed=((0.0, False), (4.0, True)),
+    )
+    # standing since 2 s, found landed at 4 s: the setpoint 1 m below the ground at 3 s is no error
+    assert flight.flying(flight.position.time_s).tolist() == [True, True, False, False, False, False]
+    assert flight.tracking_error().values[:, 0].tolist() == [0.0, 0.0]
+
+
+def test_a_landing_without_a_stand_before_it_counts_from_its_detection() -> None:
+    flight = Flight(
+        velocity=samples([0, 1, 2], [[0, 0, 1], [0, 0, 1], [0, 0, 0]]),
+        statuses=armed_from(0.0),
+        landed=((0.0, False), (1.5, True)),
+    )
+    assert flight.flying(np.array([1.0, 1.4, 1.6])).tolist() == [True, True, False]
+
+
 def test_a_setpoint_at_other_times_is_interpolated() -> None:
     flight = Flight(
         position=samples([1, 2], [[1, 0, 0], [2, 0, 0]]),
