@@ -1,0 +1,102 @@
+"""UDP datagrams, non-blocking: the same socket serves the ground station and the vehicle."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import select
+import socket
+from collections.abc import Iterator
+from typing import TypeAlias
+
+Address: TypeAlias = tuple[str, int]
+
+_LARGEST_DATAGRAM = 65536
+_RECEIVE_BUFFER = 1 << 20  # telemetry of a vehicle at many times real time comes in bursts
+_DATAGRAMS_A_CALL = 1000
+
+
+class PortBusyError(Exception):
+    """A port is taken (or may not be used); its text is one sentence that names it."""
+
+    def __init__(self, kind: str, address: Address, reason: str) -> None:
+        super().__init__(f"{kind} port {address[1]} on {address[0]} {reason}")
+        self.address = address
+
+
+def _bound(address: Address) -> socket.socket:
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        made.setblocking(False)
+        with contextlib.suppress(OSError):
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+        made.bind(address)
+    except (OSError, OverflowError) as error:
+        made.close()
+        busy = getattr(error, "errno", None) == errno.EADDRINUSE
+        reason = "is in use" if busy else f"cannot be used: {getattr(error, 'strerror', None) or error}"
+        raise PortBusyError("UDP", address, reason) from None
+    return made
+
+
+def resolve(host: str) -> str:
+    """Return the IPv4 address of a host name; raise OSError when there is none."""
+    try:
+        return socket.gethostbyname(host)
+    except UnicodeError:  # names that cannot even be asked for
+        raise OSError(f"not a host name: {host}") from None
+
+
+class UdpSocket:
+    """Datagrams to and from any peer. What cannot be sent is counted: to lose one is normal in UDP."""
+
+    def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
+        """Bind to ``host``:``port`` (0: any free one); raise PortBusyError."""
+        self._socket = _bound((host, port))
+        self._poll = select.poll()
+        self._poll.register(self._socket, select.POLLIN)
+        self.unsent = 0
+
+    @property
+    def address(self) -> Address:
+        """The local address, with the real port."""
+        host, port = self._socket.getsockname()[:2]
+        return str(host), int(port)
+
+    def fileno(self) -> int:
+        """Descriptor, for ``select``."""
+        return self._socket.fileno()
+
+    def receive(self) -> Iterator[tuple[bytes, Address]]:
+        """Yield the datagrams that are here (bounded, so that a flood cannot hold the caller)."""
+        for _ in range(_DATAGRAMS_A_CALL):
+            try:
+                data, peer = self._socket.recvfrom(_LARGEST_DATAGRAM)
+            except BlockingIOError:
+                return
+            except OSError:  # a report about an earlier datagram, not about this one
+                continue
+            yield data, peer[:2]
+
+    def send(self, data: bytes, peer: Address) -> bool:
+        """Send one datagram; return whether the system took it."""
+        try:
+            self._socket.sendto(data, peer)
+        except (OSError, OverflowError):
+            self.unsent += 1
+            return False
+        return True
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until a datagram is here, at most ``timeout_s``; return whether one is."""
+        return bool(self._poll.poll(max(0.0, timeout_s) * 1e3))
+
+    def close(self) -> None:
+        """Close the socket; twice does no harm."""
+        self._socket.close()
+
+    def __enter__(self) -> UdpSocket:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
