@@ -1,0 +1,1 @@
+"""The ground station on the command line: `gcs`."""

@@ -1,0 +1,176 @@
+"""What a ground station knows of a vehicle: immutable values, None where nothing is known."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+TEXTS_KEPT = 100
+LOST_AFTER_S = 5.0
+"""Silence after which a vehicle counts as lost: five missed heartbeats."""
+
+_POWEROFF = 7  # MAV_STATE_POWEROFF
+MISSION_COMPLETE = 5  # MISSION_STATE_COMPLETE
+
+
+class Vector(NamedTuple):
+    """Three numbers; the field that holds it tells frame and unit."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Identity(NamedTuple):
+    """Who the vehicle is: its MAVLink address and what it says it is."""
+
+    system_id: int
+    component_id: int
+    vehicle_type: int
+    autopilot: int
+
+
+class Euler(NamedTuple):
+    """Attitude as angles [rad], yaw-pitch-roll order."""
+
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+
+
+class GeoPosition(NamedTuple):
+    """WGS 84 position; altitude above mean sea level and above home."""
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+    relative_altitude_m: float
+
+
+class Setpoint(NamedTuple):
+    """What the vehicle's guidance asks for; None where it asks for nothing."""
+
+    position_ned_m: Vector | None = None
+    velocity_ned_m_s: Vector | None = None
+    yaw_rad: float | None = None
+
+
+class Mission(NamedTuple):
+    """Mission progress. ``reached`` is the last item reached; ``state`` is a MISSION_STATE."""
+
+    current: int | None = None
+    total: int | None = None
+    reached: int | None = None
+    state: int | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the vehicle says that the mission is done."""
+        return self.state == MISSION_COMPLETE
+
+
+class Battery(NamedTuple):
+    """Battery, as far as the vehicle measures it."""
+
+    remaining: float | None
+    voltage_v: float | None
+    current_a: float | None
+
+
+class LoopTiming(NamedTuple):
+    """One FS_LOOP_TIMING: times over the last second, counts since start."""
+
+    time_s: float
+    ticks: int
+    overruns: int
+    missed: int
+    inner_hz: float | None
+    outer_hz: float | None
+    real_time_factor: float | None
+    execution_mean_us: float | None
+    execution_p99_us: float | None
+    execution_max_us: float | None
+    lateness_mean_us: float | None
+    lateness_p99_us: float | None
+    lateness_max_us: float | None
+    lockstep: bool
+
+
+class StatusText(NamedTuple):
+    """A text from the vehicle. ``number`` counts them all; long ones arrive in ``chunks`` pieces."""
+
+    number: int
+    severity: int
+    text: str
+    received_s: float
+    vehicle_time_s: float | None
+    message_id: int = 0
+    chunks: int = 1
+
+
+class LinkCounts(NamedTuple):
+    """Messages from the vehicle: taken, missing in the sequence, and the rate of late [1/s]."""
+
+    received: int = 0
+    lost: int = 0
+    last_sequence: int | None = None
+    last_received_s: float | None = None
+    rate_hz: float | None = None
+    window_start_s: float | None = None
+    window_count: int = 0
+
+    @property
+    def quality(self) -> float | None:
+        """Share of the vehicle's messages that arrived, 0 to 1."""
+        total = self.received + self.lost
+        return self.received / total if total else None
+
+
+class VehicleView(NamedTuple):
+    """One snapshot of a vehicle, folded from its messages. Times ``_s`` are on the receiver's clock."""
+
+    identity: Identity | None = None
+    last_heartbeat_s: float | None = None
+    mode: str | None = None
+    armed: bool = False
+    ever_armed: bool = False
+    system_status: int = 0
+    landed_state: int = 0
+    healthy: bool | None = None
+    """Whether all its sensors are well; in a simulation: whether the simulator's state is there."""
+    attitude: Euler | None = None
+    rates_frd_rad_s: Vector | None = None
+    attitude_target: Euler | None = None
+    position_ned_m: Vector | None = None
+    velocity_ned_m_s: Vector | None = None
+    geo: GeoPosition | None = None
+    home: GeoPosition | None = None
+    heading_deg: float | None = None
+    throttle: float | None = None
+    setpoint: Setpoint | None = None
+    mission: Mission = Mission()
+    battery: Battery | None = None
+    rotor_rpm: tuple[float, ...] = ()
+    rotor_peak_rpm: float = 0.0
+    timing: LoopTiming | None = None
+    texts: tuple[StatusText, ...] = ()
+    text_count: int = 0
+    time_s: float | None = None
+    link: LinkCounts = LinkCounts()
+
+    @property
+    def powered_off(self) -> bool:
+        """Whether the vehicle has said that it shuts down."""
+        return self.system_status == _POWEROFF
+
+    def silent_s(self, now_s: float) -> float | None:
+        """Seconds since the last heartbeat; None before the first."""
+        return None if self.last_heartbeat_s is None else max(0.0, now_s - self.last_heartbeat_s)
+
+    def lost(self, now_s: float) -> bool:
+        """Whether a vehicle that was heard is heard no more."""
+        silent = self.silent_s(now_s)
+        return silent is not None and silent > LOST_AFTER_S
+
+    def texts_since(self, count: int) -> tuple[StatusText, ...]:
+        """Status texts that came after the first ``count``, as far as they are kept."""
+        return tuple(text for text in self.texts if text.number >= count)
