@@ -1,0 +1,102 @@
+"""The session on a real socket and the real clock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from flightstack.transport.udp import PortBusyError, UdpSocket, resolve
+from gcs_cli.calls import Answer, Call
+from gcs_cli.endpoint import VEHICLE_CONNECTION, Endpoint
+from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
+from gcs_cli.session import Session
+
+_LONGEST_WAIT_S = 0.25
+"""So that Ctrl-C, a dead child or a resized terminal is never noticed late."""
+
+
+class Connection:
+    """Runs a ``Session`` over UDP. Raises CliError when the port is busy."""
+
+    def __init__(self, endpoint: Endpoint, record: Callable[[bytes], None] | None = None) -> None:
+        self.endpoint = endpoint
+        try:
+            if endpoint.listens:
+                self._socket = UdpSocket(endpoint.host, endpoint.port)
+                self.session = Session(record=record)
+            else:
+                host = resolve(endpoint.host)
+                self._socket = UdpSocket("0.0.0.0")
+                self.session = Session((host, endpoint.port), record)
+        except PortBusyError as error:
+            raise CliError(
+                f"{error}: end the other ground station, or use --connect {VEHICLE_CONNECTION}", USAGE
+            ) from None
+        except OSError:
+            raise CliError(f"--connect: there is no host named {endpoint.host}", USAGE) from None
+
+    @property
+    def now_s(self) -> float:
+        """The clock that the session counts on."""
+        return time.monotonic()
+
+    def step(self, until_s: float) -> None:
+        """Send what is due, wait for datagrams until ``until_s`` at most, and take them."""
+        self._send(self.session.poll(self.now_s))
+        deadline_s = self.session.next_deadline()
+        wait_s = min(until_s, until_s if deadline_s is None else deadline_s) - self.now_s
+        if self._socket.wait(min(_LONGEST_WAIT_S, wait_s)):
+            now_s = self.now_s
+            for data, peer in self._socket.receive():
+                self.session.receive(data, peer, now_s)
+        self._send(self.session.poll(self.now_s))
+
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Run until ``condition`` holds; return False when it does not within ``timeout_s``."""
+        end_s = self.now_s + timeout_s
+        while not condition():
+            if self.now_s >= end_s:
+                return False
+            self.step(end_s)
+        return True
+
+    def meet(self, timeout_s: float) -> None:
+        """Wait for the vehicle's heartbeat; raise CliError (no answer)."""
+        if not self.wait_for(lambda: self.session.view.identity is not None, timeout_s):
+            way = "sent to" if self.endpoint.listens else "answered at"
+            raise CliError(
+                f"no vehicle {way} {self.endpoint} within {timeout_s:g} s: start `sim-bridge` and "
+                "`flightstack`, or name its link with --connect",
+                NO_ANSWER,
+            )
+
+    def complete(self, call: Call, name: str) -> Answer:
+        """Run a request to its end; raise CliError when the vehicle refuses ``name`` or does not answer."""
+        session = self.session
+        while (answer := call.answer(self.now_s)) is None:
+            if session.view.powered_off or session.view.lost(self.now_s):
+                raise CliError(
+                    f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}"
+                )
+            self.step(self.now_s + _LONGEST_WAIT_S)
+        if not answer.accepted:
+            refused = f"{name}: {answer.reason}" if answer.silent else f"{name} refused: {answer.reason}"
+            raise CliError(refused, NO_ANSWER if answer.silent else FAILED)
+        return answer
+
+    def _send(self, frames: list[bytes]) -> None:
+        peer = self.session.peer
+        if peer is not None:
+            for frame in frames:
+                self._socket.send(frame, peer)
+
+    def close(self) -> None:
+        """Say goodbye and close the socket."""
+        self._send(self.session.farewell())
+        self._socket.close()
+
+    def __enter__(self) -> Connection:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,34 @@
+"""Connection strings as MAVLink tools write them: ``udp:PORT``, ``udpin:HOST:PORT``, ``udpout:HOST:PORT``."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from gcs_cli.errors import USAGE, CliError
+
+DEFAULT_CONNECTION = "udp:127.0.0.1:14550"
+VEHICLE_CONNECTION = "udpout:127.0.0.1:18570"
+_FORMS = "udp:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
+
+
+class Endpoint(NamedTuple):
+    """Where the vehicle is met: we listen there, or we send there first."""
+
+    host: str
+    port: int
+    listens: bool
+
+    def __str__(self) -> str:
+        return f"UDP {self.host}:{self.port}"
+
+
+def parse_endpoint(text: str) -> Endpoint:
+    """Read a connection string; raise CliError (usage)."""
+    scheme, _, rest = text.partition(":")
+    host, _, port_text = rest.rpartition(":")
+    listens = scheme in ("udp", "udpin")
+    if scheme not in ("udp", "udpin", "udpout") or (scheme == "udpout" and not host):
+        raise CliError(f"--connect {text}: expected {_FORMS}", USAGE)
+    if not (port_text.isascii() and port_text.isdigit() and 0 < int(port_text) < 65536):
+        raise CliError(f"--connect {text}: {port_text or 'nothing'} is not a port (1 to 65535)", USAGE)
+    return Endpoint(host or "0.0.0.0", int(port_text), listens)

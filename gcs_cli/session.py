@@ -1,0 +1,129 @@
+"""One vehicle over one link, without I/O: datagrams in and out, heartbeats, the view and a service."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link, Message
+from flightstack.transport.udp import Address
+from gcs_cli.vehicle_view import update
+from gcs_cli.view_types import VehicleView
+
+SYSTEM_ID = 255
+COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, the custom of ground stations
+HEARTBEAT_PERIOD_S = 1.0
+_ANYONE = 0
+_MOST_PEERS = 32
+
+
+class Service(Protocol):
+    """A client side of a MAVLink service: a state machine without I/O."""
+
+    def receive(self, message: Message, now_s: float) -> None:
+        """Take a message from the vehicle."""
+
+    def poll(self, now_s: float) -> list[Message]:
+        """Return what is to be sent now."""
+
+    def next_deadline(self) -> float | None:
+        """Return when ``poll`` has something to do at the latest."""
+
+
+class Session:
+    """The ground station's side of a link.
+
+    The first peer from which an autopilot's heartbeat comes is the vehicle; datagrams of others are dropped
+    unless that one has fallen silent. ``record`` gets every frame, sent and received.
+    """
+
+    def __init__(self, peer: Address | None = None, record: Callable[[bytes], None] | None = None) -> None:
+        self.view = VehicleView()
+        self.peer = peer
+        self.bad = 0
+        self._links: dict[Address, Link] = {}
+        self._out = Link(SYSTEM_ID, COMPONENT_ID)
+        self.record = record
+        self._service: Service | None = None
+        self._heartbeat_due_s = 0.0
+
+    @property
+    def target(self) -> tuple[int, int]:
+        """System and component of the vehicle; (0, 0), everyone, before one is heard."""
+        identity = self.view.identity
+        return (_ANYONE, _ANYONE) if identity is None else (identity.system_id, identity.component_id)
+
+    def use(self, service: Service | None) -> None:
+        """Let ``service`` talk to the vehicle from now on, in place of the one before."""
+        self._service = service
+
+    def receive(self, data: bytes, peer: Address, now_s: float) -> None:
+        """Take a datagram."""
+        heard = self.view.identity is not None and not self.view.lost(now_s)
+        if heard and peer != self.peer:
+            return
+        if len(self._links) > _MOST_PEERS:
+            self._links.clear()
+        link = self._links.setdefault(peer, Link(SYSTEM_ID, COMPONENT_ID))
+        bad_before = link.bad
+        for message in link.decode(data):
+            if heard or self._is_vehicle(message, peer, now_s):
+                self._take(message, now_s)
+        self.bad += link.bad - bad_before
+
+    def _is_vehicle(self, message: Message, peer: Address, now_s: float) -> bool:
+        """Tell whether this is from our vehicle; while there is none, the heartbeat of a new one decides."""
+        if self.view.identity is not None and peer == self.peer and not self._is_other_system(message):
+            return True
+        candidate = VehicleView() if self._is_other_system(message) else self.view
+        if update(candidate, message, now_s).last_heartbeat_s != now_s:
+            return False
+        self.view, self.peer = candidate, peer
+        self._heartbeat_due_s = now_s
+        return True
+
+    def _is_other_system(self, message: Message) -> bool:
+        return (message.get_srcSystem(), message.get_srcComponent()) != self.target
+
+    def _take(self, message: Message, now_s: float) -> None:
+        if self.record is not None:
+            self.record(bytes(message.get_msgbuf()))
+        self.view = update(self.view, message, now_s)
+        if self._service is not None and not self._is_other_system(message):
+            self._service.receive(message, now_s)
+
+    def poll(self, now_s: float) -> list[bytes]:
+        """Return the datagrams to send now to ``peer``."""
+        if self.peer is None:
+            return []
+        frames = []
+        if now_s >= self._heartbeat_due_s:
+            frames.append(self._encode(_heartbeat(mavlink.MAV_STATE_ACTIVE)))
+            self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
+        if self._service is not None:
+            frames += [self._encode(message) for message in self._service.poll(now_s)]
+        return frames
+
+    def next_deadline(self) -> float | None:
+        """Return when ``poll`` has something to do at the latest; None before there is anyone to talk to."""
+        if self.peer is None:
+            return None
+        service = None if self._service is None else self._service.next_deadline()
+        return self._heartbeat_due_s if service is None else min(self._heartbeat_due_s, service)
+
+    def farewell(self) -> list[bytes]:
+        """Return the datagrams that say that this ground station leaves in order."""
+        return [] if self.peer is None else [self._encode(_heartbeat(mavlink.MAV_STATE_POWEROFF))]
+
+    def _encode(self, message: Message) -> bytes:
+        frame = self._out.encode(message)
+        if self.record is not None:
+            self.record(frame)
+        return frame
+
+
+def _heartbeat(state: int) -> Message:
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, state, 3
+    )
