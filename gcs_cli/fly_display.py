@@ -1,0 +1,145 @@
+"""What ``gcs fly`` shows while it flies: a bar on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+import time
+from typing import Protocol
+
+from rich.console import Console, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.spinner import Spinner
+from rich.table import Table
+from rich.text import Text
+
+from gcs_cli.flight import Flight, Phase
+from gcs_cli.watch_lines import text_line
+
+_FRAME_S = 0.1
+_WARNING = 4  # MAV_SEVERITY_WARNING
+
+
+class Display(Protocol):
+    """Shows the course of a flight."""
+
+    def update(self, flight: Flight) -> None:
+        """Show how the flight stands."""
+
+    def close(self) -> None:
+        """Leave the terminal as it was."""
+
+
+def make_display(console: Console) -> Display:
+    """Return the display that fits where ``console`` writes to."""
+    return BarDisplay(console) if console.is_terminal else LineDisplay(console)
+
+
+class BarDisplay:
+    """One live line: phase, waypoint, position, real-time factor."""
+
+    def __init__(self, console: Console) -> None:
+        self._live = Live(console=console, auto_refresh=False, transient=True)
+        self._live.start()
+        self._spinner = Spinner("dots")
+        self._due_s = 0.0
+        self._texts = 0
+
+    def update(self, flight: Flight) -> None:
+        """Redraw, at most ten times a second."""
+        for entry in flight.view.texts_since(self._texts):
+            if entry.severity <= _WARNING:
+                self._live.console.print(Text(text_line(entry), style="yellow"))
+        self._texts = flight.view.text_count
+        now_s = time.monotonic()
+        if now_s >= self._due_s:
+            self._due_s = now_s + _FRAME_S
+            self._live.update(progress(flight, now_s, self._spinner), refresh=True)
+
+    def close(self) -> None:
+        """Remove the line."""
+        self._live.stop()
+
+
+class LineDisplay:
+    """A line for each change of phase, mode or item, and for each status text."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._before = ""
+        self._texts = 0
+
+    def update(self, flight: Flight) -> None:
+        """Print what is new."""
+        for entry in flight.view.texts_since(self._texts):
+            self._print(text_line(entry))
+        self._texts = flight.view.text_count
+        words = f"{phase_words(flight)}{item_words(flight)}"
+        if words != self._before:
+            self._before = words
+            self._print("  ".join(part for part in (words, place_words(flight), speed_words(flight)) if part))
+
+    def _print(self, text: str) -> None:
+        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+def progress(flight: Flight, now_s: float, spinner: Spinner) -> RenderableType:
+    """Return the live line."""
+    grid = Table.grid(padding=(0, 1), expand=True)
+    for _ in range(2):
+        grid.add_column(no_wrap=True)
+    grid.add_column(ratio=1)
+    for _ in range(3):
+        grid.add_column(no_wrap=True, justify="right")
+    done, total = _share(flight)
+    grid.add_row(
+        spinner.render(now_s),
+        Text(phase_words(flight), style="bold cyan"),
+        ProgressBar(total=max(1, total), completed=done, complete_style="green"),
+        Text(item_words(flight).strip(), style="bold"),
+        Text(place_words(flight)),
+        Text(speed_words(flight), style="cyan"),
+    )
+    return grid
+
+
+def _share(flight: Flight) -> tuple[float, float]:
+    if flight.phase is Phase.UPLOAD:
+        return flight.upload_progress
+    mission = flight.view.mission
+    total = mission.total or 0
+    if flight.phase is not Phase.FLY:
+        return (total, total) if flight.began_s is not None else (0, total)
+    return (total if mission.complete else mission.current or 0), total
+
+
+def phase_words(flight: Flight) -> str:
+    """Say what is going on: the mode in flight, else the phase."""
+    return flight.view.mode or "flying" if flight.phase is Phase.FLY else flight.phase.value
+
+
+def item_words(flight: Flight) -> str:
+    """Say which item is flown."""
+    mission = flight.view.mission
+    if flight.phase is not Phase.FLY or mission.current is None or not mission.total or mission.complete:
+        return ""
+    return f"  item {mission.current}/{mission.total - 1}"
+
+
+def place_words(flight: Flight) -> str:
+    """Say where the vehicle is."""
+    position = flight.view.position_ned_m
+    if flight.phase is not Phase.FLY or position is None:
+        return ""
+    return f"N {position.x:+.1f} E {position.y:+.1f} up {-position.z:.1f} m"
+
+
+def speed_words(flight: Flight) -> str:
+    """Say how long it has flown in simulated time, and how fast that passes."""
+    if flight.phase is not Phase.FLY or flight.flown_s is None:
+        return ""
+    words = f"t {flight.flown_s:.1f} s"
+    factor = flight.real_time_factor
+    return words if factor is None else f"{words} ×{factor:.3g}"

@@ -1,0 +1,170 @@
+"""A whole flight: ports, directory, children, mission, and what is left of it in files."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+from types import FrameType
+from typing import Any, NamedTuple
+
+from flightstack.plan import Plan
+from gcs_cli.connection import Connection
+from gcs_cli.endpoint import Endpoint
+from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
+from gcs_cli.flight import Flight, Outcome
+from gcs_cli.fly_display import Display
+from gcs_cli.fly_options import (
+    DEFAULT_HOME,
+    FlyOptions,
+    check_ports,
+    simulator_arguments,
+    stack_arguments,
+)
+from gcs_cli.processes import Child, Children
+from gcs_cli.run_directory import LOG_NAME, make_run_directory
+from gcs_cli.tlog_file import TlogFile
+
+TLOG_NAME, SUMMARY_NAME, REPORT_NAME = "gcs.tlog", "summary.json", "report.html"
+_STEP_S = 0.1
+_END_PATIENCE_S = 10.0
+_LAST_WORDS_S = 1.0
+
+
+class Flown(NamedTuple):
+    """A flight that is over."""
+
+    folder: Path
+    outcome: Outcome
+    wall_time_s: float | None
+    overruns: int | None
+    returned_by_us: bool
+
+
+class Interruption:
+    """Turns the first Ctrl-C, SIGTERM or lost terminal into a flag; the second one interrupts at once."""
+
+    def __init__(self) -> None:
+        self.reason = ""
+        self._before: dict[int, Any] = {}
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        if self.reason:
+            raise KeyboardInterrupt
+        self.reason = (
+            "interrupted" if number == signal.SIGINT else f"interrupted ({signal.Signals(number).name})"
+        )
+
+    def __enter__(self) -> Interruption:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+
+def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> Flown:
+    """Fly ``plan`` with children of our own; raise CliError when nothing could be started."""
+    local = Endpoint("127.0.0.1", options.gcs_port, listens=True)
+    with Interruption() as interruption, _open(local) as connection:
+        check_ports(options)
+        folder = make_run_directory(options.plan_path, out)
+        flight = Flight(connection.session, plan.items, connection.now_s, options.timeout_s, options.limit_s)
+        with TlogFile(folder / TLOG_NAME) as tlog, Children(folder) as children:
+            connection.session.record = lambda frame: tlog.write(time.time_ns() // 1000, frame)
+            home = plan.home or DEFAULT_HOME
+            children.start("sim-bridge", "sim_bridge", simulator_arguments(options, home))
+            children.start("flightstack", "flightstack", stack_arguments(options, home, folder))
+            _run(flight, connection, children, interruption, display)
+            if flight.shut_down_accepted:
+                children.wait(_END_PATIENCE_S)
+            connection.session.record = None
+    assert flight.outcome is not None
+    wall_time_s = None
+    if flight.began_s is not None and flight.ended_s is not None:
+        wall_time_s = flight.ended_s - flight.began_s
+    timing = flight.view.timing
+    overruns = None if timing is None else timing.overruns
+    return Flown(folder, flight.outcome, wall_time_s, overruns, flight.returned_by_us)
+
+
+def _open(endpoint: Endpoint) -> Connection:
+    try:
+        return Connection(endpoint)
+    except CliError as error:
+        sentence = str(error).partition(": end the other")[0]
+        raise CliError(
+            f"{sentence}: end the other ground station, or fly beside it with --instance N", USAGE
+        ) from None
+
+
+def _run(
+    flight: Flight, connection: Connection, children: Children, interruption: Interruption, display: Display
+) -> None:
+    while not flight.over:
+        now_s = connection.now_s
+        if interruption.reason:
+            flight.abort(interruption.reason, FAILED, now_s)
+        casualty = _casualty(flight, children)
+        if casualty is not None:
+            code = casualty.exit_code if casualty.exit_code in (USAGE, NO_ANSWER) else FAILED
+            gone = any(child.name == "flightstack" for child in children.ended())
+            flight.abort(casualty.obituary, code, now_s, vehicle_is_gone=gone)
+        flight.step(now_s)
+        display.update(flight)
+        if not flight.over:
+            connection.step(now_s + _STEP_S)
+
+
+def _casualty(flight: Flight, children: Children) -> Child | None:
+    """Return the child that ended first and took the other along, while there is a flight to end."""
+    if flight.outcome is not None:
+        return None
+    if flight.view.powered_off:
+        children.wait(_LAST_WORDS_S)  # it is about to say why
+    ended = children.ended()
+    if not ended:
+        return None
+    return min(ended, key=lambda child: ((child.exit_code or 0) >= 0, " lost" in child.last_line))
+
+
+def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:
+    """Write summary and report; return the summary, and the outcome with what writing them showed."""
+    from flightstack.params.errors import ConfigError  # noqa: PLC0415
+    from gcs_cli.analysis import read_flight  # noqa: PLC0415
+    from gcs_cli.flight_data import Flight as FlightData  # noqa: PLC0415
+    from gcs_cli.report import write_report  # noqa: PLC0415
+    from gcs_cli.summary import RunInfo, summarise, write_summary  # noqa: PLC0415
+
+    log, outcome = flown.folder / LOG_NAME, flown.outcome
+    try:
+        data = read_flight(log)
+    except (ConfigError, OSError) as error:
+        data = None
+        if outcome.completed:
+            outcome = Outcome(f"the mission was flown, but its log cannot be read: {error}", FAILED)
+    run = RunInfo(
+        outcome=outcome.reason,
+        plan=str(options.plan_path),
+        wall_time_s=flown.wall_time_s,
+        vehicle=options.vehicle,
+        controller=options.controller,
+        gains=options.gains,
+        plant=options.plant,
+        loops="python",
+        seed=options.seed,
+        inner_hz=options.inner_hz,
+        outer_hz=options.outer_hz,
+        overruns=flown.overruns,
+        log_path=log,
+    )
+    summary = summarise(FlightData() if data is None else data, plan, run)
+    try:
+        write_summary(flown.folder / SUMMARY_NAME, summary)
+        if data is not None:
+            write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
+    except OSError as error:
+        raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
+    return summary, outcome

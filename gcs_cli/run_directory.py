@@ -1,0 +1,38 @@
+"""The directory of a flight: ``runs/<stamp>-<plan>/``, never one that holds another flight."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from gcs_cli.errors import USAGE, CliError
+
+RUNS = Path("runs")
+LOG_NAME = "flight.ulg"
+
+
+def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS) -> Path:
+    """Make and return the directory; raise CliError (usage) when it cannot be, or holds a flight."""
+    try:
+        if out is None:
+            return _fresh(base, f"{time.strftime('%Y%m%d-%H%M%S')}-{plan.stem}")
+        log = out / LOG_NAME
+        if log.exists() and log.stat().st_size:
+            raise CliError(f"--out {out}: {LOG_NAME} of another flight is there; choose another one", USAGE)
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CliError(f"{out or base}: the directory cannot be made: {error.strerror}", USAGE) from None
+    return out
+
+
+def _fresh(base: Path, name: str) -> Path:
+    base.mkdir(parents=True, exist_ok=True)
+    attempt = 1
+    while True:
+        folder = base / (name if attempt == 1 else f"{name}-{attempt}")
+        try:
+            folder.mkdir()
+        except FileExistsError:  # another flight began in this second
+            attempt += 1
+            continue
+        return folder
