@@ -1,0 +1,79 @@
+"""The command ``gcs``: the ground station on the command line."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from typing import Any
+
+import typer
+
+from gcs_cli.errors import DONE, FAILED, USAGE, CliError
+from gcs_cli.settings import ConnectOption, Settings, TimeoutOption
+
+app = typer.Typer(
+    name="gcs",
+    help="Ground station on the command line: fly missions, command and watch a vehicle over MAVLink.",
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+# the base of all complaints about usage, in typer with its own copy of click and without
+_UsageError: Any = typer.BadParameter.__mro__[1]
+
+
+@app.callback()
+def options(context: typer.Context, connect: ConnectOption = None, timeout: TimeoutOption = None) -> None:
+    """Hold the flags that are given before the command."""
+    context.obj = Settings(connect, timeout)
+
+
+def _register() -> None:
+    from gcs_cli.commands import actions, fly, mission, perf, status, watch  # noqa: PLC0415
+
+    app.command()(fly.fly)
+    app.add_typer(mission.app, name="mission")
+    for action in actions.ACTIONS:
+        app.command()(action)
+    app.command()(status.status)
+    app.command()(watch.watch)
+    app.command()(perf.perf)
+
+
+_register()
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line; return the exit code."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the terminal is restored
+    try:
+        return app(argv, prog_name="gcs", standalone_mode=False) or DONE
+    except (KeyboardInterrupt, typer.Abort):
+        print("gcs: interrupted", file=sys.stderr)
+        return FAILED
+    except BrokenPipeError:  # `gcs watch | head`
+        sys.stderr.close()
+        return DONE
+    except _UsageError as error:
+        sentence, code = error.format_message(), USAGE
+    except CliError as error:
+        sentence, code = str(error), error.exit_code
+    except Exception as error:
+        sentence, code = _config_problem(error), USAGE
+    print(f"gcs: {sentence}", file=sys.stderr)
+    return code
+
+
+def _config_problem(error: Exception) -> str:
+    """Return the sentence of a bad file; raise all else again."""
+    from flightstack.params.errors import ConfigError  # noqa: PLC0415
+
+    if isinstance(error, ConfigError):
+        return str(error)
+    raise error
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,94 @@
+"""``gcs perf``: the timing of the flight stack's loops."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gcs_cli.errors import NO_ANSWER, CliError
+from gcs_cli.settings import ConnectOption, JsonOption, TimeoutOption, meet_vehicle, settings_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from gcs_cli.connection import Connection
+    from gcs_cli.view_types import LoopTiming
+
+
+def perf(
+    context: typer.Context,
+    repeat: Annotated[bool, typer.Option("--watch", help="Go on until Ctrl-C.")] = False,
+    as_json: JsonOption = False,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+) -> None:
+    """Show the timing of the flight stack's loops."""
+    patience_s = settings_of(context).merged(connect, timeout).patience_s
+    with meet_vehicle(context, connect, timeout) as connection:
+        timing = next_timing(connection, None, patience_s)
+        _show(timing, as_json)
+        try:
+            while repeat:
+                timing = next_timing(connection, timing, patience_s)
+                _show(timing, as_json)
+        except KeyboardInterrupt:
+            return
+
+
+def next_timing(connection: Connection, before: LoopTiming | None, patience_s: float) -> LoopTiming:
+    """Wait for the next FS_LOOP_TIMING after ``before``; raise CliError (no answer)."""
+    session = connection.session
+    if not connection.wait_for(lambda: session.view.timing not in (None, before), patience_s):
+        raise CliError(
+            f"the vehicle sent no FS_LOOP_TIMING within {patience_s:g} s: only flightstack does, while its "
+            "loops run",
+            NO_ANSWER,
+        )
+    assert session.view.timing is not None
+    return session.view.timing
+
+
+def _show(timing: LoopTiming, as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(timing._asdict()), flush=True)
+        return
+    from rich.console import Console  # noqa: PLC0415
+
+    Console().print(timing_table(timing))
+    sys.stdout.flush()
+
+
+def timing_table(timing: LoopTiming) -> Table:
+    """Return the figures as a table; times in µs, and as a share of the inner loop's period."""
+    from rich import box  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    from gcs_cli.panels import number  # noqa: PLC0415
+
+    clock = "lockstep" if timing.lockstep else "real time"
+    factor = f", {timing.real_time_factor:.1f}× real time" if timing.real_time_factor else ""
+    title = f"inner {number(timing.inner_hz, 0)} Hz, outer {number(timing.outer_hz, 0)} Hz, {clock}{factor}"
+    period_us = 1e6 / timing.inner_hz if timing.inner_hz else None
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    table.add_column("last second")
+    for name in ("mean", "p99", "max"):
+        table.add_column(f"{name} µs", justify="right")
+        table.add_column("%", justify="right", style="bright_black")
+    rows = {
+        "execution of a tick": (timing.execution_mean_us, timing.execution_p99_us, timing.execution_max_us)
+    }
+    if not timing.lockstep:
+        rows["lateness of a tick"] = (timing.lateness_mean_us, timing.lateness_p99_us, timing.lateness_max_us)
+    for name, values in rows.items():
+        cells = []
+        for value in values:
+            share = None if value is None or period_us is None else 100.0 * value / period_us
+            cells += [number(value, 1), number(share, 1)]
+        table.add_row(name, *cells)
+    missed = "" if timing.lockstep else f", {timing.missed} deadlines missed"
+    table.caption = f"t {timing.time_s:.1f} s: {timing.ticks} ticks, {timing.overruns} overruns{missed}"
+    table.caption_justify = "left"
+    return table

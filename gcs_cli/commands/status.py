@@ -1,0 +1,81 @@
+"""``gcs status``: how the vehicle is, once."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from gcs_cli.settings import ConnectOption, JsonOption, TimeoutOption, meet_vehicle
+
+if TYPE_CHECKING:
+    from gcs_cli.view_types import VehicleView
+
+GATHER_S = 2.0
+
+
+def status(
+    context: typer.Context,
+    as_json: JsonOption = False,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+) -> None:
+    """Show how the vehicle is."""
+    with meet_vehicle(context, connect, timeout) as connection:
+        session = connection.session
+        # most of what is shown comes several times a second; what the vehicle does not send stays unknown
+        connection.wait_for(lambda: _is_full(session.view), GATHER_S)
+        view = session.view
+    facts = status_facts(view)
+    if as_json:
+        typer.echo(json.dumps(facts))
+        return
+    for name, value in facts.items():
+        typer.echo(f"{name:<20} {_shown(value)}")
+
+
+def _is_full(view: VehicleView) -> bool:
+    known = (view.attitude, view.position_ned_m, view.geo, view.mission.current, view.timing)
+    return all(part is not None for part in known) and view.landed_state != 0
+
+
+def status_facts(view: VehicleView) -> dict[str, Any]:
+    """Return what ``--json`` prints: SI units, degrees for angles, null for what is not known."""
+    attitude = view.attitude
+    battery, geo, timing = view.battery, view.geo, view.timing
+    return {
+        "system": None if view.identity is None else view.identity.system_id,
+        "mode": view.mode,
+        "armed": view.armed,
+        "landed": {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}.get(view.landed_state),
+        "time_s": view.time_s,
+        "euler_deg": None if attitude is None else [round(math.degrees(a), 3) for a in attitude],
+        "pos_ned_m": _rounded(view.position_ned_m),
+        "vel_ned_m_s": _rounded(view.velocity_ned_m_s),
+        "latitude_deg": None if geo is None else geo.latitude_deg,
+        "longitude_deg": None if geo is None else geo.longitude_deg,
+        "altitude_m": None if geo is None else geo.altitude_m,
+        "mission_current": view.mission.current,
+        "mission_total": view.mission.total,
+        "mission_reached": view.mission.reached,
+        "mission_complete": view.mission.complete,
+        "battery_remaining": None if battery is None else battery.remaining,
+        "rotor_rpm": list(view.rotor_rpm),
+        "inner_hz": None if timing is None else timing.inner_hz,
+        "overruns": None if timing is None else timing.overruns,
+        "texts": [entry.text for entry in view.texts],
+    }
+
+
+def _rounded(values: tuple[float, ...] | None) -> list[float] | None:
+    return None if values is None else [round(value, 4) for value in values]
+
+
+def _shown(value: Any) -> str:
+    if value is None or value == []:
+        return "—"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "  ".join(str(part) for part in value) if isinstance(value, list) else str(value)

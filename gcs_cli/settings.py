@@ -1,0 +1,84 @@
+"""The flags that all commands share."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+import typer
+
+from gcs_cli.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
+from gcs_cli.errors import USAGE, CliError
+
+if TYPE_CHECKING:
+    from gcs_cli.connection import Connection
+
+DEFAULT_TIMEOUT_S = 5.0
+
+ConnectOption = Annotated[
+    str | None,
+    typer.Option(
+        "--connect",
+        metavar="LINK",
+        help="Where the vehicle is: udp:PORT, udpin:HOST:PORT or udpout:HOST:PORT.  "
+        f"[default: {DEFAULT_CONNECTION}]",
+        show_default=False,
+    ),
+]
+TimeoutOption = Annotated[
+    float | None,
+    typer.Option(
+        "--timeout",
+        metavar="SECONDS",
+        help=f"How long to wait for the vehicle.  [default: {DEFAULT_TIMEOUT_S:g}]",
+        show_default=False,
+    ),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+class Settings(NamedTuple):
+    """Flags given before the command; None: not given."""
+
+    connect: str | None = None
+    timeout_s: float | None = None
+
+    def merged(self, connect: str | None, timeout_s: float | None) -> Settings:
+        """Return these with those given after the command, which win."""
+        return Settings(
+            self.connect if connect is None else connect, self.timeout_s if timeout_s is None else timeout_s
+        )
+
+    @property
+    def endpoint(self) -> Endpoint:
+        """Where the vehicle is; raise CliError (usage)."""
+        return parse_endpoint(DEFAULT_CONNECTION if self.connect is None else self.connect)
+
+    @property
+    def patience_s(self) -> float:
+        """How long to wait for the vehicle; raise CliError (usage)."""
+        timeout_s = DEFAULT_TIMEOUT_S if self.timeout_s is None else self.timeout_s
+        if not (math.isfinite(timeout_s) and timeout_s > 0):
+            raise CliError(f"--timeout {timeout_s:g}: expected seconds above zero", USAGE)
+        return timeout_s
+
+
+def settings_of(context: typer.Context) -> Settings:
+    """Return the flags given before the command."""
+    found = context.find_object(Settings)
+    return Settings() if found is None else found
+
+
+def meet_vehicle(context: typer.Context, connect: str | None, timeout_s: float | None) -> Connection:
+    """Open the link and wait for the vehicle; raise CliError."""
+    from gcs_cli.connection import Connection  # noqa: PLC0415
+
+    settings = settings_of(context).merged(connect, timeout_s)
+    patience_s = settings.patience_s
+    connection = Connection(settings.endpoint)
+    try:
+        connection.meet(patience_s)
+    except BaseException:
+        connection.close()
+        raise
+    return connection
