@@ -1,7 +1,7 @@
 """The ground station's side of the mission protocol, without I/O.
 
 ``start_…`` begins an operation, ``poll`` returns what to send, ``receive`` takes what came, and ``result``
-says how it ended. One operation at a time; a new ``start_…`` replaces the old one.
+says how it ended. One operation at a time; a new ``start_…`` cancels the one under way.
 """
 
 from __future__ import annotations
@@ -57,6 +57,8 @@ class MissionClient:
         self._deadline_s: float | None = None
         self._give_up_s = math.inf
         self._sends_left = 0
+        self._is_settling = False
+        self._busy_s = -math.inf  # when a message of the protocol was last sent or taken
 
     def start_upload(self, items: Sequence[MissionItem]) -> None:
         """Replace the vehicle's mission by ``items``; no items clear it."""
@@ -77,6 +79,7 @@ class MissionClient:
     def cancel(self) -> None:
         """Give up the operation under way, and say so to the vehicle."""
         if self._operation is not None and self._operation.result is None:
+            self._outbox.clear()
             self._give_up(self._operation, "the operation was cancelled")
 
     @property
@@ -100,6 +103,10 @@ class MissionClient:
                 return
         elif kind != "MISSION_CURRENT":
             return
+        self._busy_s = now_s
+        if self._is_settling:
+            self._receive_early(kind, now_s)
+            return
         self._outbox += operation.receive(message)
         if operation.result is not None:
             self._deadline_s = None
@@ -117,10 +124,13 @@ class MissionClient:
             if is_over:
                 self._give_up(operation, f"the vehicle (system {self.vehicle.system}) {operation.silence()}")
             else:
+                self._is_settling = False
                 self._sends_left -= 1
                 self._outbox.append(operation.request)
                 self._wait(operation, now_s)
         outbox, self._outbox = self._outbox, []
+        if outbox:
+            self._busy_s = now_s
         return outbox
 
     def next_deadline(self) -> float | None:
@@ -128,10 +138,21 @@ class MissionClient:
         return -math.inf if self._outbox else self._deadline_s
 
     def _start(self, operation: Operation) -> None:
-        self._operation = operation
-        self._outbox.clear()
+        self.cancel()
+        before, self._operation = self._operation, operation
         self._deadline_s = -math.inf  # the first poll sends the request and starts the clock
+        quiet_s = operation.quiet_after(before, self._timing) if before is not None else 0.0
+        if quiet_s > 0.0:
+            self._deadline_s = self._busy_s + quiet_s
+        self._is_settling = quiet_s > 0.0
         self._sends_left = self._timing.retries + 1
+
+    def _receive_early(self, kind: str, now_s: float) -> None:
+        """Take a message of the operation before: a vehicle that still asks for items is told to stop."""
+        if self._operation is not None and kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+            self._outbox.append(self._operation.ack(MissionResult.OPERATION_CANCELLED))
+            if self._deadline_s is not None:
+                self._deadline_s = now_s + self._timing.silence_s + self._timing.settle_s
 
     def _wait(self, operation: Operation, now_s: float) -> None:
         timing = self._timing

@@ -35,6 +35,12 @@ class Timing(NamedTuple):
     one item in 460 would be lost by all six attempts, so that half of all missions of 320 items would fail.
     """
 
+    settle_s: float = 0.5
+    """Quiet time between two operations of one client that late messages could mix.
+
+    No message says which transfer it belongs to.
+    """
+
 
 DEFAULT_TIMING = Timing()
 

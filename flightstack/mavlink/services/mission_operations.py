@@ -12,7 +12,12 @@ from typing import NamedTuple
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.mission_messages import ack_message, item_from_message, message_from_item
+from flightstack.mavlink.services.mission_messages import (
+    Timing,
+    ack_message,
+    item_from_message,
+    message_from_item,
+)
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionResult, result_name
 
@@ -39,6 +44,8 @@ class Operation:
 
     waits_for_item = False
     is_transfer = True
+    may_be_open = False
+    """Whether the vehicle may still wait for the first item of an upload that is over for us."""
 
     def __init__(self, vehicle: Address, mission_type: int, request: Message) -> None:
         self.vehicle = vehicle
@@ -60,12 +67,24 @@ class Operation:
         """Take a message of this mission type from the vehicle, and return the answers to it."""
         raise NotImplementedError
 
+    def quiet_after(self, before: Operation, timing: Timing) -> float:
+        """Return how long [s] the link must be quiet between the operation ``before`` and this one.
+
+        No message says which transfer it belongs to, so late ones must be gone. Downloads share no message
+        with the others that would matter.
+        """
+        kinds = (type(self), type(before))
+        if SetCurrent in kinds or (kinds[0] is Download) != (kinds[1] is Download):
+            return 0.0
+        return timing.settle_s + (timing.silence_s if before.may_be_open else 0.0)
+
     def ack(self, result: MissionResult) -> Message:
         """Return the MISSION_ACK that ends the operation."""
         return ack_message(self.vehicle, result, self.mission_type)
 
     def refused(self, result: int, seq: int | None = None) -> None:
         """End the operation with the vehicle's refusal."""
+        self.may_be_open = False
         self.result = Failed(f"the vehicle refused: {result_name(result)}", result, seq)
 
 
@@ -79,6 +98,7 @@ class Upload(Operation):
         self._count_message = count
         self._is_serving = False
         self._last_sent_seq = -1
+        self.may_be_open = True
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -115,6 +135,7 @@ class Upload(Operation):
             return [self.ack(MissionResult.INVALID_SEQUENCE)]
         self._is_serving = True
         self._last_sent_seq = max(self._last_sent_seq, seq)
+        self.may_be_open = self._last_sent_seq < 1
         # Integers even to the deprecated MISSION_REQUEST, as the specification says. The item is also what is
         # sent again in silence: a vehicle answers a repeated last item with the MISSION_ACK that got lost.
         self.request = message_from_item(
