@@ -13,7 +13,7 @@ from flightstack.commander.transitions import Event, Facts, Outcome, Status, tra
 from flightstack.contract import FloatArray, LoopRow, LoopStatus
 from flightstack.control.backend import ControlBackend
 from flightstack.geodesy import GeoPoint
-from flightstack.guidance.mission import TAKEOFF
+from flightstack.guidance.mission import NAV_DELAY, TAKEOFF
 from flightstack.guidance.navigator import MissionProgress, Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.guidance.plan_table import plan_table
@@ -28,7 +28,7 @@ EMERGENCY, ALERT, CRITICAL, ERROR, WARNING, NOTICE, INFO = range(7)
 
 COS_MAX_ARMING_TILT = math.cos(math.radians(30.0))
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
-"""Modes that make a standing vehicle fly."""
+"""Modes that make a standing vehicle fly, now or later."""
 
 
 class Recorder(Protocol):
@@ -74,6 +74,8 @@ class Snapshot:
     progress: MissionProgress = MissionProgress(0, -1, False, False)
     mission_count: int = 0
     mission_complete: bool = False
+    reached: list[int] = field(default_factory=list)
+    """Mission items reached that telemetry has yet to announce."""
     texts: list[Text] = field(default_factory=list)
 
 
@@ -124,7 +126,7 @@ class Autopilot:
         self._tick += 1
         if outer_due:
             self._supervise(time_us)
-            if self._flying:
+            if self._flying or now.status.mode is Mode.MISSION:  # a mission also waits on the ground
                 self._navigator.step(now.status.mode, state, now.attitude_target)
         row = self._recorder.inner_row(time_us)
         if self._flying:
@@ -190,12 +192,15 @@ class Autopilot:
     def _watch_mission(self, time_us: int) -> None:
         progress = self._navigator.progress
         if progress != self.now.progress:
-            if progress.reached != self.now.progress.reached and progress.reached >= 0:
-                self.say(INFO, f"Mission item {progress.reached} reached")
+            for seq in self._navigator.reached_items():
+                self.now.reached.append(seq)
+                self.say(INFO, f"Mission item {seq} reached")
             self.now.progress = progress
             self._recorder.mission(time_us, progress, len(self.items))
+            self._choose_loops()
         if progress.wants_return:
             self.now.mission_complete = True
+            self.say(INFO, "Mission finished: returning home")
             self.happen(Event.MISSION_ASKS_RETURN)
         elif progress.finished:
             self.now.mission_complete = True
@@ -222,7 +227,7 @@ class Autopilot:
 
     def _mission_begins_with_takeoff(self) -> bool:
         for item in self.items:
-            if item.command < 95:  # MAV_CMD_NAV_LAST: the first item that moves the vehicle
+            if item.command < NAV_DELAY:  # the first item that moves the vehicle
                 return item.command == TAKEOFF
         return False
 
@@ -257,13 +262,19 @@ class Autopilot:
             self.now.landed = True
         if after.mode is Mode.MISSION and before.mode is not Mode.MISSION:
             self.now.mission_complete = False
-        reentered = event in (Event.SELECT_TAKEOFF, Event.SELECT_HOLD)
-        self._choose_loops(entering=after.mode is not before.mode or reentered)
+        if event in (Event.TAKEOFF_REACHED, Event.MISSION_FINISHED):
+            if event is Event.MISSION_FINISHED:
+                self._navigator.hold_at_last_item()
+            self._choose_loops()
+        else:
+            reentered = event in (Event.SELECT_TAKEOFF, Event.SELECT_HOLD)
+            self._choose_loops(entering=after.mode is not before.mode or reentered)
 
     def _choose_loops(self, entering: bool = False) -> None:
         """Start or stop the loops, and let guidance enter the mode."""
         status = self.now.status
-        flying = status.armed and (not self.now.landed or status.mode in AIRBORNE_MODES)
+        rises = status.mode is Mode.TAKEOFF or (status.mode is Mode.MISSION and self._navigator.mission_flies)
+        flying = status.armed and (not self.now.landed or rises)
         starting = flying and not self._flying
         if starting:
             self._backend.reset(self._state)

@@ -57,6 +57,17 @@ def rotate(q: Quaternion, v: Vector3) -> Vector3:
 
 
 @compiled
+def blend(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
+    """Attitude at ``fraction`` of the short way from ``a`` to ``b``, for small angles between them."""
+    near = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z
+    to = fraction if near >= 0.0 else -fraction
+    left = 1.0 - fraction
+    return normalised(
+        Quaternion(left * a.w + to * b.w, left * a.x + to * b.x, left * a.y + to * b.y, left * a.z + to * b.z)
+    )
+
+
+@compiled
 def rotation_vector(q: Quaternion) -> Vector3:
     """Logarithm of a unit quaternion: axis times angle [rad], the angle in [0, π].
 

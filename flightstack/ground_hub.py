@@ -77,7 +77,6 @@ class GroundHub:
         self._missions = MissionServer(own, autopilot.check_mission)
         self._commands = CommandServer(own, [*HANDLERS, *LINK_COMMANDS])
         self._shown = (facts.armed, facts.mode)
-        self._reached = -1
         self.shutdown_requested = False
 
     # ------------------------------------------------------------------ peers
@@ -231,17 +230,15 @@ class GroundHub:
     def _note_changes(self) -> bool:
         """Announce reached items; tell whether mode or arming changed."""
         facts = self._facts
-        reached = self._autopilot.now.progress.reached
-        if reached != self._reached:
-            self._reached = reached
-            if reached >= 0:
-                self._to_all(mavlink.MAVLink_mission_item_reached_message(reached))
-            self._to_all(MAKERS[mavlink.MAVLINK_MSG_ID_MISSION_CURRENT](facts))
+        reached = self._autopilot.now.reached
+        for seq in reached:
+            self._to_all(mavlink.MAVLink_mission_item_reached_message(seq))
         shown = (facts.armed, facts.mode)
         changed = shown != self._shown
         self._shown = shown
-        if changed:
+        if changed or reached:
             self._to_all(MAKERS[mavlink.MAVLINK_MSG_ID_MISSION_CURRENT](facts))
+        reached.clear()
         return changed
 
     def _spread_texts(self) -> None:

@@ -33,7 +33,7 @@ from flightstack.control.position_pid import (
     position_pid_step,
     read_position_params,
 )
-from flightstack.geometry import conjugate, quaternion_product, rotation_vector
+from flightstack.geometry import blend, conjugate, quaternion_product, rotation_vector
 from flightstack.params.toml_reader import Table
 from flightstack.params.vehicle import Vehicle
 
@@ -130,7 +130,9 @@ def _status(row: FloatArray) -> int:
 
 def inner_kernel(
     state: FloatArray,
+    last_target: FloatArray,
     target: FloatArray,
+    fraction: float,
     rotor_speed_rad_s: FloatArray,
     reference_memory: FloatArray,
     reference_params: FloatArray,
@@ -144,7 +146,9 @@ def inner_kernel(
     """Run reference filter, attitude controller and mixer on arrays; write ``row`` and a copy to ``last``.
 
     ``last`` (48,) is the row of the previous tick: anti-windup and Ω_r come from it, and it is repeated, with
-    a status bit, when an input is not finite. A template: ``specialise`` binds the controller.
+    a status bit, when an input is not finite. The target moves in a straight line from ``last_target`` (the
+    outer loop's tick before) to ``target`` over an outer period, ``fraction`` of which has passed: its steps
+    would shake the rotors at the outer rate. A template: ``specialise`` binds the controller.
     """
     if not (all_finite(state) and all_finite(target)):
         row[:] = last
@@ -155,7 +159,7 @@ def inner_kernel(
     now, aim = vehicle_state(state), attitude_target(target)
     filtered, reference = attitude_reference_step(
         ReferenceMemory(*as_tuple(reference_memory, REFERENCE_MEMORY_SIZE)),
-        aim.attitude,
+        blend(attitude_target(last_target).attitude, aim.attitude, fraction),
         ReferenceParams(*as_tuple(reference_params, REFERENCE_PARAMS_SIZE)),
         dt_s,
     )
@@ -215,6 +219,7 @@ class PythonLoops:
         max_tilt_rad: float,
     ) -> None:
         self._inner_dt_s, self._outer_dt_s = 1.0 / inner_hz, 1.0 / outer_hz
+        self._fraction_step, self._fraction = outer_hz / inner_hz, 0.0
         self._position_params = np.array(read_position_params(vehicle, gains, max_tilt_rad))
         self._reference_params = np.array(read_reference_params(gains))
         section = f"attitude_{controller.name}"
@@ -234,6 +239,7 @@ class PythonLoops:
             CONTROLLER_PARAMS_SIZE=len(self._controller_params),
         )
         self.attitude_target = np.zeros(ATTITUDE_TARGET_SIZE)
+        self._last_target = np.zeros(ATTITUDE_TARGET_SIZE)
         self._position_memory = np.zeros(POSITION_MEMORY_SIZE)
         self._reference_memory = np.zeros(REFERENCE_MEMORY_SIZE)
         self._controller_memory = self._initial_memory.copy()
@@ -248,6 +254,8 @@ class PythonLoops:
         self._reference_memory[4:] = 0.0
         self.attitude_target[:4] = state[6:10]
         self.attitude_target[4] = 0.0
+        self._last_target[:] = self.attitude_target
+        self._fraction = 0.0
         self._last[:] = 0.0
 
     def step(
@@ -255,12 +263,17 @@ class PythonLoops:
     ) -> None:
         """Run the outer loop if it is due, then the inner loop; write ``row`` with the rotor commands."""
         if outer_due:
+            self._last_target[:] = self.attitude_target
+            self._fraction = 0.0
             outer_kernel(
                 state, setpoint, self._position_memory, self._position_params, self._outer_dt_s, self.attitude_target
             )
+        self._fraction += self._fraction_step
         self._kernel(
             state,
+            self._last_target,
             self.attitude_target,
+            self._fraction,
             rotor_speed_rad_s,
             self._reference_memory,
             self._reference_params,

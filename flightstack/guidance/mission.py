@@ -32,7 +32,10 @@ DO_CHANGE_SPEED = 178
 # progress: the current item and its phase, the last item reached (−1: none), and the goal in force
 M_CURRENT, M_PHASE, M_TIMER, M_REACHED, M_FINISHED, M_WANTS_RETURN = range(6)
 M_X, M_Y, M_Z, M_YAW, M_YAW_IS_SET, M_YAW_RATE, M_SPEED = range(6, 13)
-MISSION_MEMORY_SIZE = 13
+# items reached since the start, the newest ``LOG_SIZE`` of them: several may be reached in one tick
+M_LOG_COUNT, M_LOG = 13, 14
+LOG_SIZE = 64
+MISSION_MEMORY_SIZE = M_LOG + LOG_SIZE
 
 BEGIN, TRAVEL, STAY = 0.0, 1.0, 2.0
 """Phases of an item: about to begin; on the way; there (waiting out its time, or descending)."""
@@ -43,15 +46,22 @@ def mission_start(
     m: FloatArray, current: float, x: float, y: float, z: float, yaw_rad: float, params: GuidanceParams
 ) -> None:
     """Set ``m`` to a mission about to begin item ``current`` with the reference at x, y, z [m NED]."""
-    m[:] = 0.0
+    m[:M_LOG_COUNT] = 0.0
     m[M_CURRENT], m[M_PHASE], m[M_REACHED] = current, BEGIN, -1.0
     m[M_X], m[M_Y], m[M_Z], m[M_YAW] = x, y, z, yaw_rad
     m[M_YAW_RATE], m[M_SPEED] = params.yaw_rate_rad_s, params.cruise_speed_m_s
 
 
 @compiled
-def _advance(m: FloatArray, to: float) -> None:
+def _note_reached(m: FloatArray) -> None:
     m[M_REACHED] = m[M_CURRENT]
+    m[M_LOG + int(m[M_LOG_COUNT]) % LOG_SIZE] = m[M_CURRENT]
+    m[M_LOG_COUNT] += 1.0
+
+
+@compiled
+def _advance(m: FloatArray, to: float) -> None:
+    _note_reached(m)
     m[M_CURRENT] = to
     m[M_PHASE] = BEGIN
     m[M_TIMER] = 0.0
@@ -125,7 +135,7 @@ def _begin(
                 jumps_left[index] -= 1.0
             _advance(m, item[PARAM1] if jumps else index + 1.0)
         elif command == RETURN_TO_LAUNCH:
-            m[M_REACHED] = m[M_CURRENT]
+            _note_reached(m)
             m[M_WANTS_RETURN] = 1.0
             break
         elif command == CONDITION_YAW:

@@ -12,17 +12,28 @@ from flightstack.contract import SETPOINT_SIZE, FloatArray, VehicleState
 from flightstack.geometry import euler_from_quaternion
 from flightstack.guidance.land_detector import LandMemory, land_detector_step
 from flightstack.guidance.mission import (
+    COMMAND,
+    CONDITION_YAW,
+    LOG_SIZE,
     M_CURRENT,
     M_FINISHED,
+    M_LOG,
+    M_LOG_COUNT,
     M_REACHED,
     M_WANTS_RETURN,
+    M_X,
+    M_Y,
+    M_YAW,
+    M_Z,
     MISSION_MEMORY_SIZE,
+    NAV_DELAY,
     PLAN_COLUMNS,
     landing_speed,
     mission_goal,
     mission_start,
     mission_step,
 )
+from flightstack.guidance.mission import LAND as LAND_ITEM
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.trajectory import (
     BRAKING,
@@ -129,6 +140,7 @@ class Navigator:
         self.setpoint = np.zeros(SETPOINT_SIZE)
         self._trajectory = np.zeros(TRAJECTORY_SIZE)
         self._mission = np.zeros(MISSION_MEMORY_SIZE)
+        self._reported = 0
         self._aim = np.zeros(AIM_SIZE)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0))
         self._plan = np.zeros((0, PLAN_COLUMNS))
@@ -145,6 +157,21 @@ class Navigator:
         """Progress of the mission."""
         m = self._mission
         return MissionProgress(int(m[M_CURRENT]), int(m[M_REACHED]), bool(m[M_FINISHED]), bool(m[M_WANTS_RETURN]))
+
+    @property
+    def mission_flies(self) -> bool:
+        """Whether the current item needs the vehicle in the air; a standing one waits for the others."""
+        current = int(self._mission[M_CURRENT])
+        if self._mission[M_FINISHED] > 0.0 or current >= len(self._plan):
+            return False
+        return self._plan[current, COMMAND] not in (LAND_ITEM, NAV_DELAY, CONDITION_YAW)
+
+    def reached_items(self) -> list[int]:
+        """Return the items reached since the last call, in order."""
+        count = int(self._mission[M_LOG_COUNT])
+        fresh = range(max(self._reported, count - LOG_SIZE), count)
+        self._reported = count
+        return [int(self._mission[M_LOG + index % LOG_SIZE]) for index in fresh]
 
     def set_plan(self, plan: FloatArray, jumps: FloatArray) -> None:
         """Take a new plan, to be flown from its first item; ``jumps`` are the repeats of its DO_JUMPs."""
@@ -194,6 +221,11 @@ class Navigator:
             self._jumps_left = self._jumps.copy()
         self.set_current(int(self._mission[M_CURRENT]))
         self._mission[M_REACHED] = reached
+
+    def hold_at_last_item(self) -> None:
+        """Hold where the mission that has just ended was going to; a takeoff's goal needs no such step."""
+        m = self._mission
+        self._aim[A_X], self._aim[A_Y], self._aim[A_Z], self._aim[A_YAW] = m[M_X], m[M_Y], m[M_Z], m[M_YAW]
 
     def step(self, mode: Mode, state: FloatArray, attitude_target: FloatArray) -> None:
         """Advance by one outer tick and write ``setpoint``."""

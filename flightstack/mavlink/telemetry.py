@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import Protocol
 
 
-from flightstack.contract import FloatArray, LoopRow
+from flightstack.contract import FloatArray, LoopRow, Vector3
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Message
@@ -146,7 +146,7 @@ def _position_target(f: VehicleFacts) -> Message:
 
 def _global_position(f: VehicleFacts) -> Message:
     x = f.state.tolist()
-    point = f.frame.to_geo(x[:3])
+    point = f.frame.to_geo(Vector3(*x[:3]))
     heading = math.degrees(euler(x[6:10])[2]) % 360.0 if math.isfinite(x[6]) else 0.0
     return mavlink.MAVLink_global_position_int_message(
         boot_ms(f),

@@ -1,0 +1,51 @@
+# make fly: set up and fly the square.  make test: set up and run every test.  make check: what CI runs.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+.DEFAULT_GOAL := help
+
+.PHONY: help setup fly test check lint types imports generated generate bench clean
+
+help: ## Show the targets
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+
+setup: $(READY) ## Make the virtual environment and compile the control loops
+
+$(READY): pyproject.toml
+	@test -x $(BIN)/python || $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "flightstack needs Python 3.11 or newer: run make with PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@echo "Installing dependencies into $(VENV) ..."
+	@$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[dev]'
+	@touch $@
+
+fly: $(READY) ## Fly missions/square.plan: simulator, flight stack and ground station as three processes
+	@$(BIN)/gcs fly missions/square.plan
+
+test: $(READY) ## Run every test
+	@$(BIN)/python -m pytest
+
+check: lint types imports generated test ## Everything that CI checks
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(READY)
+	$(BIN)/mypy
+
+imports: $(READY)
+	$(BIN)/lint-imports
+
+generated: $(READY)
+	$(BIN)/python tools/generate_dialect.py --check
+
+generate: $(READY) ## Regenerate files made from others
+	$(BIN)/python tools/generate_dialect.py
+
+bench: $(READY) ## Print speeds beside their floors
+	@$(BIN)/python -m benchmarks
+
+clean: ## Remove the environment and all that was made
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

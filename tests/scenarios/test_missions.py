@@ -1,0 +1,146 @@
+"""Whole missions in one process, in simulated time, on the bytes that go over the wire."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from flightstack.mavlink.services.mission_client import Done
+from flightstack.modes import Mode
+from tests.support.world import World, item
+
+SQUARE = [(10.0, 0.0, -3.0), (10.0, 10.0, -5.0), (0.0, 10.0, -4.0), (0.0, 0.0, -3.0)]
+
+# the fastest of the paper's loops needs 1 kHz (paper/errata: gain margin 3.8 dB at 500 Hz)
+GAINS = [("tuned", 500.0, 100.0), ("paper", 1000.0, 250.0)]
+
+
+def fly_square(**options: object) -> tuple[World, list[np.ndarray]]:
+    world = World(**options)
+    world.upload("square.plan")
+    world.start_mission()
+    path = []
+    while world.armed:
+        world.run(0.02)
+        path.append(world.position)
+        assert world.time_s < 60.0, world.texts
+    return world, path
+
+
+@pytest.mark.parametrize("controller", ["pid", "backstepping"])
+@pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
+def test_square_is_flown_through_every_corner_and_ends_disarmed_at_home(vehicle: str, controller: str) -> None:
+    world, path = fly_square(vehicle=vehicle, controller=controller)
+    assert world.reached == [0, 1, 2, 3, 4, 5]
+    assert "Mission finished" in world.texts
+    for corner in SQUARE:
+        miss = min(float(np.linalg.norm(position - corner)) for position in path)
+        assert miss < 0.6, corner  # acceptance radius 0.5 m; largest miss seen 0.51 m
+    # lands on its spot: 9 mm off at most in the four flights
+    assert np.linalg.norm(world.position[:2]) < 0.05
+    assert abs(world.altitude) < 0.01
+
+
+@pytest.mark.parametrize("controller", ["pid", "backstepping"])
+@pytest.mark.parametrize(("gains", "inner_hz", "outer_hz"), GAINS)
+@pytest.mark.parametrize("plant", ["rigid", "paper"])
+def test_both_controllers_fly_with_both_sets_of_gains_on_both_plants(
+    controller: str, gains: str, inner_hz: float, outer_hz: float, plant: str
+) -> None:
+    world, _ = fly_square(controller=controller, gains=gains, inner_hz=inner_hz, outer_hz=outer_hz, plant=plant)
+    assert world.reached == [0, 1, 2, 3, 4, 5]
+    assert abs(world.altitude) < 0.01
+
+
+def test_ideal_rotors_fly_the_papers_gains_without_limits() -> None:
+    world, _ = fly_square(controller="backstepping", gains="paper", inner_hz=1000.0, ideal_rotors=True)
+    assert world.reached == [0, 1, 2, 3, 4, 5]
+
+
+def test_every_mission_item_is_flown() -> None:
+    world = World()
+    done = world.upload("every_item.plan")
+    assert isinstance(done, Done)
+    assert {item.command for item in done.items} == {16, 19, 20, 21, 22, 93, 115, 177, 178}
+    world.start_mission()
+    world.until_disarmed(limit_s=120.0)
+    # item 6 jumps back to 2 once; item 9 always jumps over the landing (10) to the return
+    assert world.reached == [0, 1, 2, 3, 4, 5, 6, 2, 3, 4, 5, 6, 7, 8, 9, 11]
+    assert np.linalg.norm(world.position[:2]) < 0.05
+
+
+def test_a_landing_in_the_middle_of_a_mission_is_followed_by_a_second_takeoff() -> None:
+    world = World()
+    hop = [item(22, z=2.0), item(21, north=3.0), item(93, p1=2.0), item(22, z=2.0), item(21)]
+    world.upload(hop)
+    world.start_mission()
+    world.until(lambda: 1 in world.reached)
+    world.run(1.0)
+    assert world.landed
+    assert world.armed
+    world.until_disarmed()
+    assert world.reached == [0, 1, 2, 3, 4]
+    assert world.texts.count("Takeoff detected") == 2
+
+
+def test_wind_and_gusts_are_withstood() -> None:
+    world, path = fly_square(vehicle="x_quad", wind=(5.0, -3.0, 0.0), gust=1.0, seed=3)
+    assert world.reached == [0, 1, 2, 3, 4, 5]
+    for corner in SQUARE:
+        assert min(float(np.linalg.norm(position - corner)) for position in path) < 0.7  # 0.55 m seen
+
+
+def test_constant_torque_is_integrated_away() -> None:
+    world = World(torque=(0.02, 0.0, 0.0))
+    world.takeoff(3.0)
+    world.arm()
+    world.until(lambda: world.mode is Mode.HOLD)
+    world.run(15.0)
+    assert np.linalg.norm(world.position - (0.0, 0.0, -3.0)) < 0.02  # 3 mm seen
+
+
+def test_same_seed_gives_the_same_log_byte_for_byte_and_another_seed_another() -> None:
+    options = {"vehicle": "x_quad", "gust": 1.5}
+    logs = [fly_square(seed=seed, **options)[0].log for seed in (5, 5, 6)]
+    assert len(logs[0]) > 1_000_000
+    assert logs[0] == logs[1]
+    assert logs[0] != logs[2]
+
+
+@pytest.mark.parametrize(("inner_hz", "outer_hz"), [(250.0, 50.0), (500.0, 100.0), (1000.0, 100.0), (400.0, 400.0)])
+def test_the_rates_are_free(inner_hz: float, outer_hz: float) -> None:
+    world = World(inner_hz=inner_hz, outer_hz=outer_hz)
+    world.upload("hop.plan")
+    world.start_mission()
+    world.until_disarmed(60.0)
+    assert world.reached == [0, 1]
+
+
+def test_the_reference_is_followed_closely() -> None:
+    """The tracking error of a smooth leg in still air: reference model and feed-forward leave millimetres."""
+    world = World()
+    world.upload("square.plan")
+    world.start_mission()
+    errors = []
+    while world.armed:
+        world.run(0.01)
+        if not world.landed:
+            errors.append(float(np.linalg.norm(world.position - world.stack.autopilot.now.setpoint[:3])))
+    assert max(errors[: -int(1.0 / 0.01)]) < 0.25
+    assert float(np.sqrt(np.mean(np.square(errors)))) < 0.08
+
+
+def test_an_upright_vehicle_keeps_its_integrators_quiet_on_the_ground() -> None:
+    """Armed and waiting, nothing winds up: the takeoff after a long wait is the takeoff after a short one."""
+    climbs = []
+    for wait_s in (0.0, 20.0):
+        world = World()
+        world.arm()
+        world.run(wait_s)
+        world.takeoff(2.0)
+        world.run(3.0)
+        climbs.append(world.position)
+    for a, b in itertools.pairwise(climbs):
+        assert np.allclose(a, b, atol=1e-3)  # 4e-6 seen

@@ -1,0 +1,274 @@
+"""A whole flight in one process: simulator, flight stack and ground station on the bytes that sockets would carry.
+
+Time is simulated; nothing here reads a clock. A scenario is a story of verbs:
+
+    world = World(vehicle="x_quad", wind=(4.0, 0.0, 0.0))
+    world.upload("square.plan")
+    world.start_mission()
+    world.until_disarmed()
+    assert world.reached == [0, 1, 2, 3, 4, 5]
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from flightstack.assembly import Stack, build
+from flightstack.config import DEFAULT_HOME, StackConfig
+from flightstack.contract import Vector3
+from flightstack.geodesy import LocalFrame
+from flightstack.ground_hub import GROUND
+from flightstack.logging.flight_log import FlightLog
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.hot_frames import ActuatorsFrame
+from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.command_client import CommandClient
+from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
+from flightstack.modes import Mode
+from flightstack.params.behaviour import Behaviour, with_assignments
+from flightstack.plan import MissionItem, load_plan
+from sim_bridge.disturbance import Disturbance
+from sim_bridge.plant import PlantOptions
+from sim_bridge.simulator import Simulator
+
+MISSIONS = Path(__file__).resolve().parents[2] / "missions"
+PEER = "ground station"
+GCS = Address(255, 190)
+HELD_STEP_S = 0.001
+SERVICE_LIMIT_S = 30.0
+
+
+class TookTooLong(AssertionError):
+    """A story's condition did not come true within its simulated time."""
+
+
+class LogBuffer(io.BytesIO):
+    """A log file in memory that can be read after it was closed."""
+
+    content = b""
+
+    def close(self) -> None:
+        self.content = self.getvalue()
+        super().close()
+
+
+class World:
+    """One vehicle, its simulator and a ground station."""
+
+    def __init__(
+        self,
+        *,
+        plant: str = "rigid",
+        wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        gust: float = 0.0,
+        force: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        torque: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        seed: int = 1,
+        params: Sequence[str] = (),
+        **config: object,
+    ) -> None:
+        self.logs: list[LogBuffer] = []
+        behaviour = with_assignments(Behaviour(), list(params))
+        self.config = StackConfig(behaviour=behaviour, **config)  # type: ignore[arg-type]
+        self.stack: Stack = build(self.config, self._open_log)
+        disturbance = Disturbance(wind, gust, force, torque)
+        self.simulator = Simulator(self.stack.vehicle, plant, PlantOptions(disturbance=disturbance, seed=seed))
+        self.simulator.set_interval_us(self.stack.rates.interval_us)
+        self._actuators = ActuatorsFrame()
+        self._held_s = 0.0
+        self._link = Link(*GCS)
+        vehicle = Address(self.config.system_id, 1)
+        self._missions = MissionClient(vehicle, GCS)
+        self._commands = CommandClient(vehicle, GCS)
+        self._heartbeat_due_s = -math.inf
+        self.received: dict[str, Message] = {}
+        self.counts: dict[str, int] = {}
+        self.texts: list[str] = []
+        self.reached: list[int] = []
+        self._next_log_us = 0
+        self._ticks = 0
+        self.stack.simulator.receive(self.simulator.state_frame())
+        self.stack.autopilot.has_state = True
+        self.stack.ground.add_peer(PEER, GROUND, permanent=True)
+
+    def _open_log(self) -> FlightLog:
+        self.logs.append(LogBuffer())
+        return FlightLog(self.logs[-1], len(self.stack.vehicle.rotors))
+
+    # ------------------------------------------------------------------ what is
+
+    @property
+    def time_s(self) -> float:
+        return self.stack.autopilot.now.time_us * 1e-6
+
+    @property
+    def position(self) -> np.ndarray:
+        return self.simulator.frame.state[:3].copy()
+
+    @property
+    def velocity(self) -> np.ndarray:
+        return self.simulator.frame.state[3:6].copy()
+
+    @property
+    def altitude(self) -> float:
+        return -float(self.simulator.frame.state[2])
+
+    @property
+    def armed(self) -> bool:
+        return self.stack.autopilot.now.status.armed
+
+    @property
+    def mode(self) -> Mode:
+        return self.stack.autopilot.now.status.mode
+
+    @property
+    def landed(self) -> bool:
+        return self.stack.autopilot.now.landed
+
+    @property
+    def log(self) -> bytes:
+        return self.logs[-1].content
+
+    # ------------------------------------------------------------------ time
+
+    def _link_now_s(self) -> float:
+        return self.time_s + self._held_s
+
+    def tick(self) -> None:
+        """One exchange: state to the stack, actuators back, all as bytes."""
+        stack = self.stack
+        commands = stack.autopilot.tick(stack.simulator.time_us)
+        assert self._actuators.open(stack.simulator.answer(commands, self.armed))
+        self._ticks += 1
+        if self._ticks % stack.rates.divisor == 0:
+            time_us = stack.autopilot.now.time_us
+            if time_us >= self._next_log_us:
+                self._next_log_us = time_us + 1_000_000
+                stack.recorder.timing(time_us, **stack.report.log_fields(time_us // stack.rates.interval_us))
+            self.exchange_with_ground()
+        self.simulator.apply(self._actuators)
+        assert stack.simulator.receive(self.simulator.state_frame())
+
+    def run(self, seconds: float) -> None:
+        """Let simulated time pass."""
+        for _ in range(round(seconds * self.stack.rates.inner_hz)):
+            self.tick()
+
+    def until(self, condition: Callable[[], bool], limit_s: float = 120.0) -> None:
+        """Fly until ``condition`` holds; fail after ``limit_s`` of simulated time."""
+        for _ in range(round(limit_s * self.stack.rates.inner_hz)):
+            if condition():
+                return
+            self.tick()
+        raise TookTooLong(f"not within {limit_s} s; mode {self.mode.name}, position {self.position}, {self.texts}")
+
+    def until_disarmed(self, limit_s: float = 180.0) -> None:
+        """Fly until the vehicle has disarmed itself."""
+        self.until(lambda: not self.armed, limit_s)
+
+    # ------------------------------------------------------------------ ground station
+
+    def exchange_with_ground(self) -> None:
+        """Carry what both sides have to say, once."""
+        now_s = self._link_now_s()
+        ground = self.stack.ground
+        if now_s >= self._heartbeat_due_s:
+            self._heartbeat_due_s = now_s + 1.0
+            self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        for message in (*self._missions.poll(now_s), *self._commands.poll(now_s)):
+            self.send(message)
+        for _, _, data in list(ground.poll(now_s)):
+            for message in self._link.decode(data):
+                self._take(message, now_s)
+
+    def send(self, message: Message) -> None:
+        """Send a message of the ground station's."""
+        self.stack.ground.receive(PEER, GROUND, self._link.encode(message), self._link_now_s())
+
+    def _take(self, message: Message, now_s: float) -> None:
+        kind = message.get_type()
+        self.received[kind] = message
+        self.counts[kind] = self.counts.get(kind, 0) + 1
+        if kind == "STATUSTEXT":
+            if message.id and message.chunk_seq:
+                self.texts[-1] += message.text
+            else:
+                self.texts.append(message.text)
+        elif kind == "MISSION_ITEM_REACHED":
+            self.reached.append(message.seq)
+        self._missions.receive(message, now_s)
+        self._commands.receive(message, now_s)
+
+    def _serve(self, done: Callable[[], bool]) -> None:
+        """Exchange messages while simulated time stands still, until ``done``."""
+        began_s = self._held_s
+        while not done():
+            self._held_s += HELD_STEP_S
+            self.exchange_with_ground()
+            if self._held_s - began_s > SERVICE_LIMIT_S:
+                raise TookTooLong("no answer from the vehicle")
+
+    def upload(self, plan: str | Sequence[MissionItem]) -> Done | Failed:
+        """Upload a mission file of ``missions/`` or a list of items; return how it ended."""
+        items = load_plan(MISSIONS / plan).items if isinstance(plan, str) else plan
+        self._missions.start_upload(items)
+        self._serve(lambda: self._missions.result is not None)
+        assert self._missions.result is not None
+        return self._missions.result
+
+    def download(self) -> tuple[MissionItem, ...]:
+        """Download the mission."""
+        self._missions.start_download()
+        self._serve(lambda: self._missions.result is not None)
+        assert isinstance(self._missions.result, Done), self._missions.result
+        return tuple(self._missions.result.items)
+
+    def command(self, command: int, *params: float) -> int | None:
+        """Send a command; return its MAV_RESULT."""
+        self._commands.send(command, params, self._link_now_s())
+        self._serve(lambda: self._commands.result is not None)
+        assert self._commands.result is not None
+        return self._commands.result.result
+
+    def arm(self) -> int | None:
+        return self.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+
+    def disarm(self, force: bool = False) -> int | None:
+        return self.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 21196 if force else 0)
+
+    def start_mission(self) -> int | None:
+        """Arm and start the mission, as ``gcs fly`` does."""
+        result = self.arm()
+        return result if result else self.command(mavlink.MAV_CMD_MISSION_START)
+
+    def takeoff(self, altitude_m: float = math.nan) -> int | None:
+        """Take off to an altitude above home."""
+        amsl = altitude_m + self.config.home.altitude_m
+        return self.command(mavlink.MAV_CMD_NAV_TAKEOFF, *[math.nan] * 6, amsl)
+
+    def land(self) -> int | None:
+        return self.command(mavlink.MAV_CMD_NAV_LAND)
+
+    def return_home(self) -> int | None:
+        return self.command(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
+
+    def hold(self) -> int | None:
+        return self.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 4, 3)
+
+    def resume_mission(self) -> int | None:
+        return self.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 4, 4)
+
+
+def item(command: int, north: float = 0.0, east: float = 0.0, z: float = 0.0, p1: float = 0.0) -> MissionItem:
+    """Mission item at a place relative to the default home, altitude above home."""
+    place = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, 0.0))
+    position = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
+    if command in (93, 115, 177, 178):
+        return MissionItem(command, 2, p1)
+    return MissionItem(command, 6, p1, 0.0, 0.0, math.nan, *position, z)
