@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import signal
 import sys
 from typing import Annotated, Any
 
@@ -13,7 +12,7 @@ import typer
 from flightstack.contract import Vector3
 from flightstack.params.errors import ConfigError
 from sim_bridge import arguments
-from sim_bridge.arguments import UsageProblemError
+from sim_bridge.errors import PlantDivergedError, UsageProblemError
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -159,23 +158,13 @@ def _table(state: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _main(argv: list[str] | None) -> int:
-    from sim_bridge.simulator import PlantDivergedError  # noqa: PLC0415
-
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line; return the exit code."""
     try:
         return app(argv, standalone_mode=False) or 0
     except PlantDivergedError as error:
         print(f"sim-bridge: {error}", file=sys.stderr)
         return 1
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Run the command line; return the exit code."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # until the server takes over
-    try:
-        return _main(argv)
-    except (KeyboardInterrupt, typer.Abort):
-        return 0
     except _UsageError as error:
         message: str = getattr(error, "format_message", error.__str__)()
         print(f"sim-bridge: {message}", file=sys.stderr)

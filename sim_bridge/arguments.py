@@ -7,12 +7,9 @@ import math
 from flightstack.contract import Vector3
 from flightstack.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.errors import UsageProblemError
 
 PLANT_NAMES = ("rigid", "paper")
-
-
-class UsageProblemError(Exception):
-    """A bad argument."""
 
 
 def numbers(flag: str, text: str, counts: tuple[int, ...]) -> tuple[float, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import select
 import signal
 import socket
@@ -133,6 +134,7 @@ class Connection:
             self._stop.wait_for(self._socket, select.POLLOUT, deadline_ns)
             self.send(memoryview(data)[sent:])
 
-    def close(self) -> None:
-        """Close the connection."""
-        self._socket.close()
+    def send_last(self, data: bytes) -> None:
+        """Send ``data`` if that can be done at once, else not at all."""
+        with contextlib.suppress(OSError):
+            self._socket.send(data)

@@ -12,9 +12,9 @@ from flightstack.geometry import euler_from_quaternion
 from flightstack.mavlink.hot_frames import ARMED_FLAG
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.disturbance import Disturbance
+from sim_bridge.errors import PlantDivergedError
 from sim_bridge.layout import DIVERGED
 from sim_bridge.plant import CompiledPlant, InitialState, PlantOptions
-from sim_bridge.simulator import PlantDivergedError
 
 _STEPS_AT_ONCE = 100_000  # between two looks at Ctrl-C
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from flightstack.mavlink.hot_frames import GROUND_CONTACT_FLAG, HEADER_SIZE, ActuatorsFrame, PlantStateFrame
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.errors import PlantDivergedError
 from sim_bridge.layout import CONTACT, DIVERGED, OUTPUT
 from sim_bridge.plant import CompiledPlant, Plant, PlantOptions
 
@@ -23,10 +24,6 @@ FASTEST_PHYSICS_HZ = 100_000.0
 
 _STATE_AT = HEADER_SIZE + 8  # after the time
 _FLAGS = (0, GROUND_CONTACT_FLAG)
-
-
-class PlantDivergedError(Exception):
-    """The state of the plant is no longer finite; the text is one sentence for the user."""
 
 
 class Simulator:

@@ -1,0 +1,272 @@
+"""`sim-bridge` as a process on real TCP, flown by clients made with pymavlink."""
+
+from __future__ import annotations
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+from pymavlink import mavutil
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
+from flightstack.mavlink.link import Link
+
+WAIT_S = 60.0  # the bound of every wait: compiling anew on a loaded machine takes ten seconds
+
+
+class SimBridge:
+    """The process, started on a free port."""
+
+    def __init__(self, *arguments: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "sim_bridge", "--port", "0", *arguments],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert self.process.stdout is not None
+        self.first_line = self.process.stdout.readline()
+        found = re.search(r":(\d+), speed", self.first_line)
+        assert found, self.first_line + self.end()[2]
+        self.port = int(found.group(1))
+
+    def end(self) -> tuple[int, str, str]:
+        out, err = self.process.communicate(timeout=WAIT_S)
+        return self.process.returncode, out, err
+
+
+class Client:
+    """A flight stack that holds the rotors at one speed; a context that closes its connection."""
+
+    def __init__(self, port: int) -> None:
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=WAIT_S)
+        self.link = Link(1, 1)
+        self.actuators = ActuatorsFrame()
+        self.actuators.rotor_speed_rad_s[:4] = 220.0
+        self.actuators.set_rotor_count(4)
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close()
+
+    def send(self, *messages) -> None:
+        self.socket.sendall(b"".join(self.link.encode(message) for message in messages))
+
+    def heartbeat(self, status: int = mavlink.MAV_STATE_ACTIVE) -> None:
+        self.send(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, status, 3))
+
+    def request(self, message_id: int = 53000, interval_us: int = 2000) -> None:
+        self.heartbeat()
+        self.send(mavlink.MAVLink_command_long_message(0, 0, 511, 0, message_id, interval_us, 0, 0, 0, 0, 0))
+
+    def messages(self) -> Iterator[object]:
+        while data := self.socket.recv(4096):
+            yield from self.link.decode(data)
+
+    def answer(self, time_us: int, flags: int = ARMED_FLAG | LOCKSTEP_FLAG) -> None:
+        self.socket.sendall(self.actuators.seal(time_us, flags))
+
+    def fly(self, count: int) -> list[int]:
+        times = []
+        for message in self.messages():
+            if message.get_type() == "FS_PLANT_STATE":
+                times.append(message.time_us)
+                if len(times) == count:
+                    break
+                self.answer(message.time_us)
+        return times
+
+
+@pytest.fixture
+def bridge() -> Iterator[SimBridge]:
+    one = SimBridge("--speed", "max")
+    yield one
+    if one.process.poll() is None:
+        one.process.kill()
+        one.process.communicate()
+
+
+def test_start_line_names_what_flies(bridge: SimBridge) -> None:
+    assert (
+        bridge.first_line
+        == f"sim-bridge: paper_quad, rigid plant, 127.0.0.1:{bridge.port}, speed max, seed 1\n"
+    )
+
+
+def test_lockstep_flight_ends_in_order(bridge: SimBridge) -> None:
+    client = Client(bridge.port)
+    client.request()
+    assert client.fly(501) == [2000 * step for step in range(501)]
+    client.heartbeat(mavlink.MAV_STATE_POWEROFF)
+    client.socket.close()
+    code, out, err = bridge.end()
+    assert (code, err) == (0, "")
+    assert "1.000 s simulated" in out
+
+
+def test_goodbye_is_heard_although_a_state_was_left_unread(bridge: SimBridge) -> None:
+    client = Client(bridge.port)
+    client.request()
+    client.fly(10)
+    client.answer(18_000)
+    client.heartbeat(mavlink.MAV_STATE_POWEROFF)
+    client.socket.close()  # with unread bytes: a reset, not a tidy end
+    assert bridge.end()[0] == 0
+
+
+def test_lost_flight_stack_is_named_with_its_time(bridge: SimBridge) -> None:
+    client = Client(bridge.port)
+    client.request()
+    client.fly(6)
+    client.socket.close()
+    code, _, err = bridge.end()
+    assert code == 1
+    assert err == "sim-bridge: flight stack lost at t=0.010 s: it closed the connection\n"
+
+
+def test_silent_flight_stack_times_out() -> None:
+    bridge = SimBridge("--timeout", "0.5")
+    client = Client(bridge.port)
+    client.request()
+    client.fly(3)
+    code, _, err = bridge.end()
+    client.socket.close()
+    assert code == 1
+    assert err == "sim-bridge: the flight stack did not answer for 0.5 s (lost at t=0.004 s)\n"
+
+
+def test_nobody_connects() -> None:
+    bridge = SimBridge("--timeout", "0.05")
+    code, _, err = bridge.end()
+    assert code == 3
+    assert err == f"sim-bridge: waited 0.05 s for a flight stack to connect to 127.0.0.1:{bridge.port}\n"
+
+
+def test_busy_port_is_named() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        done = subprocess.run(
+            [sys.executable, "-m", "sim_bridge", "--port", str(port)],
+            capture_output=True, text=True, timeout=WAIT_S, check=False,
+        )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"sim-bridge: cannot listen on 127.0.0.1:{port}: Address already in use")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("connected", [True, False])
+def test_signals_end_in_order(bridge: SimBridge, number: signal.Signals, connected: bool) -> None:
+    if not connected:
+        bridge.process.send_signal(number)
+        assert bridge.end()[0] == 0
+        return
+    with Client(bridge.port) as client:
+        client.request()
+        client.fly(5)
+        bridge.process.send_signal(number)
+        statuses = [m.system_status for m in client.messages() if m.get_type() == "HEARTBEAT"]
+    assert statuses == [mavlink.MAV_STATE_POWEROFF]
+    assert bridge.end()[::2] == (0, "")
+
+
+def test_client_on_its_own_clock_gets_states_at_the_rate() -> None:
+    bridge = SimBridge("--speed", "20")
+    client = Client(bridge.port)
+    client.request()
+    times = []
+    for message in client.messages():
+        if message.get_type() == "FS_PLANT_STATE":
+            times.append(message.time_us)
+            if len(times) == 1:
+                client.answer(0, flags=ARMED_FLAG)  # the only answer: nobody waits for more
+            elif len(times) == 300:
+                break
+    assert times == [2000 * step for step in range(300)]
+    client.heartbeat(mavlink.MAV_STATE_POWEROFF)
+    client.socket.shutdown(socket.SHUT_WR)
+    rest = list(client.messages())  # until the other side closes
+    client.socket.close()
+    code, out, _ = bridge.end()
+    assert {message.get_type() for message in rest} <= {"FS_PLANT_STATE"}
+    assert code == 0
+    assert "lateness mean" in out
+
+
+def test_same_commands_give_the_same_bytes_at_any_speed() -> None:
+    received = []
+    for speed in ("max", "10", "100"):
+        bridge = SimBridge(
+            "--speed", speed, "--vehicle", "x_quad", "--wind", "3,1", "--gust", "1", "--seed", "5"
+        )
+        client = Client(bridge.port)
+        client.request()
+        states = []
+        for message in client.messages():
+            if message.get_type() == "FS_PLANT_STATE":
+                states.append(message.get_msgbuf())
+                if len(states) == 200:
+                    break
+                client.answer(message.time_us)
+        received.append([bytes(state) for state in states])
+        client.heartbeat(mavlink.MAV_STATE_POWEROFF)
+        client.socket.close()
+        assert bridge.end()[0] == 0
+    assert received[0] == received[1] == received[2]
+
+
+def test_third_party_flies_by_hil_messages(bridge: SimBridge) -> None:
+    """pymavlink's own connection, no part of ours: request 115, answer with HIL_ACTUATOR_CONTROLS, climb."""
+    peer = mavutil.mavlink_connection(f"tcp:127.0.0.1:{bridge.port}", source_system=1, source_component=1)
+    peer.mav.heartbeat_send(2, 12, 0, 0, 4)
+    peer.mav.command_long_send(0, 0, 511, 0, 115, 4000, 0, 0, 0, 0, 0)
+    ack = peer.recv_match(type="COMMAND_ACK", blocking=True, timeout=WAIT_S)
+    assert ack.result == 0
+    altitudes_mm = []
+    for step in range(251):
+        state = peer.recv_match(type="HIL_STATE_QUATERNION", blocking=True, timeout=WAIT_S)
+        assert state.time_usec == 4000 * step
+        altitudes_mm.append(state.alt)
+        peer.mav.hil_actuator_controls_send(state.time_usec, [0.6] * 4 + [0.0] * 12, 129, 1)
+    peer.mav.heartbeat_send(2, 12, 0, 0, mavlink.MAV_STATE_POWEROFF)
+    peer.close()
+    assert bridge.end()[0] == 0
+    # thrust-to-weight 2 at full control: 0.6 climbs with 0.2 g, less a lag of 5 ms: ½·1.962·(1 s)² = 0.98 m
+    assert altitudes_mm[0] == 488000
+    assert 0.95 < (altitudes_mm[-1] - altitudes_mm[0]) / 1000.0 < 0.99
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--speed", "0"], "--speed: 0 is outside"),
+        (["--speed", "fast"], "neither a number nor max"),
+        (["--wind", "1"], "has 1 numbers, 2 or 3 are needed"),
+        (["--plant", "flat"], "not one of rigid, paper"),
+        (["--port", "70000"], "--port: 70000 is outside"),
+        (["--timeout", "-3"], "--timeout: -3 is outside"),
+        (["--physics-hz", "nan"], "--physics-hz: nan is outside"),
+        (["--home", "91,0,0"], "--home latitude"),
+        (["--vehicle", "none.toml"], "cannot be read"),
+        (["fly"], "fly"),
+    ],
+)
+def test_usage_errors(capsys: pytest.CaptureFixture[str], arguments: list[str], said: str) -> None:
+    from sim_bridge.__main__ import main  # noqa: PLC0415
+
+    assert main(arguments) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_wind_without_effect_is_said() -> None:
+    _, _, err = SimBridge("--wind", "5,0", "--timeout", "0.05").end()
+    warning, reason = err.splitlines()
+    assert warning.startswith("sim-bridge: the wind has no effect: the vehicle paper_quad has no drag")
+    assert "waited" in reason

@@ -1,0 +1,136 @@
+"""The command `sim-bridge open-loop`, in process: arguments in, JSON or a table or one sentence out."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from sim_bridge.__main__ import main
+from sim_bridge.open_loop import split_time
+
+
+def fly(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, object]:
+    code = main(["open-loop", *arguments, "--json"])
+    out = capsys.readouterr().out
+    assert code == 0
+    return json.loads(out)
+
+
+def test_json_has_the_documented_keys(capsys: pytest.CaptureFixture[str]) -> None:
+    state = fly(capsys, "--rotors", "200,210,200,210", "--seconds", "0.5", "--no-ground")
+    keys = "time_s pos_ned_m vel_ned_m_s quaternion euler_rad rates_frd_rad_s rotor_speed_rad_s"
+    assert list(state) == keys.split()
+    assert [len(value) for value in list(state.values())[1:]] == [3, 3, 4, 3, 3, 4]
+
+
+@pytest.mark.parametrize("plant", ["rigid", "paper"])
+def test_start_is_given_back_after_no_time(capsys: pytest.CaptureFixture[str], plant: str) -> None:
+    state = fly(
+        capsys, "--plant", plant, "--rotors", "-5,6,7,8", "--seconds", "0", "--no-lag", "--pos", "1,2,-3",
+        "--vel", "-4,5,6", "--euler-deg", "10,-20,30", "--rates", "0.1,0.2,0.3",
+    )  # fmt: skip
+    assert state["pos_ned_m"] == [1.0, 2.0, -3.0]
+    assert state["vel_ned_m_s"] == [-4.0, 5.0, 6.0]
+    assert state["euler_rad"] == pytest.approx([math.radians(a) for a in (10, -20, 30)], abs=1e-15)
+    assert state["rates_frd_rad_s"] == [0.1, 0.2, 0.3]
+    assert state["rotor_speed_rad_s"] == [-5.0, 6.0, 7.0, 8.0]
+
+
+def test_rotors_lag_unless_told_otherwise(capsys: pytest.CaptureFixture[str]) -> None:
+    common = ("--vehicle", "x_quad", "--rotors", "600,600,600,600", "--seconds", "0.02")
+    lagging = fly(capsys, *common)["rotor_speed_rad_s"]
+    assert lagging == pytest.approx([600.0 * (1.0 - math.exp(-1.0))] * 4, rel=1e-12)
+    assert fly(capsys, *common, "--no-lag")["rotor_speed_rad_s"] == [600.0] * 4
+
+
+def test_ground_holds_unless_removed(capsys: pytest.CaptureFixture[str]) -> None:
+    common = ("--rotors", "0,0,0,0", "--seconds", "1")
+    assert fly(capsys, *common)["pos_ned_m"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert fly(capsys, *common, "--no-ground")["pos_ned_m"] == pytest.approx([0.0, 0.0, 4.905], abs=1e-12)
+
+
+def test_time_need_not_be_a_multiple_of_the_step(capsys: pytest.CaptureFixture[str]) -> None:
+    state = fly(capsys, "--rotors", "0,0,0,0", "--seconds", "1.00037", "--dt", "0.01", "--no-ground")
+    assert state["pos_ned_m"][2] == pytest.approx(0.5 * 9.81 * 1.00037**2, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "dt_s", "expected"),
+    [
+        (0.3, 0.1, (3, 0.3 / 3, 0.0)),
+        (0.0, 0.1, (0, 0.1, 0.0)),
+        (0.05, 0.1, (0, 0.1, 0.05)),
+        (1e5, 1e-3, (10**8, 1e-3, 0.0)),
+    ],
+)
+def test_split_time(seconds: float, dt_s: float, expected: tuple[int, float, float]) -> None:
+    assert split_time(seconds, dt_s) == expected
+
+
+def test_disturbances_act(capsys: pytest.CaptureFixture[str]) -> None:
+    state = fly(
+        capsys,
+        "--rotors",
+        "0,0,0,0",
+        "--seconds",
+        "1",
+        "--no-ground",
+        "--force",
+        "0.55,0,0",
+        "--torque",
+        "0,0,0.011",
+    )
+    assert state["vel_ned_m_s"][0] == pytest.approx(1.0, abs=1e-12)
+    assert state["rates_frd_rad_s"][2] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_table_shows_the_same_figures(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["open-loop", "--rotors", "0,0,0,0", "--seconds", "1", "--no-ground"]) == 0
+    table = {line.split()[0]: line.split()[1:] for line in capsys.readouterr().out.splitlines()}
+    assert table["pos_ned_m"] == ["0", "0", "4.905"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--rotors", "1,2,3", "--seconds", "1"], "has 3 numbers, 4 are needed"),
+        (["--rotors", "1,2,3,x", "--seconds", "1"], "is not 4 numbers"),
+        (["--rotors", "1,2,3,nan", "--seconds", "1"], "outside the allowed range"),
+        (["--rotors", "1,2,3,4", "--seconds", "-1"], "--seconds: -1 is outside"),
+        (["--rotors", "1,2,3,4", "--seconds", "nan"], "--seconds: nan is outside"),
+        (["--rotors", "1,2,3,4", "--seconds", "soon"], "--seconds"),
+        (["--rotors", "1,2,3,4"], "--seconds"),
+        (["--rotors", "1,2,3,4", "--seconds", "1", "--dt", "0"], "--dt: 0 is outside"),
+        (["--rotors", "1,2,3,4", "--seconds", "1", "--plant", "flat"], "'flat' is not one of rigid, paper"),
+        (["--rotors", "1,2,3,4", "--seconds", "1", "--pos", "0,0,1"], "below the ground"),
+        (["--rotors", "1,2,3,4", "--seconds", "1", "--vehicle", "blimp"], "blimp"),
+        (["--rotors", "1,2,3,4", "--seconds", "1", "--euler-deg", "1,2"], "has 2 numbers"),
+        (["--rotors", "1,2,3,4", "--seconds", "1", "--bogus"], "--bogus"),
+    ],
+)
+def test_bad_arguments_are_one_sentence(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
+) -> None:
+    assert main(["open-loop", *arguments]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert said in shown.err
+    assert shown.err.count("\n") == 1
+
+
+def test_bad_vehicle_file_is_one_sentence(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "heavy.toml"
+    file.write_text("name = 'heavy'\n[body]\nmass_kg = -1\n[rotor_type]\n")
+    assert main(["open-loop", "--rotors", "1,2,3,4", "--seconds", "1", "--vehicle", str(file)]) == 2
+    assert "body.mass_kg: -1 is outside the allowed range" in capsys.readouterr().err
+
+
+def test_divergence_is_a_failure_not_a_number(capsys: pytest.CaptureFixture[str]) -> None:
+    code = main(
+        ["open-loop", "--rotors", "0,0,0,0", "--seconds", "9", "--torque", "1e9,1e9,1e9", "--no-ground"]
+    )
+    assert code == 1
+    assert "diverged" in capsys.readouterr().err

@@ -1,0 +1,190 @@
+"""The simulator without I/O: time, frames, limits, bad commands, determinism."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from flightstack.contract import Vector3
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.hot_frames import (
+    ARMED_FLAG,
+    GROUND_CONTACT_FLAG,
+    LOCKSTEP_FLAG,
+    ActuatorsFrame,
+    PlantStateFrame,
+)
+from flightstack.params.vehicle import load_vehicle
+from sim_bridge.disturbance import Disturbance, wind_warning
+from sim_bridge.errors import PlantDivergedError
+from sim_bridge.plant import InitialState, PlantOptions
+from sim_bridge.simulator import Simulator
+
+PAPER, X_QUAD = load_vehicle("paper_quad"), load_vehicle("x_quad")
+GUSTY = PlantOptions(Disturbance(Vector3(2.0, -1.0, 0.0), 1.5), seed=7)
+
+
+def command(*speeds: float, armed: bool = True) -> ActuatorsFrame:
+    frame = ActuatorsFrame()
+    frame.rotor_speed_rad_s[: len(speeds)] = speeds
+    frame.set_rotor_count(4)
+    frame.seal(0, LOCKSTEP_FLAG | (ARMED_FLAG if armed else 0))
+    return frame
+
+
+def rotor_speeds(simulator: Simulator) -> list[float]:
+    return simulator.frame.rotor_speed_rad_s[:4].tolist()
+
+
+def flight_digest(options: PlantOptions, intervals_us: tuple[int, ...] = (2000,) * 1500) -> str:
+    simulator = Simulator(X_QUAD, "rigid", options)
+    digest = hashlib.sha256()
+    actuators = command(0.0, 0.0, 0.0, 0.0)
+    for step, interval_us in enumerate(intervals_us):
+        digest.update(simulator.state_frame())
+        actuators.rotor_speed_rad_s[:4] = 680.0 + 10.0 * math.sin(0.01 * step)
+        simulator.set_interval_us(interval_us)
+        simulator.apply(actuators)
+    return digest.hexdigest()
+
+
+def test_first_frame_is_a_valid_message_at_rest() -> None:
+    frame = bytes(Simulator(PAPER).state_frame())
+    (message,) = mavlink.MAVLink(None).parse_buffer(bytearray(frame))
+    assert message.get_type() == "FS_PLANT_STATE"
+    assert (message.time_us, message.rotor_count, message.flags) == (0, 4, 1 | GROUND_CONTACT_FLAG)
+    assert list(message.q) == [1.0, 0.0, 0.0, 0.0]
+    assert PlantStateFrame().open(frame)
+
+
+@pytest.mark.parametrize("plant", ["rigid", "paper"])
+def test_thrust_above_weight_takes_off_and_the_flag_follows(plant: str) -> None:
+    simulator = Simulator(PAPER, plant)
+    simulator.state_frame()
+    assert simulator.frame.flags & GROUND_CONTACT_FLAG
+    for _ in range(500):
+        simulator.apply(command(*[250.0] * 4))
+    assert simulator.time_us == 1_000_000
+    assert not simulator.on_ground
+    assert simulator.frame.state[2] < -0.5
+    simulator.state_frame()
+    assert not simulator.frame.flags & GROUND_CONTACT_FLAG
+
+
+def test_limits_clip_the_command_and_disarmed_rotors_stop() -> None:
+    simulator = Simulator(PAPER)
+    rotor = PAPER.rotors[0]
+    for _ in range(200):
+        simulator.apply(command(0.0, 1e5, -5.0, 100.0))
+    low, high = rotor.min_speed_rad_s, rotor.max_speed_rad_s
+    assert rotor_speeds(simulator) == pytest.approx([low, high, low, 100.0], rel=1e-6)
+    for _ in range(200):
+        simulator.apply(command(200.0, 200.0, 200.0, 200.0, armed=False))
+    assert max(rotor_speeds(simulator)) < 1e-6
+
+
+def test_ideal_rotors_have_neither_lag_nor_limits() -> None:
+    simulator = Simulator(PAPER.with_ideal_rotors())
+    simulator.apply(command(-50.0, 900.0, -50.0, 900.0))
+    assert rotor_speeds(simulator) == [-50.0, 900.0, -50.0, 900.0]
+
+
+@pytest.mark.parametrize("plant", ["rigid", "paper"])
+@pytest.mark.parametrize("ideal", [True, False])
+def test_bad_commands_are_counted_and_the_last_good_one_holds(plant: str, ideal: bool) -> None:
+    vehicle = PAPER.with_ideal_rotors() if ideal else PAPER
+    simulator, twin = Simulator(vehicle, plant), Simulator(vehicle, plant)
+    for one in (simulator, twin):
+        one.apply(command(220.0, 230.0, 220.0, 230.0))
+    for _ in range(10):
+        simulator.apply(command(math.nan, math.inf, -math.inf, 1e300))
+        twin.apply(command(220.0, 230.0, 220.0, 230.0))
+    assert simulator.plant.bad_commands == 40
+    assert twin.plant.bad_commands == 0
+    assert bytes(simulator.state_frame()) == bytes(twin.state_frame())
+
+
+def test_diverging_plant_says_so() -> None:
+    push = PlantOptions(Disturbance(torque_frd_n_m=Vector3(1e9, 1e9, 1e9)))
+    simulator = Simulator(PAPER, "rigid", push)
+
+    def fly() -> None:
+        for _ in range(1000):
+            simulator.apply(command(200.0, 200.0, 200.0, 200.0))
+
+    with pytest.raises(PlantDivergedError, match=r"the plant diverged at t=\d"):
+        fly()
+
+
+def test_same_seed_same_bytes_other_seed_other_bytes() -> None:
+    assert flight_digest(GUSTY) == flight_digest(GUSTY)
+    assert flight_digest(GUSTY) != flight_digest(GUSTY._replace(seed=8))
+
+
+def test_gusts_do_not_depend_on_how_the_steps_are_batched() -> None:
+    """5 s in exchanges of 1, 2, 5 or 500 ms see the same gusts, also where the noise buffer is refilled."""
+    ends = []
+    for interval_us in (1000, 2000, 5000, 500_000):
+        simulator = Simulator(X_QUAD, "rigid", GUSTY, interval_us=interval_us)
+        for _ in range(5_000_000 // interval_us):
+            simulator.apply(command(*[690.0] * 4))
+        ends.append(simulator.frame.state.tobytes())
+    assert len(set(ends)) == 1
+
+
+@pytest.mark.parametrize(
+    ("interval_us", "physics_hz"), [(50, 1000.0), (1700, 1000.0), (3333, 400.0), (1_000_000, 250.0)]
+)
+def test_any_interval_is_split_into_whole_steps(interval_us: int, physics_hz: float) -> None:
+    start = PlantOptions(initial=InitialState(Vector3(0.0, 0.0, -100.0)))
+    simulator = Simulator(PAPER, "rigid", start, physics_hz=physics_hz, interval_us=interval_us)
+    for _ in range(3):
+        simulator.apply(command(0.0, 0.0, 0.0, 0.0, armed=False))
+    fallen = 0.5 * 9.81 * (3e-6 * interval_us) ** 2
+    assert simulator.time_us == 3 * interval_us
+    assert simulator.frame.state[2] == pytest.approx(-100.0 + fallen, abs=1e-11)
+
+
+@pytest.mark.parametrize("interval_us", [0, 49, 1_000_001])
+def test_intervals_out_of_range_are_refused(interval_us: int) -> None:
+    with pytest.raises(ValueError, match="outside the allowed"):
+        Simulator(PAPER).set_interval_us(interval_us)
+
+
+def test_wind_on_a_vehicle_without_drag_is_reported() -> None:
+    wind = Disturbance(Vector3(5.0, 0.0, 0.0))
+    assert "no drag" in (wind_warning(PAPER, "rigid", wind) or "")
+    assert "paper's model" in (wind_warning(X_QUAD, "paper", Disturbance(gust_m_s=1.0)) or "")
+    assert wind_warning(X_QUAD, "rigid", wind) is None
+    assert wind_warning(PAPER, "rigid", Disturbance()) is None
+
+
+_SHORT_FLIGHT = """
+import sys
+sys.path.insert(0, {here!r})
+from test_simulator import PAPER, X_QUAD, GUSTY, Simulator, command
+for plant, vehicle in (("rigid", X_QUAD), ("paper", PAPER)):
+    simulator = Simulator(vehicle, plant, GUSTY)
+    for _ in range(30):
+        simulator.apply(command(400.0, 410.0, 420.0, 390.0))
+    print(" ".join(value.hex() for value in simulator.frame.state.tolist()))
+"""
+
+
+def test_plain_python_gives_the_same_flight() -> None:
+    results = []
+    for disabled in ("0", "1"):
+        done = subprocess.run(
+            [sys.executable, "-c", _SHORT_FLIGHT.format(here=str(Path(__file__).parent))],
+            env={**os.environ, "NUMBA_DISABLE_JIT": disabled}, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        results.append([float.fromhex(text) for text in done.stdout.split()])
+    compiled, plain = results
+    assert len(compiled) == 26
+    assert compiled == plain
