@@ -172,8 +172,10 @@ class SimulatorLink:
         kind, interval = message.param1, message.param2
         if kind not in (FS_PLANT_STATE_ID, HIL_STATE_QUATERNION_ID):
             return int(mavlink.MAV_RESULT_DENIED)
+        if kind != FS_PLANT_STATE_ID and self._requested == FS_PLANT_STATE_ID:
+            return int(mavlink.MAV_RESULT_DENIED)  # one state message; who asks for both gets the exact one
         if interval == -1.0:  # MAVLink: no longer
-            self.ready = False
+            self.ready, self._requested = False, 0
             return int(mavlink.MAV_RESULT_ACCEPTED)
         if interval == 0.0:  # MAVLink: the default rate
             interval = DEFAULT_INTERVAL_US

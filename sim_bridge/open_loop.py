@@ -11,10 +11,11 @@ from flightstack.contract import MAX_ROTORS, Quaternion
 from flightstack.geometry import euler_from_quaternion
 from flightstack.mavlink.hot_frames import ARMED_FLAG
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.compiled_plant import CompiledPlant
 from sim_bridge.disturbance import Disturbance
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.layout import DIVERGED
-from sim_bridge.plant import CompiledPlant, InitialState, PlantOptions
+from sim_bridge.plant import InitialState, PlantOptions
 
 _STEPS_AT_ONCE = 100_000  # between two looks at Ctrl-C
 

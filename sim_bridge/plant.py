@@ -1,21 +1,12 @@
-"""Plants: what the simulator asks of one, and the compiled ones."""
+"""What the simulator asks of a plant, and the choices that every plant takes."""
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple, Protocol
 
-import numpy as np
-
 from flightstack.contract import FloatArray, Vector3
-from flightstack.geometry import quaternion_from_euler, rotate
-from flightstack.params.vehicle import Vehicle
-from sim_bridge.disturbance import GUST_DOWN_RATIO, GUST_TIME_S, NO_DISTURBANCE, Disturbance
-from sim_bridge.ground import Ground, ground_contact
-from sim_bridge.integrator import advance_kernel, slope_kernel
-from sim_bridge.layout import MEMORY, NOISE_ROWS, OUTPUT, RecordArray
-
-DEFAULT_STEP_S = 1e-3
+from sim_bridge.disturbance import NO_DISTURBANCE, Disturbance
+from sim_bridge.layout import RecordArray
 
 
 class InitialState(NamedTuple):
@@ -80,143 +71,3 @@ class Plant(Protocol):
     def euler_rad(self) -> Vector3 | None:
         """Roll, pitch, yaw where they are states of the plant, else None."""
         ...
-
-
-class CompiledPlant:
-    """A plant whose equations are compiled functions over the record ``MEMORY``."""
-
-    def __init__(self, vehicle: Vehicle, name: str, options: PlantOptions) -> None:
-        self.output: RecordArray = np.zeros(1, OUTPUT)
-        self._paper = name == "paper"
-        self._vehicle = vehicle
-        self._memory: RecordArray = np.zeros(1, MEMORY)
-        self._kernel = advance_kernel(name)
-        self._slope = slope_kernel(name)
-        self._random = np.random.Generator(np.random.PCG64(options.seed))
-        self._gusty = options.disturbance.gust_m_s > 0.0
-        m = self._memory[0]
-        m["ground"] = options.ground
-        m["mass"], m["weight"] = vehicle.mass_kg, vehicle.weight_n
-        m["inertia"], m["drag"] = vehicle.inertia_kg_m2, vehicle.linear_drag_n_s_m
-        self._set_rotors(options.limits)
-        self._set_disturbance(options.disturbance)
-        self.set_step(DEFAULT_STEP_S)
-        self._set_state(options.initial)
-
-    def _set_rotors(self, limits: bool) -> None:
-        m = self._memory[0]
-        m["rotor_count"] = len(self._vehicle.rotors)
-        for index, rotor in enumerate(self._vehicle.rotors):
-            x, y, _ = rotor.position_frd_m
-            b = rotor.thrust_coefficient_n_s2
-            m["rotor"][index] = (
-                b,
-                -y * b,
-                x * b,
-                -rotor.spin * rotor.torque_coefficient_n_m_s2,
-                rotor.spin * rotor.inertia_kg_m2,
-                1.0 / rotor.lag_s if rotor.lag_s > 0.0 else math.inf,
-                rotor.min_speed_rad_s if limits else -math.inf,
-                rotor.max_speed_rad_s if limits else math.inf,
-                0.0,  # set with the step
-            )
-
-    def _set_disturbance(self, disturbance: Disturbance) -> None:
-        m = self._memory[0]
-        m["wind"] = disturbance.wind_ned_m_s
-        m["force"], m["torque"] = disturbance.force_ned_n, disturbance.torque_frd_n_m
-        self._gust_m_s = np.array([1.0, 1.0, GUST_DOWN_RATIO]) * disturbance.gust_m_s
-        if self._gusty:
-            m["gust"] = self._gust_m_s * self._random.standard_normal(3)
-            self._random.standard_normal(out=m["noise"])
-
-    def _set_state(self, initial: InitialState) -> None:
-        body = self._memory[0]["body"]
-        body[0:3], body[3:6] = initial.position_ned_m, initial.velocity_ned_m_s
-        if self._paper:
-            body[6:9], body[9:12] = initial.euler_rad, initial.rates_frd_rad_s
-        else:
-            body[6:10], body[10:13] = quaternion_from_euler(*initial.euler_rad), initial.rates_frd_rad_s
-        # each friction spring starts relaxed: its anchor lies straight below or above its contact point
-        m = self._memory[0]
-        attitude = quaternion_from_euler(*initial.euler_rad)
-        for index in range(int(m["point_count"])):
-            arm = rotate(attitude, Vector3(*m["point"][index, :3].tolist()))
-            m["anchor"][index] = (body[0] + arm.x, body[1] + arm.y, initial.euler_rad.z)
-
-    def _set_ground(self, ground: Ground) -> None:
-        m = self._memory[0]
-        count = len(ground.points)
-        m["point_count"] = count
-        m["point"][:count] = ground.points
-        m["ground_z"] = ground.foot_z_m - ground.rest_depth_m
-        m["reach"] = float(np.linalg.norm(ground.points[:, :3], axis=1).max())
-        m["stiffness"], m["damping"] = ground.stiffness_n_m, ground.damping_n_s_m
-        m["ramp"] = ground.rest_depth_m
-        arms = [math.hypot(*rotor.position_frd_m[:2]) for rotor in self._vehicle.rotors]
-        m["lever"] = sum(arms) / len(arms)
-
-    @property
-    def bad_commands(self) -> int:
-        """Commands that were not a number and were replaced by the last good one."""
-        return int(self._memory[0]["bad_commands"])
-
-    def set_step(self, step_s: float) -> None:
-        """Choose the fixed step of the integration [s]."""
-        m = self._memory[0]
-        m["step_s"] = step_s
-        for index, rotor in enumerate(self._vehicle.rotors):
-            m["rotor"][index, -1] = math.exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
-        decay = math.exp(-step_s / GUST_TIME_S)
-        m["gust_decay"] = decay
-        m["gust_scale"] = self._gust_m_s * math.sqrt(1.0 - decay * decay)
-        self._set_ground(ground_contact(self._vehicle, step_s, single_point=self._paper))
-
-    def rotor_speeds_rad_s(self) -> list[float]:
-        """Rotor speeds in full precision, in the order of the vehicle file."""
-        speeds: list[float] = self._memory[0]["rotor_speed"][: len(self._vehicle.rotors)].tolist()
-        return speeds
-
-    def set_rotor_speeds(self, speeds_rad_s: tuple[float, ...]) -> None:
-        """Put the rotors at once at these speeds."""
-        self._memory[0]["rotor_speed"][: len(speeds_rad_s)] = speeds_rad_s
-
-    def advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
-        """Advance by ``steps`` steps with the commands (shape (8,), rad/s) held; see ``Plant``."""
-        if self._gusty:
-            return self._advance_in_gusts(command_rad_s, flags, steps)
-        return self._kernel(self._memory, command_rad_s, flags, steps, self.output)
-
-    def _advance_in_gusts(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
-        m, result = self._memory[0], 0
-        while steps > 0:
-            row = int(m["noise_row"])
-            if row == NOISE_ROWS:
-                self._random.standard_normal(out=m["noise"])
-                m["noise_row"] = row = 0
-            count = min(steps, NOISE_ROWS - row)
-            result = self._kernel(self._memory, command_rad_s, flags, count, self.output)
-            steps -= count
-        return result
-
-    def show(self) -> int:
-        """Write the present state to ``output``; returns as ``advance``."""
-        return self._kernel(self._memory, self._memory[0]["command"], 0, 0, self.output)
-
-    def acceleration_ned_m_s2(self) -> Vector3:
-        """Acceleration at the present state."""
-        self._slope(self._memory)
-        x, y, z = self._memory[0]["slope"][0, 3:6].tolist()
-        return Vector3(x, y, z)
-
-    def airspeed_m_s(self) -> float:
-        """Speed relative to the air."""
-        m = self._memory[0]
-        return float(np.linalg.norm(m["body"][3:6] - m["wind"] - m["gust"]))
-
-    def euler_rad(self) -> Vector3 | None:
-        """Roll, pitch, yaw where they are states of the plant, else None."""
-        if not self._paper:
-            return None
-        roll, pitch, yaw = self._memory[0]["body"][6:9].tolist()
-        return Vector3(roll, pitch, yaw)

@@ -11,9 +11,10 @@ import numpy as np
 
 from flightstack.mavlink.hot_frames import GROUND_CONTACT_FLAG, HEADER_SIZE, ActuatorsFrame, PlantStateFrame
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.compiled_plant import CompiledPlant
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.layout import CONTACT, DIVERGED, OUTPUT
-from sim_bridge.plant import CompiledPlant, Plant, PlantOptions
+from sim_bridge.plant import Plant, PlantOptions
 
 SIMULATOR_COMPONENT = 200
 DEFAULT_INTERVAL_US = 2000

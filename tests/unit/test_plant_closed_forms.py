@@ -11,9 +11,10 @@ import pytest
 from flightstack.contract import Vector3
 from flightstack.mavlink.hot_frames import ARMED_FLAG
 from flightstack.params.vehicle import Vehicle, load_vehicle
+from sim_bridge.compiled_plant import CompiledPlant
 from sim_bridge.disturbance import GUST_DOWN_RATIO, GUST_TIME_S, Disturbance
 from sim_bridge.layout import OUTPUT
-from sim_bridge.plant import AT_REST, CompiledPlant, InitialState, PlantOptions
+from sim_bridge.plant import AT_REST, InitialState, PlantOptions
 
 G = 9.81
 PAPER, X_QUAD = load_vehicle("paper_quad"), load_vehicle("x_quad")

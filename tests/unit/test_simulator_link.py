@@ -77,6 +77,14 @@ def test_requests_are_answered(client: Client, message_id: float, interval_us: f
         assert client.sim.simulator.interval_us == round(interval_us)
 
 
+def test_who_asks_for_both_states_gets_the_exact_one(client: Client) -> None:
+    assert client.request(HIL_STATE_QUATERNION_ID, 4000) == 0
+    assert client.request(FS_PLANT_STATE_ID, 2000) == 0
+    assert client.request(HIL_STATE_QUATERNION_ID, 4000) == mavlink.MAV_RESULT_DENIED
+    assert client.state().get_type() == "FS_PLANT_STATE"
+    assert client.sim.simulator.interval_us == 2000
+
+
 def test_other_commands_are_unsupported(client: Client) -> None:
     client.send(mavlink.MAVLink_command_long_message(0, 0, 400, 0, 1, 0, 0, 0, 0, 0, 0))
     (ack,) = client.codec.decode(client.sim.replies()[0])
