@@ -23,6 +23,8 @@ from flightstack.transport.udp import PortBusyError, UdpSocket
 EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
 GROUND_POLL_NS = 500_000
 GROUND_LOCAL_PORT, API_LOCAL_PORT = 18570, 14580
+SECOND_HELLO_S = 1.0
+"""Silence after which a simulator is asked for the standard message."""
 FIRST_CONTACT_S = 60.0
 """How long a process that must not outlive its ground station waits for the first word from it."""
 
@@ -175,14 +177,20 @@ class App:
         self._serve_ground()
 
     def _wait_for_state(self, simulator: TcpClient) -> None:
-        deadline_s = time.monotonic() + self._process.simulator_timeout_s
+        link, interval_us = self.stack.simulator, self.stack.rates.interval_us
+        began_s = time.monotonic()
+        asked_again = False
         while True:
             self._check_stop()
             self._serve_ground()
             data = simulator.receive(0.05)
-            if data is not None and self.stack.simulator.receive(data):
+            if data is not None and link.receive(data):
                 break
-            self._check_simulator(deadline_s)
+            silent = time.monotonic() - began_s > SECOND_HELLO_S
+            if not asked_again and (silent or link.request_refused):
+                asked_again = True
+                simulator.send(link.second_hello(interval_us))
+            self._check_simulator(began_s + self._process.simulator_timeout_s)
         self.stack.autopilot.has_state = True
 
     def _hold_time(self, simulator: TcpClient) -> None:

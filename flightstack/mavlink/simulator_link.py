@@ -1,6 +1,6 @@
 """The flight stack's end of the simulator link, without I/O.
 
-Our simulator is asked for FS_PLANT_STATE (exact, one frame each way per step) and any other for
+A simulator is asked for FS_PLANT_STATE (exact, one frame each way per step) and, if it does not know that, for
 HIL_STATE_QUATERNION, as PX4 asks; whichever arrives is answered in kind.
 """
 
@@ -48,17 +48,21 @@ class SimulatorLink:
         self.rotor_speed_rad_s = self._plant.rotor_speed_rad_s
         self.time_us = 0
         self.has_state = False
+        self.request_refused = False
         self.peer_said_goodbye = False
 
     def hello(self, interval_us: int) -> bytes:
-        """Return the bytes to send after connecting: who we are, and which state we want how often."""
-        return self.heartbeat(False) + b"".join(
-            self._link.encode(
-                mavlink.MAVLink_command_long_message(
-                    0, 0, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, message_id, interval_us, 0, 0, 0, 0, 0
-                )
-            )
-            for message_id in (FS_PLANT_STATE_ID, mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION)
+        """Return the bytes to send after connecting: who we are, and our own state message every so often."""
+        return self.heartbeat(False) + self._request(FS_PLANT_STATE_ID, interval_us)
+
+    def second_hello(self, interval_us: int) -> bytes:
+        """Return the request to a simulator that does not know our message: PX4's."""
+        return self._request(mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION, interval_us)
+
+    def _request(self, message_id: int, interval_us: int) -> bytes:
+        request = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+        return self._link.encode(
+            mavlink.MAVLink_command_long_message(0, 0, request, 0, message_id, interval_us, 0, 0, 0, 0, 0)
         )
 
     def heartbeat(self, armed: bool, leaving: bool = False) -> bytes:
@@ -93,6 +97,8 @@ class SimulatorLink:
             elif kind == mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
                 self._take_hil(message)
                 fresh = True
+            elif kind == mavlink.MAVLINK_MSG_ID_COMMAND_ACK:
+                self.request_refused = message.result != mavlink.MAV_RESULT_ACCEPTED
             elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
                 self.peer_said_goodbye = message.system_status == mavlink.MAV_STATE_POWEROFF
         self._in_general_decoder = self._link.has_partial
