@@ -207,6 +207,33 @@ def test_the_client_answers_requests_in_any_order_and_as_often_as_asked() -> Non
     assert client.result == Done(items)
 
 
+def test_an_upload_waits_until_the_vehicle_has_given_up_the_one_before() -> None:
+    """Were the vehicle, still at the first of 20 items, served the new mission's, it would end at 20."""
+    client = MissionClient(VEHICLE, GCS)
+    client.start_upload(mission(20))
+    assert names(client.poll(0.0)) == ["MISSION_COUNT"]
+    client.start_upload(mission(33))
+    assert names(client.poll(0.1)) == ["MISSION_ACK"]
+    request = over_the_wire(mavlink.MAVLink_mission_request_int_message(*GCS, 0, 0), VEHICLE)
+    client.receive(request, 0.3)
+    (answer,) = client.poll(0.3)
+    assert (answer.get_type(), answer.type) == ("MISSION_ACK", MissionResult.OPERATION_CANCELLED)
+    assert client.next_deadline() == 0.3 + 5.5
+    (announcement,) = client.poll(5.8)
+    assert (announcement.get_type(), announcement.count) == ("MISSION_COUNT", 33)
+    client.receive(request, 5.9)
+    assert names(client.poll(5.9)) == ["MISSION_ITEM_INT"]
+
+
+def test_a_request_left_over_from_another_upload_is_answered_with_the_count() -> None:
+    client = MissionClient(VEHICLE, GCS)
+    client.start_upload(mission(9))
+    client.poll(0.0)
+    stale = mavlink.MAVLink_mission_request_int_message(*GCS, 4, 0)
+    client.receive(over_the_wire(stale, VEHICLE), 0.1)
+    assert names(client.poll(0.1)) == ["MISSION_COUNT"]
+
+
 def test_the_client_ignores_other_vehicles_other_targets_and_other_types() -> None:
     client = MissionClient(VEHICLE, GCS)
     client.start_clear()

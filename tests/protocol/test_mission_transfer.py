@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from flightstack.mavlink.services.mission_client import Done, Failed
@@ -94,6 +94,9 @@ def test_a_cancelled_upload_leaves_the_old_mission_and_the_server_free(seed: int
 
 @settings(derandomize=True, deadline=None, max_examples=100)
 @given(seed=SEEDS, steps=st.integers(0, 60), count=st.sampled_from([5, 20, 33]))
+@example(seed=32483, steps=9, count=1)  # these mix, or are cut short, when the second starts at once
+@example(seed=3673, steps=6, count=20)
+@example(seed=56809, steps=6, count=5)
 def test_an_upload_right_after_a_cancelled_one_never_mixes_with_it(seed: int, steps: int, count: int) -> None:
     world = World(GroundStation("gcs", LOSSY, seed))
     client = world.stations["gcs"].client
