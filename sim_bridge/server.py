@@ -6,7 +6,6 @@ import math
 import select
 import socket
 import sys
-import time
 from typing import NamedTuple
 
 from flightstack.geodesy import GeoPoint
@@ -100,9 +99,9 @@ def _introduce(options: ServerOptions, port: int) -> None:
 
 def _await_client(listener: socket.socket, stop: StopSignal, timeout_s: float | None) -> socket.socket:
     """Return the first client; raise StoppedError, or PeerSilentError after the timeout."""
-    deadline_ns = None if timeout_s is None else time.monotonic_ns() + int(timeout_s * 1e9)
+    waiter = stop.waiter(listener, select.POLLIN)
     while True:
-        stop.wait_for(listener, select.POLLIN, deadline_ns)
+        waiter.wait(timeout_s)
         try:
             return listener.accept()[0]
         except OSError:  # it went away before we came
