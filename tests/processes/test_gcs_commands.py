@@ -1,0 +1,234 @@
+"""The ``gcs`` commands as processes, over UDP, against a scripted vehicle."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from flightstack.transport.udp import UdpSocket
+from tests.support.fake_vehicle import ARM, FakeVehicle, serve
+
+LONG_S = 30  # a bound for a machine that is busy; nothing is expected to take a second
+MISSIONS = Path(__file__).parents[2] / "missions"
+
+
+def gcs(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "gcs_cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=LONG_S, check=False)
+
+
+def told(vehicle: FakeVehicle, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run ``gcs`` with the link to ``vehicle``."""
+    with serve(vehicle) as socket:
+        return gcs("--connect", f"udpout:127.0.0.1:{socket.address[1]}", *arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line", "command"),
+    [
+        (["arm"], "armed", (400, (1, 0))),
+        (["disarm"], "disarmed", (400, (0, 0))),
+        (["disarm", "--force"], "disarmed", (400, (0, 21196))),
+        (["land"], "landing", (21, (0, 0))),
+        (["rtl"], "returning to launch", (20, (0, 0))),
+        (["hold"], "mode hold", (176, (1, 4, 3))),
+        (["mode", "MISSION"], "mode mission", (176, (1, 4, 4))),
+        (["mission", "start"], "mission started", (300, (0, 0))),
+    ],
+)
+def test_an_order_is_carried_out_and_told_in_one_line(
+    arguments: list[str], line: str, command: tuple[int, tuple[float, ...]]
+) -> None:
+    vehicle = FakeVehicle()
+    result = told(vehicle, *arguments)
+    assert (result.stdout, result.stderr, result.returncode) == (line + "\n", "", 0)
+    number, params = command
+    assert [(sent, values[: len(params)]) for sent, values in vehicle.commands] == [(number, params)]
+
+
+def test_takeoff_counts_from_sea_level_and_arms() -> None:
+    vehicle = FakeVehicle()
+    result = told(vehicle, "takeoff", "--alt", "10")
+    assert (result.stdout, result.returncode) == ("taking off to 10 m\n", 0)
+    (takeoff, values), (arm, _) = vehicle.commands
+    assert (takeoff, values[6], arm) == (22, 498.0, ARM)
+
+
+def test_a_refusal_tells_the_vehicles_reason() -> None:
+    result = told(FakeVehicle(refusals={ARM: "Command refused: no valid position and attitude yet"}), "arm")
+    assert (result.stdout, result.returncode) == ("", 1)
+    assert result.stderr == "gcs: arming refused: no valid position and attitude yet\n"
+
+
+def test_a_vehicle_that_does_not_answer_is_a_timeout() -> None:
+    result = told(FakeVehicle(deaf_to={ARM}), "arm")
+    assert result.returncode == 3
+    assert "did not answer MAV_CMD_COMPONENT_ARM_DISARM" in result.stderr
+
+
+def test_a_mission_goes_up_and_comes_down_the_same(tmp_path: Path) -> None:
+    from flightstack.plan import load_plan  # noqa: PLC0415
+
+    vehicle, copy = FakeVehicle(), tmp_path / "copy.plan"
+    assert told(vehicle, "mission", "upload", MISSIONS / "every_item.plan").returncode == 0
+    result = told(vehicle, "mission", "download", copy)
+    assert (result.stderr, result.returncode) == ("", 0)
+    before, after = load_plan(MISSIONS / "every_item.plan"), load_plan(copy)
+    assert after.items == before.items
+    assert after.home == before.home
+    printed = told(vehicle, "mission", "download").stdout
+    assert len(printed.splitlines()) == len(before.items) + 1
+    assert told(vehicle, "mission", "clear").stdout == "mission cleared\n"
+    assert vehicle.items == []
+
+
+def test_a_refused_mission_names_the_item() -> None:
+    vehicle = FakeVehicle(mission_result=3, mission_refusal="Mission refused: item 2 is not supported")
+    result = told(vehicle, "mission", "upload", MISSIONS / "hop.plan")
+    assert result.returncode == 1
+    assert "item 2 is not supported" in result.stderr
+
+
+def test_status_as_json() -> None:
+    result = told(FakeVehicle(), "status", "--json")
+    facts = json.loads(result.stdout)
+    assert (facts["mode"], facts["armed"], facts["landed"]) == ("HOLD", False, "on ground")
+    assert facts["pos_ned_m"] == [1.0, 2.0, -3.0]
+    assert facts["battery_remaining"] is None
+    assert result.returncode == 0
+    lines = told(FakeVehicle(), "status").stdout.splitlines()
+    assert len(lines) == len(facts)
+
+
+def test_perf_shows_the_loops() -> None:
+    table = told(FakeVehicle(), "perf").stdout
+    for part in ("500 Hz", "100 Hz", "lockstep", "52.5×", "12.0", "90.0", "3 overruns"):
+        assert part in table
+    timing = json.loads(told(FakeVehicle(), "perf", "--json").stdout)
+    assert (timing["execution_p99_us"], timing["lockstep"]) == (20.0, True)
+
+
+def test_perf_of_a_vehicle_without_loop_timing() -> None:
+    result = told(FakeVehicle(mute={"FS_LOOP_TIMING"}), "--timeout", "1", "perf")
+    assert result.returncode == 3
+    assert "FS_LOOP_TIMING" in result.stderr
+
+
+def test_a_vehicle_that_sends_first_is_met_on_the_listening_port() -> None:
+    with UdpSocket("127.0.0.1") as free:
+        port = free.address[1]
+    with serve(FakeVehicle(), to_port=port):
+        assert gcs("arm", "--connect", f"udpin:127.0.0.1:{port}").stdout == "armed\n"
+
+
+@pytest.mark.parametrize("command", [["arm"], ["status"], ["perf"], ["mission", "clear"], ["watch"]])
+def test_no_vehicle(command: list[str]) -> None:
+    with UdpSocket("127.0.0.1") as silent:
+        result = gcs("--timeout", "0.2", "--connect", f"udpout:127.0.0.1:{silent.address[1]}", *command)
+    assert (result.stdout, result.returncode) == ("", 3)
+    assert result.stderr.startswith("gcs: no vehicle answered at UDP 127.0.0.1:")
+
+
+def test_a_busy_port_is_named_with_the_way_round() -> None:
+    with UdpSocket("127.0.0.1") as taken:
+        port = taken.address[1]
+        result = gcs("--connect", f"udpin:127.0.0.1:{port}", "status")
+    assert result.returncode == 2
+    assert f"UDP port {port} on 127.0.0.1 is in use" in result.stderr
+    assert "--connect udpout:127.0.0.1:18570" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["frobnicate"], "No such command"),
+        (["arm", "--frobnicate"], "No such option"),
+        (["mode", "sideways"], "there is none; known are"),
+        (["takeoff", "--alt", "-3"], "--alt -3: expected metres above zero"),
+        (["takeoff", "--alt", "high"], "--alt"),
+        (["--connect", "tcp:1", "status"], "expected udp:PORT"),
+        (["--timeout", "0", "status"], "--timeout 0: expected seconds above zero"),
+        (["--connect", "udpout:no.such.host.invalid:1", "status"], "no host named"),
+        (["mission", "upload", "nowhere.plan"], "nowhere.plan: cannot be read: No such file"),
+        (["fly", "nowhere.plan"], "nowhere.plan: cannot be read: No such file"),
+        (["fly", "--speed", "fast", "nowhere.plan"], "--speed fast: expected a number"),
+        (["--connect", "udp:1", "fly", "nowhere.plan"], "fly starts a vehicle of its own"),
+    ],
+)
+def test_wrong_usage_is_one_sentence_and_exit_code_2(arguments: list[str], said: str) -> None:
+    result = gcs(*arguments)
+    assert (result.stdout, result.returncode) == ("", 2)
+    assert result.stderr.startswith("gcs: ")
+    assert said in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_watch_prints_lines_without_a_terminal() -> None:
+    vehicle = FakeVehicle()
+    with serve(vehicle) as socket:
+        command = [
+            sys.executable,
+            "-m",
+            "gcs_cli",
+            "watch",
+            "--connect",
+            f"udpout:127.0.0.1:{socket.address[1]}",
+        ]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            assert process.stderr is not None
+            line = next(line for line in process.stdout if "HOLD" in line)
+            process.send_signal(signal.SIGINT)
+            assert process.wait(LONG_S) == 0
+            assert "N +1.00 E +2.00 up 3.00 m" in line
+            assert process.stderr.read() == ""
+
+
+# makes the terminal on stdin the process's own, so that Ctrl-C reaches it
+ON_ITS_TERMINAL = """
+import fcntl, os, sys, termios
+os.setsid()
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+os.execv(sys.executable, [sys.executable, "-m", "gcs_cli", *sys.argv[1:]])
+"""
+
+
+@pytest.mark.parametrize("ending", [b"q", b"\x03", signal.SIGTERM], ids=["q", "Ctrl-C", "SIGTERM"])
+def test_watch_draws_on_a_terminal_and_restores_it(ending: bytes | signal.Signals) -> None:
+    terminal, inner = pty.openpty()
+    try:
+        with serve(FakeVehicle()) as socket:
+            link = f"udpout:127.0.0.1:{socket.address[1]}"
+            process = subprocess.Popen(
+                [sys.executable, "-c", ON_ITS_TERMINAL, "watch", "--connect", link],
+                stdin=inner, stdout=inner, stderr=inner,
+                env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"},
+            )  # fmt: skip
+            seen = _read_until(terminal, b"Attitude")
+            assert b"\x1b[?1049h" in seen  # the alternate screen
+            if isinstance(ending, bytes):
+                os.write(terminal, ending)
+            else:
+                process.send_signal(ending)
+            seen += _read_until(terminal, b"\x1b[?1049l")
+            assert process.wait(LONG_S) == 0
+            assert b"Traceback" not in seen
+    finally:
+        os.close(inner)
+        os.close(terminal)
+
+
+def _read_until(terminal: int, wanted: bytes) -> bytes:
+    seen = b""
+    while wanted not in seen:
+        assert select.select([terminal], [], [], LONG_S)[0], f"{wanted!r} never came"
+        seen += os.read(terminal, 65536)
+    return seen

@@ -1,0 +1,264 @@
+"""A vehicle for the ground station's tests: pymavlink's codec, a mission server and scripted behaviour.
+
+It knows nothing of our services, so that both sides cannot share a mistake. It does no I/O; ``serve`` does.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
+from flightstack.transport.udp import UdpSocket
+
+ARM, START, SHUT_DOWN, REQUEST, RETURN = 400, 300, 246, 512, 20
+HOLD, MISSION, RTL = (4 << 16 | sub << 24 for sub in (3, 4, 5))
+ACCEPTED, REJECTED, UNSUPPORTED = 0, 1, 3
+STEP_S = 0.05
+
+
+@dataclass
+class FakeVehicle:
+    """Flies one mission item in each poll once it is started."""
+
+    system_id: int = 1
+    refusals: dict[int, str] = field(default_factory=dict)
+    """Command → the reason of its refusal."""
+    deaf_to: set[Any] = field(default_factory=set)
+    """Names of messages and numbers of commands that are ignored."""
+    mute: set[str] = field(default_factory=set)
+    """Names of messages that never arrive."""
+    mission_result: int = ACCEPTED
+    mission_refusal: str = ""
+    healthy_after_s: float = 0.0
+    stop_at_item: int | None = None
+    """Item at which it does ``at_stop``: "disarm", "silence", "power off" or "hover"."""
+    at_stop: str = "disarm"
+    ends_in_air: bool = False
+    simulated_s_per_item: float = 5.0
+
+    def __post_init__(self) -> None:
+        self.codec = mavlink.MAVLink(None, self.system_id, 1)
+        self.codec.robust_parsing = True
+        self.items: list[Any] = []
+        self.commands: list[tuple[int, tuple[float, ...]]] = []
+        self.heard: list[str] = []
+        self.armed = self.silent = self.powered_off = self.complete = False
+        self.mode, self.current, self.time_s = HOLD, 0, 0.0
+        self._uploading: list[Any] = []
+        self._expected = 0
+        self._out: list[Any] = []
+        self._heartbeat_due_s = self._began_s = -1.0
+        self._now_s = 0.0
+
+    # -- receiving
+
+    def receive(self, data: bytes, now_s: float = 0.0) -> None:
+        """Take a datagram."""
+        self._now_s = max(self._now_s, now_s)
+        for message in self.codec.parse_buffer(data) or ():
+            name = message.get_type()
+            self.heard.append(name)
+            handler = getattr(self, f"_on_{name.lower()}", None)
+            if handler is not None and name not in self.deaf_to:
+                handler(message)
+
+    def _on_command_long(self, message: Any) -> None:
+        command = message.command
+        if command in self.deaf_to:
+            return
+        params = tuple(getattr(message, f"param{i}") for i in range(1, 8))
+        self.commands.append((command, params))
+        if command in self.refusals:
+            self._ack(command, REJECTED)
+            self._say(self.refusals[command])
+        elif command == REQUEST:
+            self._answer_request(int(params[0]))
+        else:
+            self._ack(command, self._execute(command, params))
+
+    def _execute(self, command: int, params: tuple[float, ...]) -> int:
+        if command == ARM:
+            self._become(armed=params[0] == 1.0)
+        elif command == START:
+            self._become(mode=MISSION)
+        elif command == RETURN:
+            self._become(mode=RTL)
+        elif command == SHUT_DOWN:
+            self.powered_off = True
+        elif command not in (21, 22, 176):
+            return UNSUPPORTED
+        return ACCEPTED
+
+    def _answer_request(self, number: int) -> None:
+        makers = {
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+        }
+        if number in makers:
+            self._out.append(makers[number]())
+        self._ack(REQUEST, ACCEPTED if number in makers else UNSUPPORTED)
+
+    def _on_mission_count(self, message: Any) -> None:
+        self._uploading, self._expected = [], message.count
+        self._ask_next_item()
+
+    def _on_mission_item_int(self, message: Any) -> None:
+        if message.seq == len(self._uploading):
+            self._uploading.append(message)
+            self._ask_next_item()
+
+    def _ask_next_item(self) -> None:
+        seq = len(self._uploading)
+        if seq < self._expected:
+            self._out.append(mavlink.MAVLink_mission_request_int_message(255, 190, seq))
+            return
+        self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, self.mission_result))
+        if self.mission_result == ACCEPTED:
+            self.items = self._uploading
+        elif self.mission_refusal:
+            self._say(self.mission_refusal)
+
+    def _on_mission_request_list(self, _message: Any) -> None:
+        self._out.append(mavlink.MAVLink_mission_count_message(255, 190, len(self.items)))
+
+    def _on_mission_request_int(self, message: Any) -> None:
+        item = self.items[message.seq]
+        item.target_system, item.target_component = 255, 190
+        self._out.append(item)
+
+    def _on_mission_clear_all(self, _message: Any) -> None:
+        self.items = []
+        self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, ACCEPTED))
+
+    # -- sending
+
+    def poll(self, now_s: float) -> list[bytes]:
+        """Return the datagrams to send."""
+        self._now_s = max(self._now_s, now_s)
+        if self._began_s < 0.0:
+            self._began_s = now_s
+        self._fly()
+        if now_s >= self._heartbeat_due_s:
+            self._heartbeat_due_s = now_s + 1.0
+            self._out += [self._heartbeat(), self._sys_status(), *self._telemetry()]
+        if self.powered_off and not self.silent:
+            self._out.append(self._heartbeat())
+        messages, self._out = self._out, []
+        if self.silent:
+            return []
+        self.silent = self.powered_off
+        return [self._encode(message) for message in messages if message.get_type() not in self.mute]
+
+    def _encode(self, message: Any) -> bytes:
+        frame = bytes(message.pack(self.codec))
+        self.codec.seq = (self.codec.seq + 1) % 256
+        return frame
+
+    def _fly(self) -> None:
+        if not (self.armed and self.mode in (MISSION, RTL)):
+            return
+        self.time_s += self.simulated_s_per_item
+        if self.current == self.stop_at_item:
+            self._stop()
+        elif self.mode == RTL:
+            self._become(armed=False, mode=HOLD)
+        elif self.current == len(self.items) - 1:
+            self.complete = True
+            self._out.append(mavlink.MAVLink_mission_item_reached_message(self.current))
+            self._become(armed=self.ends_in_air, mode=HOLD)
+        else:
+            self._out.append(mavlink.MAVLink_mission_item_reached_message(self.current))
+            self.current += 1
+        self._out += [self._mission_current(), *self._telemetry()]
+
+    def _stop(self) -> None:
+        if self.at_stop == "disarm":
+            self._say("Rotor 3 is gone", severity=2)
+            self._become(armed=False)
+        elif self.at_stop == "silence":
+            self.silent = True
+        elif self.at_stop == "power off":
+            self.powered_off = True
+
+    def _become(self, armed: bool | None = None, mode: int | None = None) -> None:
+        self.armed = self.armed if armed is None else armed
+        self.mode = self.mode if mode is None else mode
+        self._out.append(self._heartbeat())
+
+    def _ack(self, command: int, result: int) -> None:
+        self._out.append(mavlink.MAVLink_command_ack_message(command, result, 0, 0, 255, 190))
+
+    def _say(self, text: str, severity: int = 4) -> None:
+        data = text.encode()
+        for index in range(0, len(data), 50):
+            number = len(data) if len(data) > 50 else 0
+            chunk = data[index : index + 50]
+            self._out.append(mavlink.MAVLink_statustext_message(severity, chunk, number, index // 50))
+
+    def _heartbeat(self) -> Any:
+        base = 128 * self.armed + mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        state = mavlink.MAV_STATE_POWEROFF if self.powered_off else mavlink.MAV_STATE_ACTIVE
+        return mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, base, self.mode, state, 3)
+
+    def _sys_status(self) -> Any:
+        sensors = mavlink.MAV_SYS_STATUS_AHRS
+        health = sensors if self._now_s - self._began_s >= self.healthy_after_s else 0
+        return mavlink.MAVLink_sys_status_message(
+            sensors, sensors, health, 0, 65535, -1, -1, 0, 0, 0, 0, 0, 0
+        )
+
+    def _mission_current(self) -> Any:
+        state = mavlink.MISSION_STATE_COMPLETE if self.complete else mavlink.MISSION_STATE_ACTIVE
+        return mavlink.MAVLink_mission_current_message(self.current, len(self.items), state, 1)
+
+    def _telemetry(self) -> list[Any]:
+        ms = int(self.time_s * 1e3)
+        timing = FsLoopTiming(
+            ms * 1000, ms // 2, 3, 0, 500.0, 100.0, 52.5, 12.0, 20.0, 90.0, 0.0, 0.0, 0.0, 0
+        )
+        return [
+            mavlink.MAVLink_attitude_message(ms, 0.1, -0.05, 1.5, 0.0, 0.0, 0.0),
+            mavlink.MAVLink_local_position_ned_message(ms, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0),
+            mavlink.MAVLink_global_position_int_message(
+                ms, 473977420, 85455940, 491000, 3000, 50, 0, 0, 9000
+            ),
+            mavlink.MAVLink_home_position_message(
+                473977420, 85455940, 488000, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0, 0
+            ),
+            mavlink.MAVLink_extended_sys_state_message(0, 2 if self.armed else 1),
+            self._mission_current(),
+            EscStatus(0, ms * 1000, [2310, 2290, 2305, 2400], [0.0] * 4, [0.0] * 4),
+            timing,
+        ]
+
+
+@contextmanager
+def serve(vehicle: FakeVehicle, to_port: int | None = None) -> Iterator[UdpSocket]:
+    """Run ``vehicle`` on a free UDP port in a thread; it sends to ``to_port`` first, if given."""
+    socket = UdpSocket("127.0.0.1")
+    stopped = threading.Event()
+
+    def run() -> None:
+        peer = None if to_port is None else ("127.0.0.1", to_port)
+        while not stopped.is_set():
+            socket.wait(STEP_S)
+            for data, sender in socket.receive():
+                peer = sender
+                vehicle.receive(data, time.monotonic())
+            if peer is not None:
+                for frame in vehicle.poll(time.monotonic()):
+                    socket.send(frame, peer)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield socket
+    finally:
+        stopped.set()
+        thread.join()
+        socket.close()

@@ -1,0 +1,195 @@
+"""Connection strings, flags of ``gcs fly``, run directories, and the lines shown in flight."""
+
+from __future__ import annotations
+
+import io
+import socket
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from flightstack.geodesy import GeoPoint
+from flightstack.params.errors import ConfigError
+from gcs_cli.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.flight import Phase
+from gcs_cli.fly_display import LineDisplay
+from gcs_cli.fly_options import (
+    FlyOptions,
+    check_ports,
+    checked_plan,
+    simulator_arguments,
+    stack_arguments,
+)
+from gcs_cli.run_directory import make_run_directory
+from tests.support.fake_vehicle import FakeVehicle
+from tests.unit.test_gcs_flight import Story
+
+MISSIONS = Path(__file__).parents[2] / "missions"
+HOP = MISSIONS / "hop.plan"
+
+
+@pytest.mark.parametrize(
+    ("text", "endpoint"),
+    [
+        (DEFAULT_CONNECTION, Endpoint("127.0.0.1", 14550, True)),
+        ("udp:14560", Endpoint("0.0.0.0", 14560, True)),
+        ("udpin:10.0.0.1:1", Endpoint("10.0.0.1", 1, True)),
+        ("udpout:vehicle.local:18570", Endpoint("vehicle.local", 18570, False)),
+    ],
+)
+def test_connection_strings(text: str, endpoint: Endpoint) -> None:
+    assert parse_endpoint(text) == endpoint
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "14550",
+        "tcp:127.0.0.1:5760",
+        "udp:",
+        "udp:x",
+        "udp:0",
+        "udp:65536",
+        "udpout:14550",
+        "udp:-1",
+        "udp:²",
+    ],
+)
+def test_bad_connection_strings_are_usage_errors(text: str) -> None:
+    with pytest.raises(CliError, match="--connect") as error:
+        parse_endpoint(text)
+    assert error.value.exit_code == USAGE
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        ({"controller": "fuzzy"}, "--controller fuzzy: there is none; known are backstepping, pid"),
+        ({"plant": "flat"}, "--plant flat: expected rigid or paper"),
+        ({"speed": "fast"}, "--speed fast: expected a number"),
+        ({"speed": "0"}, "--speed 0: expected a number"),
+        ({"speed": "nan"}, "--speed nan"),
+        ({"wind": "3"}, "--wind 3: expected N,E or N,E,D"),
+        ({"wind": "3,x"}, "--wind x: expected a number"),
+        ({"gust": -1.0}, "--gust -1.0"),
+        ({"seed": -1}, "--seed -1"),
+        ({"instance": 100}, "--instance 100: expected a number from 0 to 99"),
+        ({"limit_s": float("nan")}, "--limit nan"),
+        ({"timeout_s": 0.0}, "--timeout 0.0"),
+    ],
+)
+def test_bad_flags_are_usage_errors(flags: dict[str, object], said: str) -> None:
+    with pytest.raises(CliError) as error:
+        checked_plan(FlyOptions(HOP, **flags))  # type: ignore[arg-type]
+    assert str(error.value).startswith(said)
+    assert error.value.exit_code == USAGE
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        ({"vehicle": "hexa"}, "hexa: is neither"),
+        ({"gains": "loud"}, "loud: is neither"),
+        ({"inner_hz": 1.0}, "--inner-hz"),
+        ({"outer_hz": 77.0}, "--outer-hz: 77: does not divide"),
+    ],
+)
+def test_bad_configuration_is_refused(flags: dict[str, object], said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        checked_plan(FlyOptions(HOP, **flags))  # type: ignore[arg-type]
+
+
+def test_a_plan_that_the_vehicle_would_refuse_is_not_flown(tmp_path: Path) -> None:
+    plan = tmp_path / "far.waypoints"
+    home = "0\t1\t0\t16\t0\t0\t0\t0\t47.397742\t8.545594\t488\t1"
+    plan.write_text(f"QGC WPL 110\n{home}\n1\t0\t3\t16\t0\t0\t0\t0\t48.0\t8.5\t10\t1\n")
+    with pytest.raises(
+        CliError, match=r"far.waypoints: item 0 \(NAV_WAYPOINT\): is \d+ m from home"
+    ) as error:
+        checked_plan(FlyOptions(plan))
+    assert error.value.exit_code == USAGE
+
+
+@pytest.mark.parametrize("mission", sorted(MISSIONS.glob("*.*")), ids=lambda path: path.name)
+def test_our_missions_pass_the_check(mission: Path) -> None:
+    assert checked_plan(FlyOptions(mission)).items
+
+
+def test_the_children_are_told_everything() -> None:
+    options = FlyOptions(
+        HOP, "backstepping", "paper", "paper", "4", 1000.0, 250.0, 9, "3,-1", 0.5, "x_quad", 2, True, 12.0
+    )
+    home = GeoPoint(47.1, -8.2, 3.5)
+    assert simulator_arguments(options, home) == [
+        "--vehicle=x_quad", "--plant=paper", "--speed=4", "--port=4562", "--instance=2", "--seed=9",
+        "--home=47.1,-8.2,3.5", "--timeout=12", "--wind=3,-1", "--gust=0.5", "--ideal-rotors",
+    ]  # fmt: skip
+    assert stack_arguments(options, home, Path("runs/x")) == [
+        "--vehicle=x_quad", "--controller=backstepping", "--gains=paper", "--inner-hz=1000", "--outer-hz=250",
+        "--sim-port=4562", "--sim-timeout=12", "--instance=2", "--gcs-port=14570", "--log=runs/x/flight.ulg",
+        "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--wait-for-start", "--ideal-rotors",
+    ]  # fmt: skip
+
+
+def _free_instance() -> int:
+    """Return an instance whose ports are free, so that a flight on this machine does not disturb."""
+    for instance in range(90, 100):
+        try:
+            check_ports(FlyOptions(HOP, instance=instance))
+        except CliError:
+            continue
+        return instance
+    raise AssertionError("all ports are in use")
+
+
+@pytest.mark.parametrize(("kind", "base"), [(socket.SOCK_STREAM, 4560), (socket.SOCK_DGRAM, 18570)])
+def test_a_busy_port_is_named(kind: socket.SocketKind, base: int) -> None:
+    instance = _free_instance()
+    with socket.socket(socket.AF_INET, kind) as taken:
+        taken.bind(("127.0.0.1", base + instance))
+        if kind == socket.SOCK_STREAM:
+            taken.listen(1)
+        with pytest.raises(CliError, match=f"port {base + instance} .* is in use: .*--instance") as error:
+            check_ports(FlyOptions(HOP, instance=instance))
+    assert error.value.exit_code == USAGE
+
+
+def test_run_directories_never_meet(tmp_path: Path) -> None:
+    folders = [make_run_directory(Path("missions/square.plan"), None, tmp_path) for _ in range(3)]
+    assert len(set(folders)) == 3
+    assert all(folder.is_dir() and "-square" in folder.name for folder in folders)
+
+
+def test_a_directory_with_a_flight_is_refused(tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "run"
+    assert make_run_directory(HOP, out) == out
+    assert make_run_directory(HOP, out) == out  # nothing is in it yet
+    (out / "flight.ulg").write_bytes(b"x")
+    with pytest.raises(CliError, match="of another flight is there") as error:
+        make_run_directory(HOP, out)
+    assert error.value.exit_code == USAGE
+
+
+def test_a_directory_that_cannot_be_made(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(CliError, match="cannot be made"):
+        make_run_directory(HOP, tmp_path / "file" / "run")
+
+
+def test_lines_tell_the_course_of_a_flight() -> None:
+    story = Story(FakeVehicle())
+    console = Console(file=io.StringIO(), width=40, force_terminal=False)
+    display = LineDisplay(console)
+    for phase in (Phase.UPLOAD, Phase.ARM, Phase.FLY, Phase.OVER):
+        story.run(until=phase)
+        display.update(story.flight)
+    assert isinstance(console.file, io.StringIO)
+    lines = console.file.getvalue().splitlines()
+    assert lines[0] == "uploading the mission"
+    assert lines[1] == "arming"
+    assert lines[2].startswith("MISSION  item ")
+    assert "N +1.0 E +2.0 up 3.0 m" in lines[2]
+    assert lines[-1] == "over"

@@ -1,0 +1,208 @@
+"""The ground station's flight state machine against a scripted vehicle, in memory and in simulated time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import pytest
+
+from flightstack.plan import Command, Frame, MissionItem
+from gcs_cli.errors import DONE, FAILED, NO_ANSWER
+from gcs_cli.flight import Flight, Phase
+from gcs_cli.session import Session
+from tests.support.fake_vehicle import ARM, RETURN, SHUT_DOWN, START, FakeVehicle
+
+STEP_S = 0.05
+TAKEOFF = MissionItem(Command.NAV_TAKEOFF, Frame.GLOBAL_RELATIVE_ALT, x=473977420, y=85455940, z=3.0)
+WAYPOINT = MissionItem(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, x=473978320, y=85455940, z=3.0)
+LAND = MissionItem(Command.NAV_LAND, Frame.GLOBAL_RELATIVE_ALT, x=473977420, y=85455940)
+HOP = (TAKEOFF, WAYPOINT, LAND)
+
+
+@dataclass
+class Story:
+    """A flight with a vehicle; ``now_s`` is everybody's clock."""
+
+    vehicle: FakeVehicle
+    items: tuple[MissionItem, ...] = HOP
+    connect_s: float = 10.0
+    limit_s: float = 3600.0
+    now_s: float = 100.0
+    phases: list[Phase] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.session = Session()
+        self.flight = Flight(self.session, self.items, self.now_s, self.connect_s, self.limit_s)
+
+    def run(self, most_s: float = 60.0, until: Phase = Phase.OVER) -> Story:
+        end_s = self.now_s + most_s
+        while self.flight.phase is not until:
+            assert self.now_s < end_s, f"still {self.flight.phase} after {most_s} s"
+            for frame in self.session.poll(self.now_s):
+                self.vehicle.receive(frame, self.now_s)
+            for frame in self.vehicle.poll(self.now_s):
+                self.session.receive(frame, ("fake", 1), self.now_s)
+            self.flight.step(self.now_s)
+            if not self.phases or self.phases[-1] is not self.flight.phase:
+                self.phases.append(self.flight.phase)
+            self.now_s += STEP_S
+        return self
+
+    @property
+    def reason(self) -> str:
+        assert self.flight.outcome is not None
+        return self.flight.outcome.reason
+
+    @property
+    def code(self) -> int:
+        assert self.flight.outcome is not None
+        return self.flight.outcome.exit_code
+
+    @property
+    def orders(self) -> list[int]:
+        return [command for command, _ in self.vehicle.commands if command in (ARM, START, SHUT_DOWN, RETURN)]
+
+
+def test_a_mission_is_flown_to_its_end() -> None:
+    story = Story(FakeVehicle()).run()
+    assert (story.reason, story.code) == ("completed", DONE)
+    assert [item.command for item in story.vehicle.items] == [22, 16, 21]
+    assert story.orders == [ARM, START, SHUT_DOWN]
+    assert story.flight.shut_down_accepted
+    assert story.flight.flown_s == pytest.approx(15.0)
+    assert story.flight.began_s is not None
+    assert story.flight.ended_s is not None
+    assert story.flight.began_s < story.flight.ended_s < story.now_s
+
+
+def test_no_vehicle() -> None:
+    story = Story(FakeVehicle(mute={"HEARTBEAT"}), connect_s=3.0).run()
+    assert (story.reason, story.code) == ("no vehicle answered within 3 s", NO_ANSWER)
+    assert not story.orders
+
+
+def test_refused_mission_tells_the_vehicles_reason_and_the_item() -> None:
+    vehicle = FakeVehicle(
+        mission_result=8,
+        mission_refusal="Mission refused: item 1 (NAV_WAYPOINT): the acceptance radius is -1",
+    )
+    story = Story(vehicle).run()
+    assert (
+        story.reason == "the vehicle refused the mission: item 1 (NAV_WAYPOINT): the acceptance radius is -1"
+    )
+    assert (story.code, story.orders) == (FAILED, [SHUT_DOWN])
+
+
+def test_refused_mission_without_a_word_tells_the_result() -> None:
+    story = Story(FakeVehicle(mission_result=4)).run()
+    assert "MAV_MISSION_NO_SPACE" in story.reason
+    assert story.code == FAILED
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [(ARM, "the vehicle refused to arm: "), (START, "the vehicle refused to start the mission: ")],
+)
+def test_refused_command_tells_the_vehicles_reason(command: int, text: str) -> None:
+    story = Story(FakeVehicle(refusals={command: "Command refused: the battery is low"})).run()
+    assert (story.reason, story.code) == (text + "the battery is low", FAILED)
+    assert story.orders[-1] == SHUT_DOWN
+
+
+@pytest.mark.parametrize(("deaf_to", "said"), [("MISSION_COUNT", "upload"), (ARM, "COMPONENT_ARM_DISARM")])
+def test_a_vehicle_that_does_not_answer(deaf_to: object, said: str) -> None:
+    story = Story(FakeVehicle(deaf_to={deaf_to})).run()
+    assert said in story.reason
+    assert story.code == NO_ANSWER
+
+
+def test_arming_waits_for_the_first_state() -> None:
+    story = Story(FakeVehicle(healthy_after_s=4.0)).run()
+    assert story.code == DONE
+    assert story.orders.count(ARM) == 1
+    assert story.phases.count(Phase.READY) == 1
+
+
+def test_a_vehicle_that_never_gets_ready() -> None:
+    story = Story(FakeVehicle(healthy_after_s=1e9), connect_s=8.0).run()
+    assert (story.reason, story.code) == ("the vehicle has no position and attitude after 8 s", NO_ANSWER)
+    assert ARM not in story.orders
+
+
+@pytest.mark.parametrize(
+    "mute",
+    [
+        {"MISSION_ITEM_REACHED"},
+        {"STATUSTEXT", "MISSION_ITEM_REACHED", "EXTENDED_SYS_STATE", "LOCAL_POSITION_NED"},
+        {"MISSION_CURRENT", "EXTENDED_SYS_STATE"},
+        {"MISSION_ITEM_REACHED", "ATTITUDE", "FS_LOOP_TIMING"},
+    ],
+)
+def test_no_single_message_is_needed_to_see_the_end(mute: set[str]) -> None:
+    story = Story(FakeVehicle(mute=mute)).run()
+    assert story.reason == "completed"
+
+
+def test_landing_at_the_last_item_counts_when_only_the_item_is_known() -> None:
+    vehicle = FakeVehicle(stop_at_item=2, mute={"MISSION_ITEM_REACHED"})
+    assert Story(vehicle).run().reason == "completed"
+
+
+def test_disarming_on_the_way_is_a_failure_with_the_vehicles_last_warning() -> None:
+    story = Story(FakeVehicle(stop_at_item=1)).run()
+    assert story.reason == "the vehicle disarmed at item 1 of 3, before the mission was done: Rotor 3 is gone"
+    assert story.code == FAILED
+
+
+def test_a_lost_vehicle_is_noticed_within_six_seconds() -> None:
+    story = Story(FakeVehicle(stop_at_item=1, at_stop="silence")).run(most_s=10.0)
+    assert "the vehicle was lost at t = " in story.reason
+    assert story.code == FAILED
+    assert story.flight.view.silent_s(story.now_s) == pytest.approx(5.0, abs=2.1 * STEP_S)
+    assert not story.flight.shut_down_accepted
+
+
+def test_a_vehicle_that_shuts_down_in_flight() -> None:
+    story = Story(FakeVehicle(stop_at_item=1, at_stop="power off")).run()
+    assert "the flight stack shut down" in story.reason
+    assert story.code == FAILED
+
+
+def test_the_limit_counts_simulated_time() -> None:
+    story = Story(FakeVehicle(stop_at_item=1, at_stop="hover"), limit_s=120.0).run()
+    assert story.reason == "the flight took longer than --limit 120 s of simulated time"
+    assert story.code == NO_ANSWER
+    assert story.now_s - 100.0 < 10.0  # wall time: 5 s of simulated time pass in each step of 0.05 s
+
+
+def test_a_plan_that_ends_in_the_air_is_brought_home() -> None:
+    story = Story(FakeVehicle(ends_in_air=True), items=(TAKEOFF, WAYPOINT)).run()
+    assert story.orders == [ARM, START, RETURN, SHUT_DOWN]
+    assert story.flight.returned_by_us
+    assert story.reason == "completed"
+
+
+def test_a_refused_return_ends_the_flight() -> None:
+    vehicle = FakeVehicle(ends_in_air=True, refusals={RETURN: "Command refused: no home"})
+    story = Story(vehicle, items=(TAKEOFF, WAYPOINT)).run()
+    assert story.reason == "the mission is flown, but the vehicle refused to return: no home"
+
+
+@pytest.mark.parametrize("phase", [Phase.UPLOAD, Phase.ARM, Phase.FLY])
+def test_an_interruption_shuts_the_vehicle_down(phase: Phase) -> None:
+    story = Story(FakeVehicle(stop_at_item=1, at_stop="hover")).run(until=phase)
+    story.flight.abort("interrupted", FAILED, story.now_s)
+    story.run(most_s=4.0)
+    assert (story.reason, story.orders[-1]) == ("interrupted", SHUT_DOWN)
+
+
+def test_a_vehicle_that_is_gone_is_not_waited_for() -> None:
+    story = Story(FakeVehicle()).run(until=Phase.FLY)
+    story.flight.abort("flightstack ended with code 1", FAILED, story.now_s, vehicle_is_gone=True)
+    assert story.flight.over
+
+
+def test_a_vehicle_that_ignores_the_shut_down_does_not_hold_us() -> None:
+    story = Story(FakeVehicle(deaf_to={SHUT_DOWN})).run(most_s=30.0)
+    assert story.reason == "completed"
+    assert not story.flight.shut_down_accepted

@@ -1,0 +1,148 @@
+"""The ground station's session without I/O: who the vehicle is, heartbeats, services, recording."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link
+from gcs_cli import calls
+from gcs_cli.calls import Answer, Call
+from gcs_cli.session import Session
+from tests.support.fake_vehicle import ARM, FakeVehicle
+
+HERE, THERE = ("10.0.0.1", 18570), ("10.0.0.2", 18570)
+
+
+def heartbeats(frames: list[bytes]) -> list[Any]:
+    messages = [message for frame in frames for message in Link(0, 0).decode(frame)]
+    return [message for message in messages if message.get_type() == "HEARTBEAT"]
+
+
+def met(session: Session, vehicle: FakeVehicle, peer: tuple[str, int] = HERE, now_s: float = 0.0) -> Session:
+    for frame in vehicle.poll(now_s):
+        session.receive(frame, peer, now_s)
+    return session
+
+
+def test_nothing_is_sent_before_there_is_someone_to_send_to() -> None:
+    session = Session()
+    assert session.poll(0.0) == []
+    assert session.next_deadline() is None
+    assert session.farewell() == []
+
+
+def test_heartbeats_are_sent_once_a_second_as_a_ground_station() -> None:
+    session = met(Session(), FakeVehicle())
+    sent = [now_s for now_s in (0.0, 0.5, 0.99, 1.0, 1.9, 2.0) if heartbeats(session.poll(now_s))]
+    assert sent == [0.0, 1.0, 2.0]
+    assert session.next_deadline() == 3.0
+    (message,) = heartbeats(session.poll(3.0))
+    assert (message.get_srcSystem(), message.get_srcComponent()) == (255, 190)
+    assert (message.type, message.autopilot) == (mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID)
+
+
+def test_a_given_peer_is_spoken_to_first() -> None:
+    session = Session(peer=HERE)
+    assert len(heartbeats(session.poll(0.0))) == 1
+
+
+def test_it_says_when_it_leaves() -> None:
+    session = met(Session(), FakeVehicle())
+    (message,) = heartbeats(session.farewell())
+    assert message.system_status == mavlink.MAV_STATE_POWEROFF
+
+
+def test_the_first_vehicle_heard_is_kept() -> None:
+    session = met(Session(), FakeVehicle(1))
+    met(session, FakeVehicle(2), THERE, 1.0)
+    assert (session.target, session.peer) == ((1, 1), HERE)
+    assert session.view.link.received > 0
+
+
+def test_a_vehicle_that_fell_silent_gives_way_to_the_next() -> None:
+    session = met(Session(), FakeVehicle(1))
+    met(session, FakeVehicle(2), THERE, 5.1)
+    assert (session.target, session.peer) == ((2, 1), THERE)
+    assert session.view.last_heartbeat_s == 5.1
+
+
+def test_a_vehicle_that_comes_back_from_another_port_is_the_same() -> None:
+    session = met(Session(), FakeVehicle(1))
+    texts_before = session.view.link.received
+    met(session, FakeVehicle(1), THERE, 6.0)
+    assert session.peer == THERE
+    assert session.view.link.received > texts_before
+
+
+def test_noise_is_counted_and_does_not_stop_what_follows() -> None:
+    session = Session()
+    for _ in range(40):
+        session.receive(b"\xfd\xffnoise" * 10, THERE, 0.0)
+    met(session, FakeVehicle())
+    assert session.target == (1, 1)
+    assert session.bad > 0
+
+
+def test_every_frame_is_recorded_in_both_directions() -> None:
+    frames: list[bytes] = []
+    session = met(Session(record=frames.append), FakeVehicle())
+    received = len(frames)
+    sent = session.poll(0.0)
+    assert received == session.view.link.received
+    assert frames[received:] == sent
+
+
+def complete(session: Session, vehicle: FakeVehicle, call: Call, now_s: float = 0.0) -> Answer:
+    for _ in range(1000):
+        answer = call.answer(now_s)
+        if answer is not None:
+            return answer
+        for frame in session.poll(now_s):
+            vehicle.receive(frame, now_s)
+        met(session, vehicle, HERE, now_s)
+        now_s += 0.05
+    raise AssertionError("no answer")
+
+
+def test_a_command_is_answered() -> None:
+    vehicle = FakeVehicle()
+    session = met(Session(), vehicle)
+    answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
+    assert answer.accepted
+    assert vehicle.commands == [(ARM, (1.0, 0, 0, 0, 0, 0, 0))]
+
+
+def test_a_refusal_carries_the_text_that_follows_it() -> None:
+    reason = "the vehicle is tilted by more than 30 degrees, and its rotors would touch the ground"
+    vehicle = FakeVehicle(refusals={ARM: f"Command refused: {reason}"})
+    session = met(Session(), vehicle)
+    answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
+    assert answer == Answer(False, reason)
+
+
+def test_a_refusal_without_a_text_names_the_result() -> None:
+    vehicle = FakeVehicle(refusals={ARM: "?"}, mute={"STATUSTEXT"})
+    session = met(Session(), vehicle)
+    answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
+    assert not answer.accepted
+    assert "MAV_RESULT_TEMPORARILY_REJECTED" in answer.reason
+
+
+def test_texts_of_before_explain_nothing() -> None:
+    vehicle = FakeVehicle(mute={"COMMAND_ACK"})
+    session = met(Session(), vehicle)
+    vehicle._say("Battery is low")
+    met(session, vehicle)
+    vehicle.mute = {"STATUSTEXT"}
+    vehicle.refusals = {ARM: "?"}
+    answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
+    assert "Battery" not in answer.reason
+
+
+def test_silence_is_told_from_refusal() -> None:
+    vehicle = FakeVehicle(deaf_to={ARM})
+    session = met(Session(), vehicle)
+    answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
+    assert answer.silent
+    assert "COMPONENT_ARM_DISARM" in answer.reason

@@ -1,0 +1,234 @@
+"""Messages folded into the vehicle's snapshot, through pymavlink's encoder and decoder."""
+
+from __future__ import annotations
+
+import math
+import struct
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
+from flightstack.mavlink.link import Link
+from gcs_cli.px4_modes import mode_name, mode_numbers, settable_modes
+from gcs_cli.vehicle_view import update
+from gcs_cli.view_types import TEXTS_KEPT, VehicleView
+
+NAN, INF = math.nan, math.inf
+MISSION_MODE = 4 << 16 | 4 << 24
+
+
+class Vehicle:
+    """Sends messages as one system and folds them."""
+
+    def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
+        self.link = Link(system_id, component_id)
+        self.view = VehicleView()
+
+    def send(self, message: Any, now_s: float = 1.0) -> VehicleView:
+        for decoded in Link(0, 0).decode(self.link.encode(message)):
+            self.view = update(self.view, decoded, now_s)
+        return self.view
+
+
+def heartbeat(base: int = 1, mode: int = MISSION_MODE, state: int = 4, autopilot: int = 12) -> Any:
+    return mavlink.MAVLink_heartbeat_message(2, autopilot, base, mode, state, 3)
+
+
+@pytest.fixture
+def vehicle() -> Vehicle:
+    made = Vehicle()
+    made.send(heartbeat())
+    return made
+
+
+def test_the_first_heartbeat_of_an_autopilot_decides_who_it_is() -> None:
+    vehicle = Vehicle(7, 1)
+    assert vehicle.send(mavlink.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0)).attitude is None
+    assert vehicle.send(heartbeat(autopilot=8)).identity is None  # a ground station
+    assert vehicle.send(heartbeat()).identity == (7, 1, 2, 12)
+
+
+def test_messages_of_other_systems_and_components_change_nothing(vehicle: Vehicle) -> None:
+    before = vehicle.view
+    for system, component in ((2, 1), (1, 100)):
+        stranger = Vehicle(system, component)
+        stranger.view = before
+        assert stranger.send(heartbeat(base=128)) is before
+
+
+def test_heartbeat_tells_mode_arming_and_shut_down(vehicle: Vehicle) -> None:
+    view = vehicle.send(heartbeat(base=128), 3.0)
+    assert (view.mode, view.armed, view.ever_armed, view.last_heartbeat_s) == ("MISSION", True, True, 3.0)
+    view = vehicle.send(heartbeat(state=7))
+    assert (view.armed, view.ever_armed, view.powered_off) == (False, True, True)
+
+
+def test_loss_is_five_seconds_without_heartbeat(vehicle: Vehicle) -> None:
+    assert not vehicle.view.lost(6.0)
+    assert vehicle.view.lost(6.01)
+    assert not VehicleView().lost(1e9)
+
+
+def test_kinematics(vehicle: Vehicle) -> None:
+    vehicle.send(mavlink.MAVLink_attitude_message(12_500, 0.1, -0.2, 3.0, 0.01, 0.02, 0.03))
+    vehicle.send(mavlink.MAVLink_local_position_ned_message(12_600, 1, 2, -3, 4, 5, -6))
+    vehicle.send(
+        mavlink.MAVLink_global_position_int_message(12_700, 473977420, -85455940, 491_000, 3_000, 0, 0, 0, 0)
+    )
+    view = vehicle.send(
+        mavlink.MAVLink_home_position_message(10, 20, 488_000, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0, 0)
+    )
+    assert view.attitude == pytest.approx((0.1, -0.2, 3.0))
+    assert view.rates_frd_rad_s == pytest.approx((0.01, 0.02, 0.03))
+    assert (view.position_ned_m, view.velocity_ned_m_s) == ((1, 2, -3), (4, 5, -6))
+    assert view.geo == pytest.approx((47.397742, -8.545594, 491.0, 3.0))
+    assert view.home is not None
+    assert view.home.altitude_m == 488.0
+    assert view.time_s == 12.7
+
+
+def test_setpoint_leaves_out_what_the_mask_ignores(vehicle: Vehicle) -> None:
+    def target(mask: int, x: float = 1.0) -> Any:
+        return mavlink.MAVLink_position_target_local_ned_message(
+            0, 1, mask, x, 2, 3, 4, 5, 6, 0, 0, 0, 0.5, 0
+        )
+
+    view = vehicle.send(target(0))
+    assert view.setpoint == ((1, 2, 3), (4, 5, 6), 0.5)
+    assert vehicle.send(target(0b111)).setpoint == (None, (4, 5, 6), 0.5)
+    assert vehicle.send(target(0b111 << 3 | 1 << 10)).setpoint == ((1, 2, 3), None, None)
+    assert vehicle.send(target(0, NAN)).setpoint == (None, (4, 5, 6), 0.5)
+
+
+def test_attitude_target_is_shown_as_angles(vehicle: Vehicle) -> None:
+    half = 0.25
+    q = [math.cos(half), 0.0, 0.0, math.sin(half)]  # yaw 0.5
+    assert vehicle.send(mavlink.MAVLink_attitude_target_message(0, 0, q, 0, 0, 0, 0.5)).attitude_target == (
+        pytest.approx((0.0, 0.0, 0.5), abs=1e-6)  # 32-bit floats
+    )
+    for bad in ([0.0] * 4, [NAN, 0, 0, 1], [INF, 0, 0, 0]):
+        message = mavlink.MAVLink_attitude_target_message(0, 0, bad, 0, 0, 0, 0.5)
+        assert vehicle.send(message).attitude_target is None
+
+
+def test_battery_is_none_when_it_is_not_measured(vehicle: Vehicle) -> None:
+    def status(voltage: int, current: int, remaining: int, health: int = 1) -> Any:
+        return mavlink.MAVLink_sys_status_message(
+            1, 1, health, 0, voltage, current, remaining, 0, 0, 0, 0, 0, 0
+        )
+
+    assert vehicle.send(status(65535, -1, -1)).battery is None
+    assert vehicle.send(status(12_100, 530, 76)).battery == pytest.approx((0.76, 12.1, 5.3))
+    assert vehicle.send(status(12_100, -1, -1)).battery == (None, 12.1, None)
+    assert vehicle.view.healthy is True
+    assert vehicle.send(status(65535, -1, -1, health=0)).healthy is False
+
+
+def test_mission_progress(vehicle: Vehicle) -> None:
+    vehicle.send(mavlink.MAVLink_mission_current_message(2, 6, 3, 1))
+    view = vehicle.send(mavlink.MAVLink_mission_item_reached_message(1))
+    assert view.mission == (2, 6, 1, 3)
+    assert not view.mission.complete
+    assert vehicle.send(mavlink.MAVLink_mission_current_message(5, 6, 5, 1)).mission.complete
+    shorter = vehicle.send(mavlink.MAVLink_mission_current_message(0, 1, 2, 1)).mission
+    assert shorter == (0, 1, None, 2)  # the item reached was another mission's
+
+
+def test_rotor_speeds_come_in_groups_of_four(vehicle: Vehicle) -> None:
+    vehicle.send(EscStatus(4, 0, [5, 6, 7, -8], [0.0] * 4, [0.0] * 4))
+    view = vehicle.send(EscStatus(0, 0, [1, 2, 3, 4], [0.0] * 4, [0.0] * 4))
+    assert view.rotor_rpm == (1, 2, 3, 4, 5, 6, 7, -8)
+    assert view.rotor_peak_rpm == 8
+    assert vehicle.send(EscStatus(250, 0, [1, 1, 1, 1], [0.0] * 4, [0.0] * 4)).rotor_rpm == view.rotor_rpm
+
+
+def test_loop_timing_turns_nan_into_unknown(vehicle: Vehicle) -> None:
+    message = FsLoopTiming(2_500_000, 1250, 3, 4, 500.0, 100.0, NAN, 12.0, 20.0, INF, 1.0, 2.0, 3.0, 1)
+    timing = vehicle.send(message).timing
+    assert timing is not None
+    assert timing[:4] == (2.5, 1250, 3, 4)
+    assert (timing.real_time_factor, timing.execution_max_us, timing.lockstep) == (None, None, False)
+    assert (timing.inner_hz, timing.lateness_max_us) == (500.0, 3.0)
+
+
+def test_status_texts_are_kept_numbered_and_bounded(vehicle: Vehicle) -> None:
+    for index in range(TEXTS_KEPT + 20):
+        vehicle.send(mavlink.MAVLink_statustext_message(6, f"text {index}".encode()))
+    view = vehicle.view
+    assert (len(view.texts), view.text_count) == (TEXTS_KEPT, TEXTS_KEPT + 20)
+    assert [entry.text for entry in view.texts_since(TEXTS_KEPT + 18)] == ["text 118", "text 119"]
+
+
+def test_long_status_texts_are_joined(vehicle: Vehicle) -> None:
+    pieces = [b"a" * 50, b"b" * 50, b"c" * 7]
+    for index, piece in enumerate(pieces):
+        vehicle.send(mavlink.MAVLink_statustext_message(4, piece, 99, index))
+    vehicle.send(mavlink.MAVLink_statustext_message(4, b"next", 0, 0))
+    assert [entry.text for entry in vehicle.view.texts] == ["a" * 50 + "b" * 50 + "c" * 7, "next"]
+    assert vehicle.view.text_count == 2
+
+
+def test_status_text_cannot_write_to_the_terminal(vehicle: Vehicle) -> None:
+    vehicle.send(mavlink.MAVLink_statustext_message(6, b"\x1b[2Jhello\r\n[red]"))
+    assert vehicle.view.texts[0].text == "[2Jhello[red]"
+
+
+def test_gaps_in_the_sequence_are_counted_as_lost(vehicle: Vehicle) -> None:
+    vehicle.link.encode(heartbeat())  # never arrives
+    vehicle.link.encode(heartbeat())
+    link = vehicle.send(heartbeat()).link
+    assert (link.received, link.lost) == (2, 2)
+    assert link.quality == 0.5
+
+
+def test_message_rate_is_measured_over_a_second() -> None:
+    vehicle = Vehicle()
+    for index in range(50):
+        vehicle.send(heartbeat(), index * 0.1)
+    assert vehicle.view.link.rate_hz == pytest.approx(10.0, rel=0.1)
+
+
+def _raw_frame(message_id: int, payload: bytes) -> Any:
+    """Decode ``payload`` as a message, whatever it holds."""
+    kind = mavlink.mavlink_map[message_id]
+    size = struct.calcsize(kind.unpacker.format)
+    body = (payload * (size // max(1, len(payload)) + 1))[:size]
+    frame = mavlink.MAVLink_message(message_id, kind.msgname)
+    codec = mavlink.MAVLink(None, 1, 1)
+    packed = frame._pack(codec, kind.crc_extra, body)
+    return next(iter(Link(0, 0).decode(packed)), None)
+
+
+FOLDED = [0, 1, 2, 30, 32, 33, 42, 46, 74, 83, 85, 242, 245, 253, 291, 53002]
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(st.lists(st.tuples(st.sampled_from(FOLDED), st.binary(min_size=1, max_size=64)), max_size=6))
+def test_no_payload_raises(messages: list[tuple[int, bytes]]) -> None:
+    vehicle = Vehicle()
+    vehicle.send(heartbeat())
+    for message_id, payload in messages:
+        message = _raw_frame(message_id, payload)
+        assert message is not None
+        vehicle.view = update(vehicle.view, message, 2.0)
+
+
+def test_the_list_of_folded_messages_is_whole() -> None:
+    from gcs_cli.vehicle_view import _FOLDS  # noqa: PLC0415
+
+    assert {mavlink.mavlink_map[number].msgname for number in FOLDED} == set(_FOLDS)
+
+
+def test_modes_have_px4s_names_and_numbers() -> None:
+    assert mode_name(4 << 16 | 5 << 24) == "RTL"
+    assert mode_name(3 << 16) == "POSITION"
+    assert mode_name(77 << 16) == "mode 77.0"
+    assert mode_numbers("loiter") == mode_numbers("Hold") == (4, 3)
+    assert mode_numbers("nonsense") is None
+    for name in settable_modes():
+        numbers = mode_numbers(name)
+        assert numbers is not None
+        assert mode_name(numbers[0] << 16 | numbers[1] << 24) == name
