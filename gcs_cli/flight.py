@@ -163,13 +163,13 @@ class Flight:
 
     def _arm(self, now_s: float) -> None:
         if self._answered("the vehicle refused to arm: ", now_s):
+            self._start_time_s = self.view.time_s or 0.0
             self._order(calls.START_MISSION, now_s)
             self.phase = Phase.START
 
     def _start(self, now_s: float) -> None:
         if self._answered("the vehicle refused to start the mission: ", now_s):
             self.began_s = now_s
-            self._start_time_s = self.view.time_s or 0.0
             self.phase = Phase.FLY
 
     def _fly(self, now_s: float) -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from functools import cache
+from itertools import groupby
+from operator import itemgetter
 
 from rich.style import Style
 from rich.text import Text
@@ -22,17 +25,24 @@ def horizon(attitude: Euler | None, width: int, height: int) -> Text:
     """Draw the horizon as seen from the vehicle in ``width`` × ``height`` cells, two pixels to a cell."""
     text = Text(no_wrap=True)
     for row in range(height):
-        for column in range(width):
-            upper = _pixel(attitude, column, 2 * row, width, 2 * height)
-            lower = _pixel(attitude, column, 2 * row + 1, width, 2 * height)
-            mark = _aircraft(column, row, width, height)
-            if mark:
-                text.append(mark, Style(color=_AIRCRAFT, bgcolor=lower, bold=True))
-            else:
-                text.append("▀", Style(color=upper, bgcolor=lower))
+        cells = [_cell(attitude, column, row, width, height) for column in range(width)]
+        for style, run in groupby(cells, key=itemgetter(1)):  # few runs are drawn faster than many cells
+            text.append("".join(mark for mark, _ in run), style)
         if row < height - 1:
             text.append("\n")
     return text
+
+
+def _cell(attitude: Euler | None, column: int, row: int, width: int, height: int) -> tuple[str, Style]:
+    upper = _pixel(attitude, column, 2 * row, width, 2 * height)
+    lower = _pixel(attitude, column, 2 * row + 1, width, 2 * height)
+    mark = _aircraft(column, row, width, height)
+    return (mark, _style(_AIRCRAFT, lower)) if mark else ("▀", _style(upper, lower))
+
+
+@cache
+def _style(colour: str, background: str) -> Style:
+    return Style(color=colour, bgcolor=background, bold=colour == _AIRCRAFT)
 
 
 def _pixel(attitude: Euler | None, column: int, row: int, width: int, height: int) -> str:
@@ -43,8 +53,8 @@ def _pixel(attitude: Euler | None, column: int, row: int, width: int, height: in
     right = (column + 0.5 - width / 2) * scale * _CELL_ASPECT
     up = (height / 2 - row - 0.5) * scale
     cos_roll, sin_roll = math.cos(attitude.roll_rad), math.sin(attitude.roll_rad)
-    along = right * cos_roll - up * sin_roll
-    elevation = up * cos_roll + right * sin_roll + math.degrees(attitude.pitch_rad)
+    along = right * cos_roll + up * sin_roll
+    elevation = up * cos_roll - right * sin_roll + math.degrees(attitude.pitch_rad)
     if abs(elevation) < scale / 2:
         return _LINE
     step = round(elevation / _LADDER_STEP_DEG) * _LADDER_STEP_DEG

@@ -185,18 +185,17 @@ def timing_panel(timing: LoopTiming | None, width: int) -> Panel:
 
 
 def timing_line(timing: LoopTiming | None) -> Panel:
-    """The same on one line."""
+    """The same on one line; in real time, which lateness shows, it is too long to say so too."""
     if timing is None:
         return framed("Loops", Text("no timing yet", style="bright_black"))
     period_us = 1e6 / timing.inner_hz if timing.inner_hz else None
-    line = _rates(timing)
+    line = _rates(timing, with_clock=timing.lockstep)
     for name, figures in _times(timing):
         line.append(f"  {name} ", style="bright_black")
         for index, value in enumerate(figures):
             line.append(("/" if index else "") + number(value, 0), style=_time_style(value, period_us))
-        line.append(" µs", style="bright_black")
-    line.append("  ")
-    line.append_text(_counts(timing))
+    line.append(" µs  ", style="bright_black")
+    line.append_text(_counts(timing, with_ticks=timing.lockstep))
     return framed("Loops", line)
 
 
@@ -206,22 +205,25 @@ def _times(timing: LoopTiming) -> list[tuple[str, tuple[float | None, ...]]]:
     return [("run", run)] if timing.lockstep else [("run", run), ("late", late)]
 
 
-def _rates(timing: LoopTiming) -> Text:
+def _rates(timing: LoopTiming, with_clock: bool = True) -> Text:
     text = Text(no_wrap=True, overflow="ellipsis")
     text.append(f"{number(timing.inner_hz, 0)}/{number(timing.outer_hz, 0)} Hz", style="bold")
+    if not with_clock:
+        return text
     text.append(" lockstep" if timing.lockstep else " real time")
     if timing.real_time_factor is not None:
         text.append(f" ×{timing.real_time_factor:.1f}", style="bold")
     return text
 
 
-def _counts(timing: LoopTiming) -> Text:
+def _counts(timing: LoopTiming, with_ticks: bool = True) -> Text:
     text = Text("overruns ", style="bright_black", no_wrap=True, overflow="ellipsis")
     text.append(f"{timing.overruns}", style="bold yellow" if timing.overruns else "bold")
     if not timing.lockstep:
         text.append(" missed ")
         text.append(f"{timing.missed}", style="bold red" if timing.missed else "bold")
-    text.append(f" of {timing.ticks}")
+    if with_ticks:
+        text.append(f" of {timing.ticks}")
     return text
 
 

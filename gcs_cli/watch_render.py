@@ -130,7 +130,8 @@ def link_text(view: VehicleView, now_s: float) -> Text:
 
 def _footer(view: VehicleView, width: int) -> Text:
     assert view.identity is not None
-    text = Text(" q", style="bold cyan", no_wrap=True)
+    text = Text(no_wrap=True)
+    text.append(" q", style="bold cyan")
     text.append(" quit   ", style="bright_black")
     text.append(f"vehicle {view.identity.system_id}", style="bright_black")
     if view.home is not None and width >= _WIDE:
