@@ -34,7 +34,7 @@ class FlyOptions:
     plant: str = "rigid"
     speed: str = "max"
     inner_hz: float = 500.0
-    outer_hz: float = 100.0
+    outer_hz: float | None = None
     seed: int = 1
     wind: str | None = None
     gust: float | None = None
@@ -43,6 +43,13 @@ class FlyOptions:
     ideal_rotors: bool = False
     timeout_s: float = 60.0
     limit_s: float = 3600.0
+
+    @property
+    def outer_rate_hz(self) -> float:
+        """Rate of the outer loop: as given, else the one nearest to 100 Hz that divides the inner one."""
+        return (
+            self.inner_hz / max(1, round(self.inner_hz / 100.0)) if self.outer_hz is None else self.outer_hz
+        )
 
     @property
     def gcs_port(self) -> int:
@@ -61,7 +68,7 @@ def checked_plan(options: FlyOptions) -> Plan:
     plan = load_plan(options.plan_path)
     load_vehicle(options.vehicle)
     open_gains(options.gains)
-    rates(options.inner_hz, options.outer_hz)
+    rates(options.inner_hz, options.outer_rate_hz)
     rejection = check_mission(plan.items, plan.home or DEFAULT_HOME)
     if rejection is not None:
         raise CliError(f"{options.plan_path}: {rejection.reason}", USAGE)
@@ -84,6 +91,7 @@ def _check_flags(options: FlyOptions) -> None:
             raise CliError(f"--wind {options.wind}: expected N,E or N,E,D in m/s", USAGE)
         for part in parts:
             _number("--wind", part, -200.0, 200.0)
+    _number("--inner-hz", options.inner_hz, 1.0, 1e5)
     _number("--gust", options.gust or 0.0, 0.0, 50.0)
     _number("--seed", options.seed, 0, 2**31 - 1)
     _number("--instance", options.instance, 0, MOST_INSTANCES - 1)
@@ -148,8 +156,8 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path) -> list[s
         f"--vehicle={options.vehicle}",
         f"--controller={options.controller}",
         f"--gains={options.gains}",
-        f"--inner-hz={options.inner_hz:g}",
-        f"--outer-hz={options.outer_hz:g}",
+        f"--inner-hz={options.inner_hz!r}",
+        f"--outer-hz={options.outer_rate_hz!r}",
         f"--sim-port={options.simulator_port}",
         f"--sim-timeout={options.timeout_s:g}",
         f"--instance={options.instance}",

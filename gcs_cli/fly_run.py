@@ -156,7 +156,7 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
         loops="python",
         seed=options.seed,
         inner_hz=options.inner_hz,
-        outer_hz=options.outer_hz,
+        outer_hz=options.outer_rate_hz,
         overruns=flown.overruns,
         log_path=log,
     )

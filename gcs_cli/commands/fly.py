@@ -24,7 +24,10 @@ def fly(
     plant: Annotated[str, typer.Option(help="rigid, or paper: the paper's small-angle model.")] = "rigid",
     speed: Annotated[str, typer.Option(metavar="max|N", help="N times real time.")] = "max",
     inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop.")] = 500.0,
-    outer_hz: Annotated[float, typer.Option(help="Rate of the outer loop; divides the inner one.")] = 100.0,
+    outer_hz: Annotated[
+        float | None,
+        typer.Option(help="Rate of the outer loop; divides the inner one.  [default: about 100]"),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the gusts.")] = 1,
     wind: Annotated[str | None, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")] = None,
     gust: Annotated[float | None, typer.Option(help="Standard deviation of the gusts, m/s.")] = None,

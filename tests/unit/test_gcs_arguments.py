@@ -75,6 +75,7 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
         ({"wind": "3"}, "--wind 3: expected N,E or N,E,D"),
         ({"wind": "3,x"}, "--wind x: expected a number"),
         ({"gust": -1.0}, "--gust -1.0"),
+        ({"inner_hz": float("nan")}, "--inner-hz nan: expected a number"),
         ({"seed": -1}, "--seed -1"),
         ({"instance": 100}, "--instance 100: expected a number from 0 to 99"),
         ({"limit_s": float("nan")}, "--limit nan"),
@@ -113,6 +114,15 @@ def test_a_plan_that_the_vehicle_would_refuse_is_not_flown(tmp_path: Path) -> No
     assert error.value.exit_code == USAGE
 
 
+@pytest.mark.parametrize(
+    ("inner_hz", "outer_hz"), [(500.0, 100.0), (1000.0, 100.0), (250.0, 125.0), (400.0, 100.0), (50.0, 50.0)]
+)
+def test_the_outer_rate_follows_the_inner_one(inner_hz: float, outer_hz: float) -> None:
+    options = FlyOptions(HOP, inner_hz=inner_hz)
+    assert options.outer_rate_hz == outer_hz
+    assert checked_plan(options).items
+
+
 @pytest.mark.parametrize("mission", sorted(MISSIONS.glob("*.*")), ids=lambda path: path.name)
 def test_our_missions_pass_the_check(mission: Path) -> None:
     assert checked_plan(FlyOptions(mission)).items
@@ -128,8 +138,8 @@ def test_the_children_are_told_everything() -> None:
         "--home=47.1,-8.2,3.5", "--timeout=12", "--wind=3,-1", "--gust=0.5", "--ideal-rotors",
     ]  # fmt: skip
     assert stack_arguments(options, home, Path("runs/x")) == [
-        "--vehicle=x_quad", "--controller=backstepping", "--gains=paper", "--inner-hz=1000", "--outer-hz=250",
-        "--sim-port=4562", "--sim-timeout=12", "--instance=2", "--gcs-port=14570", "--log=runs/x/flight.ulg",
+        "--vehicle=x_quad", "--controller=backstepping", "--gains=paper",
+        "--inner-hz=1000.0", "--outer-hz=250.0", "--sim-port=4562", "--sim-timeout=12", "--instance=2", "--gcs-port=14570", "--log=runs/x/flight.ulg",
         "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--wait-for-start", "--ideal-rotors",
     ]  # fmt: skip
 
