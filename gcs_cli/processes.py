@@ -78,8 +78,12 @@ class Children:
     def start(self, name: str, module: str, arguments: Sequence[str]) -> Child:
         """Start a Python module of this installation; its output goes to ``<name>.log``."""
         child = Child(name, [sys.executable, "-m", module, *arguments], self._folder / f"{name}.log")
-        self._all.append(child)
+        self.add(child)
         return child
+
+    def add(self, child: Child) -> None:
+        """Take charge of a child."""
+        self._all.append(child)
 
     def ended(self) -> list[Child]:
         """Return those that have ended."""

@@ -1,0 +1,243 @@
+"""``gcs fly`` with real simulator and flight stack: good ends, bad ends in order, and never an orphan."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from gcs_cli.processes import Child, Children
+
+LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds
+MISSIONS = Path(__file__).parents[2] / "missions"
+INSTANCE = 60  # far from the default ports, where somebody may be flying
+PATIENT = ["--speed", "1"]  # leaves time to interfere
+
+
+def command(out: Path, *flags: str, plan: str = "hop.plan", instance: int = INSTANCE) -> list[str]:
+    fly = [sys.executable, "-m", "gcs_cli", "fly", str(MISSIONS / plan), "--out", str(out)]
+    return [*fly, "--instance", str(instance), *flags]
+
+
+def run(out: Path, *flags: str, **names: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command(out, *flags, **names),
+        capture_output=True,
+        text=True,
+        timeout=LONG_S,
+        check=False,  # type: ignore[arg-type]
+    )
+
+
+def children_of(pid: int) -> dict[str, int]:
+    """Name and process id of the children of a process, from /proc."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit():
+            continue
+        try:
+            parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+            arguments = (entry / "cmdline").read_text().split("\0")
+        except (OSError, IndexError):  # it ended meanwhile
+            continue
+        if parent == pid and "-m" in arguments:
+            found[arguments[arguments.index("-m") + 1]] = int(entry.name)
+    return found
+
+
+def wait_until(condition: Callable[[], bool], what: str) -> None:
+    end_s = time.monotonic() + LONG_S
+    while not condition():
+        assert time.monotonic() < end_s, what
+        time.sleep(0.02)
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@contextmanager
+def flight(out: Path, *flags: str) -> Iterator[tuple[subprocess.Popen[str], dict[str, int]]]:
+    """Begin a flight and wait until it is in the air; no child may be left afterwards."""
+    with (out.parent / "printed").open("w") as printed:
+        process = subprocess.Popen(
+            command(out, *flags, *PATIENT),
+            stdout=printed,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+    try:
+        wait_until(
+            lambda: "Takeoff detected" in (out.parent / "printed").read_text() or process.poll() is not None,
+            "it never took off",
+        )
+        children = children_of(process.pid)
+        assert set(children) == {"sim_bridge", "flightstack"}
+        yield process, children
+        wait_until(lambda: not any(is_running(pid) for pid in children.values()), "a child was left behind")
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def summary_of(out: Path) -> dict[str, object]:
+    found: dict[str, object] = json.loads((out / "summary.json").read_text())
+    return found
+
+
+def test_a_mission_is_flown_from_plan_to_report(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    result = run(out, "--json", "--seed", "5", "--controller", "backstepping", "--inner-hz", "250")
+    assert result.returncode == 0, result.stderr
+    summary = json.loads(result.stdout)
+    assert summary.pop("directory") == str(out)
+    assert summary == summary_of(out)
+    assert summary["outcome"] == "completed"
+    assert (summary["controller"], summary["seed"], summary["inner_hz"]) == ("backstepping", 5, 250.0)
+    assert [row["reached"] for row in summary["waypoints"]] == [True, True]
+    assert summary["sim_time_s"] > 3.0
+    files = {path.name for path in out.iterdir()}
+    assert files >= {
+        "flight.ulg",
+        "gcs.tlog",
+        "summary.json",
+        "report.html",
+        "sim-bridge.log",
+        "flightstack.log",
+    }
+    assert all((out / name).stat().st_size for name in files)
+
+
+def test_the_tlog_holds_both_directions(tmp_path: Path) -> None:
+    from pymavlink import mavutil  # noqa: PLC0415
+
+    assert run(tmp_path / "run").returncode == 0
+    log = mavutil.mavlink_connection(str(tmp_path / "run" / "gcs.tlog"))
+    senders: dict[int, set[str]] = {1 + INSTANCE: set(), 255: set()}
+    while (message := log.recv_match()) is not None:
+        if message.get_srcSystem():  # 0: not in pymavlink's dialect
+            senders[message.get_srcSystem()].add(message.get_type())
+    log.close()
+    assert senders[255] >= {"HEARTBEAT", "MISSION_COUNT", "MISSION_ITEM_INT", "COMMAND_LONG"}
+    assert senders[1 + INSTANCE] >= {
+        "HEARTBEAT",
+        "MISSION_ACK",
+        "COMMAND_ACK",
+        "STATUSTEXT",
+        "MISSION_CURRENT",
+    }
+
+
+def test_a_flight_is_never_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "flight.ulg").write_bytes(b"precious")
+    result = run(tmp_path)
+    assert (result.stdout, result.returncode) == ("", 2)
+    assert "flight.ulg of another flight is there" in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.ulg"]
+    assert (tmp_path / "flight.ulg").read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize(("kind", "base", "step"), [("UDP", 14550, 10), ("UDP", 18570, 1), ("TCP", 4560, 1)])
+def test_a_busy_port_is_named_and_nothing_is_started(tmp_path: Path, kind: str, base: int, step: int) -> None:
+    port = base + step * INSTANCE
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if kind == "UDP" else socket.SOCK_STREAM) as taken:
+        taken.bind(("127.0.0.1", port))
+        if kind == "TCP":
+            taken.listen(1)
+        result = run(tmp_path / "run")
+    assert (result.stdout, result.returncode) == ("", 2)
+    assert f"{kind} port {port} on 127.0.0.1 is in use" in result.stderr
+    assert "--instance" in result.stderr
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("victim", "said"),
+    [
+        ("sim_bridge", "sim-bridge was killed by signal 9"),
+        ("flightstack", "flightstack was killed by signal 9"),
+    ],
+)
+def test_a_killed_child_ends_the_flight(tmp_path: Path, victim: str, said: str) -> None:
+    out = tmp_path / "run"
+    with flight(out) as (process, children):
+        os.kill(children[victim], signal.SIGKILL)
+        _, errors = process.communicate(timeout=LONG_S)
+    assert process.returncode == 1
+    assert errors.startswith(f"gcs: {said}")
+    assert errors.count("\n") == 1
+    assert said in str(summary_of(out)["outcome"])
+    assert (out / "report.html").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_flight_is_ended_in_order(tmp_path: Path, number: signal.Signals) -> None:
+    out = tmp_path / "run"
+    with flight(out) as (process, _):
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=LONG_S)
+    assert process.returncode == 1
+    assert errors.startswith("gcs: interrupted")
+    assert str(summary_of(out)["outcome"]).startswith("interrupted")
+    assert (out / "flight.ulg").stat().st_size
+    assert (out / "report.html").exists()
+
+
+def test_a_killed_ground_station_takes_its_children_along(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    with flight(out) as (process, _):
+        process.kill()
+        process.communicate(timeout=LONG_S)
+    assert "ground station lost" in (out / "flightstack.log").read_text()
+
+
+def test_a_flight_that_takes_too_long(tmp_path: Path) -> None:
+    result = run(tmp_path / "run", "--limit", "1", "--speed", "10")
+    assert result.returncode == 3
+    assert "longer than --limit 1 s" in result.stderr
+    assert "longer than --limit 1 s" in str(summary_of(tmp_path / "run")["outcome"])
+
+
+def test_no_vehicle_in_time(tmp_path: Path) -> None:
+    result = run(tmp_path / "run", "--timeout", "0.1")
+    assert result.returncode == 3
+    assert "within 0.1 s" in result.stderr
+    assert "within 0.1 s" in str(summary_of(tmp_path / "run")["outcome"])
+
+
+def test_a_child_that_cannot_start_says_why(tmp_path: Path) -> None:
+    with Children(tmp_path) as children:
+        child = children.start("sim-bridge", "sim_bridge", ["--plant=flat"])
+        assert children.wait(LONG_S)
+        assert child.exit_code == 2
+        assert child.obituary.startswith(
+            "sim-bridge ended with code 2: sim-bridge: --plant: 'flat' is not one of"
+        )
+
+
+def test_a_child_that_does_not_listen_is_killed(tmp_path: Path) -> None:
+    (tmp_path / "deaf.py").write_text(
+        "import signal, time\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\nprint('deaf', flush=True)\n"
+        "time.sleep(600)"
+    )
+    child = Child("deaf", [sys.executable, str(tmp_path / "deaf.py")], tmp_path / "deaf.log")
+    wait_until(lambda: child.last_line == "deaf", "it never started")
+    with Children(tmp_path) as children:
+        children.add(child)
+        children.stop(patience_s=0.1)
+    assert child.exit_code == -signal.SIGKILL
+    assert child.obituary == "deaf was killed by signal 9: deaf"
