@@ -1,0 +1,239 @@
+"""Simulator, flight stack and ground station as real processes: the same flight everywhere, and who is lost is named.
+
+Waits are for events (a line of output, the end of a process); their bounds only keep a broken run from hanging.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from queue import Empty, Queue
+
+import pytest
+from pyulog import ULog
+
+from tests.support.world import World
+
+MISSIONS = Path(__file__).resolve().parents[2] / "missions"
+BOUND_S = 60.0
+MOST_LINES = 200
+
+
+class Process:
+    """A process of ours whose output is read as it comes."""
+
+    def __init__(self, module: str, *arguments: str) -> None:
+        self.name = module
+        self._popen = subprocess.Popen(
+            [sys.executable, "-u", "-m", module, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            text=True,
+        )
+        self._fresh: Queue[str | None] = Queue()
+        self.lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._popen.stdout is not None
+        with self._popen.stdout as output:
+            for line in output:
+                self.lines.append(line.rstrip())
+                self._fresh.put(line)
+        self._fresh.put(None)
+
+    def wait_for(self, text: str) -> None:
+        for _ in range(MOST_LINES):
+            try:
+                line = self._fresh.get(timeout=BOUND_S)
+            except Empty:
+                line = None
+            assert line is not None, f"{self.name} never said {text!r}: {self.output}"
+            if text in line:
+                return
+        raise AssertionError(f"{self.name} did not say {text!r} in {MOST_LINES} lines: {self.output}")
+
+    def end(self) -> int:
+        code = self._popen.wait(BOUND_S)
+        self._reader.join(BOUND_S)
+        return code
+
+    def kill(self) -> None:
+        self._popen.kill()
+        self.end()
+
+    def interrupt(self) -> None:
+        self._popen.send_signal(signal.SIGINT)
+
+    @property
+    def output(self) -> str:
+        return "\n".join(self.lines)
+
+
+Start = Callable[..., Process]
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    processes: list[Process] = []
+
+    def begin(module: str, *arguments: str) -> Process:
+        processes.append(Process(module, *arguments))
+        return processes[-1]
+
+    yield begin
+    for process in processes:
+        process.kill()
+
+
+def fly(tmp_path: Path, instance: int, *options: str) -> tuple[dict[str, object], bytes]:
+    out = tmp_path / f"run{instance}"
+    run = subprocess.run(
+        [
+            sys.executable, "-m", "gcs_cli", "fly", str(MISSIONS / "hop.plan"), "--json", "--out", str(out),
+            "--instance", str(instance), *options,
+        ],
+        capture_output=True, text=True, timeout=4 * BOUND_S, check=False,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    summary = json.loads(run.stdout)
+    log = (out / "flight.ulg").read_bytes()
+    assert summary["log_sha256"] == hashlib.sha256(log).hexdigest()
+    return summary, log
+
+
+def test_the_same_flight_gives_the_same_log_at_any_speed_and_in_one_process(tmp_path: Path) -> None:
+    logs = []
+    for instance, speed in ((41, "max"), (42, "10"), (43, "1")):
+        summary, log = fly(tmp_path, instance, "--speed", speed, "--gust", "1", "--vehicle", "x_quad", "--seed", "7")
+        assert summary["outcome"] == "completed"
+        logs.append(log)
+    assert logs[0] == logs[1] == logs[2]
+    world = World(vehicle="x_quad", gust=1.0, seed=7, system_id=42)
+    world.upload("hop.plan")
+    world.start_mission()
+    world.until_disarmed()
+    assert world.log == logs[0]
+
+
+@pytest.fixture
+def flying(start: Start, tmp_path: Path) -> dict[str, Process]:
+    """Three processes in the middle of a mission, started one by one as in three terminals."""
+    processes = {
+        "simulator": start("sim_bridge", "--instance", "44", "--speed", "2"),
+        "stack": start(
+            "flightstack", "--instance", "44", "--gcs-port", "14994", "--log", str(tmp_path / "flight.ulg"),
+            "--exit-on-gcs-loss", "3",
+        ),
+    }  # fmt: skip
+    processes["stack"].wait_for("flightstack: paper_quad")
+    connect = ["--connect", "udp:14994", "--timeout", str(BOUND_S)]
+    for arguments in (["mission", "upload", str(MISSIONS / "square.plan")], ["mission", "start"]):
+        command = start("gcs_cli", *connect, *arguments)
+        assert command.end() == 0, command.output
+    processes["station"] = start("gcs_cli", *connect, "watch")
+    processes["station"].wait_for("MISSION")
+    return processes
+
+
+def test_a_killed_simulator_is_named_and_the_log_stays(flying: dict[str, Process], tmp_path: Path) -> None:
+    flying["simulator"].kill()
+    assert flying["stack"].end() == 1
+    assert "simulator lost at t=" in flying["stack"].output
+    assert_log_is_readable(tmp_path / "flight.ulg")
+
+
+def test_a_killed_flight_stack_is_named(flying: dict[str, Process], tmp_path: Path) -> None:
+    flying["stack"].kill()
+    assert flying["simulator"].end() == 1
+    assert "flight stack lost at t=" in flying["simulator"].output
+    flying["station"].wait_for("lost")
+    assert_log_is_readable(tmp_path / "flight.ulg")
+
+
+def test_a_killed_ground_station_is_named_by_a_stack_that_must_not_outlive_it(
+    flying: dict[str, Process], tmp_path: Path
+) -> None:
+    flying["station"].kill()
+    assert flying["stack"].end() == 1
+    assert "ground station lost" in flying["stack"].output
+    assert flying["simulator"].end() == 1
+    assert "flight stack lost at t=" in flying["simulator"].output
+    assert_log_is_readable(tmp_path / "flight.ulg")
+
+
+def test_ctrl_c_in_flight_leaves_a_readable_log_and_everyone_ends_in_order(
+    flying: dict[str, Process], tmp_path: Path
+) -> None:
+    flying["stack"].interrupt()
+    assert flying["stack"].end() == 0
+    assert flying["simulator"].end() == 0
+    assert_log_is_readable(tmp_path / "flight.ulg")
+
+
+def test_without_a_simulator_the_stack_says_so(start: Start) -> None:
+    stack = start("flightstack", "--instance", "45", "--sim-timeout", "0.2", "--log", "none")
+    assert stack.end() == 3
+    assert "no simulator at 127.0.0.1:4605 within 0.2 s" in stack.output
+
+
+def test_a_busy_port_is_named(start: Start) -> None:
+    first = start("flightstack", "--instance", "46", "--log", "none")
+    first.wait_for("flightstack: paper_quad")
+    second = start("flightstack", "--instance", "46", "--log", "none")
+    assert second.end() == 2
+    assert "UDP port 18616 on 127.0.0.1 is in use" in second.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--vehicle", "no_such"], "is neither a file nor a built-in vehicle (paper_quad, x_quad)"),
+        (["--controller", "no_such"], "is not one of backstepping, pid"),
+        (["--gains", "no_such"], "is neither a file nor built-in gains (paper, tuned)"),
+        (["--inner-hz", "0"], "is outside 10 to 20000"),
+        (["--inner-hz", "300"], "does not make a whole number of microseconds"),
+        (["--outer-hz", "333"], "does not divide the inner rate"),
+        (["--home", "95,0,0"], "is not a place on earth"),
+        (["--param", "MPC_XY_CRUISE=-3"], "is outside 0.1 to 20 m/s"),
+        (["--param", "NO_SUCH=1"], "is not known"),
+        (["--clock", "sundial"], "is not one of lockstep, realtime"),
+        (["--loops", "fortran"], "is not one of python"),
+    ],
+)
+def test_bad_arguments_are_one_sentence_and_exit_2(start: Start, arguments: list[str], sentence: str) -> None:
+    stack = start("flightstack", "--instance", "47", *arguments)
+    assert stack.end() == 2
+    assert sentence in stack.output
+    assert len(stack.lines) == 1
+
+
+def test_real_time_clock_flies_with_a_simulator_that_does_not_wait(start: Start, tmp_path: Path) -> None:
+    log = tmp_path / "flight.ulg"
+    start("sim_bridge", "--instance", "48")
+    stack = start("flightstack", "--instance", "48", "--gcs-port", "14998", "--clock", "realtime", "--log", str(log))
+    stack.wait_for("flightstack: paper_quad")
+    for arguments in (["takeoff", "--alt", "1"], ["arm"]):
+        command = start("gcs_cli", "--connect", "udp:14998", *arguments)
+        assert command.end() == 0, command.output
+    station = start("gcs_cli", "--connect", "udp:14998", "watch")
+    station.wait_for("Takeoff detected")
+    perf = start("gcs_cli", "--connect", "udpout:127.0.0.1:18618", "perf", "--json")
+    assert perf.end() == 0, perf.output
+    figures = json.loads(perf.output)
+    assert figures["clock"] == "real time"
+    assert figures["ticks"] > 100
+
+
+def assert_log_is_readable(path: Path) -> None:
+    log = ULog(str(path))
+    attitude = next(topic for topic in log.data_list if topic.name == "vehicle_attitude")
+    assert len(attitude.data["timestamp"]) > 500
