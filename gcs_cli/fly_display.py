@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from typing import Protocol
 
@@ -17,6 +18,17 @@ from gcs_cli.watch_lines import text_line
 
 _FRAME_S = 0.1
 _WARNING = 4  # MAV_SEVERITY_WARNING
+
+
+class FlyConsole(Console):
+    """A console that a flight outlives: when the reader of a pipe goes away, the rest is not printed."""
+
+    def on_broken_pipe(self) -> None:
+        """Send what is still to be printed nowhere."""
+        self.quiet = True
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self.file.fileno())
+        os.close(nowhere)
 
 
 class Display(Protocol):
@@ -133,13 +145,14 @@ def place_words(flight: Flight) -> str:
     position = flight.view.position_ned_m
     if flight.phase is not Phase.FLY or position is None:
         return ""
-    return f"N {position.x:+.1f} E {position.y:+.1f} up {-position.z:.1f} m"
+    north, east, up = (round(value, 1) + 0.0 for value in (position.x, position.y, -position.z))  # no -0.0
+    return f"N {north:+6.1f} E {east:+6.1f} up {up:5.1f} m"
 
 
 def speed_words(flight: Flight) -> str:
     """Say how long it has flown in simulated time, and how fast that passes."""
     if flight.phase is not Phase.FLY or flight.flown_s is None:
         return ""
-    words = f"t {flight.flown_s:.1f} s"
+    words = f"t {flight.flown_s:6.1f} s"
     factor = flight.real_time_factor
-    return words if factor is None else f"{words} ×{factor:.3g}"
+    return words if factor is None else f"{words} ×{factor:5.1f}"

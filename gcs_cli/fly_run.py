@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
@@ -72,15 +74,13 @@ def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> 
         check_ports(options)
         folder = make_run_directory(options.plan_path, out)
         flight = Flight(connection.session, plan.items, connection.now_s, options.timeout_s, options.limit_s)
-        with TlogFile(folder / TLOG_NAME) as tlog, Children(folder) as children:
-            connection.session.record = lambda frame: tlog.write(time.time_ns() // 1000, frame)
+        with _recording(connection, folder), Children(folder) as children:
             home = plan.home or DEFAULT_HOME
             children.start("sim-bridge", "sim_bridge", simulator_arguments(options, home))
             children.start("flightstack", "flightstack", stack_arguments(options, home, folder))
             _run(flight, connection, children, interruption, display)
             if flight.shut_down_accepted:
                 children.wait(_END_PATIENCE_S)
-            connection.session.record = None
     assert flight.outcome is not None
     wall_time_s = None
     if flight.began_s is not None and flight.ended_s is not None:
@@ -88,6 +88,17 @@ def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> 
     timing = flight.view.timing
     overruns = None if timing is None else timing.overruns
     return Flown(folder, flight.outcome, wall_time_s, overruns, flight.returned_by_us)
+
+
+@contextmanager
+def _recording(connection: Connection, folder: Path) -> Iterator[None]:
+    """Record the session's frames in the directory of the flight."""
+    with TlogFile(folder / TLOG_NAME) as tlog:
+        connection.session.record = lambda frame: tlog.write(time.time_ns() // 1000, frame)
+        try:
+            yield
+        finally:
+            connection.session.record = None
 
 
 def _open(endpoint: Endpoint) -> Connection:

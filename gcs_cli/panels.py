@@ -26,7 +26,9 @@ def number(value: float | None, digits: int = 2, unit: str = "") -> str:
     """Show a number, or a dash when it is not known."""
     if value is None:
         return UNKNOWN
-    return f"{value:.{digits}f}{unit}" if abs(value) < 1e7 else f"{value:.1e}{unit}"
+    if abs(value) >= 1e7:
+        return f"{value:.1e}{unit}"
+    return f"{round(value, digits) + 0.0:.{digits}f}{unit}"  # + 0.0: no -0.00
 
 
 def framed(title: str, content: RenderableType, style: str = "bright_black") -> Panel:

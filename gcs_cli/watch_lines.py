@@ -19,7 +19,8 @@ def state_line(view: VehicleView, now_s: float) -> str:
     parts = [clock_text(view.time_s), view.mode or "—", "armed" if view.armed else "disarmed"]
     if view.position_ned_m is not None:
         north, east, down = view.position_ned_m
-        parts.append(f"N {north:+.2f} E {east:+.2f} up {-down:.2f} m")
+        north, east, up = (round(value, 2) + 0.0 for value in (north, east, -down))  # no -0.00
+        parts.append(f"N {north:+.2f} E {east:+.2f} up {up:.2f} m")
     if view.velocity_ned_m_s is not None:
         parts.append(f"{math.hypot(view.velocity_ned_m_s.x, view.velocity_ned_m_s.y):.2f} m/s")
     if view.attitude is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -43,9 +42,7 @@ def fly(
     limit: Annotated[float, typer.Option(help="Longest flight, s of simulated time.")] = 3600.0,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""
-    from rich.console import Console  # noqa: PLC0415
-
-    from gcs_cli.fly_display import make_display  # noqa: PLC0415
+    from gcs_cli.fly_display import FlyConsole, make_display  # noqa: PLC0415
     from gcs_cli.fly_options import FlyOptions, checked_plan  # noqa: PLC0415
     from gcs_cli.fly_run import REPORT_NAME, write_results  # noqa: PLC0415
     from gcs_cli.fly_run import fly as fly_plan  # noqa: PLC0415
@@ -58,7 +55,7 @@ def fly(
         ideal_rotors, 60.0 if settings.timeout_s is None else settings.timeout_s, limit,
     )  # fmt: skip
     items = checked_plan(options)
-    console = Console(stderr=as_json, highlight=False)
+    console = FlyConsole(stderr=as_json, highlight=False)
     display = make_display(console)
     try:
         flown = fly_plan(options, items, out, display)
@@ -66,7 +63,7 @@ def fly(
         display.close()
     summary, outcome = write_results(options, items, flown)
     if as_json:
-        print(json.dumps({**summary, "directory": str(flown.folder)}))
+        print(json.dumps({**summary, "directory": str(flown.folder)}), flush=True)
     else:
         print_summary(console, summary, flown.folder)
     report = flown.folder / REPORT_NAME
@@ -74,7 +71,6 @@ def fly(
         _open(report)
     if not outcome.completed:
         raise CliError(f"{outcome.reason} (see {flown.folder})", outcome.exit_code)
-    sys.stdout.flush()
 
 
 def _open(report: Path) -> None:

@@ -212,6 +212,19 @@ def test_a_flight_that_takes_too_long(tmp_path: Path) -> None:
     assert "longer than --limit 1 s" in str(summary_of(tmp_path / "run")["outcome"])
 
 
+def test_a_reader_that_goes_away_does_not_end_the_flight(tmp_path: Path) -> None:
+    with subprocess.Popen(
+        command(tmp_path / "run"), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.wait(LONG_S) == 0
+        assert process.stderr.read() == ""
+    assert summary_of(tmp_path / "run")["outcome"] == "completed"
+
+
 def test_no_vehicle_in_time(tmp_path: Path) -> None:
     result = run(tmp_path / "run", "--timeout", "0.1")
     assert result.returncode == 3

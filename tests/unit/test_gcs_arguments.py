@@ -139,7 +139,8 @@ def test_the_children_are_told_everything() -> None:
     ]  # fmt: skip
     assert stack_arguments(options, home, Path("runs/x")) == [
         "--vehicle=x_quad", "--controller=backstepping", "--gains=paper",
-        "--inner-hz=1000.0", "--outer-hz=250.0", "--sim-port=4562", "--sim-timeout=12", "--instance=2", "--gcs-port=14570", "--log=runs/x/flight.ulg",
+        "--inner-hz=1000.0", "--outer-hz=250.0", "--sim-port=4562", "--sim-timeout=12",
+        "--instance=2", "--gcs-port=14570", "--log=runs/x/flight.ulg",
         "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--wait-for-start", "--ideal-rotors",
     ]  # fmt: skip
 
@@ -201,5 +202,5 @@ def test_lines_tell_the_course_of_a_flight() -> None:
     assert lines[0] == "uploading the mission"
     assert lines[1] == "arming"
     assert lines[2].startswith("MISSION  item ")
-    assert "N +1.0 E +2.0 up 3.0 m" in lines[2]
+    assert "N   +1.0 E   +2.0 up   3.0 m" in lines[2]
     assert lines[-1] == "over"
