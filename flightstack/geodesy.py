@@ -20,10 +20,12 @@ class GeoPoint(NamedTuple):
 
 
 class LocalFrame:
-    """Tangent plane (NED) at an origin, with the ellipsoid's two radii of curvature there.
+    """Flat earth (NED) around an origin, with the ellipsoid's two radii of curvature there.
 
-    ``to_geo`` is the exact inverse of ``to_ned``. What is left out is the change of the radii with latitude,
-    which grows with the square of the distance.
+    ``to_geo`` is the inverse of ``to_ned``, to rounding. Down is the difference of altitudes. Against the tangent
+    plane, at 47° and 488 m above the ellipsoid, a position is off horizontally by 9 mm at 100 m, 0.15 m at 1 km and
+    10 m at 10 km (the origin's altitude and the change of the parallel's radius with latitude are left out), and
+    vertically by the earth's curvature: 0.08 m at 1 km, 7.9 m at 10 km.
     """
 
     def __init__(self, origin: GeoPoint) -> None:
@@ -46,8 +48,11 @@ class LocalFrame:
 
     def to_geo(self, position_ned_m: Vector3) -> GeoPoint:
         """Return the geodetic point of a NED position [m] relative to the origin."""
+        longitude_deg = self.origin.longitude_deg + position_ned_m.y / self._east_m_per_deg
+        if abs(longitude_deg) > 180.0:  # beyond the date line
+            longitude_deg = (longitude_deg + 180.0) % 360.0 - 180.0
         return GeoPoint(
             self.origin.latitude_deg + position_ned_m.x / self._north_m_per_deg,
-            self.origin.longitude_deg + position_ned_m.y / self._east_m_per_deg,
+            longitude_deg,
             self.origin.altitude_m - position_ned_m.z,
         )
