@@ -58,15 +58,20 @@ def _largest_scale(base: FloatArray, direction: FloatArray, low: FloatArray, hig
 
 @compiled
 def _fit_roll_pitch(speed_squared: FloatArray, mixer: Mixer) -> float:
-    """Scale the roll-pitch part so that its spread fits between the limits; return the scale in [0, 1]."""
+    """Scale the roll-pitch part so that some thrust brings it between the limits; return the scale in [0, 1].
+
+    Rotor i allows the thrusts from (low − b)/a to (high − b)/a, a being its share of a newton. There is a common one
+    when no rotor's least is above another's most; a > 0 for any vehicle that hovers.
+    """
     scale = 1.0
     n = speed_squared.size
     for i in range(n):
         for j in range(n):
-            spread = speed_squared[i] - speed_squared[j]
-            room = mixer.high[i] - mixer.low[j]
+            share_i, share_j = mixer.allocation[i, 0], mixer.allocation[j, 0]
+            spread = speed_squared[i] * share_j - speed_squared[j] * share_i
+            room = mixer.high[i] * share_j - mixer.low[j] * share_i
             if spread * scale > room:
-                scale = room / spread
+                scale = max(0.0, room / spread)
     for i in range(n):
         speed_squared[i] *= scale
     return scale
