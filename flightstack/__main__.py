@@ -18,7 +18,9 @@ def run(
     controller: Annotated[str, typer.Option(help="Attitude controller: pid, backstepping or an installed one.")] = "pid",
     gains: Annotated[str, typer.Option(help="Gains: tuned, paper or a TOML file.")] = "tuned",
     inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop [Hz].")] = 500.0,
-    outer_hz: Annotated[float, typer.Option(help="Rate of the outer loop [Hz]; divides the inner rate.")] = 100.0,
+    outer_hz: Annotated[
+        float | None, typer.Option(help="Rate of the outer loop [Hz]; divides the inner rate [nearest to 100].")
+    ] = None,
     clock: Annotated[str, typer.Option(help="lockstep (the simulator owns time) or realtime.")] = "lockstep",
     loops: Annotated[str, typer.Option(help="Which loops fly: python.")] = "python",
     sim_host: Annotated[str, typer.Option(help="Host of the simulator.")] = "127.0.0.1",
@@ -36,6 +38,7 @@ def run(
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.app import EXIT_USAGE, App, ProcessConfig
+    from flightstack.clock import nearest_outer_hz
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.params.behaviour import Behaviour, with_assignments
     from flightstack.params.errors import ConfigError
@@ -44,8 +47,9 @@ def run(
     try:
         if clock not in ("lockstep", "realtime"):
             raise ConfigError("--clock", clock, "is not one of lockstep, realtime")
+        outer_rate = nearest_outer_hz(inner_hz) if outer_hz is None else outer_hz
         config = StackConfig(
-            vehicle, controller, gains, loops, inner_hz, outer_hz, ideal_rotors, clock == "lockstep",
+            vehicle, controller, gains, loops, inner_hz, outer_rate, ideal_rotors, clock == "lockstep",
             DEFAULT_HOME if home is None else parse_home(home), instance + 1,
             with_assignments(Behaviour(), param or []),
         )  # fmt: skip
@@ -67,7 +71,7 @@ def run(
         print(f"flightstack: {error}", file=sys.stderr)
         sys.exit(EXIT_USAGE)
     print(
-        f"flightstack: {stack.stack.vehicle.name}, {controller} ({gains}), {inner_hz:g}/{outer_hz:g} Hz, {clock}; "
+        f"flightstack: {stack.stack.vehicle.name}, {controller} ({gains}), {inner_hz:g}/{outer_rate:g} Hz, {clock}; "
         f"simulator {sim_host}:{process.simulator_port}, ground station UDP {gcs_port}, API UDP {process.api_port}",
         flush=True,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import select
 import signal
@@ -14,7 +15,7 @@ from types import FrameType
 from flightstack.assembly import Stack, build
 from flightstack.clock import DeadlineScheduler
 from flightstack.config import StackConfig
-from flightstack.ground_hub import API, GROUND
+from flightstack.ground_hub import API, GROUND, PeerAddress
 from flightstack.logging.flight_log import FlightLog
 from flightstack.modes import Mode
 from flightstack.transport.tcp import LinkClosedError, TcpClient
@@ -23,6 +24,7 @@ from flightstack.transport.udp import PortBusyError, UdpSocket
 EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
 GROUND_POLL_NS = 500_000
 GROUND_LOCAL_PORT, API_LOCAL_PORT = 18570, 14580
+REPORT_S = 0.2
 SECOND_HELLO_S = 1.0
 """Silence after which a simulator is asked for the standard message."""
 FIRST_CONTACT_S = 60.0
@@ -65,6 +67,10 @@ class Ports:
             raise
         self.peers = {GROUND: (host, process.ground_port), API: (host, process.api_port)}
 
+    def send(self, data: bytes, to: PeerAddress) -> None:
+        """Send a datagram on the peer's channel."""
+        self.sockets[to.channel].send(data, (to.host, to.port))
+
     def close(self) -> None:
         """Close the sockets."""
         for socket in self.sockets.values():
@@ -83,10 +89,10 @@ class App:
         self._stop_signal = 0
         self._poller = select.poll()
         for channel, socket in self._ports.sockets.items():
-            self.stack.ground.add_peer((channel, self._ports.peers[channel]), channel, permanent=True)
+            self.stack.ground.add_peer(PeerAddress(channel, *self._ports.peers[channel]), permanent=True)
             self._poller.register(socket, select.POLLIN)
         self._began_s = time.monotonic()
-        self._next_report_s = self._began_s + 1.0
+        self._next_report_s = self._began_s + REPORT_S
         self._next_log_us = 0
         self._next_ground_ns = 0
 
@@ -97,6 +103,7 @@ class App:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
         simulator: TcpClient | None = None
+        code = EXIT_LOST
         try:
             simulator = self._connect()
             simulator.send(self.stack.simulator.hello(self.stack.rates.interval_us))
@@ -110,11 +117,12 @@ class App:
         except Ended as ended:
             if str(ended):
                 print(f"flightstack: {ended}", file=sys.stderr, flush=True)
-            return ended.code
+            code = ended.code
         except LinkClosedError:
-            return self._simulator_gone()
+            code = self._simulator_gone()
         finally:
-            self._close(simulator)
+            self._close(simulator, orderly=code == EXIT_OK)
+        return code
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._stop_signal = number
@@ -130,15 +138,17 @@ class App:
         print(f"flightstack: simulator lost {at}: it closed the connection", file=sys.stderr, flush=True)
         return EXIT_LOST
 
-    def _close(self, simulator: TcpClient | None) -> None:
+    def _close(self, simulator: TcpClient | None, orderly: bool) -> None:
+        """End the log and, if all is in order, say goodbye: who hears nothing counts us as lost."""
         self.stack.recorder.close()
-        for (channel, peer), _, data in self.stack.ground.farewell():
-            self._ports.sockets[channel].send(data, peer)
+        if orderly:
+            for peer, data in self.stack.ground.farewell():
+                self._ports.send(data, peer)
         if simulator is not None:
-            try:
-                simulator.send(self.stack.simulator.heartbeat(self.stack.autopilot.now.status.armed, leaving=True))
-            except LinkClosedError:
-                pass
+            if orderly:
+                with contextlib.suppress(LinkClosedError):
+                    armed = self.stack.autopilot.now.status.armed
+                    simulator.send(self.stack.simulator.heartbeat(armed, leaving=True))
             simulator.close()
         self._ports.close()
         if self.stack.recorder.error is not None:
@@ -285,14 +295,14 @@ class App:
     def _serve_ground(self) -> None:
         now_s = time.monotonic()
         if now_s >= self._next_report_s:
-            self._next_report_s = now_s + 1.0
+            self._next_report_s = now_s + REPORT_S
             self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
         ground = self.stack.ground
         for channel, socket in self._ports.sockets.items():
             for data, peer in socket.receive():
-                ground.receive((channel, peer), channel, data, now_s)
-        for (channel, peer), _, data in ground.poll(now_s):
-            self._ports.sockets[channel].send(data, peer)
+                ground.receive(PeerAddress(channel, *peer), data, now_s)
+        for address, data in ground.poll(now_s):
+            self._ports.send(data, address)
 
     # ------------------------------------------------------------------ reasons to stop
 

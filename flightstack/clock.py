@@ -15,6 +15,7 @@ import numpy as np
 from flightstack.params.errors import ConfigError
 
 MIN_INNER_HZ, MAX_INNER_HZ = 10.0, 20_000.0
+DEFAULT_OUTER_HZ = 100.0
 WINDOW = 4096
 
 
@@ -25,6 +26,11 @@ class Rates(NamedTuple):
     outer_hz: float
     divisor: int
     interval_us: int
+
+
+def nearest_outer_hz(inner_hz: float) -> float:
+    """Return the rate nearest to 100 Hz that divides ``inner_hz``: what an outer loop runs at unless told."""
+    return inner_hz / max(1, round(inner_hz / DEFAULT_OUTER_HZ))
 
 
 def rates(inner_hz: float, outer_hz: float) -> Rates:
@@ -54,7 +60,7 @@ NO_DURATIONS = Distribution(0.0, 0.0, 0.0)
 
 
 class Durations:
-    """The last ``WINDOW`` durations since the last reading."""
+    """The last ``WINDOW`` durations: eight seconds at 500 Hz."""
 
     def __init__(self) -> None:
         self._values = np.zeros(WINDOW)
@@ -65,10 +71,9 @@ class Durations:
         self._values[self._count % WINDOW] = nanoseconds
         self._count += 1
 
-    def take(self) -> Distribution:
-        """Return the figures of what was recorded and begin anew."""
+    def figures(self) -> Distribution:
+        """Return the figures of the durations held."""
         count = min(self._count, WINDOW)
-        self._count = 0
         if count == 0:
             return NO_DURATIONS
         values = self._values[:count] * 1e-3

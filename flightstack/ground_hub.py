@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from flightstack import __version__
 from flightstack.autopilot import NOTICE, WARNING, Autopilot, Text
@@ -47,11 +48,18 @@ LINK_COMMANDS = (
 )
 
 
+class PeerAddress(NamedTuple):
+    """Where a peer is: the channel it uses, and its address there."""
+
+    channel: str
+    host: str
+    port: int
+
+
 @dataclass
 class Peer:
     """One ground station or companion."""
 
-    channel: str
     link: Link
     streams: Streams
     permanent: bool
@@ -72,7 +80,7 @@ class GroundHub:
         self._autopilot = autopilot
         self._facts = facts
         self._system_id = system_id
-        self._peers: dict[Hashable, Peer] = {}
+        self._peers: dict[PeerAddress, Peer] = {}
         own = Address(system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._missions = MissionServer(own, autopilot.check_mission)
         self._commands = CommandServer(own, [*HANDLERS, *LINK_COMMANDS])
@@ -81,10 +89,10 @@ class GroundHub:
 
     # ------------------------------------------------------------------ peers
 
-    def add_peer(self, address: Hashable, channel: str, permanent: bool = False) -> Peer:
+    def add_peer(self, address: PeerAddress, permanent: bool = False) -> Peer:
         """Begin to talk to ``address``; a permanent one gets heartbeats before it was ever heard."""
-        rates = GROUND_RATES_HZ if channel == GROUND else API_RATES_HZ
-        peer = Peer(channel, Link(self._system_id, mavlink.MAV_COMP_ID_AUTOPILOT1), Streams(rates), permanent)
+        rates = GROUND_RATES_HZ if address.channel == GROUND else API_RATES_HZ
+        peer = Peer(Link(self._system_id, mavlink.MAV_COMP_ID_AUTOPILOT1), Streams(rates), permanent)
         self._peers[address] = peer
         return peer
 
@@ -103,18 +111,18 @@ class GroundHub:
 
     # ------------------------------------------------------------------ receiving
 
-    def receive(self, address: Hashable, channel: str, data: bytes, now_s: float) -> None:
+    def receive(self, address: PeerAddress, data: bytes, now_s: float) -> None:
         """Take a datagram; whatever it holds, nothing is raised."""
         peer = self._peers.get(address)
         if peer is None:
             if len(self._peers) >= MAX_PEERS:
                 return
-            peer = self.add_peer(address, channel)
+            peer = self.add_peer(address)
         for message in peer.link.decode(data):
             peer.heard_s = now_s
             self._handle(address, peer, message, now_s)
 
-    def _handle(self, address: Hashable, peer: Peer, message: Message, now_s: float) -> None:
+    def _handle(self, address: PeerAddress, peer: Peer, message: Message, now_s: float) -> None:
         command = self._commands.receive(message, address, now_s)
         if command is not None:
             self._execute(peer, command)
@@ -175,6 +183,8 @@ class GroundHub:
             peer.outbox.append(self._version())
         elif number == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL and math.isfinite(argument):
             about = int(argument)
+            if not 0 <= about <= 0xFFFF:
+                return Answer(DENIED, f"message {argument:g} has no place in MESSAGE_INTERVAL")
             peer.outbox.append(mavlink.MAVLink_message_interval_message(about, peer.streams.interval_us(about)))
         elif number in MAKERS:
             peer.outbox.append(MAKERS[number](self._facts))
@@ -197,8 +207,8 @@ class GroundHub:
 
     # ------------------------------------------------------------------ sending
 
-    def poll(self, now_s: float) -> Iterator[tuple[Hashable, str, bytes]]:
-        """Yield (address, channel, bytes) of all that is to be sent now."""
+    def poll(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
+        """Yield (address, bytes) of all that is to be sent now."""
         self._take_mission_events()
         changed = self._note_changes()
         self._missions.current_seq = self._facts.mission_current
@@ -208,12 +218,12 @@ class GroundHub:
         self._spread_texts()
         for address, peer in list(self._peers.items()):
             for message in self._due(peer, changed, now_s):
-                yield address, peer.channel, peer.link.encode(message)
+                yield address, peer.link.encode(message)
         self._forget_silent(now_s)
 
     def _collect(self, addressed: list[tuple[Hashable, Message]]) -> None:
         for address, message in addressed:
-            if address in self._peers:
+            if isinstance(address, PeerAddress) and address in self._peers:
                 self._peers[address].outbox.append(message)
 
     def _due(self, peer: Peer, changed: bool, now_s: float) -> Iterator[Message]:
@@ -253,22 +263,22 @@ class GroundHub:
             if peer.heard:
                 peer.outbox.append(message)
 
-    def farewell(self) -> Iterator[tuple[Hashable, str, bytes]]:
+    def farewell(self) -> Iterator[tuple[PeerAddress, bytes]]:
         """Yield the last bytes of an orderly end: waiting answers, then a heartbeat that says so."""
         self._spread_texts()
         self._collect(self._commands.poll(0.0))
         for address, peer in self._peers.items():
             for message in [*peer.outbox, heartbeat(self._facts, leaving=True)]:
-                yield address, peer.channel, peer.link.encode(message)
+                yield address, peer.link.encode(message)
             peer.outbox.clear()
 
 
 def _status_texts(text: Text) -> Iterator[Message]:
-    """STATUSTEXT, in chunks of 50 octets when it is longer."""
+    """STATUSTEXT, in chunks of 50 octets when it is longer; the last chunk is the one that is not full."""
     octets = text.text.encode("utf-8")
     if len(octets) <= 50:
         yield mavlink.MAVLink_statustext_message(text.severity, octets, 0, 0)
         return
     identity = 1 + sum(octets) % 0xFFFF
-    for index in range(0, len(octets), 50):
+    for index in range(0, len(octets) + 1, 50):
         yield mavlink.MAVLink_statustext_message(text.severity, octets[index : index + 50], identity, index // 50)

@@ -1,4 +1,4 @@
-"""The loops' timing as a message and as log entries, once a second."""
+"""The loops' timing as a message and as log entries."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flightstack.mavlink.link import Message
 
 
 class TimingReport:
-    """Figures of the last second, refreshed by ``update``."""
+    """Figures of the last few thousand ticks, refreshed by ``update``."""
 
     def __init__(self, timing: LoopTiming, rates: Rates, lockstep: bool) -> None:
         self._timing = timing
@@ -23,9 +23,9 @@ class TimingReport:
         self._last: tuple[int, float] | None = None
 
     def update(self, time_us: int, wall_s: float) -> None:
-        """Take the figures of what passed since the last update."""
-        self._execution = self._timing.execution.take()
-        self._lateness = self._timing.lateness.take()
+        """Take the figures of now; the real-time factor is that since the last update."""
+        self._execution = self._timing.execution.figures()
+        self._lateness = self._timing.lateness.figures()
         if self._last is not None and wall_s > self._last[1]:
             self._factor = (time_us - self._last[0]) * 1e-6 / (wall_s - self._last[1])
         self._last = (time_us, wall_s)

@@ -26,7 +26,8 @@ class Connection:
                 self.session = Session(record=record)
             else:
                 host = resolve(endpoint.host)
-                self._socket = UdpSocket("0.0.0.0")
+                # the loopback interface reaches nobody else, so that nobody else reaches us
+                self._socket = UdpSocket("127.0.0.1" if host.startswith("127.") else "0.0.0.0")
                 self.session = Session((host, endpoint.port), record)
         except PortBusyError as error:
             raise CliError(

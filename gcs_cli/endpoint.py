@@ -10,6 +10,9 @@ DEFAULT_CONNECTION = "udp:127.0.0.1:14550"
 VEHICLE_CONNECTION = "udpout:127.0.0.1:18570"
 _FORMS = "udp:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
 
+LOOPBACK = "127.0.0.1"
+"""Where we listen unless told otherwise; ``udp:0.0.0.0:14550`` listens on every network."""
+
 
 class Endpoint(NamedTuple):
     """Where the vehicle is met: we listen there, or we send there first."""
@@ -31,4 +34,4 @@ def parse_endpoint(text: str) -> Endpoint:
         raise CliError(f"--connect {text}: expected {_FORMS}", USAGE)
     if not (port_text.isascii() and port_text.isdigit() and 0 < int(port_text) < 65536):
         raise CliError(f"--connect {text}: {port_text or 'nothing'} is not a port (1 to 65535)", USAGE)
-    return Endpoint(host or "0.0.0.0", int(port_text), listens)
+    return Endpoint(host or LOOPBACK, int(port_text), listens)

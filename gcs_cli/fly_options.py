@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from flightstack.clock import rates
+from flightstack.clock import nearest_outer_hz, rates
 from flightstack.geodesy import GeoPoint
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
@@ -47,9 +47,9 @@ class FlyOptions:
     @property
     def outer_rate_hz(self) -> float:
         """Rate of the outer loop: as given, else the one nearest to 100 Hz that divides the inner one."""
-        return (
-            self.inner_hz / max(1, round(self.inner_hz / 100.0)) if self.outer_hz is None else self.outer_hz
-        )
+        if self.outer_hz is not None:
+            return self.outer_hz
+        return nearest_outer_hz(self.inner_hz)
 
     @property
     def gcs_port(self) -> int:

@@ -13,7 +13,7 @@ class Field(NamedTuple):
 
     name: str
     format: str
-    count: int
+    length: int
     is_array: bool
     type: str
     unit: str
@@ -31,7 +31,7 @@ class Layout(NamedTuple):
     @property
     def format(self) -> str:
         """Struct format of the whole payload."""
-        return "<" + "".join(f"{f.count}{f.format}" if f.count > 1 else f.format for f in self.fields)
+        return "<" + "".join(f"{f.length}{f.format}" if f.length > 1 else f.format for f in self.fields)
 
 
 def message_class(layout: Layout) -> Any:
@@ -76,8 +76,8 @@ def message_class(layout: Layout) -> Any:
             "fieldunits_by_name": {field.name: field.unit for field in declared if field.unit},
             "native_format": bytearray(("<" + "".join(f.format for f in fields)).encode()),
             "orders": [fields.index(field) for field in declared],
-            "lengths": [field.count for field in fields],
-            "array_lengths": [field.count if field.is_array else 0 for field in fields],
+            "lengths": [field.length for field in fields],
+            "array_lengths": [field.length if field.is_array else 0 for field in fields],
             "crc_extra": layout.crc_extra,
             "unpacker": unpacker,
             "instance_field": None,

@@ -83,6 +83,7 @@ class SimulatorLink:
         if not self._in_general_decoder and self._plant.open(data):
             self.time_us = self._plant.time_us
             self.has_state = True
+            self._speaks_hil = False
             return True
         return self._receive_any(bytes(data))
 
@@ -91,9 +92,8 @@ class SimulatorLink:
         for message in self._link.decode(data):
             kind = message.get_msgId()
             if kind == FS_PLANT_STATE_ID:
-                fresh = self._plant.open(message.get_msgbuf()) or fresh
-                self.time_us = self._plant.time_us
-                self._speaks_hil = False
+                self._take_plant_state(message)
+                fresh = True
             elif kind == mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
                 self._take_hil(message)
                 fresh = True
@@ -104,6 +104,13 @@ class SimulatorLink:
         self._in_general_decoder = self._link.has_partial
         self.has_state = self.has_state or fresh
         return fresh
+
+    def _take_plant_state(self, m: Message) -> None:
+        """Take a frame that the general decoder read: it may be signed, or cut where its payload ends in zeros."""
+        self._speaks_hil = False
+        self.state[:] = (*m.position_ned_m, *m.velocity_ned_m_s, *m.q, *m.rates_frd_rad_s)
+        self.rotor_speed_rad_s[:] = m.rotor_speed_rad_s
+        self.time_us = m.time_us
 
     def _take_hil(self, m: Message) -> None:
         self._speaks_hil = True

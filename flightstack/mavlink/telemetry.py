@@ -19,6 +19,10 @@ from flightstack.modes import CUSTOM_MODE, Mode
 
 NAN = math.nan
 RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
+LONGEST_INTERVAL_US = 2**31 - 1
+"""What MESSAGE_INTERVAL can say."""
+_SINGLE_LIMIT = 1e18
+"""Beyond this a number counts as infinite: single-precision fields, and their products, must hold it."""
 
 # messages per second: PX4's defaults on its two links for what this vehicle has
 GROUND_RATES_HZ: dict[int, float] = {
@@ -48,31 +52,77 @@ API_RATES_HZ: dict[int, float] = {
 class VehicleFacts(Protocol):
     """What telemetry reads."""
 
-    time_us: int
-    armed: bool
-    mode: Mode
-    landed: bool
-    climbing: bool
-    """Whether a takeoff is under way."""
-    descending: bool
-    """Whether a landing is under way."""
-    mission_current: int
-    mission_count: int
-    mission_state: int
-    can_arm: bool
-    has_state: bool
     state: FloatArray
     setpoint: FloatArray
     attitude_target: FloatArray
-    row: FloatArray
-    rotors: int
-    weight_n: float
     max_thrust_n: float
     home: GeoPoint
     frame: LocalFrame
 
-    def loop_timing(self) -> Message:
-        """Return FS_LOOP_TIMING."""
+    @property
+    def time_us(self) -> int:
+        """Time of the newest tick."""
+        ...
+
+    @property
+    def armed(self) -> bool:
+        """Whether the vehicle is armed."""
+        ...
+
+    @property
+    def mode(self) -> Mode:
+        """The mode."""
+        ...
+
+    @property
+    def landed(self) -> bool:
+        """Whether the vehicle stands on the ground."""
+        ...
+
+    @property
+    def climbing(self) -> bool:
+        """Whether a takeoff is under way."""
+        ...
+
+    @property
+    def descending(self) -> bool:
+        """Whether a landing is under way."""
+        ...
+
+    @property
+    def mission_current(self) -> int:
+        """Number of the current item."""
+        ...
+
+    @property
+    def mission_count(self) -> int:
+        """Number of items."""
+        ...
+
+    @property
+    def mission_state(self) -> int:
+        """MISSION_STATE of the common dialect."""
+        ...
+
+    @property
+    def can_arm(self) -> bool:
+        """Whether an arm command would be accepted."""
+        ...
+
+    @property
+    def has_state(self) -> bool:
+        """Whether a state has ever arrived."""
+        ...
+
+    @property
+    def row(self) -> FloatArray:
+        """The newest row of the inner loop, shape (48,)."""
+        ...
+
+    @property
+    def loop_timing(self) -> Callable[[], Message]:
+        """Makes FS_LOOP_TIMING."""
+        ...
 
 
 def euler(q: list[float]) -> tuple[float, float, float]:
@@ -89,6 +139,14 @@ def euler(q: list[float]) -> tuple[float, float, float]:
 def _whole(value: float, low: int, high: int) -> int:
     """Round into an integer field; what is not finite becomes 0."""
     return max(low, min(high, round(value))) if math.isfinite(value) else 0
+
+
+def _floats(array: FloatArray) -> list[float]:
+    """Return the values for fields of single precision, which not every double fits."""
+    values: list[float] = array.tolist()
+    if any(abs(value) > _SINGLE_LIMIT for value in values):
+        return [math.copysign(math.inf, v) if abs(v) > _SINGLE_LIMIT else v for v in values]
+    return values
 
 
 def _int16(value: float) -> int:
@@ -120,32 +178,32 @@ def heartbeat(f: VehicleFacts, leaving: bool = False) -> Message:
 
 
 def _attitude(f: VehicleFacts) -> Message:
-    x = f.state.tolist()
+    x = _floats(f.state)
     return mavlink.MAVLink_attitude_message(boot_ms(f), *euler(x[6:10]), *x[10:13])
 
 
 def _attitude_quaternion(f: VehicleFacts) -> Message:
-    return mavlink.MAVLink_attitude_quaternion_message(boot_ms(f), *f.state.tolist()[6:13])
+    return mavlink.MAVLink_attitude_quaternion_message(boot_ms(f), *_floats(f.state)[6:13])
 
 
 def _attitude_target(f: VehicleFacts) -> Message:
-    target = f.attitude_target.tolist()
-    rates = f.row[LoopRow.REFERENCE_RATES].tolist()
+    target = _floats(f.attitude_target)
+    rates = _floats(f.row[LoopRow.REFERENCE_RATES])
     thrust = min(1.0, max(0.0, target[4] / f.max_thrust_n)) if math.isfinite(target[4]) else 0.0
     return mavlink.MAVLink_attitude_target_message(boot_ms(f), 0, target[:4], *rates, thrust)
 
 
 def _local_position(f: VehicleFacts) -> Message:
-    return mavlink.MAVLink_local_position_ned_message(boot_ms(f), *f.state.tolist()[:6])
+    return mavlink.MAVLink_local_position_ned_message(boot_ms(f), *_floats(f.state)[:6])
 
 
 def _position_target(f: VehicleFacts) -> Message:
-    s = f.setpoint.tolist()
+    s = _floats(f.setpoint)
     return mavlink.MAVLink_position_target_local_ned_message(boot_ms(f), mavlink.MAV_FRAME_LOCAL_NED, 0, *s)
 
 
 def _global_position(f: VehicleFacts) -> Message:
-    x = f.state.tolist()
+    x = _floats(f.state)
     point = f.frame.to_geo(Vector3(*x[:3]))
     heading = math.degrees(euler(x[6:10])[2]) % 360.0 if math.isfinite(x[6]) else 0.0
     return mavlink.MAVLink_global_position_int_message(
@@ -166,7 +224,7 @@ def _esc_status(f: VehicleFacts) -> Message:
 
 
 def _vfr_hud(f: VehicleFacts) -> Message:
-    x = f.state.tolist()
+    x = _floats(f.state)
     speed = math.hypot(x[3], x[4])
     heading = math.degrees(euler(x[6:10])[2]) % 360.0 if math.isfinite(x[6]) else 0.0
     throttle = 100.0 * float(f.row[LoopRow.WRENCH_ACHIEVED][0]) / f.max_thrust_n
@@ -269,7 +327,7 @@ class Streams:
 
     def set_interval(self, message_id: int, interval_us: float) -> bool:
         """Set an interval as SET_MESSAGE_INTERVAL says (−1 stop, 0 default); tell whether that can be done."""
-        if message_id not in MAKERS or not math.isfinite(interval_us):
+        if message_id not in MAKERS or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # nor is NaN
             return False
         if interval_us == 0 and message_id in self._default:
             self._interval_s[message_id] = 1.0 / self._default[message_id]

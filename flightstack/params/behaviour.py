@@ -74,13 +74,15 @@ class Behaviour:
         return {name: getattr(self, spec.field) for name, spec in SPECS.items()}
 
 
-def _spec(name: str, low: float, high: float, unit: str, text: str, attribute: str, default: float) -> ParamSpec:
+def _spec(attribute: str, default: float, param: tuple[str, float, float, str, str]) -> ParamSpec:
+    name, low, high, unit, text = param
     return ParamSpec(name, attribute, default, low, high, unit, text)
 
 
 SPECS: dict[str, ParamSpec] = {
-    item.metadata["param"][0]: _spec(*item.metadata["param"], item.name, float(item.default))  # type: ignore[arg-type]
+    item.metadata["param"][0]: _spec(item.name, float(item.default), item.metadata["param"])
     for item in fields(Behaviour)
+    if isinstance(item.default, int | float)
 }
 
 

@@ -73,7 +73,7 @@ def timing_table(timing: LoopTiming) -> Table:
     title = f"inner {number(timing.inner_hz, 0)} Hz, outer {number(timing.outer_hz, 0)} Hz, {clock}{factor}"
     period_us = 1e6 / timing.inner_hz if timing.inner_hz else None
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    table.add_column("last second")
+    table.add_column("last 4096 ticks")
     for name in ("mean", "p99", "max"):
         table.add_column(f"{name} µs", justify="right")
         table.add_column("%", justify="right", style="bright_black")

@@ -22,7 +22,7 @@ from flightstack.assembly import Stack, build
 from flightstack.config import DEFAULT_HOME, StackConfig
 from flightstack.contract import Vector3
 from flightstack.geodesy import LocalFrame
-from flightstack.ground_hub import GROUND
+from flightstack.ground_hub import GROUND, PeerAddress
 from flightstack.logging.flight_log import FlightLog
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.hot_frames import ActuatorsFrame
@@ -38,7 +38,7 @@ from sim_bridge.plant import PlantOptions
 from sim_bridge.simulator import Simulator
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
-PEER = "ground station"
+PEER = PeerAddress(GROUND, "memory", 0)
 GCS = Address(255, 190)
 HELD_STEP_S = 0.001
 SERVICE_LIMIT_S = 30.0
@@ -95,7 +95,7 @@ class World:
         self._ticks = 0
         self.stack.simulator.receive(self.simulator.state_frame())
         self.stack.autopilot.has_state = True
-        self.stack.ground.add_peer(PEER, GROUND, permanent=True)
+        self.stack.ground.add_peer(PEER, permanent=True)
 
     def _open_log(self) -> FlightLog:
         self.logs.append(LogBuffer())
@@ -183,13 +183,13 @@ class World:
             self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
         for message in (*self._missions.poll(now_s), *self._commands.poll(now_s)):
             self.send(message)
-        for _, _, data in list(ground.poll(now_s)):
+        for _, data in list(ground.poll(now_s)):
             for message in self._link.decode(data):
                 self._take(message, now_s)
 
     def send(self, message: Message) -> None:
         """Send a message of the ground station's."""
-        self.stack.ground.receive(PEER, GROUND, self._link.encode(message), self._link_now_s())
+        self.stack.ground.receive(PEER, self._link.encode(message), self._link_now_s())
 
     def _take(self, message: Message, now_s: float) -> None:
         kind = message.get_type()
