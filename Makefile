@@ -18,6 +18,9 @@ $(READY): pyproject.toml
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "Installing dependencies into $(VENV) ..."
 	@$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[dev]'
+	@echo "Compiling control loops and plant, once ..."
+	@$(BIN)/flightstack --check
+	@$(BIN)/sim-bridge open-loop --rotors 214,214,214,214 --seconds 0.01 --json >/dev/null
 	@touch $@
 
 fly: $(READY) ## Fly missions/square.plan: simulator, flight stack and ground station as three processes

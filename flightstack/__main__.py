@@ -34,10 +34,12 @@ def run(
     home: Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of the local origin.")] = None,
     ideal_rotors: Annotated[bool, typer.Option(help="Rotors without lag and limits, as the paper assumes.")] = False,
     wait_for_start: Annotated[bool, typer.Option(help="Keep time at zero until a mission is started.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Check the configuration, compile the loops, and end.")] = False,
     exit_on_gcs_loss: Annotated[float | None, typer.Option(help="End when no ground station is heard [s].")] = None,
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.app import EXIT_USAGE, App, ProcessConfig
+    from flightstack.assembly import build
     from flightstack.clock import nearest_outer_hz
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.params.behaviour import Behaviour, with_assignments
@@ -53,6 +55,10 @@ def run(
             DEFAULT_HOME if home is None else parse_home(home), instance + 1,
             with_assignments(Behaviour(), param or []),
         )  # fmt: skip
+        if check:
+            vehicle_name = build(config, lambda: None).vehicle.name
+            print(f"flightstack: {vehicle_name} with {controller} ({gains}) is ready to fly")
+            return
         stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
         path = Path("runs") / f"{stamp}-flight.ulg" if log is None else Path(log)
         process = ProcessConfig(
