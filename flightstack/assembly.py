@@ -15,8 +15,8 @@ from flightstack.autopilot import Autopilot
 from flightstack.clock import LoopTiming, Rates, rates
 from flightstack.config import LOOPS, StackConfig
 from flightstack.contract import LoopRow
-from flightstack.control.attitude_controller import load_controller
 from flightstack.control.backend import ControlBackend
+from flightstack.control.controller_loading import load_controller
 from flightstack.control.loops import PythonLoops
 from flightstack.ground_hub import GroundHub
 from flightstack.guidance.navigator import Navigator

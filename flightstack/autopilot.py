@@ -27,6 +27,7 @@ EMERGENCY, ALERT, CRITICAL, ERROR, WARNING, NOTICE, INFO = range(7)
 """MAV_SEVERITY of texts."""
 
 COS_MAX_ARMING_TILT = math.cos(math.radians(30.0))
+HELD = LoopStatus.INPUT_NOT_FINITE | LoopStatus.OUTPUT_NOT_FINITE
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
 """Modes that make a standing vehicle fly, now or later."""
 
@@ -106,7 +107,7 @@ class Autopilot:
         self._rotor_speed = rotor_speed_rad_s
         self._tick = 0
         self._flying = False
-        self._input_is_bad = False
+        self._faults = 0
         self._armed_us = 0
         self._landed_us = 0
         self._has_flown = False
@@ -154,13 +155,16 @@ class Autopilot:
             self.happen(Event.TAKEOFF_REACHED)
 
     def _watch_input(self) -> None:
-        bad = bool(int(self.now.row[LoopRow.STATUS]) & LoopStatus.INPUT_NOT_FINITE)
-        if bad != self._input_is_bad:
-            self._input_is_bad = bad
-            if bad:
-                self.say(CRITICAL, "State is not finite: the loops hold their last output")
-            else:
-                self.say(NOTICE, "State is finite again")
+        faults = int(self.now.row[LoopRow.STATUS]) & HELD
+        if faults == self._faults:
+            return
+        self._faults = faults
+        if faults & LoopStatus.INPUT_NOT_FINITE:
+            self.say(CRITICAL, "State is not finite: the loops hold their last output")
+        elif faults:
+            self.say(CRITICAL, "Controller output is not finite: the loops hold their last output")
+        else:
+            self.say(NOTICE, "State and controller output are finite again")
 
     def _watch_ground(self, time_us: int) -> None:
         landed = self._navigator.landed
@@ -194,6 +198,7 @@ class Autopilot:
         if progress != self.now.progress:
             for seq in self._navigator.reached_items():
                 self.now.reached.append(seq)
+                self._recorder.mission(time_us, progress._replace(reached=seq), len(self.items))
                 self.say(INFO, f"Mission item {seq} reached")
             self.now.progress = progress
             self._recorder.mission(time_us, progress, len(self.items))
@@ -241,6 +246,8 @@ class Autopilot:
             altitude = self.behaviour.takeoff_altitude_m if takeoff_altitude_m is None else takeoff_altitude_m
             if not altitude > self.behaviour.altitude_acceptance_m:
                 return f"takeoff altitude {altitude:g} m is too low"
+            if altitude > self.limits.max_altitude_m:
+                return f"takeoff altitude {altitude:g} m is above {self.limits.max_altitude_m:g} m"
             self._takeoff_altitude_m = altitude
         self._adopt(before, outcome.status, event)
         return None

@@ -26,6 +26,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 F = TypeVar("F", bound=Callable[..., Any])
 
 _KEPT_CACHES = 4
+_OWN_PACKAGES = ("flightstack", "sim_bridge")
 _WITHOUT_KERNELS = ("mavlink", "services", "logging", "transport", "plan", "commander")
 """Packages that neither hold compiled code nor are used by it."""
 
@@ -38,7 +39,7 @@ def _sources_digest() -> str:
     """
     top = Path(__file__).resolve().parent.parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for package in ("flightstack", "sim_bridge"):
+    for package in _OWN_PACKAGES:
         for source in sorted((top / package).rglob("*.py")):
             if source.parent.name in _WITHOUT_KERNELS:
                 continue
@@ -65,9 +66,18 @@ def _use_cache_directory() -> None:
 _use_cache_directory()
 
 
+def is_own(module_name: str) -> bool:
+    """Tell whether a module is this project's: the cache directory is one for each state of its sources."""
+    return module_name.partition(".")[0] in _OWN_PACKAGES
+
+
 def compiled(function: F) -> F:
-    """Compile ``function`` with Numba on first use; IEEE division (no exception), no fast-math, no FMA."""
-    return numba.njit(cache=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+    """Compile ``function`` with Numba on first use; IEEE division (no exception), no fast-math, no FMA.
+
+    A function of another package is not cached by itself, only within a kernel whose key names its sources.
+    """
+    cache = is_own(function.__module__)
+    return numba.njit(cache=cache, error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
 def specialise(template: Callable[..., Any], key: str, **names: Any) -> Callable[..., Any]:

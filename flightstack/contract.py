@@ -47,6 +47,7 @@ class LoopStatus:
     YAW_SATURATED = 8
     THRUST_SATURATED = 16
     IDLE = 32
+    OUTPUT_NOT_FINITE = 64
 
 
 class Vector3(NamedTuple):

@@ -1,4 +1,4 @@
-"""Backstepping attitude control, the paper's nonlinear inner loop (section II.B.2, printing errors corrected)."""
+"""Backstepping attitude control, the paper's nonlinear inner loop (section II.B.2, corrected)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,9 @@ class BacksteppingParams(NamedTuple):
 
 
 @compiled
-def _axis(error: float, rate: float, rate_d: float, acceleration_d: float, c_outer: float, c_inner: float) -> float:
+def _axis(
+    error: float, rate: float, rate_d: float, acceleration_d: float, c_outer: float, c_inner: float
+) -> float:
     """Angular acceleration demanded on one axis before the cancelling terms [rad/s²].
 
     ε1 = x_d − x, ε2 = ẋ − ẋ_d − c1 ε1, and ε1 − c2 ε2 − c1 (c1 ε1 + ε2) + ẍ_d.
@@ -67,14 +69,16 @@ def attitude_backstepping_step(
     return memory, torque
 
 
-def read_backstepping_params(vehicle: Vehicle, gains: Table | None) -> BacksteppingParams:
+def read_backstepping_params(vehicle: Vehicle, gains: Table) -> BacksteppingParams:
     """Read ``[attitude_backstepping]``: c = [c1 … c6] and the feed-forward switches."""
-    assert gains is not None
     c = gains.numbers("c", 6, 0.0, 1e4)
-    feedforward = gains.number("rate_feedforward", 0.0, 1.0), gains.number("acceleration_feedforward", 0.0, 1.0)
+    feedforward = (
+        gains.number("rate_feedforward", 0.0, 1.0),
+        gains.number("acceleration_feedforward", 0.0, 1.0),
+    )
     gains.finish()
     rotor_inertia = sum(r.inertia_kg_m2 for r in vehicle.rotors) / len(vehicle.rotors)
-    return BacksteppingParams(*c, *feedforward, *vehicle.inertia_kg_m2, rotor_inertia)
+    return BacksteppingParams._make((*c, *feedforward, *vehicle.inertia_kg_m2, rotor_inertia))
 
 
 CONTROLLER = AttitudeController(

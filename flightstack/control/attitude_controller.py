@@ -1,25 +1,23 @@
-"""What an attitude controller is, and where the stack finds one by name.
+"""What an attitude controller is.
 
 A controller is a value of ``AttitudeController`` in a module, announced by the entry point group
-``flightstack.attitude_controllers``. A user's package adds one in its own ``pyproject.toml`` and flies it with
-``--controller name``; docs/controllers.md shows an example.
+``flightstack.attitude_controllers`` (``controller_loading``). A user's package adds one in its own
+``pyproject.toml`` and flies it with ``--controller name``; docs/controllers.md shows an example.
 """
 
 from __future__ import annotations
 
 import hashlib
+import re
 import sys
 from collections.abc import Callable
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from flightstack.compiled import is_own
 from flightstack.contract import AttitudeReference, Quaternion, Vector3
-from flightstack.params.errors import ConfigError
 from flightstack.params.toml_reader import Table
 from flightstack.params.vehicle import Vehicle
-
-ENTRY_POINT_GROUP = "flightstack.attitude_controllers"
 
 
 class AttitudeInputs(NamedTuple):
@@ -41,10 +39,11 @@ class AttitudeInputs(NamedTuple):
 class AttitudeController(NamedTuple):
     """An attitude controller: a pure step function and the types of its memory and parameters.
 
-    ``step(memory, inputs, params, dt_s) -> (memory, torque)`` is marked ``@compiled``; torque is a ``Vector3``
-    in N m about the body axes. ``memory_type`` and ``params_type`` are NamedTuples of floats only;
-    ``initial_memory`` is what a reset restores. ``read_params(vehicle, gains)`` makes the parameters from the
-    vehicle and the controller's table of the gains file (None when the file has none).
+    ``step(memory, inputs, params, dt_s) -> (memory, torque)`` is marked ``@compiled``; torque is a
+    ``Vector3`` in N m about the body axes. ``memory_type`` and ``params_type`` are NamedTuples of floats
+    only, one at least; ``initial_memory`` is what a reset restores. ``read_params(vehicle, gains)`` makes the
+    parameters from the vehicle and the table ``[attitude_<name>]`` of the gains file, which is empty when
+    the file has none.
     """
 
     name: str
@@ -52,30 +51,23 @@ class AttitudeController(NamedTuple):
     memory_type: type
     params_type: type
     initial_memory: tuple[float, ...]
-    read_params: Callable[[Vehicle, Table | None], tuple[float, ...]]
+    read_params: Callable[[Vehicle, Table], tuple[float, ...]]
 
     @property
     def key(self) -> str:
         """Identify name and source text, so that a cached kernel is never an older controller's."""
-        module = sys.modules[self.step.__module__]
-        source = Path(module.__file__).read_bytes() if module.__file__ else b""
-        return f"{self.name}_{hashlib.sha256(source).hexdigest()[:12]}"
+        digest = hashlib.sha256()
+        for source in _sources(self.step.__module__):
+            digest.update(source.read_bytes())
+        return f"{re.sub(r'[^0-9A-Za-z]', '_', self.name)}_{digest.hexdigest()[:12]}"
 
 
-def controller_names() -> list[str]:
-    """Return the names of the installed attitude controllers."""
-    return sorted(point.name for point in entry_points(group=ENTRY_POINT_GROUP))
-
-
-def load_controller(name: str) -> AttitudeController:
-    """Return the installed attitude controller ``name``; raise ConfigError if there is none or it is broken."""
-    points = entry_points(group=ENTRY_POINT_GROUP, name=name)
-    if not points:
-        raise ConfigError("--controller", name, f"is not one of {', '.join(controller_names())}")
-    try:
-        controller = next(iter(points)).load()
-    except Exception as error:  # a user's package may fail in any way: report it as theirs
-        raise ConfigError("--controller", name, f"cannot be loaded: {error}") from error
-    if not isinstance(controller, AttitudeController):
-        raise ConfigError("--controller", name, "its entry point is not an AttitudeController")
-    return controller
+def _sources(module_name: str) -> list[Path]:
+    """Return the module's file and, in a package, those beside and below it: the law may call into them."""
+    module = sys.modules[module_name]
+    if module.__file__ is None:
+        return []
+    path = Path(module.__file__)
+    if not module.__package__ or is_own(module_name):  # ours: the whole cache is one of their state
+        return [path]
+    return sorted(path.parent.rglob("*.py"))

@@ -20,7 +20,7 @@ class PidMemory(NamedTuple):
 
 
 class PidParams(NamedTuple):
-    """Gains in angular acceleration per error, so that they fit any inertia; inertia turns them into torque."""
+    """Gains in angular acceleration per error, which fit any vehicle; its inertia turns them into torque."""
 
     kp_roll: float
     kp_pitch: float
@@ -48,7 +48,7 @@ def integrated(integral: float, error: float, saturation: float, dt_s: float) ->
 def attitude_pid_step(
     memory: PidMemory, inputs: AttitudeInputs, params: PidParams, dt_s: float
 ) -> tuple[PidMemory, Vector3]:
-    """Return the torque [N m, FRD]: PID on the angle error with the gyro as its derivative, and feed-forward."""
+    """Return the torque [N m, FRD]: PID on the angle error, the gyro for its derivative, and feed-forward."""
     error, rates, reference = inputs.error_rad, inputs.rates_frd_rad_s, inputs.reference
     ahead, push = reference.rates_frd_rad_s, reference.acceleration_frd_rad_s2
     memory = PidMemory(
@@ -58,7 +58,11 @@ def attitude_pid_step(
     )
     ff, fa = params.rate_feedforward, params.acceleration_feedforward
     roll = params.kp_roll * error.x + params.ki_roll * memory.roll + params.kd_roll * (ff * ahead.x - rates.x)
-    pitch = params.kp_pitch * error.y + params.ki_pitch * memory.pitch + params.kd_pitch * (ff * ahead.y - rates.y)
+    pitch = (
+        params.kp_pitch * error.y
+        + params.ki_pitch * memory.pitch
+        + params.kd_pitch * (ff * ahead.y - rates.y)
+    )
     yaw = params.kp_yaw * error.z + params.ki_yaw * memory.yaw + params.kd_yaw * (ff * ahead.z - rates.z)
     torque = Vector3(
         params.ix_kg_m2 * (roll + fa * push.x),
@@ -73,13 +77,12 @@ def paper_arm_m(vehicle: Vehicle) -> float:
     return max(max(abs(r.position_frd_m[0]), abs(r.position_frd_m[1])) for r in vehicle.rotors)
 
 
-def read_pid_params(vehicle: Vehicle, gains: Table | None) -> PidParams:
+def read_pid_params(vehicle: Vehicle, gains: Table) -> PidParams:
     """Read ``[attitude_pid]``.
 
-    ``convention = "paper"``: kp and kd give U2, U3 in newton (b1 = l/Ix, b2 = l/Iy) and U4 in N m (b3 = 1/Iz).
+    ``convention = "paper"``: kp and kd give U2, U3 in N (b1 = l/Ix, b2 = l/Iy) and U4 in N m (b3 = 1/Iz).
     ``convention = "angular_acceleration"``: rad/s² per rad, per rad s and per rad/s.
     """
-    assert gains is not None
     kp, kd = gains.numbers("kp", 3, 0.0, 1e5), gains.numbers("kd", 3, 0.0, 1e4)
     ki = gains.numbers("ki", 3, 0.0, 1e5, (0.0, 0.0, 0.0))
     ix, iy, iz = vehicle.inertia_kg_m2
@@ -87,10 +90,13 @@ def read_pid_params(vehicle: Vehicle, gains: Table | None) -> PidParams:
     if gains.choice("convention", ("angular_acceleration", "paper")) == "paper":
         arm = paper_arm_m(vehicle)
         scale = (arm / ix, arm / iy, 1.0 / iz)
-    feedforward = gains.number("rate_feedforward", 0.0, 1.0), gains.number("acceleration_feedforward", 0.0, 1.0)
+    feedforward = (
+        gains.number("rate_feedforward", 0.0, 1.0),
+        gains.number("acceleration_feedforward", 0.0, 1.0),
+    )
     gains.finish()
     flat = [g * s for group in (kp, ki, kd) for g, s in zip(group, scale, strict=True)]
-    return PidParams(*flat, *feedforward, ix, iy, iz)
+    return PidParams._make((*flat, *feedforward, ix, iy, iz))
 
 
 CONTROLLER = AttitudeController(

@@ -75,10 +75,13 @@ def attitude_reference_step(
         ),
         params.max_rate_rad_s,
     )
-    attitude = normalised(quaternion_product(attitude, _rotation_over(rates, dt_s)))
-    advanced = ReferenceMemory(
-        attitude.w, attitude.x, attitude.y, attitude.z, rates.x, rates.y, rates.z
+    acceleration = Vector3(  # what the limits left of it
+        (rates.x - memory.p_rad_s) / dt_s,
+        (rates.y - memory.q_rad_s) / dt_s,
+        (rates.z - memory.r_rad_s) / dt_s,
     )
+    attitude = normalised(quaternion_product(attitude, _rotation_over(rates, dt_s)))
+    advanced = ReferenceMemory(attitude.w, attitude.x, attitude.y, attitude.z, rates.x, rates.y, rates.z)
     return advanced, AttitudeReference(attitude, rates, acceleration)
 
 

@@ -1,4 +1,4 @@
-"""The seam between the flight stack and the loops that fly: Python now, C on the host or on a target beside it."""
+"""The seam between the flight stack and the loops that fly: Python now, C on host or target beside it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,12 @@ class ControlBackend(Protocol):
         """Forget the past: integrators zero, the reference at the present attitude, at rest."""
 
     def step(
-        self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray, outer_due: bool, row: FloatArray
+        self,
+        state: FloatArray,
+        setpoint: FloatArray,
+        rotor_speed_rad_s: FloatArray,
+        outer_due: bool,
+        row: FloatArray,
     ) -> None:
         """Run the outer loop if it is due, then the inner loop; write ``row`` with the rotor commands."""
 

@@ -11,6 +11,7 @@ from flightstack.arrays import attitude_target, position_setpoint, store_attitud
 from flightstack.compiled import as_tuple, compiled, specialise, store
 from flightstack.contract import (
     ATTITUDE_TARGET_SIZE,
+    MAX_ROTORS,
     STATE_SIZE,
     AttitudeReference,
     FloatArray,
@@ -26,6 +27,7 @@ from flightstack.control.attitude_reference import (
     attitude_reference_step,
     in_body_frame,
 )
+from flightstack.control.controller_loading import compile_error, controller_params
 from flightstack.control.mixer import Mixer, mix, mixer_for, relative_rotor_speed
 from flightstack.control.position_pid import (
     PositionMemory,
@@ -49,6 +51,7 @@ COMMAND_AT = LoopRow.ROTOR_COMMAND.start
 SPEED_AT = LoopRow.ROTOR_SPEED.start
 STATUS_AT = LoopRow.STATUS
 INPUT_NOT_FINITE = LoopStatus.INPUT_NOT_FINITE
+OUTPUT_NOT_FINITE = LoopStatus.OUTPUT_NOT_FINITE
 
 # bound by ``specialise`` to the chosen controller
 controller_step: Any = None
@@ -59,9 +62,9 @@ CONTROLLER_PARAMS_SIZE = 0
 
 
 @compiled
-def all_finite(values: FloatArray) -> bool:
-    """Tell whether no value is infinite or not a number."""
-    for value in values:
+def all_finite(values: FloatArray | tuple[float, ...]) -> bool:
+    """Tell whether no value of an array or a flat tuple is infinite or not a number."""
+    for value in values:  # noqa: SIM110  # compiled code has no generators
         if not math.isfinite(value):
             return False
     return True
@@ -69,9 +72,14 @@ def all_finite(values: FloatArray) -> bool:
 
 @compiled
 def outer_kernel(
-    state: FloatArray, setpoint: FloatArray, memory: FloatArray, params: FloatArray, dt_s: float, target: FloatArray
+    state: FloatArray,
+    setpoint: FloatArray,
+    memory: FloatArray,
+    params: FloatArray,
+    dt_s: float,
+    target: FloatArray,
 ) -> None:
-    """Run the position loop on arrays: write ``memory`` (3,) and ``target`` (5,); keep both if an input is bad."""
+    """Run the position loop: write ``memory`` (3,) and ``target`` (5,), or keep both as they were."""
     if not (all_finite(state) and all_finite(setpoint)):
         return
     advanced, aim = position_pid_step(
@@ -81,6 +89,8 @@ def outer_kernel(
         PositionParams(*as_tuple(params, POSITION_PARAMS_SIZE)),
         dt_s,
     )
+    if not (all_finite(aim.attitude) and math.isfinite(aim.thrust_n)):
+        return
     store(memory, advanced)
     store_attitude_target(target, aim)
 
@@ -124,8 +134,7 @@ def _saturation(row: FloatArray) -> Vector3:
 def _status(row: FloatArray) -> int:
     s = _saturation(row)
     thrust = _lag(row[WRENCH_AT], row[ACHIEVED_AT], 1e-9)
-    status = 2 * int(s.x != 0.0) + 4 * int(s.y != 0.0) + 8 * int(s.z != 0.0) + 16 * int(thrust != 0.0)
-    return status
+    return 2 * int(s.x != 0.0) + 4 * int(s.y != 0.0) + 8 * int(s.z != 0.0) + 16 * int(thrust != 0.0)
 
 
 def inner_kernel(
@@ -146,9 +155,10 @@ def inner_kernel(
     """Run reference filter, attitude controller and mixer on arrays; write ``row`` and a copy to ``last``.
 
     ``last`` (48,) is the row of the previous tick: anti-windup and Ω_r come from it, and it is repeated, with
-    a status bit, when an input is not finite. The target moves in a straight line from ``last_target`` (the
-    outer loop's tick before) to ``target`` over an outer period, ``fraction`` of which has passed: its steps
-    would shake the rotors at the outer rate. A template: ``specialise`` binds the controller.
+    a status bit, when an input or what the controller makes of it is not finite. The target moves in a
+    straight line from ``last_target`` (the outer loop's tick before) to ``target`` over an outer period,
+    ``fraction`` of which has passed: its steps would shake the rotors at the outer rate. A template:
+    ``specialise`` binds the controller.
     """
     if not (all_finite(state) and all_finite(target)):
         row[:] = last
@@ -178,6 +188,10 @@ def inner_kernel(
         ControllerParams(*as_tuple(params, CONTROLLER_PARAMS_SIZE)),
         dt_s,
     )
+    if not (all_finite(advanced) and all_finite(torque)):
+        row[:] = last
+        row[STATUS_AT] = OUTPUT_NOT_FINITE
+        return
     demanded = Wrench(aim.thrust_n, torque)
     achieved = mix(demanded, Mixer(allocation, effectiveness, low, high, spin), row[COMMAND_AT:], work)
     store(reference_memory, filtered)
@@ -222,9 +236,7 @@ class PythonLoops:
         self._fraction_step, self._fraction = outer_hz / inner_hz, 0.0
         self._position_params = np.array(read_position_params(vehicle, gains, max_tilt_rad))
         self._reference_params = np.array(read_reference_params(gains))
-        section = f"attitude_{controller.name}"
-        table = gains.table(section) if gains.has(section) else None
-        self._controller_params = np.array(controller.read_params(vehicle, table), dtype=np.float64)
+        self._controller_params = controller_params(controller, vehicle, gains)
         self._initial_memory = np.array(controller.initial_memory, dtype=np.float64)
         mixer = mixer_for(vehicle)
         self._mixer = (*mixer, np.zeros((2, len(vehicle.rotors))))
@@ -244,7 +256,17 @@ class PythonLoops:
         self._reference_memory = np.zeros(REFERENCE_MEMORY_SIZE)
         self._controller_memory = self._initial_memory.copy()
         self._last = np.zeros(LoopRow.SIZE)
-        self.reset(np.array([0.0] * 6 + [1.0] + [0.0] * 6))
+        self._compile(controller.name)
+
+    def _compile(self, name: str) -> None:
+        """Compile the kernel with the controller, or load it from the cache; raise ConfigError."""
+        state = np.array([0.0] * 6 + [1.0] + [0.0] * 6)
+        self.reset(state)
+        try:
+            self._run_inner(state, np.zeros(MAX_ROTORS, np.float32), np.zeros(LoopRow.SIZE))
+        except Exception as error:  # the controller may be anyone's
+            raise compile_error(name, error) from error
+        self.reset(state)
 
     def reset(self, state: FloatArray) -> None:
         """Forget the past: integrators zero, the reference at the present attitude, at rest."""
@@ -259,16 +281,29 @@ class PythonLoops:
         self._last[:] = 0.0
 
     def step(
-        self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray, outer_due: bool, row: FloatArray
+        self,
+        state: FloatArray,
+        setpoint: FloatArray,
+        rotor_speed_rad_s: FloatArray,
+        outer_due: bool,
+        row: FloatArray,
     ) -> None:
         """Run the outer loop if it is due, then the inner loop; write ``row`` with the rotor commands."""
         if outer_due:
             self._last_target[:] = self.attitude_target
             self._fraction = 0.0
             outer_kernel(
-                state, setpoint, self._position_memory, self._position_params, self._outer_dt_s, self.attitude_target
+                state,
+                setpoint,
+                self._position_memory,
+                self._position_params,
+                self._outer_dt_s,
+                self.attitude_target,
             )
         self._fraction += self._fraction_step
+        self._run_inner(state, rotor_speed_rad_s, row)
+
+    def _run_inner(self, state: FloatArray, rotor_speed_rad_s: FloatArray, row: FloatArray) -> None:
         self._kernel(
             state,
             self._last_target,

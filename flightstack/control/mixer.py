@@ -60,8 +60,8 @@ def _largest_scale(base: FloatArray, direction: FloatArray, low: FloatArray, hig
 def _fit_roll_pitch(speed_squared: FloatArray, mixer: Mixer) -> float:
     """Scale the roll-pitch part so that some thrust brings it between the limits; return the scale in [0, 1].
 
-    Rotor i allows the thrusts from (low − b)/a to (high − b)/a, a being its share of a newton. There is a common one
-    when no rotor's least is above another's most; a > 0 for any vehicle that hovers.
+    Rotor i allows the thrusts from (low − b)/a to (high − b)/a, a being its share of a newton. There is a
+    common one when no rotor's least is above another's most; a > 0 for any vehicle that hovers.
     """
     scale = 1.0
     n = speed_squared.size

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from flightstack.compiled import compiled
-from flightstack.contract import AttitudeTarget, PositionSetpoint, Vector3, VehicleState
+from flightstack.contract import AttitudeTarget, PositionSetpoint, VehicleState
 from flightstack.geometry import quaternion_from_euler
 from flightstack.params.toml_reader import Table
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
@@ -55,7 +55,11 @@ def _bounded(value: float, limit: float) -> float:
 
 @compiled
 def position_pid_step(
-    memory: PositionMemory, state: VehicleState, setpoint: PositionSetpoint, params: PositionParams, dt_s: float
+    memory: PositionMemory,
+    state: VehicleState,
+    setpoint: PositionSetpoint,
+    params: PositionParams,
+    dt_s: float,
 ) -> tuple[PositionMemory, AttitudeTarget]:
     """Return the attitude and the thrust that accelerate the vehicle along the setpoint.
 

@@ -9,6 +9,9 @@ from flightstack.params.toml_reader import Table, read_toml
 
 BUILT_IN = Path(__file__).parent / "gains"
 DEFAULT_GAINS = "tuned"
+LOOP_TABLES = ("position", "altitude", "attitude_reference")
+CONTROLLER_PREFIX = "attitude_"
+"""What the names of the controllers' tables begin with; those of other controllers are left alone."""
 
 
 def built_in_gains() -> list[str]:
@@ -24,4 +27,6 @@ def open_gains(name_or_path: str) -> Table:
             known = ", ".join(built_in_gains())
             raise ConfigError(name_or_path, "", f"is neither a file nor built-in gains ({known})")
         path = BUILT_IN / f"{name_or_path}.toml"
-    return read_toml(path)
+    gains = read_toml(path)
+    gains.expect(*LOOP_TABLES, "description", prefix=CONTROLLER_PREFIX)
+    return gains

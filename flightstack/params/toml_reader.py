@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -41,8 +40,9 @@ class Table:
     def _in_range(self, key: str, value: Any, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f"{value!r} is not a number")
-        if not math.isfinite(value) or not low <= value <= high:
-            raise self.error(key, f"{value:g} is outside the allowed range {low:g} to {high:g}")
+        if not low <= value <= high:  # nor is NaN
+            shown = f"{value:g}" if isinstance(value, float) or abs(value) < 10**15 else "a number that large"
+            raise self.error(key, f"{shown} is outside the allowed range {low:g} to {high:g}")
         return float(value)
 
     def numbers(
@@ -75,6 +75,10 @@ class Table:
             raise self.error(key, "must be a table")
         return Table(self.file, value, self._name(key))
 
+    def optional_table(self, key: str) -> Table:
+        """Return the table under ``key``, an empty one if there is none."""
+        return self.table(key) if key in self._values else Table(self.file, {}, self._name(key))
+
     def tables(self, key: str) -> list[Table]:
         """Return the array of tables under ``key``."""
         value = self._get(key, None)
@@ -85,6 +89,12 @@ class Table:
     def has(self, key: str) -> bool:
         """Tell whether ``key`` is given."""
         return key in self._values
+
+    def expect(self, *keys: str, prefix: str) -> None:
+        """Raise for a key that is neither one of ``keys`` nor begins with ``prefix``."""
+        for key in self._values:
+            if key not in keys and not key.startswith(prefix):
+                raise self.error(key, "is not a known key")
 
     def finish(self) -> None:
         """Raise for keys that nobody asked for: a misspelt key must not be ignored."""
@@ -101,3 +111,6 @@ def read_toml(path: Path) -> Table:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(path, "", f"is not valid TOML: {error}") from error
+    except (RecursionError, ValueError) as error:  # nested without end, numbers of thousands of digits
+        problem = "is not sane TOML: it nests too deeply or holds an endless number"
+        raise ConfigError(path, "", problem) from error
