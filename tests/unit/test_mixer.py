@@ -31,7 +31,7 @@ def run(vehicle: Vehicle, wrench: tuple[float, float, float, float]) -> tuple[np
 
 
 def forces_and_moments(vehicle: Vehicle, speeds: np.ndarray) -> np.ndarray:
-    """Thrust and torque of spinning rotors from mechanics: Σ F, Σ r × F, and the air's reaction on each rotor."""
+    """Thrust and torque of spinning rotors from mechanics: Σ F, Σ r × F, and the air's reaction on each."""
     force, torque = np.zeros(3), np.zeros(3)
     for rotor, speed in zip(vehicle.rotors, speeds, strict=True):
         push = np.array([0.0, 0.0, -rotor.thrust_coefficient_n_s2 * speed * abs(speed)])
@@ -95,8 +95,8 @@ def test_what_the_mixer_reports_is_what_the_rotors_make_within_their_limits(
 def best_by_linear_programming(vehicle: Vehicle, wrench: tuple[float, ...]) -> np.ndarray:
     """Return the wrench of the stated priorities: most of roll and pitch, then thrust, then yaw.
 
-    Unknowns are the scale k of roll and pitch, the thrust T, the distance e of T from the demand, and the scale s
-    of yaw; Ω² = A (T, k·roll, k·pitch, s·yaw) lies within the limits.
+    Unknowns are the scale k of roll and pitch, the thrust T, the distance e of T from the demand, and the
+    scale s of yaw; Ω² = A (T, k·roll, k·pitch, s·yaw) lies within the limits.
     """
     allocation = np.linalg.pinv(vehicle.effectiveness())
     columns = np.stack(
