@@ -38,6 +38,7 @@ class FlyOptions:
     seed: int = 1
     wind: str | None = None
     gust: float | None = None
+    torque_gust: float | None = None
     vehicle: str = "paper_quad"
     instance: int = 0
     ideal_rotors: bool = False
@@ -93,6 +94,7 @@ def _check_flags(options: FlyOptions) -> None:
             _number("--wind", part, -200.0, 200.0)
     _number("--inner-hz", options.inner_hz, 1.0, 1e5)
     _number("--gust", options.gust or 0.0, 0.0, 50.0)
+    _number("--torque-gust", options.torque_gust or 0.0, 0.0, 100.0)
     _number("--seed", options.seed, 0, 2**31 - 1)
     _number("--instance", options.instance, 0, MOST_INSTANCES - 1)
     _number("--timeout", options.timeout_s, 0.1, 86_400.0)
@@ -147,6 +149,8 @@ def simulator_arguments(options: FlyOptions, home: GeoPoint) -> list[str]:
         arguments.append(f"--wind={options.wind}")
     if options.gust is not None:
         arguments.append(f"--gust={options.gust}")
+    if options.torque_gust is not None:
+        arguments.append(f"--torque-gust={options.torque_gust}")
     return [*arguments, "--ideal-rotors"] if options.ideal_rotors else arguments
 
 

@@ -26,10 +26,13 @@ _WindOption = Annotated[str, typer.Option(metavar="N,E[,D]", help="Steady wind, 
 _GustOption = Annotated[float, typer.Option(help="Standard deviation of the gusts, m/s.")]
 _ForceOption = Annotated[str, typer.Option(metavar="N,E,D", help="Constant external force, N.")]
 _TorqueOption = Annotated[str, typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")]
+_TorqueGustOption = Annotated[
+    float, typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
+]
 _SeedOption = Annotated[int, typer.Option(help="Seed of the gusts.")]
 
 
-def _disturbance(wind: str, gust: float, force: str, torque: str) -> Any:
+def _disturbance(wind: str, gust: float, force: str, torque: str, torque_gust: float) -> Any:
     from sim_bridge.disturbance import Disturbance  # noqa: PLC0415
 
     return Disturbance(
@@ -37,6 +40,7 @@ def _disturbance(wind: str, gust: float, force: str, torque: str) -> Any:
         arguments.in_range("--gust", gust, 0.0, 50.0),
         arguments.vector("--force", force),
         arguments.vector("--torque", torque),
+        arguments.in_range("--torque-gust", torque_gust, 0.0, 100.0),
     )
 
 
@@ -58,6 +62,7 @@ def run(
     gust: _GustOption = 0.0,
     force: _ForceOption = _ZERO,
     torque: _TorqueOption = _ZERO,
+    torque_gust: _TorqueGustOption = 0.0,
     ideal_rotors: Annotated[bool, typer.Option("--ideal-rotors", help="No rotor lag, no limits.")] = False,
     physics_hz: Annotated[float, typer.Option(help="Lowest rate of the integration steps.")] = 1000.0,
     home: Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Where the vehicle stands.")] = (
@@ -84,7 +89,7 @@ def run(
     options = ServerOptions(
         vehicle=load_vehicle(vehicle),
         plant=plant,
-        plant_options=PlantOptions(_disturbance(wind, gust, force, torque), seed),
+        plant_options=PlantOptions(_disturbance(wind, gust, force, torque, torque_gust), seed),
         home=arguments.home(home),
         speed=arguments.speed(speed),
         host=host,
@@ -116,6 +121,7 @@ def open_loop(
     gust: _GustOption = 0.0,
     force: _ForceOption = _ZERO,
     torque: _TorqueOption = _ZERO,
+    torque_gust: _TorqueGustOption = 0.0,
     seed: _SeedOption = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
@@ -135,7 +141,7 @@ def open_loop(
     from sim_bridge.server import complain  # noqa: PLC0415
 
     loaded = load_vehicle(vehicle)
-    disturbance = _disturbance(wind, gust, force, torque)
+    disturbance = _disturbance(wind, gust, force, torque, torque_gust)
     warning = wind_warning(loaded, plant, disturbance)
     if warning:
         complain(warning)

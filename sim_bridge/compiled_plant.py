@@ -9,11 +9,11 @@ import numpy as np
 from flightstack.contract import FloatArray, Vector3
 from flightstack.geometry import quaternion_from_euler, rotate
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.disturbance import GUST_DOWN_RATIO, GUST_TIME_S, Disturbance
 from sim_bridge.ground import Ground, ground_contact
 from sim_bridge.integrator import advance_kernel, slope_kernel
-from sim_bridge.layout import MEMORY, NOISE_ROWS, OUTPUT, RecordArray
+from sim_bridge.layout import MEMORY, OUTPUT, RecordArray
 from sim_bridge.plant import InitialState, PlantOptions
+from sim_bridge.turbulence import Turbulence
 
 DEFAULT_STEP_S = 1e-3
 
@@ -28,14 +28,15 @@ class CompiledPlant:
         self._memory: RecordArray = np.zeros(1, MEMORY)
         self._kernel = advance_kernel(name)
         self._slope = slope_kernel(name)
-        self._random = np.random.Generator(np.random.PCG64(options.seed))
-        self._gusty = options.disturbance.gust_m_s > 0.0
         m = self._memory[0]
+        disturbance = options.disturbance
+        m["wind"], m["force"] = disturbance.wind_ned_m_s, disturbance.force_ned_n
+        m["steady_torque"] = m["torque"] = disturbance.torque_frd_n_m
+        self._turbulence = Turbulence(m, disturbance, options.seed)
         m["ground"] = options.ground
         m["mass"], m["weight"] = vehicle.mass_kg, vehicle.weight_n
         m["inertia"], m["drag"] = vehicle.inertia_kg_m2, vehicle.linear_drag_n_s_m
         self._set_rotors(options.limits)
-        self._set_disturbance(options.disturbance)
         self.set_step(DEFAULT_STEP_S)
         self._set_state(options.initial)
 
@@ -56,15 +57,6 @@ class CompiledPlant:
                 rotor.max_speed_rad_s if limits else math.inf,
                 0.0,  # set with the step
             )
-
-    def _set_disturbance(self, disturbance: Disturbance) -> None:
-        m = self._memory[0]
-        m["wind"] = disturbance.wind_ned_m_s
-        m["force"], m["torque"] = disturbance.force_ned_n, disturbance.torque_frd_n_m
-        self._gust_m_s = np.array([1.0, 1.0, GUST_DOWN_RATIO]) * disturbance.gust_m_s
-        if self._gusty:
-            m["gust"] = self._gust_m_s * self._random.standard_normal(3)
-            self._random.standard_normal(out=m["noise"])
 
     def _set_state(self, initial: InitialState) -> None:
         body = self._memory[0]["body"]
@@ -103,9 +95,7 @@ class CompiledPlant:
         m["step_s"] = step_s
         for index, rotor in enumerate(self._vehicle.rotors):
             m["rotor"][index, -1] = math.exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
-        decay = math.exp(-step_s / GUST_TIME_S)
-        m["gust_decay"] = decay
-        m["gust_scale"] = self._gust_m_s * math.sqrt(1.0 - decay * decay)
+        self._turbulence.set_step(step_s)
         self._set_ground(ground_contact(self._vehicle, step_s, single_point=self._paper))
 
     def rotor_speeds_rad_s(self) -> list[float]:
@@ -119,18 +109,14 @@ class CompiledPlant:
 
     def advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         """Advance by ``steps`` steps with the commands (shape (8,), rad/s) held; see ``Plant``."""
-        if self._gusty:
+        if self._turbulence.active:
             return self._advance_in_gusts(command_rad_s, flags, steps)
         return self._kernel(self._memory, command_rad_s, flags, steps, self.output)
 
     def _advance_in_gusts(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
-        m, result = self._memory[0], 0
+        result = 0
         while steps > 0:
-            row = int(m["noise_row"])
-            if row == NOISE_ROWS:
-                self._random.standard_normal(out=m["noise"])
-                m["noise_row"] = row = 0
-            count = min(steps, NOISE_ROWS - row)
+            count = min(steps, self._turbulence.rows_left())
             result = self._kernel(self._memory, command_rad_s, flags, count, self.output)
             steps -= count
         return result

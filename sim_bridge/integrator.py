@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from flightstack.compiled import compiled, specialise
@@ -37,10 +38,15 @@ def _combine(x: FloatArray, h: float, a: FloatArray, b: FloatArray, c: FloatArra
 
 @compiled
 def _next_gust(m: Record) -> None:
-    """First-order Gauss-Markov process, exact for its value at the steps, held over each step."""
-    gust, scale, noise, row = m["gust"], m["gust_scale"], m["noise"], m["noise_row"]
+    """Gauss-Markov processes of wind and torque, exact for their values at the steps, held over each step."""
+    row = m["noise_row"]
+    gust, scale, noise = m["gust"], m["gust_scale"], m["noise"]
+    twist, twist_scale, twist_noise = m["torque_gust"], m["torque_gust_scale"], m["torque_noise"]
+    torque, steady = m["torque"], m["steady_torque"]
     for i in range(3):
         gust[i] = m["gust_decay"] * gust[i] + scale[i] * noise[row, i]
+        twist[i] = m["torque_gust_decay"] * twist[i] + twist_scale[i] * twist_noise[row, i]
+        torque[i] = steady[i] + twist[i]
     m["noise_row"] += 1
 
 
@@ -54,7 +60,7 @@ def _advance(memory: RecordArray, command: FloatArray, flags: int, steps: int, o
     x, stage, slopes = m["body"], m["stage"], m["slope"]
     k1, k2, k3, k4 = slopes[0], slopes[1], slopes[2], slopes[3]
     h = m["step_s"]
-    gusty = m["gust_scale"][0] > 0.0
+    gusty = m["gust_scale"][0] > 0.0 or m["torque_gust_scale"][0] > 0.0
     if steps > 0:
         take_commands(m, command, flags)
     at_end = rotor_forces(m)
@@ -92,6 +98,7 @@ def _slope_at(memory: RecordArray) -> None:
     derivative(m["body"], rotor_forces(m), m, m["slope"][0])
 
 
+@cache  # reading a kernel from the disk takes longer than a second of flight
 def _join(template: Callable[..., Any], plant: str) -> Callable[..., Any]:
     module = {"rigid": rigid, "paper": paper}[plant]
     parts = ("derivative", "before_step", "after_step", "show")

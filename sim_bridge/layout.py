@@ -33,7 +33,10 @@ MEMORY = np.dtype(
         ("bad_commands", "i8"),
         ("anchor", "f8", (MAX_POINTS, 3)),  # where the friction spring of each contact point is fastened
         ("gust", "f8", 3),  # m/s NED
-        ("noise", "f8", (NOISE_ROWS, 3)),  # unit normal deviates, one row for each step
+        ("torque_gust", "f8", 3),  # N m FRD
+        ("torque", "f8", 3),  # external, steady and gusty, N m FRD
+        ("noise", "f8", (NOISE_ROWS, 3)),  # unit normal deviates of the wind, one row for each step
+        ("torque_noise", "f8", (NOISE_ROWS, 3)),  # and of the torque
         ("noise_row", "i8"),
         # what is fixed
         ("step_s", "f8"),
@@ -44,10 +47,12 @@ MEMORY = np.dtype(
         ("inertia", "f8", 3),  # kg m²
         ("drag", "f8", 3),  # N s/m, body axes
         ("force", "f8", 3),  # external, N NED
-        ("torque", "f8", 3),  # external, N m FRD
+        ("steady_torque", "f8", 3),  # external, N m FRD
         ("wind", "f8", 3),  # steady, m/s NED
         ("gust_decay", "f8"),  # over one step
         ("gust_scale", "f8", 3),  # m/s, zero without gusts
+        ("torque_gust_decay", "f8"),  # over one step
+        ("torque_gust_scale", "f8", 3),  # N m, zero without a gusty torque
         ("ground", "i8"),  # whether there is a ground
         ("ground_z", "f8"),  # m, where the contact springs are relaxed
         ("reach", "f8"),  # m, farthest contact point from the body origin

@@ -30,6 +30,9 @@ def fly(
     seed: Annotated[int, typer.Option(help="Seed of the gusts.")] = 1,
     wind: Annotated[str | None, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")] = None,
     gust: Annotated[float | None, typer.Option(help="Standard deviation of the gusts, m/s.")] = None,
+    torque_gust: Annotated[
+        float | None, typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Directory of the results.  [default: runs/<stamp>-<plan>]")
     ] = None,
@@ -51,8 +54,8 @@ def fly(
     if settings.connect is not None:
         raise CliError("fly starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
     options = FlyOptions(
-        plan, controller, gains, plant, speed, inner_hz, outer_hz, seed, wind, gust, vehicle, instance,
-        ideal_rotors, 60.0 if settings.timeout_s is None else settings.timeout_s, limit,
+        plan, controller, gains, plant, speed, inner_hz, outer_hz, seed, wind, gust, torque_gust, vehicle,
+        instance, ideal_rotors, 60.0 if settings.timeout_s is None else settings.timeout_s, limit,
     )  # fmt: skip
     items = checked_plan(options)
     console = FlyConsole(stderr=as_json, highlight=False)

@@ -202,8 +202,9 @@ def test_same_commands_give_the_same_bytes_at_any_speed() -> None:
     received = []
     for speed in ("max", "10", "100"):
         bridge = SimBridge(
-            "--speed", speed, "--vehicle", "x_quad", "--wind", "3,1", "--gust", "1", "--seed", "5"
-        )
+            "--speed", speed, "--vehicle", "x_quad", "--wind", "3,1", "--gust", "1", "--torque-gust", "0.1",
+            "--seed", "5",
+        )  # fmt: skip
         client = Client(bridge.port)
         client.request()
         states = []

@@ -112,12 +112,13 @@ def fly(tmp_path: Path, instance: int, *options: str) -> tuple[dict[str, object]
 
 def test_the_same_flight_gives_the_same_log_at_any_speed_and_in_one_process(tmp_path: Path) -> None:
     logs = []
+    gusts = ("--gust", "1", "--torque-gust", "0.1", "--seed", "7")
     for instance, speed in ((41, "max"), (42, "10"), (43, "1")):
-        summary, log = fly(tmp_path, instance, "--speed", speed, "--gust", "1", "--vehicle", "x_quad", "--seed", "7")
+        summary, log = fly(tmp_path, instance, "--speed", speed, "--vehicle", "x_quad", *gusts)
         assert summary["outcome"] == "completed"
         logs.append(log)
     assert logs[0] == logs[1] == logs[2]
-    world = World(vehicle="x_quad", gust=1.0, seed=7, system_id=42)
+    world = World(vehicle="x_quad", gust=1.0, torque_gust=0.1, seed=7, system_id=42)
     world.upload("hop.plan")
     world.start_mission()
     world.until_disarmed()

@@ -31,7 +31,9 @@ def fly_square(**options: object) -> tuple[World, list[np.ndarray]]:
 
 @pytest.mark.parametrize("controller", ["pid", "backstepping"])
 @pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
-def test_square_is_flown_through_every_corner_and_ends_disarmed_at_home(vehicle: str, controller: str) -> None:
+def test_square_is_flown_through_every_corner_and_ends_disarmed_at_home(
+    vehicle: str, controller: str
+) -> None:
     world, path = fly_square(vehicle=vehicle, controller=controller)
     assert world.reached == [0, 1, 2, 3, 4, 5]
     assert "Mission finished" in world.texts
@@ -49,7 +51,9 @@ def test_square_is_flown_through_every_corner_and_ends_disarmed_at_home(vehicle:
 def test_both_controllers_fly_with_both_sets_of_gains_on_both_plants(
     controller: str, gains: str, inner_hz: float, outer_hz: float, plant: str
 ) -> None:
-    world, _ = fly_square(controller=controller, gains=gains, inner_hz=inner_hz, outer_hz=outer_hz, plant=plant)
+    world, _ = fly_square(
+        controller=controller, gains=gains, inner_hz=inner_hz, outer_hz=outer_hz, plant=plant
+    )
     assert world.reached == [0, 1, 2, 3, 4, 5]
     assert abs(world.altitude) < 0.01
 
@@ -92,6 +96,17 @@ def test_wind_and_gusts_are_withstood() -> None:
         assert min(float(np.linalg.norm(position - corner)) for position in path) < 0.7  # 0.55 m seen
 
 
+def test_gusty_torque_is_withstood() -> None:
+    """Its standard deviation about roll and pitch is 7 % of the torque that the rotors have there."""
+    world, path = fly_square(vehicle="x_quad", torque_gust=0.2, seed=3)
+    assert world.reached == [0, 1, 2, 3, 4, 5]
+    for corner in SQUARE:
+        assert min(float(np.linalg.norm(position - corner)) for position in path) < 0.5  # 0.26 m seen
+    assert np.linalg.norm(world.position[:2]) < 0.1  # 0.044 m seen
+    _, calm = fly_square(vehicle="x_quad", seed=3)
+    assert max(np.linalg.norm(a - b) for a, b in zip(path, calm, strict=False)) > 0.02  # 0.06 m seen
+
+
 def test_constant_torque_is_integrated_away() -> None:
     world = World(torque=(0.02, 0.0, 0.0))
     world.takeoff(3.0)
@@ -109,7 +124,9 @@ def test_same_seed_gives_the_same_log_byte_for_byte_and_another_seed_another() -
     assert logs[0] != logs[2]
 
 
-@pytest.mark.parametrize(("inner_hz", "outer_hz"), [(250.0, 50.0), (500.0, 100.0), (1000.0, 100.0), (400.0, 400.0)])
+@pytest.mark.parametrize(
+    ("inner_hz", "outer_hz"), [(250.0, 50.0), (500.0, 100.0), (1000.0, 100.0), (400.0, 400.0)]
+)
 def test_the_rates_are_free(inner_hz: float, outer_hz: float) -> None:
     world = World(inner_hz=inner_hz, outer_hz=outer_hz)
     world.upload("hop.plan")

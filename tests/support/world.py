@@ -1,4 +1,4 @@
-"""A whole flight in one process: simulator, flight stack and ground station on the bytes that sockets would carry.
+"""A whole flight in one process: simulator, flight stack and ground station on the bytes that sockets carry.
 
 Time is simulated; nothing here reads a clock. A scenario is a story of verbs:
 
@@ -69,6 +69,7 @@ class World:
         gust: float = 0.0,
         force: tuple[float, float, float] = (0.0, 0.0, 0.0),
         torque: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        torque_gust: float = 0.0,
         seed: int = 1,
         params: Sequence[str] = (),
         **config: object,
@@ -77,8 +78,10 @@ class World:
         behaviour = with_assignments(Behaviour(), list(params))
         self.config = StackConfig(behaviour=behaviour, **config)  # type: ignore[arg-type]
         self.stack: Stack = build(self.config, self._open_log)
-        disturbance = Disturbance(wind, gust, force, torque)
-        self.simulator = Simulator(self.stack.vehicle, plant, PlantOptions(disturbance=disturbance, seed=seed))
+        disturbance = Disturbance(wind, gust, force, torque, torque_gust)
+        self.simulator = Simulator(
+            self.stack.vehicle, plant, PlantOptions(disturbance=disturbance, seed=seed)
+        )
         self.simulator.set_interval_us(self.stack.rates.interval_us)
         self._actuators = ActuatorsFrame()
         self._held_s = 0.0
@@ -166,7 +169,9 @@ class World:
             if condition():
                 return
             self.tick()
-        raise TookTooLong(f"not within {limit_s} s; mode {self.mode.name}, position {self.position}, {self.texts}")
+        raise TookTooLong(
+            f"not within {limit_s} s; mode {self.mode.name}, position {self.position}, {self.texts}"
+        )
 
     def until_disarmed(self, limit_s: float = 180.0) -> None:
         """Fly until the vehicle has disarmed itself."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import socket
 from pathlib import Path
 
@@ -34,7 +35,7 @@ HOP = MISSIONS / "hop.plan"
     ("text", "endpoint"),
     [
         (DEFAULT_CONNECTION, Endpoint("127.0.0.1", 14550, True)),
-        ("udp:14560", Endpoint("0.0.0.0", 14560, True)),
+        ("udp:14560", Endpoint("127.0.0.1", 14560, True)),
         ("udpin:10.0.0.1:1", Endpoint("10.0.0.1", 1, True)),
         ("udpout:vehicle.local:18570", Endpoint("vehicle.local", 18570, False)),
     ],
@@ -75,6 +76,7 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
         ({"wind": "3"}, "--wind 3: expected N,E or N,E,D"),
         ({"wind": "3,x"}, "--wind x: expected a number"),
         ({"gust": -1.0}, "--gust -1.0"),
+        ({"torque_gust": math.inf}, "--torque-gust inf: expected a number"),
         ({"inner_hz": float("nan")}, "--inner-hz nan: expected a number"),
         ({"seed": -1}, "--seed -1"),
         ({"instance": 100}, "--instance 100: expected a number from 0 to 99"),
@@ -130,12 +132,27 @@ def test_our_missions_pass_the_check(mission: Path) -> None:
 
 def test_the_children_are_told_everything() -> None:
     options = FlyOptions(
-        HOP, "backstepping", "paper", "paper", "4", 1000.0, 250.0, 9, "3,-1", 0.5, "x_quad", 2, True, 12.0
+        HOP,
+        "backstepping",
+        "paper",
+        "paper",
+        "4",
+        1000.0,
+        250.0,
+        9,
+        "3,-1",
+        0.5,
+        0.02,
+        "x_quad",
+        2,
+        True,
+        12.0,
     )
     home = GeoPoint(47.1, -8.2, 3.5)
     assert simulator_arguments(options, home) == [
         "--vehicle=x_quad", "--plant=paper", "--speed=4", "--port=4562", "--instance=2", "--seed=9",
-        "--home=47.1,-8.2,3.5", "--timeout=12", "--wind=3,-1", "--gust=0.5", "--ideal-rotors",
+        "--home=47.1,-8.2,3.5", "--timeout=12", "--wind=3,-1", "--gust=0.5", "--torque-gust=0.02",
+        "--ideal-rotors",
     ]  # fmt: skip
     assert stack_arguments(options, home, Path("runs/x")) == [
         "--vehicle=x_quad", "--controller=backstepping", "--gains=paper",

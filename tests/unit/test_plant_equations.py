@@ -40,7 +40,7 @@ def rotor_terms(vehicle: Vehicle, speeds: tuple[float, ...]) -> tuple[float, np.
 def rigid_slope(vehicle: Vehicle, case: Case):
     thrust, torque, momentum = rotor_terms(vehicle, case.speeds)
     inertia = np.diag(vehicle.inertia_kg_m2)
-    wind, _, force, extra = (np.array(value) for value in case.disturbance)
+    wind, _, force, extra, _ = (np.array(value) for value in case.disturbance)
     drag_coefficient = np.array(vehicle.linear_drag_n_s_m)
 
     def slope(_t: float, x: np.ndarray) -> np.ndarray:

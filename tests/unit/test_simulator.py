@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
 
 from flightstack.contract import Vector3
@@ -21,6 +23,7 @@ from flightstack.mavlink.hot_frames import (
     PlantStateFrame,
 )
 from flightstack.params.vehicle import load_vehicle
+from sim_bridge.compiled_plant import CompiledPlant
 from sim_bridge.disturbance import Disturbance, wind_warning
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.plant import InitialState, PlantOptions
@@ -28,6 +31,8 @@ from sim_bridge.simulator import Simulator
 
 PAPER, X_QUAD = load_vehicle("paper_quad"), load_vehicle("x_quad")
 GUSTY = PlantOptions(Disturbance(Vector3(2.0, -1.0, 0.0), 1.5), seed=7)
+TWISTED = PlantOptions(Disturbance(torque_gust_n_m=0.02), seed=7)
+BOTH_GUSTS = GUSTY._replace(disturbance=GUSTY.disturbance._replace(torque_gust_n_m=0.02))
 
 
 def command(*speeds: float, armed: bool = True) -> ActuatorsFrame:
@@ -42,14 +47,14 @@ def rotor_speeds(simulator: Simulator) -> list[float]:
     return simulator.frame.rotor_speed_rad_s[:4].tolist()
 
 
-def flight_digest(options: PlantOptions, intervals_us: tuple[int, ...] = (2000,) * 1500) -> str:
+def flight_digest(options: PlantOptions) -> str:
+    """Digest of all frames of 3 s, long enough for the noise to be drawn anew twice."""
     simulator = Simulator(X_QUAD, "rigid", options)
     digest = hashlib.sha256()
     actuators = command(0.0, 0.0, 0.0, 0.0)
-    for step, interval_us in enumerate(intervals_us):
+    for step in range(1500):
         digest.update(simulator.state_frame())
         actuators.rotor_speed_rad_s[:4] = 680.0 + 10.0 * math.sin(0.01 * step)
-        simulator.set_interval_us(interval_us)
         simulator.apply(actuators)
     return digest.hexdigest()
 
@@ -122,20 +127,43 @@ def test_diverging_plant_says_so() -> None:
         fly()
 
 
-def test_same_seed_same_bytes_other_seed_other_bytes() -> None:
-    assert flight_digest(GUSTY) == flight_digest(GUSTY)
-    assert flight_digest(GUSTY) != flight_digest(GUSTY._replace(seed=8))
+GUSTS = pytest.mark.parametrize("options", [GUSTY, TWISTED, BOTH_GUSTS], ids=["wind", "torque", "both"])
 
 
-def test_gusts_do_not_depend_on_how_the_steps_are_batched() -> None:
+@GUSTS
+def test_same_seed_same_bytes_other_seed_other_bytes(options: PlantOptions) -> None:
+    first = flight_digest(options)
+    assert flight_digest(options) == first
+    assert flight_digest(options._replace(seed=8)) != first
+
+
+@GUSTS
+def test_gusts_do_not_depend_on_how_the_steps_are_batched(options: PlantOptions) -> None:
     """5 s in exchanges of 1, 2, 5 or 500 ms see the same gusts, also where the noise buffer is refilled."""
     ends = []
     for interval_us in (1000, 2000, 5000, 500_000):
-        simulator = Simulator(X_QUAD, "rigid", GUSTY, interval_us=interval_us)
+        simulator = Simulator(X_QUAD, "rigid", options, interval_us=interval_us)
         for _ in range(5_000_000 // interval_us):
             simulator.apply(command(*[690.0] * 4))
         ends.append(simulator.frame.state.tobytes())
     assert len(set(ends)) == 1
+
+
+def test_gusts_of_wind_and_torque_leave_each_other_as_they_were() -> None:
+    """Without drag or rotors the wind's gusts show in the airspeed alone, the torque's in the rates alone."""
+    shown = []
+    for options in (GUSTY, BOTH_GUSTS, TWISTED):
+        plant = CompiledPlant(PAPER, "rigid", options._replace(ground=False))
+        airspeeds, rates = [], []
+        for _ in range(50):
+            plant.advance(np.zeros(8), 0, 50)
+            airspeeds.append(plant.airspeed_m_s())
+            rates.append(plant.output[0]["state"][10:13].tolist())
+        shown.append((airspeeds, rates))
+    wind, both, torque = shown
+    assert both == (wind[0], torque[1])
+    assert wind[1] != torque[1]
+    assert wind[0] != torque[0]
 
 
 @pytest.mark.parametrize(
@@ -165,26 +193,22 @@ def test_wind_on_a_vehicle_without_drag_is_reported() -> None:
     assert wind_warning(PAPER, "rigid", Disturbance()) is None
 
 
-_SHORT_FLIGHT = """
-import sys
-sys.path.insert(0, {here!r})
-from test_simulator import PAPER, X_QUAD, GUSTY, Simulator, command
-for plant, vehicle in (("rigid", X_QUAD), ("paper", PAPER)):
-    simulator = Simulator(vehicle, plant, GUSTY)
-    for _ in range(30):
-        simulator.apply(command(400.0, 410.0, 420.0, 390.0))
-    print(" ".join(value.hex() for value in simulator.frame.state.tolist()))
-"""
+def short_flights() -> str:
+    """Digits of the states after 60 ms in all gusts, from the ground, on both plants."""
+    digits = []
+    for plant, vehicle in (("rigid", X_QUAD), ("paper", PAPER)):
+        simulator = Simulator(vehicle, plant, BOTH_GUSTS)
+        for _ in range(30):
+            simulator.apply(command(400.0, 410.0, 420.0, 390.0))
+        digits += [value.hex() for value in simulator.frame.state.tolist()]
+    return " ".join(digits)
 
 
 def test_plain_python_gives_the_same_flight() -> None:
-    results = []
-    for disabled in ("0", "1"):
-        done = subprocess.run(
-            [sys.executable, "-c", _SHORT_FLIGHT.format(here=str(Path(__file__).parent))],
-            env={**os.environ, "NUMBA_DISABLE_JIT": disabled}, capture_output=True, text=True, check=True,
-        )  # fmt: skip
-        results.append([float.fromhex(text) for text in done.stdout.split()])
-    compiled, plain = results
-    assert len(compiled) == 26
-    assert compiled == plain
+    code = "from tests.unit.test_simulator import *; print(numba.config.DISABLE_JIT, short_flights())"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=Path(__file__).parents[2],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert not numba.config.DISABLE_JIT
+    assert done.stdout.split() == ["1", *short_flights().split()]
