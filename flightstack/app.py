@@ -15,15 +15,14 @@ from types import FrameType
 from flightstack.assembly import Stack, build
 from flightstack.clock import DeadlineScheduler
 from flightstack.config import StackConfig
-from flightstack.ground_hub import API, GROUND, PeerAddress
+from flightstack.ground_hub import PeerAddress
 from flightstack.logging.flight_log import FlightLog
 from flightstack.modes import Mode
 from flightstack.transport.tcp import LinkClosedError, TcpClient
-from flightstack.transport.udp import PortBusyError, UdpSocket
+from flightstack.transport.vehicle_ports import VehiclePorts
 
 EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
 GROUND_POLL_NS = 500_000
-GROUND_LOCAL_PORT, API_LOCAL_PORT = 18570, 14580
 REPORT_S = 0.2
 SECOND_HELLO_S = 1.0
 """Silence after which a simulator is asked for the standard message."""
@@ -54,29 +53,6 @@ class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops
         self.code = code
 
 
-class Ports:
-    """The vehicle's UDP sockets, one for each channel."""
-
-    def __init__(self, process: ProcessConfig) -> None:
-        host = "127.0.0.1"
-        self.sockets = {GROUND: UdpSocket(host, GROUND_LOCAL_PORT + process.instance)}
-        try:
-            self.sockets[API] = UdpSocket(host, API_LOCAL_PORT + process.instance)
-        except PortBusyError:
-            self.close()
-            raise
-        self.peers = {GROUND: (host, process.ground_port), API: (host, process.api_port)}
-
-    def send(self, data: bytes, to: PeerAddress) -> None:
-        """Send a datagram on the peer's channel."""
-        self.sockets[to.channel].send(data, (to.host, to.port))
-
-    def close(self) -> None:
-        """Close the sockets."""
-        for socket in self.sockets.values():
-            socket.close()
-
-
 class App:
     """Runs one flight stack until it is told to stop or loses someone it needs."""
 
@@ -84,13 +60,11 @@ class App:
         self._process = process
         self._log_count = 0
         self.stack: Stack = build(config, self._open_log)
-        self._ports = Ports(process)
+        self._ports = VehiclePorts(process.instance, process.ground_port, process.api_port)
         self._lockstep = config.lockstep
         self._stop_signal = 0
-        self._poller = select.poll()
-        for channel, socket in self._ports.sockets.items():
-            self.stack.ground.add_peer(PeerAddress(channel, *self._ports.peers[channel]), permanent=True)
-            self._poller.register(socket, select.POLLIN)
+        for channel, peer in self._ports.first_peers.items():
+            self.stack.ground.add_peer(PeerAddress(channel, *peer), permanent=True)
         self._began_s = time.monotonic()
         self._next_report_s = self._began_s + REPORT_S
         self._next_log_us = 0
@@ -142,8 +116,8 @@ class App:
         """End the log and, if all is in order, say goodbye: who hears nothing counts us as lost."""
         self.stack.recorder.close()
         if orderly:
-            for peer, data in self.stack.ground.farewell():
-                self._ports.send(data, peer)
+            for (channel, host, port), data in self.stack.ground.farewell():
+                self._ports.send(channel, (host, port), data)
         if simulator is not None:
             if orderly:
                 with contextlib.suppress(LinkClosedError):
@@ -152,7 +126,11 @@ class App:
             simulator.close()
         self._ports.close()
         if self.stack.recorder.error is not None:
-            print(f"flightstack: the log is incomplete: {self.stack.recorder.error}", file=sys.stderr, flush=True)
+            print(
+                f"flightstack: the log is incomplete: {self.stack.recorder.error}",
+                file=sys.stderr,
+                flush=True,
+            )
 
     def _open_log(self) -> FlightLog | None:
         path = self._process.log
@@ -163,10 +141,12 @@ class App:
             path = path.with_name(f"{path.stem}-{self._log_count}{path.suffix}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            return FlightLog(open(path, "wb", buffering=0), len(self.stack.vehicle.rotors))  # noqa: SIM115
+            return FlightLog(open(path, "wb", buffering=0), len(self.stack.vehicle.rotors))
         except OSError as error:
             self.stack.autopilot.say(3, f"No log: {path}: {error.strerror}")
-            print(f"flightstack: no log can be written to {path}: {error.strerror}", file=sys.stderr, flush=True)
+            print(
+                f"flightstack: no log can be written to {path}: {error.strerror}", file=sys.stderr, flush=True
+            )
             return None
 
     # ------------------------------------------------------------------ start
@@ -174,7 +154,9 @@ class App:
     def _connect(self) -> TcpClient:
         p = self._process
         try:
-            return TcpClient.connect(p.simulator_host, p.simulator_port, p.simulator_timeout_s, self._between_tries)
+            return TcpClient.connect(
+                p.simulator_host, p.simulator_port, p.simulator_timeout_s, self._between_tries
+            )
         except (TimeoutError, OSError):
             raise Ended(
                 EXIT_TIMEOUT,
@@ -207,8 +189,7 @@ class App:
         """Keep time at zero until the vehicle flies a mission; the ground links go on meanwhile."""
         poller = select.poll()
         poller.register(simulator, select.POLLIN)
-        for socket in self._ports.sockets.values():
-            poller.register(socket, select.POLLIN)
+        self._ports.register(poller)
         now = self.stack.autopilot.now
         next_sign_s = 0.0
         while not (now.status.armed and now.status.mode is Mode.MISSION):
@@ -240,10 +221,7 @@ class App:
                 if tick % divisor == 0:
                     self._between_ticks()
             data = receive(0.02)
-            if data is None:
-                fresh = self._wait_slowly(simulator)
-            else:
-                fresh = link.receive(data)
+            fresh = self._wait_slowly(simulator) if data is None else link.receive(data)
 
     def _wait_slowly(self, simulator: TcpClient) -> bool:
         """Serve the ground links while the simulator takes its time; return whether a state came."""
@@ -298,11 +276,10 @@ class App:
             self._next_report_s = now_s + REPORT_S
             self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
         ground = self.stack.ground
-        for channel, socket in self._ports.sockets.items():
-            for data, peer in socket.receive():
-                ground.receive(PeerAddress(channel, *peer), data, now_s)
-        for address, data in ground.poll(now_s):
-            self._ports.send(data, address)
+        for channel, peer, data in self._ports.receive():
+            ground.receive(PeerAddress(channel, *peer), data, now_s)
+        for (channel, host, port), data in ground.poll(now_s):
+            self._ports.send(channel, (host, port), data)
 
     # ------------------------------------------------------------------ reasons to stop
 

@@ -1,7 +1,7 @@
 """All ground stations and companions of the vehicle, without I/O: links, services and telemetry.
 
-Each peer has a link of its own (sequence numbers, rates). Times here are the links' own clock: the wall clock in a
-process, simulated time in tests. Telemetry counts simulated time too (``mavlink.telemetry``).
+Each peer has a link of its own (sequence numbers, rates). Times here are the links' own clock: the wall clock
+in a process, simulated time in tests. Telemetry counts simulated time too (``mavlink.streams``).
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from flightstack import __version__
-from flightstack.autopilot import NOTICE, WARNING, Autopilot, Text
+from flightstack.autopilot import NOTICE, WARNING, Autopilot
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from flightstack.mavlink.services.addressing import Address
@@ -24,7 +23,8 @@ from flightstack.mavlink.services.mission_server import (
     MissionReplaced,
     MissionServer,
 )
-from flightstack.mavlink.telemetry import API_RATES_HZ, GROUND_RATES_HZ, MAKERS, Streams, heartbeat
+from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
+from flightstack.mavlink.telemetry import MAKERS, autopilot_version, heartbeat, status_texts
 from flightstack.vehicle_commands import (
     ACCEPTED,
     DENIED,
@@ -39,7 +39,8 @@ from flightstack.vehicle_facts import AutopilotFacts
 HEARTBEAT_S = 1.0
 PEER_FORGOTTEN_S = 30.0
 MAX_PEERS = 32
-GROUND, API = "ground", "api"
+GROUND = "ground"
+"""The channel of ground stations; any other gets the rates of an API client."""
 SHUT_DOWN = 2.0
 LINK_COMMANDS = (
     mavlink.MAV_CMD_REQUEST_MESSAGE,
@@ -180,30 +181,19 @@ class GroundHub:
     def _request_message(self, peer: Peer, wanted: float, argument: float) -> Answer:
         number = int(wanted) if math.isfinite(wanted) else -1
         if number == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
-            peer.outbox.append(self._version())
+            peer.outbox.append(autopilot_version(self._system_id))
         elif number == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL and math.isfinite(argument):
             about = int(argument)
             if not 0 <= about <= 0xFFFF:
                 return Answer(DENIED, f"message {argument:g} has no place in MESSAGE_INTERVAL")
-            peer.outbox.append(mavlink.MAVLink_message_interval_message(about, peer.streams.interval_us(about)))
+            peer.outbox.append(
+                mavlink.MAVLink_message_interval_message(about, peer.streams.interval_us(about))
+            )
         elif number in MAKERS:
             peer.outbox.append(MAKERS[number](self._facts))
         else:
             return Answer(DENIED, f"message {wanted:g} is not available")
         return Answer(ACCEPTED)
-
-    def _version(self) -> Message:
-        capabilities = (
-            mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-            | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-            | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-        )
-        major, minor, patch = (int(part) for part in __version__.split(".")[:3])
-        version = major << 24 | minor << 16 | patch << 8
-        nothing = [0] * 8
-        return mavlink.MAVLink_autopilot_version_message(
-            capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, self._system_id
-        )
 
     # ------------------------------------------------------------------ sending
 
@@ -227,10 +217,9 @@ class GroundHub:
                 self._peers[address].outbox.append(message)
 
     def _due(self, peer: Peer, changed: bool, now_s: float) -> Iterator[Message]:
-        if peer.heard or peer.permanent:
-            if changed or now_s >= peer.heartbeat_due_s:
-                peer.heartbeat_due_s = now_s + HEARTBEAT_S
-                yield heartbeat(self._facts)
+        if (peer.heard or peer.permanent) and (changed or now_s >= peer.heartbeat_due_s):
+            peer.heartbeat_due_s = now_s + HEARTBEAT_S
+            yield heartbeat(self._facts)
         if peer.outbox:
             yield from peer.outbox
             peer.outbox.clear()
@@ -254,7 +243,7 @@ class GroundHub:
     def _spread_texts(self) -> None:
         texts = self._autopilot.now.texts
         for text in texts:
-            for message in _status_texts(text):
+            for message in status_texts(text.severity, text.text):
                 self._to_all(message)
         texts.clear()
 
@@ -271,14 +260,3 @@ class GroundHub:
             for message in [*peer.outbox, heartbeat(self._facts, leaving=True)]:
                 yield address, peer.link.encode(message)
             peer.outbox.clear()
-
-
-def _status_texts(text: Text) -> Iterator[Message]:
-    """STATUSTEXT, in chunks of 50 octets when it is longer; the last chunk is the one that is not full."""
-    octets = text.text.encode("utf-8")
-    if len(octets) <= 50:
-        yield mavlink.MAVLink_statustext_message(text.severity, octets, 0, 0)
-        return
-    identity = 1 + sum(octets) % 0xFFFF
-    for index in range(0, len(octets) + 1, 50):
-        yield mavlink.MAVLink_statustext_message(text.severity, octets[index : index + 50], identity, index // 50)

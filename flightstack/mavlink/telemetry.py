@@ -1,8 +1,4 @@
-"""Telemetry of one link: which message how often, and how each is made from the vehicle's snapshot. Pure.
-
-Rates count simulated time, and never more than the same rate on the link's own clock: at fifty times real time a
-client gets 50 attitudes a second, not 2 500. In lockstep at speed 1, and over a memory link, both clocks are one.
-"""
+"""The messages of telemetry, each made from what the vehicle knows. Pure."""
 
 from __future__ import annotations
 
@@ -10,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
-
+from flightstack import __version__
 from flightstack.contract import FloatArray, LoopRow, Vector3
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
@@ -19,34 +15,9 @@ from flightstack.modes import CUSTOM_MODE, Mode
 
 NAN = math.nan
 RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
-LONGEST_INTERVAL_US = 2**31 - 1
-"""What MESSAGE_INTERVAL can say."""
+STATUSTEXT_SIZE = 50
 _SINGLE_LIMIT = 1e18
 """Beyond this a number counts as infinite: single-precision fields, and their products, must hold it."""
-
-# messages per second: PX4's defaults on its two links for what this vehicle has
-GROUND_RATES_HZ: dict[int, float] = {
-    mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
-    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: 10.0,
-    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
-    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 10.0,
-    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
-    EscStatus.id: 10.0,
-    mavlink.MAVLINK_MSG_ID_VFR_HUD: 4.0,
-    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
-    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
-    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
-    mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
-    FS_LOOP_TIMING_ID: 2.0,
-}
-API_RATES_HZ: dict[int, float] = {
-    **GROUND_RATES_HZ,
-    mavlink.MAVLINK_MSG_ID_ATTITUDE: 100.0,
-    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50.0,
-    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
-    mavlink.MAVLINK_MSG_ID_VFR_HUD: 10.0,
-}
 
 
 class VehicleFacts(Protocol):
@@ -286,8 +257,38 @@ def _home(f: VehicleFacts) -> Message:
 def _origin(f: VehicleFacts) -> Message:
     home = f.home
     return mavlink.MAVLink_gps_global_origin_message(
-        _int32(home.latitude_deg * 1e7), _int32(home.longitude_deg * 1e7), _int32(home.altitude_m * 1e3), f.time_us
+        _int32(home.latitude_deg * 1e7),
+        _int32(home.longitude_deg * 1e7),
+        _int32(home.altitude_m * 1e3),
+        f.time_us,
     )
+
+
+def autopilot_version(system_id: int) -> Message:
+    """AUTOPILOT_VERSION: what this vehicle can do, and which version of the stack it runs."""
+    capabilities = (
+        mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+        | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+        | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    )
+    major, minor, patch = (int(part) for part in __version__.split(".")[:3])
+    version = major << 24 | minor << 16 | patch << 8
+    nothing = [0] * 8
+    return mavlink.MAVLink_autopilot_version_message(
+        capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, system_id
+    )
+
+
+def status_texts(severity: int, text: str) -> Iterator[Message]:
+    """STATUSTEXT, in chunks of 50 octets when it is longer."""
+    octets = text.encode("utf-8")
+    if len(octets) <= STATUSTEXT_SIZE:
+        yield mavlink.MAVLink_statustext_message(severity, octets, 0, 0)
+        return
+    identity = 1 + sum(octets) % 0xFFFF
+    for chunk, start in enumerate(range(0, len(octets), STATUSTEXT_SIZE)):
+        part = octets[start : start + STATUSTEXT_SIZE]
+        yield mavlink.MAVLink_statustext_message(severity, part, identity, chunk)
 
 
 MAKERS: dict[int, Callable[[VehicleFacts], Message]] = {
@@ -308,52 +309,3 @@ MAKERS: dict[int, Callable[[VehicleFacts], Message]] = {
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: _origin,
     FS_LOOP_TIMING_ID: lambda f: f.loop_timing(),
 }
-
-
-class Streams:
-    """The messages that one link sends by itself."""
-
-    def __init__(self, rates_hz: dict[int, float]) -> None:
-        self._default = rates_hz
-        self._interval_s = {message_id: 1.0 / rate for message_id, rate in rates_hz.items()}
-        self._next: dict[int, tuple[float, float]] = {}
-        self._soonest_s = -math.inf
-
-    def interval_us(self, message_id: int) -> int:
-        """Interval of a message; −1 if it is not sent, 0 if it is not known."""
-        if message_id in self._interval_s:
-            return round(self._interval_s[message_id] * 1e6)
-        return -1 if message_id in MAKERS else 0
-
-    def set_interval(self, message_id: int, interval_us: float) -> bool:
-        """Set an interval as SET_MESSAGE_INTERVAL says (−1 stop, 0 default); tell whether that can be done."""
-        if message_id not in MAKERS or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # nor is NaN
-            return False
-        if interval_us == 0 and message_id in self._default:
-            self._interval_s[message_id] = 1.0 / self._default[message_id]
-        elif interval_us <= 0:
-            self._interval_s.pop(message_id, None)
-        else:
-            self._interval_s[message_id] = interval_us * 1e-6
-        self._next.pop(message_id, None)
-        self._soonest_s = -math.inf
-        return True
-
-    def due(self, facts: VehicleFacts, link_now_s: float) -> Iterator[Message]:
-        """Yield the messages that are due by the vehicle's time and by the link's."""
-        now_s = facts.time_us * 1e-6
-        if now_s < self._soonest_s:
-            return
-        for message_id, interval_s in self._interval_s.items():
-            vehicle_s, link_s = self._next.get(message_id, (-math.inf, -math.inf))
-            if now_s >= vehicle_s and link_now_s >= link_s:
-                # keep the phase, unless a whole interval was missed
-                upcoming = vehicle_s + interval_s
-                self._next[message_id] = (
-                    upcoming if upcoming > now_s else now_s + interval_s,
-                    max(link_s + interval_s, link_now_s + 0.5 * interval_s),
-                )
-                yield MAKERS[message_id](facts)
-        self._soonest_s = min((times[0] for times in self._next.values()), default=math.inf)
-
-

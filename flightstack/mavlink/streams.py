@@ -1,0 +1,88 @@
+"""Which telemetry one link sends how often. Pure.
+
+Rates count simulated time, and never more than the same rate on the link's own clock: at fifty times real
+time a client gets 50 attitudes a second, not 2 500. At speed 1, and over a memory link, both clocks are one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.telemetry import MAKERS, VehicleFacts
+
+LONGEST_INTERVAL_US = 2**31 - 1
+"""What MESSAGE_INTERVAL can say."""
+
+# messages per second: PX4's defaults on its two links for what this vehicle has
+GROUND_RATES_HZ: dict[int, float] = {
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: 10.0,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 10.0,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
+    EscStatus.id: 10.0,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: 4.0,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+    FS_LOOP_TIMING_ID: 2.0,
+}
+API_RATES_HZ: dict[int, float] = {
+    **GROUND_RATES_HZ,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 100.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50.0,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: 10.0,
+}
+
+
+class Streams:
+    """The messages that one link sends by itself."""
+
+    def __init__(self, rates_hz: dict[int, float]) -> None:
+        self._default = rates_hz
+        self._interval_s = {message_id: 1.0 / rate for message_id, rate in rates_hz.items()}
+        self._next: dict[int, tuple[float, float]] = {}
+        self._soonest_s = -math.inf
+
+    def interval_us(self, message_id: int) -> int:
+        """Interval of a message; −1 if it is not sent, 0 if it is not known."""
+        if message_id in self._interval_s:
+            return round(self._interval_s[message_id] * 1e6)
+        return -1 if message_id in MAKERS else 0
+
+    def set_interval(self, message_id: int, interval_us: float) -> bool:
+        """Set an interval as SET_MESSAGE_INTERVAL says (−1 stop, 0 default); tell whether it can be done."""
+        if message_id not in MAKERS or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # nor is NaN
+            return False
+        if interval_us == 0 and message_id in self._default:
+            self._interval_s[message_id] = 1.0 / self._default[message_id]
+        elif interval_us <= 0:
+            self._interval_s.pop(message_id, None)
+        else:
+            self._interval_s[message_id] = interval_us * 1e-6
+        self._next.pop(message_id, None)
+        self._soonest_s = -math.inf
+        return True
+
+    def due(self, facts: VehicleFacts, link_now_s: float) -> Iterator[Message]:
+        """Yield the messages that are due by the vehicle's time and by the link's."""
+        now_s = facts.time_us * 1e-6
+        if now_s < self._soonest_s:
+            return
+        for message_id, interval_s in self._interval_s.items():
+            vehicle_s, link_s = self._next.get(message_id, (-math.inf, -math.inf))
+            if now_s >= vehicle_s and link_now_s >= link_s:
+                # keep the phase, unless a whole interval was missed
+                upcoming = vehicle_s + interval_s
+                self._next[message_id] = (
+                    upcoming if upcoming > now_s else now_s + interval_s,
+                    max(link_s + interval_s, link_now_s + 0.5 * interval_s),
+                )
+                yield MAKERS[message_id](facts)
+        self._soonest_s = min((times[0] for times in self._next.values()), default=math.inf)
