@@ -76,10 +76,14 @@ def outer_kernel(
     setpoint: FloatArray,
     memory: FloatArray,
     params: FloatArray,
+    last: FloatArray,
     dt_s: float,
     target: FloatArray,
 ) -> None:
-    """Run the position loop: write ``memory`` (3,) and ``target`` (5,), or keep both as they were."""
+    """Run the position loop: write ``memory`` (3,) and ``target`` (5,), or keep both as they were.
+
+    ``last`` (48,) is the inner loop's row of the previous tick: it tells whether the mixer followed.
+    """
     if not (all_finite(state) and all_finite(setpoint)):
         return
     advanced, aim = position_pid_step(
@@ -88,6 +92,7 @@ def outer_kernel(
         position_setpoint(setpoint),
         PositionParams(*as_tuple(params, POSITION_PARAMS_SIZE)),
         dt_s,
+        _lag(last[WRENCH_AT], last[ACHIEVED_AT], 1e-9),
     )
     if not (all_finite(aim.attitude) and math.isfinite(aim.thrust_n)):
         return
@@ -297,6 +302,7 @@ class PythonLoops:
                 setpoint,
                 self._position_memory,
                 self._position_params,
+                self._last,
                 self._outer_dt_s,
                 self.attitude_target,
             )

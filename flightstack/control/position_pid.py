@@ -60,13 +60,15 @@ def position_pid_step(
     setpoint: PositionSetpoint,
     params: PositionParams,
     dt_s: float,
+    thrust_saturation: float = 0.0,
 ) -> tuple[PositionMemory, AttitudeTarget]:
     """Return the attitude and the thrust that accelerate the vehicle along the setpoint.
 
     PID on position in NED with feed-forward; the desired specific force f = a − g is turned into roll and
     pitch by inverting eq. 7 (NED signs corrected): θ = atan2(−f_x', −f_z), φ = atan2(f_y', √(f_x'² + f_z²)),
     f' in the frame turned by the yaw setpoint. Thrust carries the weight at the present tilt. Integrators
-    stop while tilt or thrust is at its limit.
+    stop while tilt or thrust is at its limit, or while the mixer could not deliver the thrust
+    (``thrust_saturation``: −1 more, +1 less than demanded in the last tick).
     """
     north, east = _horizontal_demand(memory, state, setpoint, params)
     z, vz = state.position_ned_m.z, state.velocity_ned_m_s.z
@@ -79,7 +81,10 @@ def position_pid_step(
     )
     lift = params.gravity_m_s2 - down  # specific force upwards
     most, least = params.max_thrust_n / params.mass_kg, params.min_thrust_n / params.mass_kg
-    vertical_free = least < lift < most
+    # the vertical integrator stops only in the direction that cannot be followed, here or in the mixer
+    at_top = lift >= most or thrust_saturation > 0.0
+    at_bottom = lift <= least or thrust_saturation < 0.0
+    vertical_free = not (at_top and error_z < 0.0) and not (at_bottom and error_z > 0.0)
     lift = min(max(lift, least), most)
     tilt_force = math.tan(params.max_tilt_rad) * max(lift, 0.5 * params.gravity_m_s2)
     demand = math.sqrt(north * north + east * east)

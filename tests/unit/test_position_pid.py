@@ -140,3 +140,17 @@ def test_thrust_carries_the_weight_at_the_present_tilt_but_not_of_a_capsized_veh
 def test_ideal_rotors_lift_the_thrust_limit() -> None:
     params = read_position_params(PAPER.with_ideal_rotors(), open_gains("tuned"), 0.5)
     assert params.max_thrust_n == pytest.approx(10.0 * PAPER.weight_n)
+
+
+def test_the_vertical_integrator_stops_only_in_the_direction_the_mixer_cannot_follow() -> None:
+    """+1: less thrust than demanded; more lift (a setpoint above) must not wind up, less must still count."""
+    for setpoint_z, saturation, moves in (
+        (-0.1, 1.0, False),
+        (0.1, 1.0, True),
+        (0.1, -1.0, False),
+        (-0.1, 0.0, True),
+    ):
+        memory, _ = position_pid_step(
+            EMPTY, vehicle_at(), wanted((0.0, 0.0, setpoint_z)), TUNED, 0.01, saturation
+        )
+        assert (memory.z != 0.0) is moves, (setpoint_z, saturation)
