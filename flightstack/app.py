@@ -18,6 +18,7 @@ from flightstack.config import StackConfig
 from flightstack.ground_hub import PeerAddress
 from flightstack.logging.flight_log import FlightLog
 from flightstack.modes import Mode
+from flightstack.transport.processor import Follower
 from flightstack.transport.tcp import LinkClosedError, TcpClient
 from flightstack.transport.vehicle_ports import VehiclePorts
 
@@ -69,6 +70,7 @@ class App:
         self._next_report_s = self._began_s + REPORT_S
         self._next_log_us = 0
         self._next_ground_ns = 0
+        self._follower: Follower | None = None
 
     # ------------------------------------------------------------------ life
 
@@ -175,7 +177,7 @@ class App:
         while True:
             self._check_stop()
             self._serve_ground()
-            data = simulator.receive(0.05)
+            data = simulator.receive()
             if data is not None and link.receive(data):
                 break
             silent = time.monotonic() - began_s > SECOND_HELLO_S
@@ -209,6 +211,7 @@ class App:
         """Answer each state with actuators; the simulator owns time."""
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
         receive, clock_ns = simulator.receive, time.monotonic_ns
+        self._follower = Follower(simulator.socket)
         divisor, tick = self.stack.rates.divisor, 0
         fresh = True  # the state that came before the start
         while True:
@@ -220,7 +223,7 @@ class App:
                 tick += 1
                 if tick % divisor == 0:
                     self._between_ticks()
-            data = receive(0.02)
+            data = receive()
             fresh = self._wait_slowly(simulator) if data is None else link.receive(data)
 
     def _wait_slowly(self, simulator: TcpClient) -> bool:
@@ -229,7 +232,7 @@ class App:
         while True:
             self._check_stop()
             self._serve_ground()
-            data = simulator.receive(0.02)
+            data = simulator.receive()
             if data is not None:
                 return self.stack.simulator.receive(data)
             self._check_simulator(deadline_s)
@@ -265,6 +268,8 @@ class App:
         if now_ns < self._next_ground_ns:
             return
         self._next_ground_ns = now_ns + GROUND_POLL_NS
+        if self._follower is not None:
+            self._follower.follow()
         self._serve_ground()
         self._check_stop()
 

@@ -1,4 +1,4 @@
-"""The TCP connection of the one client: receive by spinning briefly, then by waiting with a deadline."""
+"""The TCP connection of the one client: every wait has a deadline and ends when the user asks to stop."""
 
 from __future__ import annotations
 
@@ -9,13 +9,7 @@ import socket
 import time
 from types import FrameType
 
-# Waking up from ``poll`` costs some 20 µs, so that spinning for the answer more than doubles the speed where
-# a processor is free for it. Where none is, the spinning keeps the very process from running that is waited
-# for, and the speed falls to a quarter. So a spin that did not pay is followed by a time without, longer with
-# each failure.
-SPIN_NS = 50_000
-_FEWEST_WITHOUT_SPIN = 32
-_MOST_WITHOUT_SPIN = 4096
+from flightstack.transport.tcp import PATIENCE_S, wait_in_kernel
 
 
 class StoppedError(Exception):
@@ -91,47 +85,31 @@ class Connection:
     """A connected client."""
 
     def __init__(self, sock: socket.socket, stop: StopSignal, timeout_s: float) -> None:
-        sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        wait_in_kernel(sock)
         self._socket = sock
+        self._receive_into = sock.recv_into
+        self._send = sock.send
         self._stop = stop
-        self._readable = stop.waiter(sock, select.POLLIN)
         self._timeout_s = timeout_s
         self._buffer = memoryview(bytearray(65536))
         self._last_heard_ns = time.monotonic_ns()
-        self._without_spin = 0  # receptions still to do without spinning
-        self._penalty = _FEWEST_WITHOUT_SPIN
 
     def receive(self) -> memoryview:
         """Wait for bytes; raise PeerClosedError, PeerSilentError after the timeout, or StoppedError."""
-        data = self._receive_spinning() if self._without_spin == 0 else None
-        if data is None:
-            self._without_spin -= 1
-            while (data := self.receive_now()) is None:
-                self._readable.wait(self._timeout_s)
+        waited_s = 0.0
+        while (data := self.receive_now(0)) is None:
+            waited_s += PATIENCE_S
+            if self._stop.stopped:
+                raise StoppedError
+            if waited_s >= self._timeout_s:
+                raise PeerSilentError
         return data
 
-    def _receive_spinning(self) -> memoryview | None:
-        """Return the bytes if they come while spinning pays, else None."""
-        began_ns = time.monotonic_ns()
-        spent_ns = 0
-        data = None
-        while data is None and spent_ns <= SPIN_NS:
-            data = self.receive_now()
-            spent_ns = time.monotonic_ns() - began_ns
-        if self._stop.stopped:
-            raise StoppedError
-        if spent_ns <= SPIN_NS:
-            self._penalty = max(_FEWEST_WITHOUT_SPIN, self._penalty * 15 // 16)
-        else:  # too long, or interrupted by the scheduler
-            self._penalty = min(_MOST_WITHOUT_SPIN, 2 * self._penalty)
-            self._without_spin = self._penalty
-        return data
-
-    def receive_now(self) -> memoryview | None:
+    def receive_now(self, flags: int = socket.MSG_DONTWAIT) -> memoryview | None:
         """Return the bytes that have come, None when there are none; raise PeerClosedError."""
         try:
-            count = self._socket.recv_into(self._buffer)
+            count = self._receive_into(self._buffer, 0, flags)
         except BlockingIOError:
             return None
         except OSError as error:  # reset by the peer
@@ -154,7 +132,7 @@ class Connection:
         A closed connection is left for ``receive`` to report, after what the client said last.
         """
         try:
-            sent = self._socket.send(data)
+            sent = self._send(data, socket.MSG_DONTWAIT)
         except BlockingIOError:
             sent = 0
         except OSError:
@@ -166,4 +144,4 @@ class Connection:
     def send_last(self, data: bytes) -> None:
         """Send ``data`` if that can be done at once, else not at all."""
         with contextlib.suppress(OSError):
-            self._socket.send(data)
+            self._socket.send(data, socket.MSG_DONTWAIT)

@@ -9,7 +9,7 @@ on its own clock: then the simulator does so too and uses the newest commands.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, TypeAlias
 
 from flightstack.geodesy import GeoPoint, LocalFrame
@@ -99,8 +99,10 @@ class SimulatorLink:
         """Whether further actuators would replace an answer that still has to be applied."""
         return self.answered and not self.free_running
 
-    def replies(self) -> list[bytes]:
+    def replies(self) -> Sequence[bytes]:
         """Return the frames to send besides the state, once."""
+        if not self._replies:
+            return ()
         replies, self._replies = self._replies, []
         return replies
 

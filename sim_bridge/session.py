@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 
+from flightstack.transport.processor import Roamer
 from sim_bridge.connection import Connection, StoppedError, StopSignal
 from sim_bridge.lockstep import SimulatorLink
 from sim_bridge.pacing import Pacer
@@ -18,6 +19,9 @@ class Session:
         self.exchanges = 0
         self.wall_s = 0.0
         self.pacer = None if math.isinf(speed) else Pacer(speed, stop.is_set)
+        # at a given speed there is time to sleep, and the scheduler finds the processor that wakes up first
+        self._roamer = Roamer() if self.pacer is None else None
+        self._move_at = 1
         self._connection = connection
         self._stop = stop
 
@@ -46,14 +50,16 @@ class Session:
             self._connection.send(reply)
 
     def _exchange_in_lockstep(self) -> None:
-        link = self.link
-        self._connection.send(link.state())
+        link, connection = self.link, self._connection
+        connection.send(link.state())
         while not link.answered:
-            self._take(self._connection.receive())
+            self._take(connection.receive())
             if link.free_running or link.fault is not None:
                 return
         link.step()
         self.exchanges += 1
+        if self.exchanges == self._move_at and self._roamer is not None:
+            self._move_at += self._roamer.step()
         if self.pacer is not None:
             self.pacer.wait_until(link.simulator.time_us)
 
@@ -61,6 +67,9 @@ class Session:
         link, connection = self.link, self._connection
         if self.pacer is None:  # as fast as it goes means nothing to a client with a clock of its own
             self.pacer = Pacer(1.0, self._stop.is_set)
+        if self._roamer is not None:
+            self._roamer.leave()
+            self._roamer = None
         self.pacer.wait_until(link.simulator.time_us)
         heard = False
         while (data := connection.receive_now()) is not None:

@@ -1,18 +1,26 @@
-"""A TCP client with little latency: it spins for a moment before it lets the kernel put it to sleep.
-
-Waking up from a blocking ``recv`` costs tens of microseconds here, a spinning one a few. In lockstep the answer
-comes within that time, and every step waits for it.
-"""
+"""A TCP client that waits in ``recv`` itself: one system call to receive, and none beside it to wait."""
 
 from __future__ import annotations
 
 import select
 import socket
+import struct
 import time
 from collections.abc import Callable
 
 BUFFER_SIZE = 65536
-SPIN_NS = 100_000
+PATIENCE_S = 0.02
+"""How long ``receive`` waits before it lets its caller look after other things."""
+
+
+def wait_in_kernel(connection: socket.socket) -> None:
+    """Make ``recv`` block for ``PATIENCE_S`` and then raise BlockingIOError.
+
+    Python's own timeouts take a ``poll`` before each ``recv``.
+    """
+    connection.setblocking(True)
+    timeout = struct.pack("@ll", 0, round(PATIENCE_S * 1e6))
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeout)
 
 
 class LinkClosedError(Exception):
@@ -24,12 +32,12 @@ class TcpClient:
 
     def __init__(self, connection: socket.socket) -> None:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        connection.setblocking(False)
-        self._socket = connection
+        wait_in_kernel(connection)
+        self.socket = connection
+        self._receive_into = connection.recv_into
+        self._send = connection.send
         self._buffer = bytearray(BUFFER_SIZE)
         self._view = memoryview(self._buffer)
-        self._poll = select.poll()
-        self._poll.register(connection, select.POLLIN)
 
     @classmethod
     def connect(
@@ -53,12 +61,16 @@ class TcpClient:
 
     def fileno(self) -> int:
         """Descriptor, for ``poll``."""
-        return self._socket.fileno()
+        return self.socket.fileno()
 
     def receive_now(self) -> memoryview | None:
         """Return what is here, or None; raise LinkClosedError."""
+        return self.receive(socket.MSG_DONTWAIT)
+
+    def receive(self, flags: int = 0) -> memoryview | None:
+        """Return what comes within ``PATIENCE_S``, or None; raise LinkClosedError."""
         try:
-            count = self._socket.recv_into(self._buffer)
+            count = self._receive_into(self._buffer, 0, flags)
         except BlockingIOError:
             return None
         except OSError as error:
@@ -67,36 +79,16 @@ class TcpClient:
             raise LinkClosedError
         return self._view[:count]
 
-    def receive(self, timeout_s: float) -> memoryview | None:
-        """Return what comes within ``timeout_s``, or None; raise LinkClosedError."""
-        receive_into, buffer = self._socket.recv_into, self._buffer
-        spin_until = time.monotonic_ns() + SPIN_NS
-        while True:
-            try:
-                count = receive_into(buffer)
-                break
-            except BlockingIOError:
-                if time.monotonic_ns() < spin_until:
-                    continue
-            except OSError as error:
-                raise LinkClosedError from error
-            if not self._poll.poll(max(0.0, timeout_s) * 1e3):
-                return None
-            spin_until = 0
-        if count == 0:
-            raise LinkClosedError
-        return self._view[:count]
-
     def send(self, data: bytes | memoryview) -> None:
         """Send all of ``data``; raise LinkClosedError. Frames are small: they fit the socket's buffer."""
         try:
-            sent = self._socket.send(data)
+            sent = self._send(data, socket.MSG_DONTWAIT)
             while sent < len(data):  # a peer that stopped reading
-                select.select([], [self._socket], [], 5.0)
-                sent += self._socket.send(data[sent:])
+                select.select([], [self.socket], [], 5.0)
+                sent += self._send(data[sent:], socket.MSG_DONTWAIT)
         except OSError as error:
             raise LinkClosedError from error
 
     def close(self) -> None:
         """Close the connection."""
-        self._socket.close()
+        self.socket.close()
