@@ -1,7 +1,7 @@
 """The two messages of the lockstep exchange, encoded in place: no copy and no object per step.
 
-Each keeps its frame in one buffer, laid out so that the doubles of the payload are aligned: the array handed to
-the kernels *is* the payload. The bytes equal pymavlink's (a test holds them to it).
+Each keeps its frame in one buffer, laid out so that the doubles of the payload are aligned: the array handed
+to the kernels *is* the payload. The bytes equal pymavlink's (a test holds them to it).
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ _ALIGNMENT = 6  # the payload starts at 16 in the buffer
 _TIME = struct.Struct("<Q")
 _HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, incompat, compat, seq, system, component, id (24 bits)
 _CRC = struct.Struct("<H")
+_FIXED = struct.Struct("<3s4x3s")  # what is the same in all frames of one message: see _HEADER
 _crc16 = crc16.mcrf4xx
 
 VALID_FLAG = 1
@@ -41,17 +42,18 @@ class _HotFrame:
         layout = LAYOUT_BY_NAME[self.name]
         self.payload_size = struct.calcsize(layout.format)
         self.size = HEADER_SIZE + self.payload_size + CHECKSUM_SIZE
-        self._extra = bytes([layout.crc_extra])
+        self._extra = layout.crc_extra
+        self._extra_byte = bytes([layout.crc_extra])
         self._buffer = bytearray(_ALIGNMENT + self.size)
         self.frame = memoryview(self._buffer)[_ALIGNMENT:]
-        self._checked = self.frame[1 : HEADER_SIZE + self.payload_size]
-        self._header_after_seq = bytes([layout.message_id & 255, layout.message_id >> 8 & 255, layout.message_id >> 16])
         _HEADER.pack_into(
             self.frame, 0, 0xFD, self.payload_size, 0, 0, 0, system_id, component_id,
             layout.message_id & 0xFFFF, layout.message_id >> 16,
         )  # fmt: skip
+        self._fixed = _FIXED.unpack_from(self.frame)
         self._seq = 0
         self._crc_at = HEADER_SIZE + self.payload_size
+        self._checked = self.frame[1 : self._crc_at + 1]
         self._flags_at = self._crc_at - 1
         self.frame[self._flags_at] = VALID_FLAG
 
@@ -75,7 +77,8 @@ class _HotFrame:
         self._seq = (self._seq + 1) & 255
         _TIME.pack_into(frame, HEADER_SIZE, time_us)
         frame[self._flags_at] = flags | VALID_FLAG
-        _CRC.pack_into(frame, self._crc_at, _crc16(self._extra, _crc16(self._checked)))
+        frame[self._crc_at] = self._extra  # the checksum covers one byte more, which is not sent
+        _CRC.pack_into(frame, self._crc_at, _crc16(self._checked))
         return frame
 
     def open(self, data: bytes | bytearray | memoryview) -> bool:
@@ -83,15 +86,9 @@ class _HotFrame:
 
         Signed or truncated frames are legal MAVLink too: those take the general codec's way.
         """
-        if (
-            len(data) != self.size
-            or data[0] != 0xFD
-            or data[1] != self.payload_size
-            or data[2] != 0
-            or bytes(data[7:10]) != self._header_after_seq
-        ):
+        if len(data) != self.size or _FIXED.unpack_from(data) != self._fixed:
             return False
-        crc = _crc16(self._extra, _crc16(data[1 : self._crc_at]))
+        crc = _crc16(self._extra_byte, _crc16(data[1 : self._crc_at]))
         if _CRC.unpack_from(data, self._crc_at)[0] != crc:
             return False
         self.frame[:] = data
