@@ -230,6 +230,6 @@ class Navigator:
     def step(self, mode: Mode, state: FloatArray, attitude_target: FloatArray) -> None:
         """Advance by one outer tick and write ``setpoint``."""
         guidance_kernel(
-            mode, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim, self._land,
+            int(mode), state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim, self._land,
             attitude_target, self._params_array, self._dt_s, self.setpoint,
         )  # fmt: skip
