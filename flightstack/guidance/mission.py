@@ -1,8 +1,8 @@
 """Fly a plan item by item, over tables of numbers, so that a whole flight can be compiled.
 
-The plan is an array, a row for each item: command, parameters 1–4, north, east, down [m] from home; NaN where the
-item leaves a value open. Progress is an array too (``M_…`` below), advanced in place. ``jumps_left`` holds for each
-DO_JUMP how often it still jumps (negative: for ever).
+The plan is an array, a row for each item: command, parameters 1–4, north, east, down [m] from home; NaN where
+the item leaves a value open. Progress is an array too (``M_…`` below), advanced in place. ``jumps_left``
+holds for each DO_JUMP how often it still jumps (negative: for ever).
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ DO_CHANGE_SPEED = 178
 
 # progress: the current item and its phase, the last item reached (−1: none), and the goal in force
 M_CURRENT, M_PHASE, M_TIMER, M_REACHED, M_FINISHED, M_WANTS_RETURN = range(6)
-M_X, M_Y, M_Z, M_YAW, M_YAW_IS_SET, M_YAW_RATE, M_SPEED = range(6, 13)
+M_X, M_Y, M_Z, M_YAW, M_YAW_IS_SET, M_YAW_IS_COUNTED, M_YAW_RATE, M_SPEED = range(6, 14)
 # items reached since the start, the newest ``LOG_SIZE`` of them: several may be reached in one tick
-M_LOG_COUNT, M_LOG = 13, 14
+M_LOG_COUNT, M_LOG = 14, 15
 LOG_SIZE = 64
 MISSION_MEMORY_SIZE = M_LOG + LOG_SIZE
 
@@ -70,21 +70,35 @@ def _advance(m: FloatArray, to: float) -> None:
 @compiled
 def _leg_heading(m: FloatArray, x: float, y: float, state: VehicleState, params: GuidanceParams) -> float:
     """Heading of a leg for which the plan gives none."""
+    present: float = m[M_YAW]
     if m[M_YAW_IS_SET] > 0.0 or params.yaw_mode >= 0.5:
-        return m[M_YAW]
+        return present
     dx, dy = x - state.position_ned_m.x, y - state.position_ned_m.y
     if dx * dx + dy * dy < 1.0:  # too near for a direction
-        return m[M_YAW]
+        return present
     return math.atan2(dy, dx)
 
 
 @compiled
-def _begin_condition_yaw(m: FloatArray, item: FloatArray, yaw_now_rad: float, params: GuidanceParams) -> None:
-    """CONDITION_YAW: angle [deg], rate [deg/s], direction (−1, 0 shortest, 1), relative (1) or absolute."""
-    angle = math.radians(item[PARAM1])
-    if item[PARAM4] > 0.5:
-        angle = yaw_now_rad - angle if item[PARAM3] < 0.0 else yaw_now_rad + angle
-    m[M_YAW], m[M_YAW_IS_SET] = wrap_pi(angle), 1.0
+def _begin_condition_yaw(
+    m: FloatArray, item: FloatArray, reference_yaw_rad: float, params: GuidanceParams
+) -> None:
+    """CONDITION_YAW: angle [deg], rate [deg/s], direction (−1, 0 shortest, 1), relative (1) or absolute.
+
+    With a direction the turn is counted from the reference's heading: exactly, and by more than half a
+    circle if need be. Without one the heading alone counts.
+    """
+    angle, direction = math.radians(item[PARAM1]), item[PARAM3]
+    turn = angle if item[PARAM4] > 0.5 else wrap_pi(angle - reference_yaw_rad)
+    if direction != 0.0 and not math.isnan(direction):
+        if item[PARAM4] > 0.5:
+            turn = direction * turn
+        elif direction * turn < -1e-6:  # the other way round; a heading that is there already stays
+            turn += direction * 2.0 * math.pi
+        m[M_YAW], m[M_YAW_IS_COUNTED] = reference_yaw_rad + turn, 1.0
+    else:
+        m[M_YAW], m[M_YAW_IS_COUNTED] = wrap_pi(reference_yaw_rad + turn), 0.0
+    m[M_YAW_IS_SET] = 1.0
     m[M_YAW_RATE] = params.yaw_rate_rad_s
     if item[PARAM2] > 0.0:
         m[M_YAW_RATE] = min(params.yaw_rate_rad_s, math.radians(item[PARAM2]))
@@ -92,7 +106,9 @@ def _begin_condition_yaw(m: FloatArray, item: FloatArray, yaw_now_rad: float, pa
 
 
 @compiled
-def _begin_position_item(m: FloatArray, item: FloatArray, state: VehicleState, params: GuidanceParams) -> None:
+def _begin_position_item(
+    m: FloatArray, item: FloatArray, state: VehicleState, params: GuidanceParams
+) -> None:
     command = item[COMMAND]
     x = m[M_X] if math.isnan(item[NORTH]) else item[NORTH]
     y = m[M_Y] if math.isnan(item[EAST]) else item[EAST]
@@ -102,6 +118,7 @@ def _begin_position_item(m: FloatArray, item: FloatArray, state: VehicleState, p
         m[M_YAW], m[M_YAW_IS_SET] = wrap_pi(math.radians(item[PARAM4])), 1.0
     elif command != TAKEOFF:
         m[M_YAW] = _leg_heading(m, x, y, state, params)
+    m[M_YAW_IS_COUNTED] = 0.0
     m[M_X], m[M_Y] = x, y
     m[M_YAW_RATE] = params.yaw_rate_rad_s
     m[M_PHASE] = TRAVEL
@@ -117,7 +134,12 @@ def _change_speed(m: FloatArray, item: FloatArray, params: GuidanceParams) -> No
 
 @compiled
 def _begin(
-    m: FloatArray, plan: FloatArray, jumps_left: FloatArray, state: VehicleState, params: GuidanceParams
+    m: FloatArray,
+    plan: FloatArray,
+    jumps_left: FloatArray,
+    state: VehicleState,
+    reference_yaw_rad: float,
+    params: GuidanceParams,
 ) -> None:
     """Carry out items that take no time until one that does, and begin that one."""
     for _ in range(2 * plan.shape[0] + 2):  # a plan was checked to have no endless loop of jumps
@@ -139,7 +161,7 @@ def _begin(
             m[M_WANTS_RETURN] = 1.0
             break
         elif command == CONDITION_YAW:
-            _begin_condition_yaw(m, item, euler_from_quaternion(state.attitude).z, params)
+            _begin_condition_yaw(m, item, reference_yaw_rad, params)
             return
         elif command == NAV_DELAY:
             m[M_PHASE] = STAY
@@ -158,12 +180,14 @@ def _heading_error(m: FloatArray, state: VehicleState) -> float:
 @compiled
 def _is_within(m: FloatArray, state: VehicleState, radius_m: float) -> bool:
     dx, dy = m[M_X] - state.position_ned_m.x, m[M_Y] - state.position_ned_m.y
-    return dx * dx + dy * dy <= radius_m * radius_m
+    within: bool = dx * dx + dy * dy <= radius_m * radius_m
+    return within
 
 
 @compiled
 def _is_at_height(m: FloatArray, state: VehicleState, params: GuidanceParams) -> bool:
-    return abs(m[M_Z] - state.position_ned_m.z) <= params.altitude_acceptance_m
+    there: bool = abs(m[M_Z] - state.position_ned_m.z) <= params.altitude_acceptance_m
+    return there
 
 
 @compiled
@@ -178,17 +202,32 @@ def _is_reached(m: FloatArray, item: FloatArray, state: VehicleState, params: Gu
 
 
 @compiled
-def _travel(m: FloatArray, item: FloatArray, state: VehicleState, params: GuidanceParams) -> None:
+def _is_turned(m: FloatArray, state: VehicleState, reference_yaw_rad: float, params: GuidanceParams) -> bool:
+    """Tell whether a CONDITION_YAW is done: the vehicle looks there, and the reference has turned so far."""
+    if m[M_YAW_IS_COUNTED] > 0.0 and abs(m[M_YAW] - reference_yaw_rad) > params.yaw_acceptance_rad:
+        return False
+    return _heading_error(m, state) <= params.yaw_acceptance_rad
+
+
+@compiled
+def _travel(
+    m: FloatArray,
+    item: FloatArray,
+    state: VehicleState,
+    reference_yaw_rad: float,
+    landed: bool,
+    params: GuidanceParams,
+) -> None:
     command = item[COMMAND]
     following = m[M_CURRENT] + 1.0
-    if command == CONDITION_YAW:
-        if _heading_error(m, state) <= params.yaw_acceptance_rad:
+    if command == CONDITION_YAW:  # a vehicle that stands cannot turn, and does so later
+        if landed or _is_turned(m, state, reference_yaw_rad, params):
             _advance(m, following)
     elif command == TAKEOFF:
         if _is_at_height(m, state, params):
             m[M_PHASE] = STAY  # high enough: now over to the item's own position
     elif _is_reached(m, item, state, params):
-        waits = item[PARAM1] > 0.0 and (command == WAYPOINT or command == LOITER_TIME)
+        waits = item[PARAM1] > 0.0 and command in (WAYPOINT, LOITER_TIME)
         if waits or command == LAND:
             m[M_PHASE] = STAY
         else:
@@ -217,26 +256,27 @@ def mission_step(
     plan: FloatArray,
     jumps_left: FloatArray,
     state: VehicleState,
+    reference_yaw_rad: float,
     landed: bool,
     params: GuidanceParams,
     dt_s: float,
 ) -> None:
-    """Advance the mission by one outer tick."""
+    """Advance the mission by one outer tick; ``reference_yaw_rad`` is the trajectory's present heading."""
     if m[M_FINISHED] > 0.0:
         return
     if m[M_PHASE] == TRAVEL:
-        _travel(m, plan[int(m[M_CURRENT])], state, params)
+        _travel(m, plan[int(m[M_CURRENT])], state, reference_yaw_rad, landed, params)
     elif m[M_PHASE] == STAY:
         _stay(m, plan[int(m[M_CURRENT])], state, landed, params, dt_s)
     if m[M_PHASE] == BEGIN:
-        _begin(m, plan, jumps_left, state, params)
+        _begin(m, plan, jumps_left, state, reference_yaw_rad, params)
 
 
 @compiled
 def mission_goal(
     m: FloatArray, plan: FloatArray, start_x: float, start_y: float, down_m: float, params: GuidanceParams
 ) -> Goal:
-    """Return where the present item sends the vehicle, now at ``down_m``; the mission began above ``start``."""
+    """Return where the present item sends the vehicle, now at ``down_m``; it began above ``start``."""
     x, y, z = m[M_X], m[M_Y], m[M_Z]
     climb, descent = params.climb_speed_m_s, params.descent_speed_m_s
     index = int(m[M_CURRENT])
@@ -249,7 +289,7 @@ def mission_goal(
         elif command == LAND and m[M_PHASE] == STAY:
             z = params.far_below_m
             descent = landing_speed(down_m, params)
-    return Goal(x, y, z, m[M_YAW], m[M_SPEED], climb, descent, m[M_YAW_RATE])
+    return Goal(x, y, z, m[M_YAW], m[M_SPEED], climb, descent, m[M_YAW_RATE], m[M_YAW_IS_COUNTED])
 
 
 @compiled

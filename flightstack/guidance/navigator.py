@@ -20,10 +20,12 @@ from flightstack.guidance.mission import (
     M_LOG,
     M_LOG_COUNT,
     M_REACHED,
+    M_SPEED,
     M_WANTS_RETURN,
     M_X,
     M_Y,
     M_YAW,
+    M_YAW_IS_SET,
     M_Z,
     MISSION_MEMORY_SIZE,
     NAV_DELAY,
@@ -48,6 +50,7 @@ from flightstack.modes import Mode
 TAKEOFF, MISSION, RETURN, LAND = int(Mode.TAKEOFF), int(Mode.MISSION), int(Mode.RETURN), int(Mode.LAND)
 
 TRAJECTORY_SIZE = 11
+T_YAW = 9
 GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
 LAND_MEMORY_SIZE = 3
 # the target of every mode but the mission: position, heading, and the phase of a return
@@ -77,7 +80,7 @@ def _mode_goal(mode: int, aim: FloatArray, state: VehicleState, params: Guidance
         z = params.far_below_m
         descent = landing_speed(state.position_ned_m.z, params)
     return Goal(
-        aim[A_X], aim[A_Y], z, aim[A_YAW], params.cruise_speed_m_s, climb, descent, params.yaw_rate_rad_s
+        aim[A_X], aim[A_Y], z, aim[A_YAW], params.cruise_speed_m_s, climb, descent, params.yaw_rate_rad_s, 0.0
     )
 
 
@@ -106,7 +109,7 @@ def guidance_kernel(
     state = vehicle_state(state_array)
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     if mode == MISSION:
-        mission_step(mission, plan, jumps_left, state, land[0] > 0.0, params, dt_s)
+        mission_step(mission, plan, jumps_left, state, trajectory[T_YAW], land[0] > 0.0, params, dt_s)
         goal = mission_goal(mission, plan, aim[A_START_X], aim[A_START_Y], state.position_ned_m.z, params)
     else:
         if mode == RETURN:
@@ -118,7 +121,9 @@ def guidance_kernel(
     store_position_setpoint(setpoint, setpoint_of(reference))
     descending = reference.vz > 0.1
     memory = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE))
-    store(land, land_detector_step(memory, state, attitude_target[THRUST_AT], params.weight_n, descending, dt_s))
+    store(
+        land, land_detector_step(memory, state, attitude_target[THRUST_AT], params.weight_n, descending, dt_s)
+    )
 
 
 class MissionProgress(NamedTuple):
@@ -156,7 +161,9 @@ class Navigator:
     def progress(self) -> MissionProgress:
         """Progress of the mission."""
         m = self._mission
-        return MissionProgress(int(m[M_CURRENT]), int(m[M_REACHED]), bool(m[M_FINISHED]), bool(m[M_WANTS_RETURN]))
+        return MissionProgress(
+            int(m[M_CURRENT]), int(m[M_REACHED]), bool(m[M_FINISHED]), bool(m[M_WANTS_RETURN])
+        )
 
     @property
     def mission_flies(self) -> bool:
@@ -183,21 +190,21 @@ class Navigator:
     def set_current(self, index: int) -> None:
         """Make ``index`` the mission's current item."""
         t = self._trajectory
-        mission_start(self._mission, float(index), t[0], t[1], t[2], t[9], self.params)
+        mission_start(self._mission, float(index), t[0], t[1], t[2], t[T_YAW], self.params)
         self._aim[A_START_X], self._aim[A_START_Y] = t[0], t[1]
 
     def rest_at(self, state: FloatArray) -> None:
         """Put the reference at the vehicle's position, at rest: before it leaves the ground."""
         self._trajectory[:] = 0.0
         self._trajectory[:3] = state[:3]
-        self._trajectory[9] = euler_from_quaternion(vehicle_state(state).attitude).z
+        self._trajectory[T_YAW] = euler_from_quaternion(vehicle_state(state).attitude).z
         self._land[:] = (1.0, 0.0, state[2])
         store_position_setpoint(self.setpoint, setpoint_of(Trajectory(*self._trajectory.tolist())))
 
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
         """Aim for ``mode`` from where the reference is now."""
         t, aim, p = self._trajectory, self._aim, self.params
-        aim[A_X], aim[A_Y], aim[A_Z], aim[A_YAW] = t[0], t[1], t[2], t[9]
+        aim[A_X], aim[A_Y], aim[A_Z], aim[A_YAW] = t[0], t[1], t[2], t[T_YAW]
         if mode == Mode.TAKEOFF:
             aim[A_Z] = -takeoff_altitude_m
         elif mode == Mode.HOLD:  # where the reference comes to rest
@@ -213,14 +220,20 @@ class Navigator:
             self._enter_mission()
 
     def _enter_mission(self) -> None:
-        """Begin the current item anew from here; a finished mission begins with its first one."""
-        reached = self._mission[M_REACHED]
-        if self._mission[M_FINISHED] > 0.0:
-            reached = -1.0
-            self._mission[M_CURRENT] = 0.0
+        """Begin the current item anew from here, at the speed and with the heading set by those before it.
+
+        A finished mission begins with its first item.
+        """
+        m = self._mission
+        if m[M_FINISHED] > 0.0:
             self._jumps_left = self._jumps.copy()
-        self.set_current(int(self._mission[M_CURRENT]))
-        self._mission[M_REACHED] = reached
+            self.set_current(0)
+            return
+        reached, speed, yaw_is_set, yaw = m[M_REACHED], m[M_SPEED], m[M_YAW_IS_SET], m[M_YAW]
+        self.set_current(int(m[M_CURRENT]))
+        m[M_REACHED], m[M_SPEED], m[M_YAW_IS_SET] = reached, speed, yaw_is_set
+        if yaw_is_set > 0.0:
+            m[M_YAW] = yaw
 
     def hold_at_last_item(self) -> None:
         """Hold where the mission that has just ended was going to; a takeoff's goal needs no such step."""
@@ -230,6 +243,6 @@ class Navigator:
     def step(self, mode: Mode, state: FloatArray, attitude_target: FloatArray) -> None:
         """Advance by one outer tick and write ``setpoint``."""
         guidance_kernel(
-            int(mode), state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim, self._land,
-            attitude_target, self._params_array, self._dt_s, self.setpoint,
+            int(mode), state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim,
+            self._land, attitude_target, self._params_array, self._dt_s, self.setpoint,
         )  # fmt: skip

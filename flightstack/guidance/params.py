@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from flightstack.guidance.trajectory import POLE_RAD_S
 from flightstack.params.behaviour import Behaviour
 
 FAR_BELOW_M = 1e4
@@ -36,8 +37,12 @@ class GuidanceParams(NamedTuple):
 
 
 def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:
-    """Collect the numbers of guidance."""
+    """Collect the numbers of guidance.
+
+    With little jerk the reference accelerates less: what it cannot shed in time would carry it past its goal.
+    """
     b = behaviour
+    in_time_m_s2 = b.jerk_m_s3 / POLE_RAD_S
     return GuidanceParams(
         cruise_speed_m_s=b.cruise_speed_m_s,
         max_speed_m_s=b.max_speed_m_s,
@@ -46,8 +51,8 @@ def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:
         takeoff_speed_m_s=b.takeoff_speed_m_s,
         land_speed_m_s=b.land_speed_m_s,
         land_slow_altitude_m=b.land_slow_altitude_m,
-        acceleration_m_s2=b.acceleration_m_s2,
-        vertical_acceleration_m_s2=b.vertical_acceleration_m_s2,
+        acceleration_m_s2=min(b.acceleration_m_s2, in_time_m_s2),
+        vertical_acceleration_m_s2=min(b.vertical_acceleration_m_s2, in_time_m_s2),
         jerk_m_s3=b.jerk_m_s3,
         yaw_rate_rad_s=math.radians(b.yaw_rate_deg_s),
         yaw_mode=b.yaw_mode,

@@ -15,7 +15,7 @@ from flightstack.geometry import wrap_pi
 
 
 class Trajectory(NamedTuple):
-    """State of the reference point, NED."""
+    """State of the reference point, NED. In a turn with a direction ``yaw_rad`` may leave (−π, π]."""
 
     x: float
     y: float
@@ -31,7 +31,11 @@ class Trajectory(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """Where to go, and how fast at most."""
+    """Where to go, and how fast at most.
+
+    The heading is reached the short way round, unless ``yaw_is_counted`` (1): then ``yaw_rad`` counts turns
+    from the reference's own ``yaw_rad``, so that a turn has a direction and may be longer than half a circle.
+    """
 
     x: float
     y: float
@@ -41,10 +45,11 @@ class Goal(NamedTuple):
     climb_m_s: float
     descent_m_s: float
     yaw_rate_rad_s: float
+    yaw_is_counted: float
 
 
 class TrajectoryLimits(NamedTuple):
-    """Limits of the reference."""
+    """Limits of the reference; the jerk must be at least ``POLE_RAD_S`` times either acceleration."""
 
     acceleration_m_s2: float
     vertical_acceleration_m_s2: float
@@ -61,7 +66,7 @@ BRAKING = 0.5  # share of the acceleration planned for braking; the rest covers 
 
 @compiled
 def approach_speed(distance_m: float, top_m_s: float, acceleration_m_s2: float) -> float:
-    """Speed at ``distance_m`` from the goal: linear near it, constant braking farther out, at most ``top``."""
+    """Speed at ``distance_m`` from the goal: linear near it, then constant braking, at most ``top``."""
     braking = BRAKING * acceleration_m_s2
     linear_m = braking / (KP * KP)
     if distance_m <= linear_m:
@@ -107,10 +112,14 @@ def _vertical(t: Trajectory, goal: Goal, limits: TrajectoryLimits, dt_s: float) 
 
 @compiled
 def _heading(t: Trajectory, goal: Goal, dt_s: float) -> tuple[float, float]:
-    error = wrap_pi(goal.yaw_rad - t.yaw_rad)
+    counted = goal.yaw_is_counted > 0.0
+    error = goal.yaw_rad - t.yaw_rad
+    if not counted:
+        error = wrap_pi(error)
     wanted = min(max(2.0 * error, -goal.yaw_rate_rad_s), goal.yaw_rate_rad_s)
     rate = t.yaw_rate_rad_s + min(max(6.0 * (wanted - t.yaw_rate_rad_s), -6.0), 6.0) * dt_s
-    return wrap_pi(t.yaw_rad + rate * dt_s), rate
+    yaw_rad = t.yaw_rad + rate * dt_s
+    return yaw_rad if counted else wrap_pi(yaw_rad), rate
 
 
 @compiled
@@ -118,7 +127,7 @@ def trajectory_step(t: Trajectory, goal: Goal, limits: TrajectoryLimits, dt_s: f
     """Move the reference by ``dt_s`` towards ``goal``; it comes to rest there.
 
     A cascade with vector limits: position gives a velocity (square-root approach), velocity an acceleration,
-    acceleration a jerk. Horizontal limits act on the vector, so that a leg flown from rest is a straight line.
+    acceleration a jerk. Horizontal limits act on the vector, so that a leg from rest is a straight line.
     """
     x, y, vx, vy, ax, ay = _horizontal(t, goal, limits, dt_s)
     z, vz, az = _vertical(t, goal, limits, dt_s)
@@ -130,5 +139,9 @@ def trajectory_step(t: Trajectory, goal: Goal, limits: TrajectoryLimits, dt_s: f
 def setpoint_of(t: Trajectory) -> PositionSetpoint:
     """Return the outer loop's setpoint at the reference point."""
     return PositionSetpoint(
-        Vector3(t.x, t.y, t.z), Vector3(t.vx, t.vy, t.vz), Vector3(t.ax, t.ay, t.az), t.yaw_rad, t.yaw_rate_rad_s
+        Vector3(t.x, t.y, t.z),
+        Vector3(t.vx, t.vy, t.vz),
+        Vector3(t.ax, t.ay, t.az),
+        wrap_pi(t.yaw_rad),
+        t.yaw_rate_rad_s,
     )
