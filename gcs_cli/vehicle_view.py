@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from gcs_cli.px4_modes import mode_name
+from gcs_cli.status_texts import add_piece, without_stale_piece
 from gcs_cli.view_types import (
-    TEXTS_KEPT,
     Battery,
     Euler,
     GeoPosition,
@@ -17,7 +17,6 @@ from gcs_cli.view_types import (
     LoopTiming,
     Mission,
     Setpoint,
-    StatusText,
     Vector,
     VehicleView,
 )
@@ -28,7 +27,6 @@ _IGNORE_POSITION, _IGNORE_VELOCITY, _IGNORE_YAW = 0b111, 0b111000, 1 << 10  # PO
 _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
 _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: says whether to arm, not how the sensors are
 _RATE_WINDOW_S = 1.0
-_LONGEST_TEXT = 500
 _MOST_ROTORS = 16
 _NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
 
@@ -47,7 +45,7 @@ def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
         view = view._replace(identity=sender)
     elif (message.get_srcSystem(), message.get_srcComponent()) != view.identity[:2]:
         return view
-    view = view._replace(link=_counted(view.link, message.get_seq(), now_s))
+    view = without_stale_piece(view, now_s)._replace(link=_counted(view.link, message.get_seq(), now_s))
     fold = _FOLDS.get(message.get_type())
     return view if fold is None else fold(view, message, now_s)
 
@@ -192,16 +190,6 @@ def _system_time(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return view._replace(time_s=message.time_boot_ms / 1e3)
 
 
-def _status_text(view: VehicleView, message: Any, now_s: float) -> VehicleView:
-    text = "".join(c for c in message.text if c.isprintable())
-    last = view.texts[-1] if view.texts else None
-    if last and message.id and message.id == last.message_id and message.chunk_seq == last.chunks:
-        whole = last._replace(text=(last.text + text)[:_LONGEST_TEXT], chunks=last.chunks + 1)
-        return view._replace(texts=(*view.texts[:-1], whole))
-    entry = StatusText(view.text_count, message.severity, text, now_s, view.time_s, message.id)
-    return view._replace(texts=(*view.texts, entry)[-TEXTS_KEPT:], text_count=view.text_count + 1)
-
-
 _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "HEARTBEAT": _heartbeat,
     "SYS_STATUS": _system,
@@ -218,5 +206,5 @@ _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "ESC_STATUS": _rotors,
     "FS_LOOP_TIMING": _loop_timing,
     "SYSTEM_TIME": _system_time,
-    "STATUSTEXT": _status_text,
+    "STATUSTEXT": add_piece,
 }

@@ -77,7 +77,7 @@ class Battery(NamedTuple):
 
 
 class LoopTiming(NamedTuple):
-    """One FS_LOOP_TIMING: times over the last second, counts since start."""
+    """One FS_LOOP_TIMING: times over the last 4096 ticks, counts since start."""
 
     time_s: float
     ticks: int
@@ -96,15 +96,24 @@ class LoopTiming(NamedTuple):
 
 
 class StatusText(NamedTuple):
-    """A text from the vehicle. ``number`` counts them all; long ones arrive in ``chunks`` pieces."""
+    """A text from the vehicle. ``number`` counts them all."""
 
     number: int
     severity: int
     text: str
     received_s: float
     vehicle_time_s: float | None
-    message_id: int = 0
-    chunks: int = 1
+
+
+class PartialText(NamedTuple):
+    """The first ``pieces`` of a long text; all of them carry the same ``message_id``."""
+
+    message_id: int
+    severity: int
+    octets: bytes
+    pieces: int
+    received_s: float
+    vehicle_time_s: float | None
 
 
 class LinkCounts(NamedTuple):
@@ -154,6 +163,7 @@ class VehicleView(NamedTuple):
     timing: LoopTiming | None = None
     texts: tuple[StatusText, ...] = ()
     text_count: int = 0
+    partial_text: PartialText | None = None
     time_s: float | None = None
     link: LinkCounts = LinkCounts()
 

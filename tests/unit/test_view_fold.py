@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
 from flightstack.mavlink.link import Link
 from gcs_cli.px4_modes import mode_name, mode_numbers, settable_modes
+from gcs_cli.status_texts import PIECE_PATIENCE_S
 from gcs_cli.vehicle_view import update
 from gcs_cli.view_types import TEXTS_KEPT, VehicleView
 
@@ -169,6 +170,36 @@ def test_long_status_texts_are_joined(vehicle: Vehicle) -> None:
     vehicle.send(mavlink.MAVLink_statustext_message(4, b"next", 0, 0))
     assert [entry.text for entry in vehicle.view.texts] == ["a" * 50 + "b" * 50 + "c" * 7, "next"]
     assert vehicle.view.text_count == 2
+
+
+def test_a_long_status_text_shows_once_it_is_whole(vehicle: Vehicle) -> None:
+    text = "a refusal whose reason needs 50 octets and then a few more, äöü"
+    octets = text.encode()
+    vehicle.send(mavlink.MAVLink_statustext_message(4, octets[:50], 7, 0))
+    assert vehicle.view.texts == ()
+    vehicle.send(mavlink.MAVLink_statustext_message(4, octets[50:], 7, 1))
+    assert [entry.text for entry in vehicle.view.texts] == [text]
+
+
+def test_a_letter_may_be_cut_between_two_pieces(vehicle: Vehicle) -> None:
+    octets = b"x" * 49 + "é".encode()
+    for index in (0, 1):
+        vehicle.send(mavlink.MAVLink_statustext_message(4, octets[50 * index :][:50], 7, index))
+    assert vehicle.view.texts[0].text == "x" * 49 + "é"
+
+
+def test_a_text_of_exactly_full_pieces_ends_with_an_empty_one(vehicle: Vehicle) -> None:
+    for index, piece in enumerate((b"a" * 50, b"")):
+        vehicle.send(mavlink.MAVLink_statustext_message(4, piece, 7, index))
+    assert [entry.text for entry in vehicle.view.texts] == ["a" * 50]
+
+
+def test_a_text_whose_last_piece_is_lost_is_not(vehicle: Vehicle) -> None:
+    vehicle.send(mavlink.MAVLink_statustext_message(4, b"a" * 50, 7, 0))
+    assert vehicle.view.partial_text is not None
+    first_s = vehicle.view.partial_text.received_s
+    assert vehicle.send(heartbeat(), now_s=first_s + PIECE_PATIENCE_S).texts == ()
+    assert [entry.text for entry in vehicle.send(heartbeat(), now_s=first_s + 1.0).texts] == ["a" * 50]
 
 
 def test_status_text_cannot_write_to_the_terminal(vehicle: Vehicle) -> None:
