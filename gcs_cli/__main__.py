@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
@@ -24,8 +24,26 @@ app = typer.Typer(
 _UsageError: Any = typer.BadParameter.__mro__[1]
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from flightstack import __version__  # noqa: PLC0415
+
+        print(f"gcs {__version__}")
+        raise typer.Exit
+
+
+_VersionOption = Annotated[
+    bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+]
+
+
 @app.callback()
-def options(context: typer.Context, connect: ConnectOption = None, timeout: TimeoutOption = None) -> None:
+def options(
+    context: typer.Context,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+    version: _VersionOption = False,  # its callback does all
+) -> None:
     """Hold the flags that are given before the command."""
     context.obj = Settings(connect, timeout)
 
@@ -57,6 +75,9 @@ def main(argv: list[str] | None = None) -> int:
         sys.stderr.close()
         return DONE
     except _UsageError as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # `gcs` and `gcs mission`: its message is the help
+            print(error.format_message(), file=sys.stderr)
+            return USAGE
         sentence, code = error.format_message(), USAGE
     except CliError as error:
         sentence, code = str(error), error.exit_code

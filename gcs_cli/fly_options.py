@@ -12,7 +12,7 @@ from flightstack.clock import nearest_outer_hz, rates
 from flightstack.geodesy import GeoPoint
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
-from flightstack.plan import Plan, check_mission, load_plan
+from flightstack.plan import POSITION_COMMANDS, Command, Plan, check_mission, load_plan
 from flightstack.transport.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.run_directory import LOG_NAME
@@ -22,6 +22,7 @@ PLANTS = ("rigid", "paper")
 DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
 GCS_LOSS_S = 5.0
 MOST_INSTANCES = 100
+_RETURN = Command.NAV_RETURN_TO_LAUNCH
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,10 @@ def checked_plan(options: FlyOptions) -> Plan:
     rejection = check_mission(plan.items, plan.home or DEFAULT_HOME)
     if rejection is not None:
         raise CliError(f"{options.plan_path}: {rejection.reason}", USAGE)
+    moving = (item.command for item in plan.items if item.command in POSITION_COMMANDS | {_RETURN})
+    if next(moving, None) != Command.NAV_TAKEOFF:
+        problem = "the mission must begin with a takeoff, since the vehicle stands on the ground"
+        raise CliError(f"{options.plan_path}: {problem}", USAGE)
     return plan
 
 
@@ -107,7 +112,7 @@ def _number(flag: str, value: str | float, low: float, high: float) -> None:
     except ValueError:
         number = math.nan
     if not low <= number <= high:
-        raise CliError(f"{flag} {value}: expected a number from {low:g} to {high:g}", USAGE)
+        raise CliError(f"{flag} {value}: expected a number from {low:.10g} to {high:.10g}", USAGE)
 
 
 def check_ports(options: FlyOptions) -> None:

@@ -52,7 +52,7 @@ class Child:
         ending = (
             f"was killed by signal {-code}" if code is not None and code < 0 else f"ended with code {code}"
         )
-        said = self.last_line
+        said = self.last_line.removeprefix(f"{self.name}: ")
         return f"{self.name} {ending}" + (f": {said}" if said else "")
 
     def terminate(self) -> None:

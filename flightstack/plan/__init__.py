@@ -7,6 +7,7 @@ from flightstack.plan.plan import Plan
 from flightstack.plan.vocabulary import (
     MAX_MISSION_ITEMS,
     NAV_COMMANDS,
+    POSITION_COMMANDS,
     UNSET_E7,
     Command,
     Frame,
@@ -20,6 +21,7 @@ __all__ = [
     "DEFAULT_LIMITS",
     "MAX_MISSION_ITEMS",
     "NAV_COMMANDS",
+    "POSITION_COMMANDS",
     "UNSET_E7",
     "Command",
     "Frame",

@@ -238,7 +238,7 @@ def test_a_child_that_cannot_start_says_why(tmp_path: Path) -> None:
         assert children.wait(LONG_S)
         assert child.exit_code == 2
         assert child.obituary.startswith(
-            "sim-bridge ended with code 2: sim-bridge: --plant: 'flat' is not one of"
+            "sim-bridge ended with code 2: --plant: 'flat' is not one of"
         )
 
 

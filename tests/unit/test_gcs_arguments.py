@@ -116,6 +116,20 @@ def test_a_plan_that_the_vehicle_would_refuse_is_not_flown(tmp_path: Path) -> No
     assert error.value.exit_code == USAGE
 
 
+@pytest.mark.parametrize("first", [(16, 47.3978, 8.5456, 5), (20, 0, 0, 0)])
+def test_a_plan_that_does_not_begin_with_a_takeoff_is_not_flown(
+    tmp_path: Path, first: tuple[float, ...]
+) -> None:
+    plan = tmp_path / "hover.waypoints"
+    home = "0\t1\t0\t16\t0\t0\t0\t0\t47.397742\t8.545594\t488\t1"
+    code, *position = first
+    item = "\t".join(map(str, (1, 0, 3, code, 0, 0, 0, 0, *position, 1)))
+    plan.write_text(f"QGC WPL 110\n{home}\n{item}\n")
+    with pytest.raises(CliError, match=r"hover.waypoints: the mission must begin with a takeoff") as error:
+        checked_plan(FlyOptions(plan))
+    assert error.value.exit_code == USAGE
+
+
 @pytest.mark.parametrize(
     ("inner_hz", "outer_hz"), [(500.0, 100.0), (1000.0, 100.0), (250.0, 125.0), (400.0, 100.0), (50.0, 50.0)]
 )
