@@ -1,0 +1,235 @@
+"""The flight stack's end of the simulator link: exact frames, any chunks, junk, standard HIL messages."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flightstack.contract import Vector3
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, FsPlantState, mavlink
+from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
+from flightstack.mavlink.link import Link
+from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.params.vehicle import load_vehicle
+
+PAPER = load_vehicle("paper_quad")
+HOME = GeoPoint(47.397742, 8.545594, 488.0)
+STATE = [1.0, -2.0, -3.5, 0.1, 0.2, -0.3, 0.8, 0.6, 0.0, 0.0, 0.01, 0.02, 0.03]
+
+
+def link(lockstep: bool = True, vehicle=PAPER) -> SimulatorLink:
+    return SimulatorLink(vehicle, HOME, lockstep, system_id=3)
+
+
+def plant_state(time_us: int, state=STATE, speed: float = 200.0) -> bytes:
+    frame = PlantStateFrame(1, 51)
+    frame.state[:] = state
+    frame.rotor_speed_rad_s[:] = speed
+    frame.set_rotor_count(4)
+    return bytes(frame.seal(time_us, 0))
+
+
+def hil_state(time_us: int = 4000, **changes) -> bytes:
+    fields = {
+        "time_usec": time_us, "attitude_quaternion": [0.8, 0.0, 0.6, 0.0],
+        "rollspeed": 0.1, "pitchspeed": -0.2, "yawspeed": 0.3,
+        "lat": 473980000, "lon": 85460000, "alt": 495000, "vx": 150, "vy": -250, "vz": 35,
+        "ind_airspeed": 0, "true_airspeed": 0, "xacc": 0, "yacc": 0, "zacc": 0,
+    }  # fmt: skip
+    return Link(1, 1).encode(mavlink.MAVLink_hil_state_quaternion_message(**{**fields, **changes}))
+
+
+def heartbeat(status: int = mavlink.MAV_STATE_ACTIVE) -> bytes:
+    return Link(1, 1).encode(mavlink.MAVLink_heartbeat_message(30, 8, 0, 0, status, 3))
+
+
+def receive(stack: SimulatorLink, data: bytes) -> bool:
+    return stack.receive(memoryview(data))
+
+
+# ---------------------------------------------------------------------- the exact exchange
+
+
+def test_a_state_arrives_exactly_and_is_answered_with_its_time() -> None:
+    stack = link()
+    state = stack.state
+    assert not stack.has_state
+    assert receive(stack, plant_state(6000))
+    assert stack.has_state
+    assert state is stack.state
+    assert state.tolist() == STATE
+    assert stack.rotor_speed_rad_s.tolist() == [200.0] * 8
+    answer = ActuatorsFrame()
+    assert answer.open(stack.answer(np.arange(8.0), armed=True))
+    assert answer.time_us == 6000
+    assert answer.rotor_speed_rad_s.tolist() == list(range(8))
+    assert (answer.rotor_count, answer.flags) == (4, 1 | 2 | 4)
+
+
+@pytest.mark.parametrize(
+    ("lockstep", "armed", "flags"), [(True, False, 5), (False, True, 3), (False, False, 1)]
+)
+def test_flags_say_armed_and_lockstep(lockstep: bool, armed: bool, flags: int) -> None:
+    stack = link(lockstep)
+    receive(stack, plant_state(0))
+    answer = ActuatorsFrame()
+    assert answer.open(stack.answer(np.zeros(8), armed))
+    assert answer.flags == flags
+
+
+def test_the_newest_of_several_states_counts() -> None:
+    stack = link()
+    assert receive(stack, plant_state(2000) + plant_state(4000, [0.0] * 6 + STATE[6:]))
+    assert stack.time_us == 4000
+    assert stack.state[0] == 0.0
+
+
+STREAM = heartbeat() + plant_state(2000) + heartbeat() + plant_state(4000)
+
+
+@pytest.mark.parametrize("cut", range(1, len(STREAM)))
+def test_the_stream_may_be_cut_anywhere(cut: int) -> None:
+    stack = link()
+    first, second = receive(stack, STREAM[:cut]), receive(stack, STREAM[cut:])
+    assert second or (first and cut == len(STREAM))
+    assert stack.time_us == 4000
+    assert stack.state.tolist() == STATE
+    # afterwards whole frames take the direct way again
+    assert receive(stack, plant_state(6000))
+    assert stack.time_us == 6000
+
+
+def test_byte_by_byte() -> None:
+    stack = link()
+    fresh = [receive(stack, STREAM[index : index + 1]) for index in range(len(STREAM))]
+    assert sum(fresh) == 2
+    assert stack.time_us == 4000
+
+
+@pytest.mark.parametrize("junk", [b"\x00" * 7, b"hello", bytes(range(200)), b"\xfe\x00", b"\xff" * 300])
+def test_junk_between_frames_is_survived(junk: bytes) -> None:
+    stack = link()
+    receive(stack, junk)
+    for time_us in range(2000, 22_000, 2000):  # a false header may swallow the first ones
+        receive(stack, plant_state(time_us))
+    assert stack.time_us == 20_000
+    assert stack.state.tolist() == STATE
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(
+    st.lists(
+        st.one_of(st.binary(max_size=80), st.sampled_from([STREAM, hil_state(), heartbeat()])), max_size=10
+    )
+)
+def test_no_bytes_raise(chunks: list[bytes]) -> None:
+    stack = link()
+    for chunk in chunks:
+        receive(stack, chunk)
+        stack.answer(np.full(8, 100.0), True)
+
+
+def test_a_state_that_takes_the_general_way_is_taken_too() -> None:
+    """Legal MAVLink that no hot frame is: signed, or with its trailing zeros cut."""
+    codec = Link(1, 1)
+    codec._codec.signing.secret_key = b"k" * 32
+    codec._codec.signing.sign_outgoing = True
+    message = FsPlantState(8000, STATE[:3], STATE[3:6], STATE[6:10], STATE[10:], [150.0] * 8, 4, 1)
+    stack = link()
+    assert receive(stack, codec.encode(message))
+    assert (stack.time_us, stack.state.tolist()) == (8000, STATE)
+    assert stack.rotor_speed_rad_s.tolist() == [150.0] * 8
+    cut = Link(1, 1).encode(
+        FsPlantState(9000, STATE[:3], STATE[3:6], STATE[6:10], STATE[10:], [0.0] * 8, 0, 0)
+    )
+    assert len(cut) < len(plant_state(0))
+    assert receive(stack, cut)
+    assert (stack.time_us, stack.state.tolist()) == (9000, STATE)
+    assert stack.rotor_speed_rad_s.tolist() == [0.0] * 8
+
+
+# ---------------------------------------------------------------------- third parties
+
+
+def test_hello_says_who_we_are_and_asks_for_states() -> None:
+    messages = list(Link(1, 51).decode(link().hello(2000)))
+    assert messages[0].get_type() == "HEARTBEAT"
+    assert messages[0].get_srcSystem() == 3
+    asked = [(m.command, m.param1, m.param2) for m in messages[1:]]
+    assert (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, FS_PLANT_STATE_ID, 2000.0) in asked
+
+
+def test_a_simulator_that_refuses_our_message_is_asked_for_the_standard_one() -> None:
+    stack = link()
+    request = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+    receive(stack, Link(1, 1).encode(mavlink.MAVLink_command_ack_message(request, 0)))
+    assert not stack.request_refused
+    receive(stack, Link(1, 1).encode(mavlink.MAVLink_command_ack_message(request, 2)))
+    assert stack.request_refused
+    (message,) = Link(1, 51).decode(stack.second_hello(4000))
+    assert (message.param1, message.param2) == (115.0, 4000.0)
+
+
+def test_hil_state_becomes_the_state() -> None:
+    stack = link()
+    assert receive(stack, hil_state())
+    place = LocalFrame(HOME).to_geo(Vector3(*stack.state[:3]))
+    assert place == pytest.approx((47.398, 8.546, 495.0), abs=1e-9)
+    # an independent figure: 258 µdeg of latitude are 28.69 m, 406 µdeg of longitude there 30.65 m
+    assert stack.state[0] == pytest.approx(28.685, abs=0.01)
+    assert stack.state[1] == pytest.approx(30.653, abs=0.01)
+    assert stack.state[2] == pytest.approx(-7.0, abs=1e-9)
+    assert stack.state[3:6].tolist() == [1.5, -2.5, 0.35]
+    assert stack.state[6:10].tolist() == pytest.approx([0.8, 0.0, 0.6, 0.0], abs=1e-7)
+    assert stack.state[10:].tolist() == pytest.approx([0.1, -0.2, 0.3], abs=1e-7)
+    assert stack.time_us == 4000
+
+
+def controls(stack: SimulatorLink, speeds, armed: bool = True):
+    (message,) = Link(1, 51).decode(bytes(stack.answer(np.array(speeds, dtype=float), armed)))
+    assert message.get_type() == "HIL_ACTUATOR_CONTROLS"
+    return message
+
+
+def test_hil_states_are_answered_with_shares_of_thrust() -> None:
+    stack = link()
+    receive(stack, hil_state(8000))
+    top = PAPER.rotors[0].max_speed_rad_s
+    answer = controls(stack, [top, top / 2, 0.0, 2 * top, 5.0, 5.0, 5.0, 5.0])
+    assert list(answer.controls) == pytest.approx([1.0, 0.25, 0.0, 1.0] + [0.0] * 12)
+    assert (answer.time_usec, answer.flags) == (8000, 1)
+    assert answer.mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def test_a_disarmed_or_failing_stack_stops_the_rotors() -> None:
+    stack = link()
+    receive(stack, hil_state())
+    assert list(controls(stack, [200.0] * 8, armed=False).controls) == [0.0] * 16
+    assert not controls(stack, [200.0] * 8, armed=False).mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    answer = controls(stack, [math.nan, -50.0, math.inf, 200.0] + [0.0] * 4)
+    assert list(answer.controls)[:3] == [0.0, 0.0, 1.0]
+
+
+def test_each_state_is_answered_in_its_own_kind() -> None:
+    stack = link()
+    receive(stack, hil_state())
+    controls(stack, [0.0] * 8)
+    receive(stack, plant_state(2000))
+    assert ActuatorsFrame().open(stack.answer(np.zeros(8), True))
+    receive(stack, hil_state())
+    controls(stack, [0.0] * 8)
+
+
+def test_goodbye_is_heard_and_said() -> None:
+    stack = link()
+    receive(stack, heartbeat())
+    assert not stack.peer_said_goodbye
+    receive(stack, heartbeat(mavlink.MAV_STATE_POWEROFF))
+    assert stack.peer_said_goodbye
+    (message,) = Link(1, 51).decode(stack.heartbeat(False, leaving=True))
+    assert message.system_status == mavlink.MAV_STATE_POWEROFF
