@@ -36,7 +36,10 @@ class Link:
     def decode(self, data: bytes) -> Iterator[Message]:
         """Yield the messages that ``data`` completes; what is not a message is counted in ``bad``."""
         try:
-            messages = self._codec.parse_buffer(data) or ()
+            if self._is_one_frame(data):  # the usual datagram: no need to look for frames
+                messages = [self._codec.decode(bytearray(data))]
+            else:
+                messages = self._codec.parse_buffer(data) or []
         except mavlink.MAVError:  # robust parsing reports most faults as BAD_DATA; a signature fault raises
             self.bad += 1
             return
@@ -46,3 +49,9 @@ class Link:
             else:
                 self.received += 1
                 yield message
+
+    def _is_one_frame(self, data: bytes) -> bool:
+        """Tell whether ``data`` is one whole unsigned frame and the decoder holds no beginning of another."""
+        if len(data) < 12 or data[0] != 0xFD or data[2] != 0:
+            return False
+        return data[1] == len(data) - 12 and not self.has_partial

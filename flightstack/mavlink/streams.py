@@ -41,19 +41,36 @@ API_RATES_HZ: dict[int, float] = {
 }
 
 
+class _Stream:
+    """A message of a link, due at ``vehicle_s`` on the vehicle's clock, not before ``link_s`` on the link's."""
+
+    __slots__ = ("interval_s", "link_s", "make", "vehicle_s")
+
+    def __init__(self, message_id: int, interval_s: float) -> None:
+        self.make = MAKERS[message_id]
+        self.interval_s = interval_s
+        self.vehicle_s = self.link_s = -math.inf
+
+    def sent(self, now_s: float, link_now_s: float) -> None:
+        """Set when it is due next: keep the phase, unless a whole interval was missed."""
+        interval_s = self.interval_s
+        upcoming_s = self.vehicle_s + interval_s
+        self.vehicle_s = upcoming_s if upcoming_s > now_s else now_s + interval_s
+        self.link_s = max(self.link_s + interval_s, link_now_s + 0.5 * interval_s)
+
+
 class Streams:
     """The messages that one link sends by itself."""
 
     def __init__(self, rates_hz: dict[int, float]) -> None:
         self._default = rates_hz
-        self._interval_s = {message_id: 1.0 / rate for message_id, rate in rates_hz.items()}
-        self._next: dict[int, tuple[float, float]] = {}
+        self._streams = {message_id: _Stream(message_id, 1.0 / rate) for message_id, rate in rates_hz.items()}
         self._soonest_s = -math.inf
 
     def interval_us(self, message_id: int) -> int:
         """Interval of a message; −1 if it is not sent, 0 if it is not known."""
-        if message_id in self._interval_s:
-            return round(self._interval_s[message_id] * 1e6)
+        if message_id in self._streams:
+            return round(self._streams[message_id].interval_s * 1e6)
         return -1 if message_id in MAKERS else 0
 
     def set_interval(self, message_id: int, interval_us: float) -> bool:
@@ -61,12 +78,11 @@ class Streams:
         if message_id not in MAKERS or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # nor is NaN
             return False
         if interval_us == 0 and message_id in self._default:
-            self._interval_s[message_id] = 1.0 / self._default[message_id]
+            self._streams[message_id] = _Stream(message_id, 1.0 / self._default[message_id])
         elif interval_us <= 0:
-            self._interval_s.pop(message_id, None)
+            self._streams.pop(message_id, None)
         else:
-            self._interval_s[message_id] = interval_us * 1e-6
-        self._next.pop(message_id, None)
+            self._streams[message_id] = _Stream(message_id, interval_us * 1e-6)
         self._soonest_s = -math.inf
         return True
 
@@ -75,14 +91,10 @@ class Streams:
         now_s = facts.time_us * 1e-6
         if now_s < self._soonest_s:
             return
-        for message_id, interval_s in self._interval_s.items():
-            vehicle_s, link_s = self._next.get(message_id, (-math.inf, -math.inf))
-            if now_s >= vehicle_s and link_now_s >= link_s:
-                # keep the phase, unless a whole interval was missed
-                upcoming = vehicle_s + interval_s
-                self._next[message_id] = (
-                    upcoming if upcoming > now_s else now_s + interval_s,
-                    max(link_s + interval_s, link_now_s + 0.5 * interval_s),
-                )
-                yield MAKERS[message_id](facts)
-        self._soonest_s = min((times[0] for times in self._next.values()), default=math.inf)
+        soonest_s = math.inf
+        for stream in self._streams.values():
+            if now_s >= stream.vehicle_s and link_now_s >= stream.link_s:
+                stream.sent(now_s, link_now_s)
+                yield stream.make(facts)
+            soonest_s = min(soonest_s, stream.vehicle_s)
+        self._soonest_s = soonest_s
