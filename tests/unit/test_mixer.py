@@ -111,8 +111,10 @@ def best_by_linear_programming(vehicle: Vehicle, wrench: tuple[float, ...]) -> n
     low = np.array([r.min_speed_rad_s**2 for r in vehicle.rotors])
     high = np.array([r.max_speed_rad_s**2 for r in vehicle.rotors])
     distance = np.array([[0.0, 1.0, -1.0, 0.0], [0.0, -1.0, -1.0, 0.0]])
-    upper = np.vstack([columns, -columns, distance])
-    right = np.concatenate([high, -low, [wrench[0], -wrench[0]]])
+    # rows as shares of each rotor's range: the solver's tolerances are absolute
+    share = 1.0 / high
+    upper = np.vstack([columns * share[:, None], -columns * share[:, None], distance])
+    right = np.concatenate([high * share, -low * share, [wrench[0], -wrench[0]]])
     bounds: list[tuple[float, float | None]] = [(0.0, 1.0), (-1e3, 1e3), (0.0, None), (0.0, 1.0)]
     # roll and pitch without any yaw, then thrust beside them, then yaw beside both
     for variable, aim in ((0, -1.0), (2, 1.0), (3, -1.0)):
@@ -120,10 +122,9 @@ def best_by_linear_programming(vehicle: Vehicle, wrench: tuple[float, ...]) -> n
         cost = [aim if index == variable else 0.0 for index in range(4)]
         found = linprog(cost, upper, right, bounds=fixed, method="highs")
         assert found.status == 0, found.message
-        for settled in (
-            (variable, 1) if variable == 2 else (variable,)
-        ):  # with the distance the thrust is settled too
-            bounds[settled] = (found.x[settled] - 1e-12, found.x[settled] + 1e-12)
+        # with the distance, thrust is settled too; the width is the solver's own tolerance
+        for settled in (variable, 1) if variable == 2 else (variable,):
+            bounds[settled] = (found.x[settled] - 1e-7, found.x[settled] + 1e-7)
     k, thrust, _, s = found.x
     return np.array([thrust, k * wrench[1], k * wrench[2], s * wrench[3]])
 
