@@ -24,7 +24,7 @@ from flightstack.mavlink.services.mission_server import (
     MissionServer,
 )
 from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
-from flightstack.mavlink.telemetry import MAKERS, autopilot_version, heartbeat, status_texts
+from flightstack.mavlink.telemetry import MAKERS, autopilot_version, heartbeat, messages, status_texts
 from flightstack.vehicle_commands import (
     ACCEPTED,
     DENIED,
@@ -190,7 +190,7 @@ class GroundHub:
                 mavlink.MAVLink_message_interval_message(about, peer.streams.interval_us(about))
             )
         elif number in MAKERS:
-            peer.outbox.append(MAKERS[number](self._facts))
+            peer.outbox.extend(messages(number, self._facts))
         else:
             return Answer(DENIED, f"message {wanted:g} is not available")
         return Answer(ACCEPTED)

@@ -20,6 +20,7 @@ class AutopilotFacts:
         self._autopilot = autopilot
         self._now = autopilot.now
         self.loop_timing = loop_timing
+        self.rotors = len(vehicle.rotors)
         self.max_thrust_n = vehicle.weight_n * 2.0 if vehicle.ideal_rotors else vehicle.max_thrust_n
         self.home: GeoPoint = autopilot.home
         self.frame = LocalFrame(autopilot.home)

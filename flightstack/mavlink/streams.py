@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Message
-from flightstack.mavlink.telemetry import MAKERS, VehicleFacts
+from flightstack.mavlink.telemetry import MAKERS, VehicleFacts, messages
 
 LONGEST_INTERVAL_US = 2**31 - 1
 """What MESSAGE_INTERVAL can say."""
@@ -42,12 +42,12 @@ API_RATES_HZ: dict[int, float] = {
 
 
 class _Stream:
-    """A message of a link, due at ``vehicle_s`` on the vehicle's clock, not before ``link_s`` on the link's."""
+    """A message of a link, due at ``vehicle_s`` on the vehicle's clock and ``link_s`` on the link's."""
 
-    __slots__ = ("interval_s", "link_s", "make", "vehicle_s")
+    __slots__ = ("interval_s", "link_s", "message_id", "vehicle_s")
 
     def __init__(self, message_id: int, interval_s: float) -> None:
-        self.make = MAKERS[message_id]
+        self.message_id = message_id
         self.interval_s = interval_s
         self.vehicle_s = self.link_s = -math.inf
 
@@ -95,6 +95,6 @@ class Streams:
         for stream in self._streams.values():
             if now_s >= stream.vehicle_s and link_now_s >= stream.link_s:
                 stream.sent(now_s, link_now_s)
-                yield stream.make(facts)
+                yield from messages(stream.message_id, facts)
             soonest_s = min(soonest_s, stream.vehicle_s)
         self._soonest_s = soonest_s

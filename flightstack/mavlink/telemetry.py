@@ -27,6 +27,7 @@ class VehicleFacts(Protocol):
     setpoint: FloatArray
     attitude_target: FloatArray
     max_thrust_n: float
+    rotors: int
     home: GeoPoint
     frame: LocalFrame
 
@@ -188,10 +189,10 @@ def _global_position(f: VehicleFacts) -> Message:
     )
 
 
-def _esc_status(f: VehicleFacts) -> Message:
-    speeds = f.row[LoopRow.ROTOR_SPEED].tolist()[:4]
+def _esc_status(f: VehicleFacts, first: int = 0) -> Message:
+    speeds = f.row[LoopRow.ROTOR_SPEED].tolist()[first : first + 4]
     rpm = [_int32(speed * RPM_PER_RAD_S) for speed in speeds]
-    return EscStatus(0, f.time_us, rpm, [NAN] * 4, [NAN] * 4)
+    return EscStatus(first, f.time_us, rpm, [NAN] * 4, [NAN] * 4)
 
 
 def _vfr_hud(f: VehicleFacts) -> Message:
@@ -280,13 +281,13 @@ def autopilot_version(system_id: int) -> Message:
 
 
 def status_texts(severity: int, text: str) -> Iterator[Message]:
-    """STATUSTEXT, in chunks of 50 octets when it is longer."""
+    """STATUSTEXT, in chunks of 50 octets when it is longer; the last chunk is the one that is not full."""
     octets = text.encode("utf-8")
     if len(octets) <= STATUSTEXT_SIZE:
         yield mavlink.MAVLink_statustext_message(severity, octets, 0, 0)
         return
     identity = 1 + sum(octets) % 0xFFFF
-    for chunk, start in enumerate(range(0, len(octets), STATUSTEXT_SIZE)):
+    for chunk, start in enumerate(range(0, len(octets) + 1, STATUSTEXT_SIZE)):
         part = octets[start : start + STATUSTEXT_SIZE]
         yield mavlink.MAVLink_statustext_message(severity, part, identity, chunk)
 
@@ -309,3 +310,10 @@ MAKERS: dict[int, Callable[[VehicleFacts], Message]] = {
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: _origin,
     FS_LOOP_TIMING_ID: lambda f: f.loop_timing(),
 }
+
+
+def messages(message_id: int, f: VehicleFacts) -> Iterator[Message]:
+    """Yield a message of ``MAKERS`` as it is now: two of ESC_STATUS, which holds four rotors, for more."""
+    yield MAKERS[message_id](f)
+    if message_id == EscStatus.id and f.rotors > 4:
+        yield _esc_status(f, 4)

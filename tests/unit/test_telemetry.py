@@ -1,0 +1,280 @@
+"""Telemetry: every message against figures computed here, streams on both clocks, and absurd states."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from flightstack.contract import LoopRow
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, FsLoopTiming, mavlink
+from flightstack.mavlink.link import Link
+from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
+from flightstack.mavlink.telemetry import MAKERS, autopilot_version, heartbeat, messages, status_texts
+from flightstack.modes import Mode
+
+HOME = GeoPoint(47.397742, 8.545594, 488.0)
+EULER = (0.1, -0.2, 2.5)
+X, Y, Z, W = Rotation.from_euler("ZYX", EULER[::-1]).as_quat()
+ATTITUDE = mavlink.MAVLINK_MSG_ID_ATTITUDE
+
+
+def facts(**changes: object) -> SimpleNamespace:
+    row = np.zeros(LoopRow.SIZE)
+    row[LoopRow.REFERENCE_RATES] = 0.4, 0.5, 0.6
+    row[LoopRow.WRENCH_ACHIEVED] = 6.0, 0.0, 0.0, 0.0
+    row[LoopRow.ROTOR_SPEED] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 0.0, 0.0]
+    values = {
+        "state": np.array([10.0, -20.0, -30.0, 1.0, -2.0, 0.5, W, X, Y, Z, 0.01, 0.02, 0.03]),
+        "setpoint": np.arange(11.0),
+        "attitude_target": np.array([1.0, 0.0, 0.0, 0.0, 5.0]),
+        "row": row, "time_us": 12_345_678, "max_thrust_n": 12.0, "rotors": 4,
+        "home": HOME, "frame": LocalFrame(HOME),
+        "armed": True, "mode": Mode.MISSION, "landed": False, "climbing": False, "descending": False,
+        "mission_current": 2, "mission_count": 5, "mission_state": 3, "can_arm": True, "has_state": True,
+        "loop_timing": lambda: FsLoopTiming(1, 2, 0, 0, 500.0, 100.0, 30.0, *[1.0] * 6, 0),
+    }  # fmt: skip
+    return SimpleNamespace(**{**values, **changes})
+
+
+def on_the_wire(message_id: int, **changes: object):
+    """What a ground station decodes of the message."""
+    (message,) = Link(255, 190).decode(Link(1, 1).encode(MAKERS[message_id](facts(**changes))))
+    assert message.get_msgId() == message_id
+    return message
+
+
+# ---------------------------------------------------------------------- what is said
+
+
+def test_attitude_and_rates() -> None:
+    m = on_the_wire(ATTITUDE)
+    assert (m.roll, m.pitch, m.yaw) == pytest.approx(EULER, abs=1e-6)
+    assert (m.rollspeed, m.pitchspeed, m.yawspeed) == pytest.approx((0.01, 0.02, 0.03))
+    assert m.time_boot_ms == 12345
+    q = on_the_wire(mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION)
+    assert (q.q1, q.q2, q.q3, q.q4, q.yawspeed) == pytest.approx((W, X, Y, Z, 0.03), abs=1e-7)
+
+
+def test_local_and_global_position() -> None:
+    m = on_the_wire(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED)
+    assert (m.x, m.y, m.z, m.vx, m.vy, m.vz) == (10.0, -20.0, -30.0, 1.0, -2.0, 0.5)
+    g = on_the_wire(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
+    # 10 m of latitude are 89.9 µdeg, 20 m of longitude at 47.4° 264.9 µdeg
+    assert g.lat == pytest.approx(473977420 + 899, abs=2)
+    assert g.lon == pytest.approx(85455940 - 2649, abs=3)
+    assert (g.alt, g.relative_alt) == (518_000, 30_000)
+    assert (g.vx, g.vy, g.vz) == (100, -200, 50)
+    assert g.hdg == round(math.degrees(2.5) * 100)
+
+
+def test_targets() -> None:
+    a = on_the_wire(mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET)
+    assert (list(a.q), a.thrust) == ([1.0, 0.0, 0.0, 0.0], pytest.approx(5.0 / 12.0))
+    assert (a.body_roll_rate, a.body_pitch_rate, a.body_yaw_rate) == pytest.approx((0.4, 0.5, 0.6))
+    p = on_the_wire(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED)
+    shown = (p.x, p.y, p.z, p.vx, p.vy, p.vz, p.afx, p.afy, p.afz, p.yaw, p.yaw_rate)
+    assert shown == tuple(range(11))
+    assert (p.coordinate_frame, p.type_mask) == (mavlink.MAV_FRAME_LOCAL_NED, 0)
+
+
+def test_hud() -> None:
+    m = on_the_wire(mavlink.MAVLINK_MSG_ID_VFR_HUD)
+    assert m.groundspeed == pytest.approx(math.hypot(1.0, 2.0))
+    assert (m.heading, m.throttle, m.alt, m.climb) == (143, 50, 518.0, -0.5)
+
+
+@pytest.mark.parametrize(("yaw", "heading"), [(-0.1, 354), (-1e-9, 360), (math.pi, 180), (0.0, 0)])
+def test_headings_are_0_to_360(yaw: float, heading: int) -> None:
+    state = facts().state
+    state[6:10] = math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_VFR_HUD, state=state).heading == heading
+    assert 0 <= on_the_wire(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, state=state).hdg <= 35999
+
+
+@pytest.mark.parametrize(("rotors", "expected"), [(4, [(0, 100.0)]), (6, [(0, 100.0), (4, 500.0)])])
+def test_rotor_speeds_in_groups_of_four(rotors: int, expected: list[tuple[int, float]]) -> None:
+    sent = list(messages(EscStatus.id, facts(rotors=rotors)))
+    decoded = [next(Link(2, 1).decode(Link(1, 1).encode(message))) for message in sent]
+    assert [(m.index, m.rpm[0]) for m in decoded] == [
+        (at, round(speed * 30 / math.pi)) for at, speed in expected
+    ]
+    assert math.isnan(decoded[0].voltage[0])
+
+
+@pytest.mark.parametrize(
+    ("changes", "state"),
+    [
+        ({"landed": True}, mavlink.MAV_LANDED_STATE_ON_GROUND),
+        ({"landed": True, "climbing": True}, mavlink.MAV_LANDED_STATE_ON_GROUND),
+        ({}, mavlink.MAV_LANDED_STATE_IN_AIR),
+        ({"climbing": True}, mavlink.MAV_LANDED_STATE_TAKEOFF),
+        ({"descending": True}, mavlink.MAV_LANDED_STATE_LANDING),
+    ],
+)
+def test_landed_state(changes: dict[str, bool], state: int) -> None:
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, **changes).landed_state == state
+
+
+def test_heartbeat_is_px4s() -> None:
+    armed, disarmed = heartbeat(facts()), heartbeat(facts(armed=False, mode=Mode.HOLD))
+    assert (armed.type, armed.autopilot) == (mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
+    assert (armed.custom_mode, disarmed.custom_mode) == (4 << 16 | 4 << 24, 4 << 16 | 3 << 24)
+    assert armed.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert not disarmed.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    states = (armed.system_status, disarmed.system_status, heartbeat(facts(), leaving=True).system_status)
+    assert states == (mavlink.MAV_STATE_ACTIVE, mavlink.MAV_STATE_STANDBY, mavlink.MAV_STATE_POWEROFF)
+
+
+def test_mission_progress_and_its_end() -> None:
+    m = on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
+    assert (m.seq, m.total, m.mission_state, m.mission_mode) == (2, 5, 3, 1)
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mission_current=5).seq == 4
+    nothing = on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mission_current=0, mission_count=0)
+    assert (nothing.seq, nothing.total) == (0, 0)
+
+
+def test_status_says_whether_it_can_arm_and_that_there_is_no_battery() -> None:
+    m = on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS)
+    prearm = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    assert m.onboard_control_sensors_health & prearm
+    assert (m.voltage_battery, m.current_battery, m.battery_remaining) == (65535, -1, -1)
+    refused = on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, can_arm=False)
+    assert not refused.onboard_control_sensors_health & prearm
+    assert refused.onboard_control_sensors_health
+    assert not on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, has_state=False).onboard_control_sensors_health
+
+
+def test_home_and_origin() -> None:
+    for message_id in (mavlink.MAVLINK_MSG_ID_HOME_POSITION, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN):
+        m = on_the_wire(message_id)
+        assert (m.latitude, m.longitude, m.altitude) == (473977420, 85455940, 488000)
+
+
+def test_time_wraps_as_the_field_does() -> None:
+    late = on_the_wire(ATTITUDE, time_us=(2**32 + 5) * 1000)
+    assert late.time_boot_ms == 5
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME).time_boot_ms == 12345
+
+
+def test_version_is_ours() -> None:
+    m = autopilot_version(3)
+    assert m.uid == 3
+    assert m.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=13, max_size=13), st.floats())
+def test_no_state_is_too_absurd_to_be_told(values: list[float], thrust: float) -> None:
+    """Doubles of any size go through single-precision and integer fields."""
+    state, row = np.array(values), np.resize(values, LoopRow.SIZE)
+    strange = facts(
+        state=state, row=row, setpoint=np.resize(values, 11), attitude_target=np.array([*values[:4], thrust])
+    )
+    codec = Link(1, 1)
+    for message_id in MAKERS:
+        for message in messages(message_id, strange):
+            assert codec.encode(message)
+
+
+# ---------------------------------------------------------------------- texts
+
+
+@pytest.mark.parametrize("length", [0, 1, 49, 50, 51, 99, 100, 101, 150, 240])
+def test_long_texts_come_in_chunks_of_which_only_the_last_is_not_full(length: int) -> None:
+    text = "".join(chr(65 + index % 26) for index in range(length))
+    link, station = Link(1, 1), Link(255, 190)
+    chunks = [next(station.decode(link.encode(message))) for message in status_texts(4, text)]
+    assert "".join(chunk.text for chunk in chunks) == text
+    if length <= 50:
+        assert [(chunk.id, chunk.chunk_seq) for chunk in chunks] == [(0, 0)]
+    else:
+        assert len({chunk.id for chunk in chunks}) == 1
+        assert chunks[0].id > 0
+        assert [chunk.chunk_seq for chunk in chunks] == list(range(len(chunks)))
+        # "any null character in the text field is taken to mean this was the last chunk"
+        assert [len(chunk.text) == 50 for chunk in chunks] == [True] * (len(chunks) - 1) + [False]
+
+
+def test_texts_are_utf_8() -> None:
+    (message,) = status_texts(6, "Höhe 5 m")
+    assert message._text_raw == "Höhe 5 m".encode()  # pymavlink shows texts as ASCII
+
+
+# ---------------------------------------------------------------------- streams
+
+
+def count(streams: Streams, seconds: float, vehicle_rate: float, step_s: float = 0.0005) -> dict[int, int]:
+    """Poll at the link's steps while the vehicle's time runs ``vehicle_rate`` times as fast; count messages."""
+    counts: dict[int, int] = {}
+    for tick in range(round(seconds / step_s)):
+        now_s = tick * step_s
+        for message in streams.due(facts(time_us=round(now_s * vehicle_rate * 1e6)), 100.0 + now_s):
+            counts[message.get_msgId()] = counts.get(message.get_msgId(), 0) + 1
+    return counts
+
+
+@pytest.mark.parametrize("rates", [GROUND_RATES_HZ, API_RATES_HZ], ids=["ground", "api"])
+def test_rates_are_kept_when_both_clocks_are_one(rates: dict[int, float]) -> None:
+    counts = count(Streams(rates), 10.0, 1.0)
+    for message_id, rate in rates.items():
+        assert counts[message_id] == pytest.approx(rate * 10.0, abs=1), message_id
+
+
+def test_at_fast_vehicle_time_the_links_clock_limits() -> None:
+    counts = count(Streams(GROUND_RATES_HZ), 4.0, 50.0)
+    for message_id, rate in GROUND_RATES_HZ.items():
+        assert counts[message_id] == pytest.approx(rate * 4.0, abs=2), message_id
+
+
+def test_at_slow_vehicle_time_the_vehicles_clock_limits() -> None:
+    counts = count(Streams(GROUND_RATES_HZ), 10.0, 0.2)
+    for message_id, rate in GROUND_RATES_HZ.items():
+        assert counts[message_id] == pytest.approx(rate * 2.0, abs=1), message_id
+
+
+def test_while_vehicle_time_stands_each_is_sent_once() -> None:
+    assert count(Streams(GROUND_RATES_HZ), 10.0, 0.0) == dict.fromkeys(GROUND_RATES_HZ, 1)
+
+
+def test_after_a_gap_nothing_is_made_up_for() -> None:
+    streams = Streams({ATTITUDE: 10.0})
+    count(streams, 1.0, 1.0)
+    late = [
+        list(streams.due(facts(time_us=at), at * 1e-6 + 100.0)) for at in (60_000_000, 60_010_000, 60_110_000)
+    ]
+    assert [len(sent) for sent in late] == [1, 0, 1]
+
+
+def test_intervals_can_be_set_stopped_and_reset() -> None:
+    streams = Streams(GROUND_RATES_HZ)
+    quaternion = mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION
+    assert [streams.interval_us(number) for number in (ATTITUDE, quaternion, 9999)] == [20_000, -1, 0]
+    assert streams.set_interval(ATTITUDE, 100_000)
+    assert streams.set_interval(quaternion, 50_000)
+    assert streams.set_interval(mavlink.MAVLINK_MSG_ID_VFR_HUD, -1)
+    counts = count(streams, 10.0, 1.0)
+    assert counts[ATTITUDE] == pytest.approx(100, abs=1)
+    assert counts[quaternion] == pytest.approx(200, abs=1)
+    assert mavlink.MAVLINK_MSG_ID_VFR_HUD not in counts
+    assert streams.set_interval(ATTITUDE, 0)
+    assert streams.set_interval(quaternion, 0)  # its default is not to be sent
+    assert (streams.interval_us(ATTITUDE), streams.interval_us(quaternion)) == (20_000, -1)
+
+
+@pytest.mark.parametrize("interval", [math.nan, math.inf, -2.0, 2.0**31, 1e30])
+def test_intervals_that_cannot_be(interval: float) -> None:
+    streams = Streams(GROUND_RATES_HZ)
+    assert not streams.set_interval(ATTITUDE, interval)
+    assert not streams.set_interval(9999, 1e5)
+    assert streams.interval_us(ATTITUDE) == 20_000
+
+
+def test_the_loops_timing_is_streamed() -> None:
+    assert on_the_wire(FS_LOOP_TIMING_ID).inner_hz == 500.0
