@@ -69,7 +69,7 @@ def _angles(angles: Euler | None, width: int, style: str, label: str = "") -> Te
         if degrees is None:
             shown = UNKNOWN
         else:
-            shown = f"{degrees % 360:03.0f}°" if index == 2 else f"{degrees:+.1f}°"
+            shown = f"{round(degrees) % 360:03d}°" if index == 2 else f"{degrees:+.1f}°"
         text.append(f"{name} ", style="bright_black")
         text.append(shown, style=style)
         text.append(gap if index < 2 else "")

@@ -25,7 +25,7 @@ def state_line(view: VehicleView, now_s: float) -> str:
         parts.append(f"{math.hypot(view.velocity_ned_m_s.x, view.velocity_ned_m_s.y):.2f} m/s")
     if view.attitude is not None:
         roll, pitch, yaw = (math.degrees(angle) for angle in view.attitude)
-        parts.append(f"roll {roll:+.1f}° pitch {pitch:+.1f}° yaw {yaw % 360:03.0f}°")
+        parts.append(f"roll {roll:+.1f}° pitch {pitch:+.1f}° yaw {round(yaw) % 360:03d}°")
     if view.mission.total:
         parts.append(f"item {view.mission.current}/{view.mission.total - 1}")
     if view.battery is not None and view.battery.remaining is not None:
