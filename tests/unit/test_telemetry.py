@@ -211,7 +211,7 @@ def test_texts_are_utf_8() -> None:
 
 
 def count(streams: Streams, seconds: float, vehicle_rate: float, step_s: float = 0.0005) -> dict[int, int]:
-    """Poll at the link's steps while the vehicle's time runs ``vehicle_rate`` times as fast; count messages."""
+    """Poll at the link's steps while vehicle time runs ``vehicle_rate`` times as fast; count messages."""
     counts: dict[int, int] = {}
     for tick in range(round(seconds / step_s)):
         now_s = tick * step_s

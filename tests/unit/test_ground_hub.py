@@ -1,0 +1,369 @@
+"""The hub of ground stations: who is answered, who is told what, and that no bytes break it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flightstack.assembly import build
+from flightstack.autopilot import NOTICE
+from flightstack.config import StackConfig
+from flightstack.ground_hub import GROUND, MAX_PEERS, PeerAddress
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link
+from flightstack.modes import Mode
+
+ALICE, BOB = PeerAddress(GROUND, "alice", 1), PeerAddress("api", "bob", 2)
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+COMMAND = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+NAN = math.nan
+
+
+class Station:
+    """One ground station's end of its link."""
+
+    def __init__(self, net: Net, address: PeerAddress, system: int = 255, component: int = 190) -> None:
+        self.net, self.address = net, address
+        self.codec = Link(system, component)
+        self.frames: list[bytes] = []
+        self.inbox: list = []
+
+    def send(self, message) -> None:
+        self.net.hub.receive(self.address, self.codec.encode(message), self.net.now_s)
+
+    def heartbeat(self) -> None:
+        self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+
+    def command(self, number: int, *params: float, system: int = 7, component: int = 1) -> None:
+        values = [*params, *[0.0] * (7 - len(params))]
+        self.send(mavlink.MAVLink_command_long_message(system, component, number, 0, *values))
+
+    def take(self, kind: str) -> list:
+        """The messages of a kind that came since the last call."""
+        found = [message for message in self.inbox if message.get_type() == kind]
+        self.inbox = [message for message in self.inbox if message.get_type() != kind]
+        return found
+
+    def ask(self, number: int, *params: float, **where: int) -> int:
+        """Send a command and return the result of its acknowledgement."""
+        self.command(number, *params, **where)
+        self.net.poll()
+        (ack,) = self.take("COMMAND_ACK")
+        assert ack.command == number
+        return ack.result
+
+
+class Net:
+    """A hub without a process, on a clock of its own, with which vehicle time moves unless told otherwise."""
+
+    def __init__(self) -> None:
+        stack = build(StackConfig(system_id=7), lambda: None)
+        self.autopilot, self.hub = stack.autopilot, stack.ground
+        self.autopilot.has_state = True
+        self.now_s = 50.0
+        self.stations: dict[PeerAddress, Station] = {}
+        self.strangers: list[PeerAddress] = []
+
+    def join(self, address: PeerAddress, heard: bool = True, **ids: int) -> Station:
+        station = self.stations[address] = Station(self, address, **ids)
+        if heard:
+            station.heartbeat()
+        return station
+
+    def poll(self) -> None:
+        for address, data in self.hub.poll(self.now_s):
+            if address in self.stations:
+                self.stations[address].frames.append(data)
+                self.stations[address].inbox += self.stations[address].codec.decode(data)
+            else:
+                self.strangers.append(address)
+
+    def run(self, seconds: float, vehicle_rate: float = 1.0, step_s: float = 0.01) -> None:
+        for _ in range(round(seconds / step_s)):
+            self.now_s += step_s
+            self.autopilot.now.time_us += round(step_s * vehicle_rate * 1e6)
+            self.poll()
+
+
+@pytest.fixture
+def net() -> Net:
+    return Net()
+
+
+# ---------------------------------------------------------------------- who is answered
+
+
+@pytest.mark.parametrize(("system", "component"), [(8, 1), (7, 2), (255, 1), (8, 0)])
+def test_commands_to_others_are_ignored(net: Net, system: int, component: int) -> None:
+    alice = net.join(ALICE)
+    alice.command(COMMAND, 1.0, system=system, component=component)
+    net.poll()
+    assert alice.take("COMMAND_ACK") == []
+    assert not net.autopilot.now.status.armed
+
+
+@pytest.mark.parametrize(("system", "component"), [(7, 1), (0, 1), (7, 0), (0, 0)])
+def test_commands_to_us_or_to_all_are_carried_out(net: Net, system: int, component: int) -> None:
+    alice = net.join(ALICE)
+    assert alice.ask(COMMAND, 1.0, system=system, component=component) == ACCEPTED
+    assert net.autopilot.now.status.armed
+
+
+def test_an_acknowledgement_is_addressed_to_its_sender_and_goes_only_there(net: Net) -> None:
+    alice, bob = net.join(ALICE, system=250, component=191), net.join(BOB)
+    alice.command(COMMAND, 1.0)
+    net.poll()
+    (ack,) = alice.take("COMMAND_ACK")
+    assert (ack.target_system, ack.target_component) == (250, 191)
+    assert (ack.get_srcSystem(), ack.get_srcComponent()) == (7, 1)
+    assert bob.take("COMMAND_ACK") == []
+
+
+def test_mode_requests_of_old_stations_are_for_one_system(net: Net) -> None:
+    alice = net.join(ALICE)
+    takeoff = 4 << 16 | 2 << 24
+    alice.send(mavlink.MAVLink_set_mode_message(8, 1, takeoff))
+    assert net.autopilot.now.status.mode is Mode.HOLD
+    alice.send(mavlink.MAVLink_set_mode_message(7, 1, takeoff))
+    assert net.autopilot.now.status.mode is Mode.TAKEOFF
+    alice.send(mavlink.MAVLink_set_mode_message(7, 1, 12345))
+    net.poll()
+    assert any("no such mode" in text.text for text in alice.take("STATUSTEXT"))
+
+
+def test_each_peer_has_sequence_numbers_of_its_own(net: Net) -> None:
+    alice, bob = net.join(ALICE), net.join(BOB)
+    net.run(3.0)
+    for station in (alice, bob):
+        numbers = [frame[4] for frame in station.frames]
+        assert len(numbers) > 300
+        assert numbers == [index % 256 for index in range(len(numbers))]
+    assert len(alice.frames) < len(bob.frames)
+
+
+# ---------------------------------------------------------------------- who is told what
+
+
+def test_an_unheard_permanent_peer_gets_heartbeats_only(net: Net) -> None:
+    station = net.join(ALICE, heard=False)
+    net.hub.add_peer(ALICE, permanent=True)
+    net.autopilot.say(NOTICE, "nobody hears this")
+    net.run(10.0)
+    assert {message.get_type() for message in station.inbox} == {"HEARTBEAT"}
+    assert len(station.inbox) == pytest.approx(10, abs=1)
+    station.heartbeat()
+    net.run(1.0)
+    assert {"ATTITUDE", "SYS_STATUS", "ESC_STATUS"} <= {message.get_type() for message in station.inbox}
+
+
+def test_an_unknown_sender_of_junk_gets_nothing_and_is_forgotten(net: Net) -> None:
+    junk = PeerAddress(GROUND, "junk", 9)
+    net.hub.receive(junk, b"\xfd\x00junk", net.now_s)
+    net.run(2.0)
+    assert net.strangers == []
+    assert net.hub._peers == {}
+
+
+def test_silent_peers_are_forgotten_and_permanent_ones_fall_back_to_heartbeats(net: Net) -> None:
+    alice, bob = net.join(ALICE, heard=False), net.join(BOB)
+    net.hub.add_peer(ALICE, permanent=True)
+    alice.heartbeat()
+    net.run(29.0)
+    for station in (alice, bob):
+        assert station.take("ATTITUDE")
+        station.inbox.clear()
+    net.run(2.0)
+    alice.inbox.clear()
+    bob.inbox.clear()
+    net.run(5.0)
+    assert {message.get_type() for message in alice.inbox} == {"HEARTBEAT"}
+    assert bob.inbox == []
+    assert net.hub.last_heard_s == -math.inf
+    bob.heartbeat()
+    net.run(0.1)
+    assert bob.take("ATTITUDE")
+
+
+def test_no_more_peers_than_there_is_room_for(net: Net) -> None:
+    for index in range(MAX_PEERS + 8):
+        net.join(PeerAddress(GROUND, "host", index))
+    assert len(net.hub._peers) == MAX_PEERS
+    net.run(0.1)
+    assert not net.stations[PeerAddress(GROUND, "host", MAX_PEERS + 1)].inbox
+
+
+def test_heartbeats_tell_a_change_at_once(net: Net) -> None:
+    alice = net.join(ALICE)
+    net.run(0.5)
+    alice.take("HEARTBEAT")
+    alice.command(COMMAND, 1.0)
+    net.poll()
+    (beat,) = alice.take("HEARTBEAT")
+    assert beat.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def test_texts_and_reached_items_go_to_all_who_listen(net: Net) -> None:
+    alice, bob = net.join(ALICE), net.join(BOB)
+    net.poll()
+    net.autopilot.say(NOTICE, "x" * 120)
+    net.autopilot.now.reached += [3, 4]
+    net.poll()
+    for station in (alice, bob):
+        assert [len(chunk.text) for chunk in station.take("STATUSTEXT")] == [50, 50, 20]
+        assert [message.seq for message in station.take("MISSION_ITEM_REACHED")] == [3, 4]
+    net.poll()
+    assert alice.take("STATUSTEXT") == alice.take("MISSION_ITEM_REACHED") == []
+
+
+@pytest.mark.parametrize(("vehicle_rate", "expected"), [(1.0, 250), (50.0, 250), (0.1, 25), (0.0, 1)])
+def test_streams_count_the_slower_of_both_clocks(net: Net, vehicle_rate: float, expected: int) -> None:
+    alice = net.join(ALICE)
+    net.run(5.0, vehicle_rate)
+    assert len(alice.take("ATTITUDE")) == pytest.approx(expected, abs=3)
+    assert len(alice.take("HEARTBEAT")) == pytest.approx(5, abs=1)  # by the link's own clock
+
+
+# ---------------------------------------------------------------------- commands of a link
+
+
+def test_message_intervals_are_the_peers_own(net: Net) -> None:
+    alice, bob = net.join(ALICE), net.join(BOB)
+    interval = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+    attitude = mavlink.MAVLINK_MSG_ID_ATTITUDE
+    assert alice.ask(interval, attitude, 200_000.0) == ACCEPTED
+    alice.inbox.clear()
+    bob.inbox.clear()
+    net.run(2.0)
+    assert len(alice.take("ATTITUDE")) == pytest.approx(10, abs=1)
+    assert len(bob.take("ATTITUDE")) == pytest.approx(200, abs=2)
+    assert alice.ask(mavlink.MAV_CMD_REQUEST_MESSAGE, 244.0, attitude) == ACCEPTED
+    (told,) = alice.take("MESSAGE_INTERVAL")
+    assert (told.message_id, told.interval_us) == (attitude, 200_000)
+    assert alice.ask(interval, attitude, -1.0) == ACCEPTED
+    net.run(1.0)
+    alice.take("ATTITUDE")
+    net.run(1.0)
+    assert alice.take("ATTITUDE") == []
+
+
+@pytest.mark.parametrize(
+    ("number", "params"),
+    [
+        (511, (9999.0, 1e5)), (511, (NAN, 1e5)), (511, (30.0, NAN)), (511, (30.0, 1e30)), (511, (30.0, -5.0)),
+        (511, (math.inf, 1e5)), (512, (9999.0,)), (512, (NAN,)), (512, (math.inf,)), (512, (-1.0,)),
+        (512, (244.0, -1.0)), (512, (244.0, 70000.0)), (512, (244.0, NAN)), (512, (244.0, 1e30)),
+    ],
+)  # fmt: skip
+def test_wishes_that_cannot_be_are_denied(net: Net, number: int, params: tuple[float, ...]) -> None:
+    alice = net.join(ALICE)
+    assert alice.ask(number, *params) == DENIED
+    assert any(text.text.startswith("Command refused") for text in alice.take("STATUSTEXT"))
+    net.run(0.1)
+
+
+@pytest.mark.parametrize(
+    "name", ["ATTITUDE", "HOME_POSITION", "AUTOPILOT_VERSION", "GPS_GLOBAL_ORIGIN", "ESC_STATUS"]
+)
+def test_messages_come_on_request(net: Net, name: str) -> None:
+    alice = net.join(ALICE)
+    net.poll()
+    alice.inbox.clear()
+    number = next(number for number, kind in mavlink.mavlink_map.items() if kind.msgname == name)
+    assert alice.ask(mavlink.MAV_CMD_REQUEST_MESSAGE, number) == ACCEPTED
+    assert len(alice.take(name)) == 1
+
+
+def test_shut_down_is_for_a_vehicle_on_the_ground(net: Net) -> None:
+    alice = net.join(ALICE)
+    shutdown = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+    assert alice.ask(shutdown, 1.0) == UNSUPPORTED
+    net.autopilot.now.status = net.autopilot.now.status._replace(armed=True)
+    net.autopilot.now.landed = False
+    assert alice.ask(shutdown, 2.0) == DENIED
+    assert not net.hub.shutdown_requested
+    net.autopilot.now.landed = True
+    assert alice.ask(shutdown, 2.0) == ACCEPTED
+    assert net.hub.shutdown_requested
+
+
+@pytest.mark.parametrize(
+    ("altitude", "result"),
+    [(491.0, ACCEPTED), (NAN, ACCEPTED), (math.inf, DENIED), (1e30, REJECTED), (488.1, REJECTED)],
+)
+def test_takeoff_altitudes_have_limits(net: Net, altitude: float, result: int) -> None:
+    alice = net.join(ALICE)
+    assert alice.ask(mavlink.MAV_CMD_NAV_TAKEOFF, NAN, NAN, NAN, NAN, NAN, NAN, altitude) == result
+
+
+def test_farewell_says_goodbye_to_all(net: Net) -> None:
+    alice = net.join(ALICE)
+    net.poll()
+    alice.inbox.clear()
+    alice.command(COMMAND, 5.0)
+    for address, data in net.hub.farewell():
+        assert address == ALICE
+        alice.inbox += alice.codec.decode(data)
+    assert [message.get_type() for message in alice.inbox] == ["STATUSTEXT"] * 2 + [
+        "COMMAND_ACK",
+        "HEARTBEAT",
+    ]
+    assert alice.inbox[-1].system_status == mavlink.MAV_STATE_POWEROFF
+
+
+# ---------------------------------------------------------------------- anything
+
+
+KINDS = sorted(mavlink.mavlink_map)
+
+
+@st.composite
+def any_frame(draw: st.DrawFn) -> bytes:
+    """A frame with a right checksum: any message, any payload, any sender."""
+    kind = mavlink.mavlink_map[draw(st.sampled_from(KINDS))]
+    payload = draw(st.binary(min_size=1, max_size=255))
+    size = min(255, kind.unpacker.size)
+    payload = (payload * 255)[: draw(st.integers(1, size))]
+    codec = mavlink.MAVLink(None, draw(st.integers(0, 255)), draw(st.integers(0, 255)))
+    head = bytes([len(payload), 0, 0, 3, codec.srcSystem, codec.srcComponent]) + kind.id.to_bytes(3, "little")
+    crc = mavlink.x25crc(head + payload)
+    crc.accumulate(bytes([kind.crc_extra]))
+    return b"\xfd" + head + payload + crc.crc.to_bytes(2, "little")
+
+
+STRANGE = st.sampled_from(
+    [0.0, 1.0, 2.0, -1.0, 7.0, 30.0, 244.0, 21196.0, NAN, math.inf, -math.inf, 3e38, 1e-40]
+)
+
+
+@st.composite
+def any_command(draw: st.DrawFn) -> bytes:
+    number = draw(st.sampled_from([16, 20, 21, 22, 176, 246, 300, 400, 511, 512, 31010]))
+    params = [draw(STRANGE) for _ in range(7)]
+    link = Link(255, 190)
+    if draw(st.booleans()):
+        return link.encode(
+            mavlink.MAVLink_command_long_message(7, 1, number, draw(st.integers(0, 255)), *params)
+        )
+    x, y = draw(st.integers(-(2**31), 2**31 - 1)), draw(st.integers(-(2**31), 2**31 - 1))
+    frame = draw(st.integers(0, 255))
+    return link.encode(
+        mavlink.MAVLink_command_int_message(7, 1, frame, number, 0, 0, *params[:4], x, y, params[6])
+    )
+
+
+@settings(derandomize=True, deadline=None, max_examples=120)
+@given(st.lists(st.one_of(st.binary(max_size=100), any_frame(), any_command()), min_size=1, max_size=12))
+def test_nothing_that_arrives_raises(storm: list[bytes]) -> None:
+    net = Net()
+    alice = net.join(ALICE)
+    for data in storm:
+        net.hub.receive(ALICE, data, net.now_s)
+        net.run(0.02)
+    alice.inbox.clear()
+    for _ in range(12):  # half a frame may wait for its other half
+        alice.heartbeat()
+        net.run(0.1, step_s=0.1)
+    assert alice.take("HEARTBEAT")
