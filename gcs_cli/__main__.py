@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 import signal
 import sys
 from typing import Annotated, Any
@@ -36,6 +38,9 @@ _VersionOption = Annotated[
     bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
 ]
 
+_TYPER_INTERRUPTED = 130
+"""What typer makes of a KeyboardInterrupt; none of our exit codes."""
+
 
 @app.callback()
 def options(
@@ -66,14 +71,25 @@ _register()
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the terminal is restored
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # None when it is closed
+            stream.reconfigure(errors="replace")  # for an output that has no × and no °
     try:
-        return app(argv, prog_name="gcs", standalone_mode=False) or DONE
+        code = app(argv, prog_name="gcs", standalone_mode=False) or DONE
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        if code != _TYPER_INTERRUPTED:
+            return code
+        sentence, code = "interrupted", FAILED
     except (KeyboardInterrupt, typer.Abort):
-        print("gcs: interrupted", file=sys.stderr)
-        return FAILED
+        sentence, code = "interrupted", FAILED
     except BrokenPipeError:  # `gcs watch | head`
-        sys.stderr.close()
+        _drop_output()
         return DONE
+    except OSError as error:
+        _drop_output()  # which may be what failed
+        where = "" if error.filename is None else f"{error.filename}: "
+        sentence, code = f"{where}{error.strerror or error}", FAILED
     except _UsageError as error:
         if type(error).__name__ == "NoArgsIsHelpError":  # `gcs` and `gcs mission`: its message is the help
             print(error.format_message(), file=sys.stderr)
@@ -85,6 +101,14 @@ def main(argv: list[str] | None = None) -> int:
         sentence, code = _config_problem(error), USAGE
     print(f"gcs: {sentence}", file=sys.stderr)
     return code
+
+
+def _drop_output() -> None:
+    """Send what Python still holds for stdout nowhere, or it would complain at its end."""
+    if sys.stdout is not None:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
 
 
 def _config_problem(error: Exception) -> str:

@@ -20,6 +20,8 @@ from gcs_cli.view_types import LOST_AFTER_S, VehicleView
 READY_PAUSE_S = 0.1
 """Between two questions whether the vehicle is ready."""
 SHUT_DOWN_PATIENCE_S = 3.0
+STALL_S = 10.0
+"""How long simulated time may stand still in flight, at real time or faster."""
 _FACTOR_NEEDS_S = 0.05
 _ON_GROUND, _IN_AIR = 1, 2  # MAV_LANDED_STATE
 _WARNING = 4  # MAV_SEVERITY_WARNING
@@ -59,7 +61,13 @@ class Flight:
     """Flies ``items`` on the vehicle of ``session``."""
 
     def __init__(
-        self, session: Session, items: Sequence[MissionItem], now_s: float, connect_s: float, limit_s: float
+        self,
+        session: Session,
+        items: Sequence[MissionItem],
+        now_s: float,
+        connect_s: float,
+        limit_s: float,
+        stall_s: float = STALL_S,
     ) -> None:
         self.phase = Phase.CONNECT
         self.outcome: Outcome | None = None
@@ -78,6 +86,8 @@ class Flight:
         self._ask_again_s: float | None = None
         self._questions: list[calls.Command] = []
         self._start_time_s: float | None = None
+        self._stall_s = stall_s
+        self._moved: tuple[float | None, float] = (None, now_s)
         self._phase_due_s = 0.0
 
     @property
@@ -170,6 +180,7 @@ class Flight:
     def _start(self, now_s: float) -> None:
         if self._answered("the vehicle refused to start the mission: ", now_s):
             self.began_s = now_s
+            self._moved = (self.view.time_s, now_s)
             self.phase = Phase.FLY
 
     def _fly(self, now_s: float) -> None:
@@ -183,11 +194,20 @@ class Flight:
         elif (self.flown_s or 0.0) > self._limit_s:
             late = f"the flight took longer than --limit {self._limit_s:g} s of simulated time"
             self._end(Outcome(late, NO_ANSWER), now_s)
+        elif self._stands_still(now_s):
+            still = f"simulated time stood still for {self._stall_s:g} s at t = {self._moved[0] or 0.0:.1f} s"
+            self._end(Outcome(f"{still}: the simulator does not answer", FAILED), now_s)
         elif self._ends_in_air and view.mission.complete and view.mode == "HOLD" and not self.returned_by_us:
             self.returned_by_us = True
             self._order(calls.RETURN, now_s)
         elif self.returned_by_us and view.landed_state == _IN_AIR:
             self._answered("the mission is flown, but the vehicle refused to return: ", now_s)
+
+    def _stands_still(self, now_s: float) -> bool:
+        """Tell whether time has stood still for too long; the vehicle's heartbeats go on meanwhile."""
+        if self.view.time_s != self._moved[0]:
+            self._moved = (self.view.time_s, now_s)
+        return now_s - self._moved[1] > self._stall_s
 
     def _confirm(self, now_s: float) -> None:
         """Ask for what the last telemetry may not have said; the answers are in the view."""

@@ -54,6 +54,11 @@ class FlyOptions:
         return nearest_outer_hz(self.inner_hz)
 
     @property
+    def speed_factor(self) -> float:
+        """How many times real time the flight shall be; infinite for ``max``."""
+        return math.inf if self.speed == "max" else float(self.speed)
+
+    @property
     def gcs_port(self) -> int:
         """UDP port to which the vehicle sends."""
         return 14550 + 10 * self.instance

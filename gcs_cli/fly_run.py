@@ -14,7 +14,7 @@ from flightstack.plan import Plan
 from gcs_cli.connection import Connection
 from gcs_cli.endpoint import Endpoint
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
-from gcs_cli.flight import Flight, Outcome
+from gcs_cli.flight import STALL_S, Flight, Outcome
 from gcs_cli.fly_display import Display
 from gcs_cli.fly_options import (
     DEFAULT_HOME,
@@ -73,7 +73,14 @@ def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> 
     with Interruption() as interruption, _open(local) as connection:
         check_ports(options)
         folder = make_run_directory(options.plan_path, out)
-        flight = Flight(connection.session, plan.items, connection.now_s, options.timeout_s, options.limit_s)
+        flight = Flight(
+            connection.session,
+            plan.items,
+            connection.now_s,
+            options.timeout_s,
+            options.limit_s,
+            STALL_S / min(1.0, options.speed_factor),
+        )
         with _recording(connection, folder), Children(folder) as children:
             home = plan.home or DEFAULT_HOME
             children.start("sim-bridge", "sim_bridge", simulator_arguments(options, home))
@@ -115,6 +122,8 @@ def _run(
     flight: Flight, connection: Connection, children: Children, interruption: Interruption, display: Display
 ) -> None:
     while not flight.over:
+        if flight.outcome is not None and children.wait(0.0):
+            return  # nobody is left who could be shut down
         now_s = connection.now_s
         if interruption.reason:
             flight.abort(interruption.reason, FAILED, now_s)
@@ -131,14 +140,14 @@ def _run(
 
 def _casualty(flight: Flight, children: Children) -> Child | None:
     """Return the child that ended first and took the other along, while there is a flight to end."""
-    if flight.outcome is not None:
-        return None
-    if flight.view.powered_off:
-        children.wait(_LAST_WORDS_S)  # it is about to say why
     ended = children.ended()
-    if not ended:
+    if flight.outcome is not None or not (ended or flight.view.powered_off):
         return None
-    return min(ended, key=lambda child: ((child.exit_code or 0) >= 0, " lost" in child.last_line))
+    if all(child.blames_another for child in ended):
+        children.wait(_LAST_WORDS_S)  # the one to blame is about to end, and to say why
+    # of two that ended in order, the one started last depends on the other and would have blamed it
+    ended = list(reversed(children.ended()))
+    return min(ended, key=lambda child: ((child.exit_code or 0) >= 0, child.blames_another), default=None)
 
 
 def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 _TAIL_BYTES = 4096
 _POLL_S = 0.02
+_BLAME = ("lost at", "lost:", "was shut down")  # in the words of simulator and flight stack
 
 
 class Child:
@@ -46,12 +47,17 @@ class Child:
         return next((line.strip() for line in reversed(lines) if line.strip()), "")
 
     @property
+    def blames_another(self) -> bool:
+        """Whether it ended because another process did."""
+        return any(words in self.last_line for words in _BLAME)
+
+    @property
     def obituary(self) -> str:
         """How it ended, in one clause."""
         code = self.exit_code
-        ending = (
-            f"was killed by signal {-code}" if code is not None and code < 0 else f"ended with code {code}"
-        )
+        if code is not None and code < 0:  # its last line was about something else
+            return f"{self.name} was killed by signal {-code}"
+        ending = f"ended with code {code}"
         said = self.last_line.removeprefix(f"{self.name}: ")
         return f"{self.name} {ending}" + (f": {said}" if said else "")
 

@@ -8,7 +8,7 @@ import pytest
 
 from flightstack.plan import Command, Frame, MissionItem
 from gcs_cli.errors import DONE, FAILED, NO_ANSWER
-from gcs_cli.flight import Flight, Phase
+from gcs_cli.flight import STALL_S, Flight, Phase
 from gcs_cli.session import Session
 from tests.support.fake_vehicle import ARM, RETURN, SHUT_DOWN, START, FakeVehicle
 
@@ -166,6 +166,13 @@ def test_a_vehicle_that_shuts_down_in_flight() -> None:
     story = Story(FakeVehicle(stop_at_item=1, at_stop="power off")).run()
     assert "the flight stack shut down" in story.reason
     assert story.code == FAILED
+
+
+def test_simulated_time_that_stands_still_ends_the_flight() -> None:
+    vehicle = FakeVehicle(stop_at_item=1, at_stop="hover", simulated_s_per_item=1e-9)
+    story = Story(vehicle).run(most_s=STALL_S + 5.0)
+    assert story.code == FAILED
+    assert story.reason.startswith("simulated time stood still for 10 s at t = 0.0 s: the simulator")
 
 
 def test_the_limit_counts_simulated_time() -> None:
