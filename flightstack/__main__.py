@@ -15,27 +15,44 @@ app = typer.Typer(add_completion=False, context_settings={"help_option_names": [
 @app.command()
 def run(
     vehicle: Annotated[str, typer.Option(help="Built-in vehicle or TOML file.")] = "paper_quad",
-    controller: Annotated[str, typer.Option(help="Attitude controller: pid, backstepping or an installed one.")] = "pid",
+    controller: Annotated[str, typer.Option(help="Attitude controller: pid, backstepping or yours.")] = "pid",
     gains: Annotated[str, typer.Option(help="Gains: tuned, paper or a TOML file.")] = "tuned",
     inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop [Hz].")] = 500.0,
     outer_hz: Annotated[
-        float | None, typer.Option(help="Rate of the outer loop [Hz]; divides the inner rate [nearest to 100].")
+        float | None,
+        typer.Option(help="Rate of the outer loop [Hz]; divides the inner rate [nearest to 100]."),
     ] = None,
     clock: Annotated[str, typer.Option(help="lockstep (the simulator owns time) or realtime.")] = "lockstep",
     loops: Annotated[str, typer.Option(help="Which loops fly: python.")] = "python",
     sim_host: Annotated[str, typer.Option(help="Host of the simulator.")] = "127.0.0.1",
     sim_port: Annotated[int | None, typer.Option(help="Port of the simulator [4560 + instance].")] = None,
     sim_timeout: Annotated[float, typer.Option(help="Longest wait for the simulator [s].")] = 30.0,
-    instance: Annotated[int, typer.Option(min=0, max=250, help="Number of this vehicle; shifts ports and id.")] = 0,
+    instance: Annotated[
+        int, typer.Option(min=0, max=250, help="Number of this vehicle; shifts ports and id.")
+    ] = 0,
     gcs_port: Annotated[int, typer.Option(help="UDP port of the ground station.")] = 14550,
-    api_port: Annotated[int | None, typer.Option(help="UDP port of the API client [14540 + instance].")] = None,
-    log: Annotated[str | None, typer.Option(help="Log file [runs/<stamp>-flight.ulg]; 'none' for no log.")] = None,
-    param: Annotated[list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")] = None,
+    api_port: Annotated[
+        int | None, typer.Option(help="UDP port of the API client [14540 + instance].")
+    ] = None,
+    log: Annotated[
+        str | None, typer.Option(help="Log file [runs/<stamp>-flight.ulg]; 'none' for no log.")
+    ] = None,
+    param: Annotated[
+        list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")
+    ] = None,
     home: Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of the local origin.")] = None,
-    ideal_rotors: Annotated[bool, typer.Option(help="Rotors without lag and limits, as the paper assumes.")] = False,
-    wait_for_start: Annotated[bool, typer.Option(help="Keep time at zero until a mission is started.")] = False,
-    check: Annotated[bool, typer.Option("--check", help="Check the configuration, compile the loops, and end.")] = False,
-    exit_on_gcs_loss: Annotated[float | None, typer.Option(help="End when no ground station is heard [s].")] = None,
+    ideal_rotors: Annotated[
+        bool, typer.Option(help="Rotors without lag and limits, as the paper assumes.")
+    ] = False,
+    wait_for_start: Annotated[
+        bool, typer.Option(help="Keep time at zero until a mission is started.")
+    ] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="Check the configuration, compile the loops, end.")
+    ] = False,
+    exit_on_gcs_loss: Annotated[
+        float | None, typer.Option(help="End when no ground station is heard [s].")
+    ] = None,
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.app import EXIT_USAGE, App, ProcessConfig

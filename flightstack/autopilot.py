@@ -38,7 +38,9 @@ class Recorder(Protocol):
     def inner_row(self, time_us: int) -> FloatArray:
         """Return the row, shape (48,), that the inner loop fills in this tick."""
 
-    def outer(self, time_us: int, state: FloatArray, setpoint: FloatArray, attitude_target: FloatArray) -> None:
+    def outer(
+        self, time_us: int, state: FloatArray, setpoint: FloatArray, attitude_target: FloatArray
+    ) -> None:
         """Record one outer tick."""
 
     def status(self, time_us: int, status: Status) -> None:
@@ -52,6 +54,10 @@ class Recorder(Protocol):
 
     def text(self, time_us: int, severity: int, text: str) -> None:
         """Record a text."""
+
+
+DISARMED = Status()
+NO_PROGRESS = MissionProgress(0, -1, False, False)
 
 
 class Text(NamedTuple):
@@ -70,9 +76,9 @@ class Snapshot:
     attitude_target: FloatArray
     row: FloatArray
     time_us: int = 0
-    status: Status = Status()
+    status: Status = DISARMED
     landed: bool = True
-    progress: MissionProgress = MissionProgress(0, -1, False, False)
+    progress: MissionProgress = NO_PROGRESS
     mission_count: int = 0
     mission_complete: bool = False
     reached: list[int] = field(default_factory=list)

@@ -39,7 +39,9 @@ def rates(inner_hz: float, outer_hz: float) -> Rates:
         raise ConfigError("--inner-hz", f"{inner_hz:g}", f"is outside {MIN_INNER_HZ:g} to {MAX_INNER_HZ:g}")
     interval_us = round(1e6 / inner_hz)
     if abs(interval_us * inner_hz - 1e6) > 1e-6:
-        raise ConfigError("--inner-hz", f"{inner_hz:g}", "does not make a whole number of microseconds per tick")
+        raise ConfigError(
+            "--inner-hz", f"{inner_hz:g}", "does not make a whole number of microseconds per tick"
+        )
     if not 0.0 < outer_hz <= inner_hz:
         raise ConfigError("--outer-hz", f"{outer_hz:g}", f"is outside 0 to the inner rate {inner_hz:g}")
     divisor = round(inner_hz / outer_hz)

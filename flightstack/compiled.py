@@ -101,7 +101,7 @@ def as_tuple(array: Any, count: int) -> Any:
 @overload(as_tuple, prefer_literal=True)
 def _as_tuple(array, count):  # type: ignore[no-untyped-def]  # Numba compares the two signatures, annotations too
     if isinstance(count, numba.types.Literal):
-        return lambda array, count: to_fixed_tuple(array, count)
+        return lambda array, count: to_fixed_tuple(array, count)  # noqa: PLW0108  # its names are compared too
     return None
 
 

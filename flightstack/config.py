@@ -40,7 +40,11 @@ def parse_home(text: str) -> GeoPoint:
     try:
         latitude, longitude, altitude = (float(part) for part in text.split(","))
     except ValueError:
-        raise ConfigError("--home", text, "must be LATITUDE,LONGITUDE,ALTITUDE in degrees and metres") from None
-    if not (abs(latitude) < 90.0 and abs(longitude) <= 180.0 and math.isfinite(altitude) and abs(altitude) < 2e4):
+        raise ConfigError(
+            "--home", text, "must be LATITUDE,LONGITUDE,ALTITUDE in degrees and metres"
+        ) from None
+    if not (
+        abs(latitude) < 90.0 and abs(longitude) <= 180.0 and math.isfinite(altitude) and abs(altitude) < 2e4
+    ):
         raise ConfigError("--home", text, "is not a place on earth")
     return GeoPoint(latitude, longitude, altitude)

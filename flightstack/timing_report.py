@@ -41,7 +41,11 @@ class TimingReport:
 
     def log_fields(self, ticks: int) -> dict[str, Any]:
         """Return the fields of the log topic ``loop_timing``: in lockstep only what every run has in common."""
-        fields: dict[str, Any] = {"ticks": ticks, "inner_hz": self._rates.inner_hz, "outer_hz": self._rates.outer_hz}
+        fields: dict[str, Any] = {
+            "ticks": ticks,
+            "inner_hz": self._rates.inner_hz,
+            "outer_hz": self._rates.outer_hz,
+        }
         if self._lockstep:
             return fields
         e, late = self._execution, self._lateness

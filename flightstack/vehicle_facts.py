@@ -13,6 +13,7 @@ from flightstack.mavlink.link import Message
 from flightstack.modes import Mode
 from flightstack.params.vehicle import Vehicle
 
+
 class AutopilotFacts:
     """Implements ``telemetry.VehicleFacts``; every property reads the present."""
 

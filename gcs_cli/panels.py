@@ -66,9 +66,8 @@ def _angles(angles: Euler | None, width: int, style: str, label: str = "") -> Te
         text.append(f"{label}  ", style="bright_black")
     for index, name in enumerate(names):
         degrees = None if angles is None else math.degrees(angles[index])
-        if degrees is None:
-            shown = UNKNOWN
-        else:
+        shown = UNKNOWN
+        if degrees is not None:
             shown = f"{round(degrees) % 360:03d}°" if index == 2 else f"{degrees:+.1f}°"
         text.append(f"{name} ", style="bright_black")
         text.append(shown, style=style)

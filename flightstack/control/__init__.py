@@ -1,0 +1,1 @@
+"""Control laws, mixer and the loops that join them."""

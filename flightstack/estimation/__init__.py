@@ -1,0 +1,1 @@
+"""Estimators; none is needed while the simulator sends the true state."""

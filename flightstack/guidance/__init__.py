@@ -1,0 +1,1 @@
+"""From modes and missions to the setpoints of the outer loop."""

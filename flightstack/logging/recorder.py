@@ -42,7 +42,9 @@ class FlightRecorder:
         """Return the row that the inner loop fills in this tick."""
         return self._scratch if self._log is None else self._log.inner.append(time_us)
 
-    def outer(self, time_us: int, state: FloatArray, setpoint: FloatArray, attitude_target: FloatArray) -> None:
+    def outer(
+        self, time_us: int, state: FloatArray, setpoint: FloatArray, attitude_target: FloatArray
+    ) -> None:
         """Record one outer tick."""
         if self._log is None:
             return

@@ -1,0 +1,1 @@
+"""MAVLink without I/O: dialect, frames, telemetry, services."""

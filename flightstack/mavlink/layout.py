@@ -40,7 +40,7 @@ def message_class(layout: Layout) -> Any:
     declared = sorted(fields, key=lambda field: field.declared_index)
     unpacker = struct.Struct(layout.format)
 
-    def __init__(self: Any, *values: Any, **named: Any) -> None:
+    def initialise(self: Any, *values: Any, **named: Any) -> None:
         common.MAVLink_message.__init__(self, layout.message_id, layout.name)
         self._fieldnames = names
         self._instance_field = None
@@ -82,7 +82,7 @@ def message_class(layout: Layout) -> Any:
             "unpacker": unpacker,
             "instance_field": None,
             "instance_offset": -1,
-            "__init__": __init__,
+            "__init__": initialise,
             "pack": pack,
         },
     )

@@ -1,0 +1,1 @@
+"""Numbers that decide a flight: vehicles, gains, behaviour."""

@@ -94,7 +94,9 @@ def _vehicle(top: Table) -> Vehicle:
     inertia = body.numbers("inertia_kg_m2", 3, 1e-8, 1e4)
     ix, iy, iz = inertia
     if ix + iy < iz or iy + iz < ix or iz + ix < iy:
-        raise body.error("inertia_kg_m2", "no rigid body has it: each must be at most the sum of the other two")
+        raise body.error(
+            "inertia_kg_m2", "no rigid body has it: each must be at most the sum of the other two"
+        )
     vehicle = Vehicle(
         name=top.text("name"),
         description=top.text("description", ""),
@@ -122,7 +124,9 @@ def _rotors(top: Table, rotor_type: Table, mass_kg: float) -> tuple[Rotor, ...]:
         ratio = rotor_type.number("thrust_to_weight", 1.05, 20.0)
         max_speed = math.sqrt(ratio * mass_kg * GRAVITY_M_S2 / (len(entries) * thrust_coefficient))
     if min_speed >= max_speed:
-        raise rotor_type.error("min_speed_rad_s", f"{min_speed:g} is not below the largest speed {max_speed:g}")
+        raise rotor_type.error(
+            "min_speed_rad_s", f"{min_speed:g} is not below the largest speed {max_speed:g}"
+        )
     torque_coefficient = rotor_type.number("torque_coefficient_n_m_s2", 1e-15, 1.0)
     inertia = rotor_type.number("inertia_kg_m2", 0.0, 1.0, 0.0)
     lag_s = rotor_type.number("lag_s", 0.0, 1.0, 0.0)
@@ -132,7 +136,9 @@ def _rotors(top: Table, rotor_type: Table, mass_kg: float) -> tuple[Rotor, ...]:
         spin = 1 if entry.choice("spin", ("cw", "ccw")) == "cw" else -1
         entry.finish()
         rotors.append(
-            Rotor((x, y, z), spin, thrust_coefficient, torque_coefficient, inertia, lag_s, min_speed, max_speed)
+            Rotor(
+                (x, y, z), spin, thrust_coefficient, torque_coefficient, inertia, lag_s, min_speed, max_speed
+            )
         )
     return tuple(rotors)
 
@@ -142,8 +148,12 @@ def _check_geometry(top: Table, vehicle: Vehicle) -> None:
     scaled = matrix / np.maximum(np.abs(matrix).max(axis=1, keepdims=True), 1e-300)
     if np.linalg.matrix_rank(scaled, tol=1e-6) < 4:
         raise top.error(
-            "rotor", "the rotor geometry is singular: it cannot make thrust, roll, pitch and yaw independently"
+            "rotor",
+            "the rotor geometry is singular: it does not make thrust, roll, pitch and yaw each by itself",
         )
     hover = np.linalg.pinv(matrix) @ np.array([vehicle.weight_n, 0.0, 0.0, 0.0])
-    if hover.min() <= 0.0 or vehicle.max_thrust_n <= vehicle.weight_n:
-        raise top.error("rotor", "the rotors cannot hold the vehicle in hover")
+    for number, (rotor, squared) in enumerate(zip(vehicle.rotors, hover.tolist(), strict=True), start=1):
+        needed, low, high = math.sqrt(max(squared, 0.0)), rotor.min_speed_rad_s, rotor.max_speed_rad_s
+        if squared <= 0.0 or not low < needed < high:
+            needs = f"number {number} would need {needed:.0f} rad/s, its range is {low:.0f} to {high:.0f}"
+            raise top.error("rotor", f"the rotors cannot hold the vehicle in hover: {needs}")

@@ -220,7 +220,9 @@ def test_bad_arguments_are_one_sentence_and_exit_2(start: Start, arguments: list
 def test_real_time_clock_flies_with_a_simulator_that_does_not_wait(start: Start, tmp_path: Path) -> None:
     log = tmp_path / "flight.ulg"
     start("sim_bridge", "--instance", "48")
-    stack = start("flightstack", "--instance", "48", "--gcs-port", "14998", "--clock", "realtime", "--log", str(log))
+    stack = start(
+        "flightstack", "--instance", "48", "--gcs-port", "14998", "--clock", "realtime", "--log", str(log)
+    )
     stack.wait_for("flightstack: paper_quad")
     for arguments in (["takeoff", "--alt", "1"], ["arm"]):
         command = start("gcs_cli", "--connect", "udp:14998", *arguments)

@@ -44,7 +44,7 @@ HELD_STEP_S = 0.001
 SERVICE_LIMIT_S = 30.0
 
 
-class TookTooLong(AssertionError):
+class TookTooLongError(AssertionError):
     """A story's condition did not come true within its simulated time."""
 
 
@@ -169,7 +169,7 @@ class World:
             if condition():
                 return
             self.tick()
-        raise TookTooLong(
+        raise TookTooLongError(
             f"not within {limit_s} s; mode {self.mode.name}, position {self.position}, {self.texts}"
         )
 
@@ -217,7 +217,7 @@ class World:
             self._held_s += HELD_STEP_S
             self.exchange_with_ground()
             if self._held_s - began_s > SERVICE_LIMIT_S:
-                raise TookTooLong("no answer from the vehicle")
+                raise TookTooLongError("no answer from the vehicle")
 
     def upload(self, plan: str | Sequence[MissionItem]) -> Done | Failed:
         """Upload a mission file of ``missions/`` or a list of items; return how it ended."""
