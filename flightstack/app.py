@@ -13,7 +13,7 @@ from pathlib import Path
 from types import FrameType
 
 from flightstack.assembly import Stack, build
-from flightstack.clock import DeadlineScheduler
+from flightstack.clock import DeadlineScheduler, ask_for_punctual_sleeps
 from flightstack.config import StackConfig
 from flightstack.ground_hub import PeerAddress
 from flightstack.logging.flight_log import FlightLog
@@ -240,6 +240,7 @@ class App:
     def _run_real_time(self, simulator: TcpClient) -> None:
         """Tick at fixed deadlines on the newest state; the machine's clock owns time."""
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
+        ask_for_punctual_sleeps()
         scheduler = DeadlineScheduler(timing)
         interval_us, tick, time_us = self.stack.rates.interval_us, 0, 0
         heard_s = time.monotonic()

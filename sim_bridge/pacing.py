@@ -4,19 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 _BINS = 100_000  # of 1 µs; later ones count as the last
 _SLIP_NS = 500_000_000
 _NAP_S = 0.1
-
-
-def ask_for_punctual_sleeps() -> None:
-    """Set this process's timer slack to its minimum (Linux: 50 µs otherwise); elsewhere nothing happens."""
-    try:
-        Path("/proc/self/timerslack_ns").write_text("1", encoding="ascii")
-    except OSError:
-        return
 
 
 class Lateness:

@@ -8,6 +8,7 @@ import socket
 import sys
 from typing import NamedTuple
 
+from flightstack.clock import ask_for_punctual_sleeps
 from flightstack.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.connection import (
@@ -21,7 +22,6 @@ from sim_bridge.connection import (
 from sim_bridge.disturbance import wind_warning
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.lockstep import SimulatorLink
-from sim_bridge.pacing import ask_for_punctual_sleeps
 from sim_bridge.plant import PlantOptions
 from sim_bridge.session import Session
 from sim_bridge.simulator import Simulator
