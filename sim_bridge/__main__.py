@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 from typing import Annotated, Any
 
@@ -135,25 +136,32 @@ def open_loop(
     if position.z > 0.0 and not no_ground:
         raise UsageProblemError(f"--pos: {position.z:g} m down is below the ground; add --no-ground")
     from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
-    from sim_bridge.disturbance import wind_warning  # noqa: PLC0415
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
     from sim_bridge.plant import InitialState  # noqa: PLC0415
     from sim_bridge.server import complain  # noqa: PLC0415
 
     loaded = load_vehicle(vehicle)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
-    warning = wind_warning(loaded, plant, disturbance)
-    if warning:
-        complain(warning)
     velocity, rates_frd = arguments.vector("--vel", vel), arguments.vector("--rates", rates)
     state = run_open_loop(
         OpenLoop(
             loaded, plant, arguments.rotor_speeds(rotors, loaded),
             InitialState(position, velocity, Vector3(roll, pitch, yaw), rates_frd),
             seconds, dt, not no_ground, not no_lag, disturbance, seed,
-        )
+        ),
+        warn=complain,
     )  # fmt: skip
-    typer.echo(json.dumps(state) if as_json else _table(state))
+    _print(json.dumps(state) if as_json else _table(state))
+
+
+def _print(text: str) -> None:
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        sys.stdout = open(os.devnull, "w", encoding="ascii")  # noqa: SIM115  # Python tries again at its end
+        if not isinstance(error, BrokenPipeError):  # who closed a pipe has read enough
+            print(f"sim-bridge: cannot write the result: {error.strerror}", file=sys.stderr)
+        raise typer.Exit(1) from None
 
 
 def _table(state: dict[str, Any]) -> str:

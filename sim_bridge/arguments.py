@@ -10,17 +10,23 @@ from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
 
 PLANT_NAMES = ("rigid", "paper")
+_LONGEST_QUOTE = 60
 
 
 def numbers(flag: str, text: str, counts: tuple[int, ...]) -> tuple[float, ...]:
     """Read finite numbers separated by commas, as many as one of ``counts``."""
     wanted = " or ".join(str(count) for count in counts)
+    shown = repr(text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…")
+    parts = text.split(",")
     try:
-        values = tuple(float(part) for part in text.split(","))
+        values = tuple(float(part) for part in parts)
     except ValueError:
-        raise UsageProblemError(f"{flag}: {text!r} is not {wanted} numbers separated by commas") from None
+        values = ()
+    if not values or "_" in text:  # Python reads 1_000, nobody else does
+        raise UsageProblemError(f"{flag}: {shown} is not {wanted} numbers separated by commas")
     if len(values) not in counts:
-        raise UsageProblemError(f"{flag}: {text!r} has {len(values)} numbers, {wanted} are needed")
+        has = "1 number" if len(values) == 1 else f"{len(values)} numbers"
+        raise UsageProblemError(f"{flag}: {shown} has {has}, {wanted} are needed")
     for value in values:
         in_range(flag, value, -1e9, 1e9)
     return values

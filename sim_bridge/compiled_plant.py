@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from flightstack.contract import FloatArray, Vector3
+from flightstack.contract import FloatArray, Quaternion, Vector3
 from flightstack.geometry import quaternion_from_euler, rotate
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.ground import Ground, ground_contact
@@ -130,6 +130,18 @@ class CompiledPlant:
         self._slope(self._memory)
         x, y, z = self._memory[0]["slope"][0, 3:6].tolist()
         return Vector3(x, y, z)
+
+    @property
+    def ground_softness_m(self) -> float:
+        """How far the ground gives way under the vehicle's weight; more with longer steps."""
+        return float(self._memory[0]["ramp"])
+
+    def buried_m(self) -> float:
+        """How far the lowest contact point lies below the ground (negative above it) in the state shown."""
+        m, state = self._memory[0], self.output[0]["state"].tolist()
+        points = m["point"][: int(m["point_count"]), :3].tolist()
+        lowest = max(rotate(Quaternion(*state[6:10]), Vector3(*point)).z for point in points)
+        return float(state[2] + lowest - m["ground_z"] - m["ramp"])
 
     def airspeed_m_s(self) -> float:
         """Speed relative to the air."""

@@ -8,4 +8,4 @@ class UsageProblemError(Exception):
 
 
 class PlantDivergedError(Exception):
-    """The state of the plant is no longer finite."""
+    """The state of the plant is no longer finite, or it spins too fast for the step."""

@@ -17,6 +17,9 @@ from sim_bridge import paper, rigid
 from sim_bridge.layout import DIVERGED, Record, RecordArray
 from sim_bridge.rotors import half_step, rotor_forces, take_commands
 
+LARGEST_TURN_RAD = 1.0
+"""Rotation in one step beyond which the result is not trusted: first the attitude is lost, then the rest."""
+
 # what ``specialise`` binds in the templates below; these make the templates themselves a valid program
 derivative = rigid.derivative
 before_step = rigid.before_step
@@ -54,7 +57,7 @@ def _advance(memory: RecordArray, command: FloatArray, flags: int, steps: int, o
     """Advance by ``steps`` steps with the commands [rad/s] held; write the result to ``output``.
 
     ``memory`` has dtype ``MEMORY``, shape (1,), ``output`` ``OUTPUT``, shape (1,); ``flags`` are those of
-    FS_ACTUATORS. Returns bits CONTACT and DIVERGED.
+    FS_ACTUATORS. Returns bits CONTACT and DIVERGED (not finite, or spinning too fast for the step).
     """
     m, o = memory[0], output[0]
     x, stage, slopes = m["body"], m["stage"], m["slope"]
@@ -86,10 +89,12 @@ def _advance(memory: RecordArray, command: FloatArray, flags: int, steps: int, o
     total = 0.0
     for i in range(STATE_SIZE):
         total += abs(x[i])
+    p, q, r = o["state"][10], o["state"][11], o["state"][12]
+    turn = math.sqrt(p * p + q * q + r * r) * h
     speeds, shown = m["rotor_speed"], o["rotor_speed"]
     for i in range(m["rotor_count"]):
         shown[i] = speeds[i]
-    return result if math.isfinite(total) else result | DIVERGED
+    return result if math.isfinite(total) and turn <= LARGEST_TURN_RAD else result | DIVERGED
 
 
 def _slope_at(memory: RecordArray) -> None:

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.contract import MAX_ROTORS, Quaternion
+from flightstack.contract import MAX_ROTORS, FloatArray, Quaternion
 from flightstack.geometry import euler_from_quaternion
 from flightstack.mavlink.hot_frames import ARMED_FLAG
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.compiled_plant import CompiledPlant
-from sim_bridge.disturbance import Disturbance
-from sim_bridge.errors import PlantDivergedError
-from sim_bridge.layout import DIVERGED
+from sim_bridge.disturbance import Disturbance, wind_warning
+from sim_bridge.errors import PlantDivergedError, UsageProblemError
+from sim_bridge.layout import CONTACT, DIVERGED
 from sim_bridge.plant import InitialState, PlantOptions
 
+MOST_STEPS = 100_000_000  # at most a minute of computing
 _STEPS_AT_ONCE = 100_000  # between two looks at Ctrl-C
+_SOFTEST_GROUND_M = 0.012
 
 
 class OpenLoop(NamedTuple):
@@ -48,12 +51,52 @@ def split_time(seconds: float, dt_s: float) -> tuple[int, float, float]:
     return count, dt_s, seconds - count * dt_s
 
 
-def run_open_loop(run: OpenLoop) -> dict[str, Any]:
+def check_length(seconds: float, dt_s: float) -> None:
+    """Raise UsageProblemError where the flight would take too many steps."""
+    if seconds / dt_s > MOST_STEPS * (1.0 + 1e-9):
+        raise UsageProblemError(
+            f"--seconds {seconds:g} in steps of {dt_s:g} s are {seconds / dt_s:.3g} steps, more than "
+            f"{MOST_STEPS:g}; raise --dt or lower --seconds"
+        )
+
+
+def start_warning(plant: CompiledPlant, ground: bool) -> str | None:
+    """Return a sentence when the vehicle starts in the ground, else None."""
+    buried_m = plant.buried_m()
+    if not ground or buried_m < 1e-6:
+        return None
+    return (
+        f"the vehicle starts {buried_m:.3g} m in the ground, which throws it out: "
+        "start higher (--pos) or add --no-ground"
+    )
+
+
+def _fly(plant: CompiledPlant, command: FloatArray, steps: int, step_s: float, ground: bool) -> None:
+    """Fly ``steps`` equal steps; raise PlantDivergedError, or UsageProblemError on too soft a ground."""
+    plant.set_step(step_s)
+    soft = ground and plant.ground_softness_m > _SOFTEST_GROUND_M
+    at_once = 1 if soft else _STEPS_AT_ONCE  # a soft ground does no harm before the vehicle is there
+    result = plant.show()
+    for done in range(0, steps, at_once):
+        if not (soft and result & CONTACT):
+            result = plant.advance(command, ARMED_FLAG, min(at_once, steps - done))
+        if result & DIVERGED:
+            raise PlantDivergedError("the plant diverged: forces or rates are too large for --dt")
+        if soft and result & CONTACT:
+            raise UsageProblemError(
+                f"--dt: in steps of {step_s:g} s the ground gives way by {plant.ground_softness_m:.2g} m, "
+                "and the vehicle meets it; use a smaller --dt or --no-ground"
+            )
+
+
+def run_open_loop(run: OpenLoop, warn: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
     """Return the state after the flight as plain numbers, keyed by name with unit and frame.
 
     Rotor speeds are taken as given, without the vehicle's limits. With lag the rotors start at rest, without
-    they are at their speeds from the start. Raises PlantDivergedError.
+    they are at their speeds from the start. What may surprise is told to ``warn``. Raises PlantDivergedError
+    and, where flags do not fit together, UsageProblemError.
     """
+    check_length(run.seconds, run.dt_s)
     vehicle = run.vehicle if run.lag else run.vehicle.with_ideal_rotors()
     options = PlantOptions(run.disturbance, run.seed, run.initial, run.ground, limits=False)
     plant = CompiledPlant(vehicle, run.plant, options)
@@ -62,14 +105,13 @@ def run_open_loop(run: OpenLoop) -> dict[str, Any]:
     if not run.lag:
         plant.set_rotor_speeds(run.rotor_speed_rad_s)
     count, step_s, rest_s = split_time(run.seconds, run.dt_s)
-    result = plant.show()
+    plant.show()
+    for warning in (wind_warning(vehicle, run.plant, run.disturbance), start_warning(plant, run.ground)):
+        if warning:
+            warn(warning)
     for steps, length_s in ((count, step_s), (1 if rest_s > 0.0 else 0, rest_s)):
         if steps:
-            plant.set_step(length_s)
-        for done in range(0, steps, _STEPS_AT_ONCE):
-            result = plant.advance(command, ARMED_FLAG, min(_STEPS_AT_ONCE, steps - done))
-            if result & DIVERGED:
-                raise PlantDivergedError("the plant diverged: forces or rates are too large for --dt")
+            _fly(plant, command, steps, length_s, run.ground)
     return _state(plant, run.seconds)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import select
 import socket
@@ -62,9 +63,9 @@ def serve(options: ServerOptions) -> int:
         listener = listen(options.host, options.port)
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or error
-        complain(
-            f"cannot listen on {options.host}:{options.port}: {reason}; choose another --port or --instance"
-        )
+        port_is_bad = getattr(error, "errno", None) in (errno.EADDRINUSE, errno.EACCES)
+        remedy = "choose another --port or --instance" if port_is_bad else "check --host"
+        complain(f"cannot listen on {options.host}:{options.port}: {reason}; {remedy}")
         return USAGE
     with listener:
         stop = StopSignal()

@@ -247,7 +247,7 @@ def test_third_party_flies_by_hil_messages(bridge: SimBridge) -> None:
     [
         (["--speed", "0"], "--speed: 0 is outside"),
         (["--speed", "fast"], "neither a number nor max"),
-        (["--wind", "1"], "has 1 numbers, 2 or 3 are needed"),
+        (["--wind", "1"], "has 1 number, 2 or 3 are needed"),
         (["--plant", "flat"], "not one of rigid, paper"),
         (["--port", "70000"], "--port: 70000 is outside"),
         (["--timeout", "-3"], "--timeout: -3 is outside"),

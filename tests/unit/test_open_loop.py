@@ -70,6 +70,47 @@ def test_split_time(seconds: float, dt_s: float, expected: tuple[int, float, flo
     assert split_time(seconds, dt_s) == expected
 
 
+def test_figures_are_those_of_a_sheet_of_paper(capsys: pytest.CaptureFixture[str]) -> None:
+    """Paper vehicle: m 0.55, b 2.93e-5, d 7.2e-7, l 0.2, J_r 6.3e-5, I 7.2e-3, 7.2e-3, 1.1e-2."""
+    air = ("--no-ground", "--no-lag", "--seconds")
+    hover = ",".join([repr(math.sqrt(0.55 * 9.81 / (4 * 2.93e-5)))] * 4)
+    assert fly(capsys, *air, "10", "--rotors", hover)["pos_ned_m"] == pytest.approx([0, 0, 0], abs=1e-12)
+    yawing = fly(capsys, *air, "1", "--rotors", "200,210,200,210")["rates_frd_rad_s"]
+    assert yawing == pytest.approx([0.0, 0.0, 2 * 7.2e-7 * (210**2 - 200**2) / 1.1e-2], abs=1e-12)
+    # for a short time: roll by a4 q Ωr and U2, pitch as it was
+    turning = fly(capsys, *air, "1e-4", "--rotors", "0,300,0,310", "--rates", "0,1,0")["rates_frd_rad_s"]
+    roll = (6.3e-5 * (300 + 310) * 1.0 + 0.2 * 2.93e-5 * (310**2 - 300**2)) / 7.2e-3
+    assert turning[0] == pytest.approx(1e-4 * roll, rel=1e-4)  # measured: 3.1e-5
+
+
+def test_gusty_torque_is_the_same_for_the_same_seed(capsys: pytest.CaptureFixture[str]) -> None:
+    common = ("--rotors", "0,0,0,0", "--seconds", "3", "--no-ground", "--torque-gust", "0.01", "--seed")
+    first, again, other = (fly(capsys, *common, seed)["rates_frd_rad_s"] for seed in ("1", "1", "2"))
+    assert first == again != other
+    assert min(abs(rate) for rate in first) > 1e-3
+
+
+def test_who_starts_in_the_ground_is_warned(capsys: pytest.CaptureFixture[str]) -> None:
+    common = ["open-loop", "--rotors", "0,0,0,0", "--seconds", "0", "--euler-deg", "90,0,0"]
+    for more, said in (([], "0.1 m in the ground"), (["--pos", "0,0,-0.11"], ""), (["--no-ground"], "")):
+        assert main([*common, *more]) == 0
+        shown = capsys.readouterr()
+        assert said in shown.err
+        assert bool(shown.err) == bool(said)
+        assert shown.out
+
+
+def test_long_steps_do_not_meet_the_ground(capsys: pytest.CaptureFixture[str]) -> None:
+    """Springs that are stable in long steps are soft; high above them, long steps do no harm."""
+    common = ["--rotors", "0,0,0,0", "--dt", "0.1", "--pos", "0,0,-100", "--json", "--seconds"]
+    fallen = fly(capsys, *common, "4")["pos_ned_m"]
+    assert fallen[2] == pytest.approx(-100.0 + 0.5 * 9.81 * 16.0, abs=1e-9)
+    assert main(["open-loop", *common, "5"]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert "--dt: in steps of 0.1 s the ground gives way by 1 m" in shown.err
+
+
 def test_disturbances_act(capsys: pytest.CaptureFixture[str]) -> None:
     state = fly(
         capsys,
@@ -101,6 +142,12 @@ def test_table_shows_the_same_figures(capsys: pytest.CaptureFixture[str]) -> Non
         (["--rotors", "1,2,3,nan", "--seconds", "1"], "outside the allowed range"),
         (["--rotors", "1,2,3,4", "--seconds", "-1"], "--seconds: -1 is outside"),
         (["--rotors", "1,2,3,4", "--seconds", "nan"], "--seconds: nan is outside"),
+        (["--rotors", "1,2,3,4", "--seconds", "1e9"], "--seconds: 1e+09 is outside"),
+        (["--rotors", "1,2,3,4", "--seconds", "1e5", "--dt", "1e-4"], "are 1e+09 steps, more than 1e+08"),
+        (["--rotors", "1_0,2,3,4", "--seconds", "1"], "is not 4 numbers"),
+        (["--rotors", "5", "--seconds", "1"], "has 1 number, 4 are needed"),
+        (["--rotors", "1," * 10_000 + "1", "--seconds", "1"], "1,…' has 10001 numbers, 4 are needed"),
+        (["--rotors", "1,2,3,4", "--seconds", "1", "--torque-gust", "nan"], "--torque-gust: nan is outside"),
         (["--rotors", "1,2,3,4", "--seconds", "soon"], "--seconds"),
         (["--rotors", "1,2,3,4"], "--seconds"),
         (["--rotors", "1,2,3,4", "--seconds", "1", "--dt", "0"], "--dt: 0 is outside"),
@@ -119,6 +166,7 @@ def test_bad_arguments_are_one_sentence(
     assert shown.out == ""
     assert said in shown.err
     assert shown.err.count("\n") == 1
+    assert len(shown.err) < 200
 
 
 def test_bad_vehicle_file_is_one_sentence(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -128,9 +176,9 @@ def test_bad_vehicle_file_is_one_sentence(capsys: pytest.CaptureFixture[str], tm
     assert "body.mass_kg: -1 is outside the allowed range" in capsys.readouterr().err
 
 
-def test_divergence_is_a_failure_not_a_number(capsys: pytest.CaptureFixture[str]) -> None:
-    code = main(
-        ["open-loop", "--rotors", "0,0,0,0", "--seconds", "9", "--torque", "1e9,1e9,1e9", "--no-ground"]
-    )
-    assert code == 1
+@pytest.mark.parametrize("more", [["--torque", "1e9,1e9,1e9"], ["--rates", "1100,0,0"]])
+def test_divergence_is_a_failure_not_a_number(capsys: pytest.CaptureFixture[str], more: list[str]) -> None:
+    """Also where all stays finite: more than a radian in a step is not resolved."""
+    common = ["open-loop", "--rotors", "0,0,0,0", "--seconds", "9", "--no-ground"]
+    assert main([*common, *more]) == 1
     assert "diverged" in capsys.readouterr().err
