@@ -1,0 +1,1 @@
+"""Speeds beside their floors: ``python -m benchmarks``; docs/performance.md says how to read them."""

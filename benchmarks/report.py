@@ -1,0 +1,116 @@
+"""The figures as tables, and as plain values for a JSON file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from benchmarks.measure import Figure, short
+from benchmarks.real_time import PERCENTILES
+from benchmarks.round_trip import WAYS
+from benchmarks.step_costs import Part
+from benchmarks.table import Row, table
+from benchmarks.three_processes import Flights
+
+# on a machine of the same kind: PX4 with an external simulator, ArduCopter's SITL in one process
+PEERS = {500.0: ("≥ 20", "PX4 10"), 250.0: ("≥ 40", "PX4 18–23")}
+ONE_PROCESS = ("≥ 60, goal 150", "ArduCopter 70–76")
+
+
+def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
+    """Yield the sections that were measured."""
+    yield (
+        f"{machine['system']}, {machine['cores']} cores, Python {machine['python']}; "
+        f"other programs used {100 * machine['used_by_others']:.0f} % of the machine meanwhile.\n"
+        "Median (least–greatest) of interleaved rounds. Steps are those of the inner loop.\n"
+    )
+    if "three_processes" in results:
+        yield _flights(results) + "\n"
+    if "costs" in results:
+        yield _costs(results["costs"], results["round_trips"]) + "\n"
+    if "round_trips" in results:
+        yield _round_trips(results["round_trips"]) + "\n"
+    if "lateness" in results:
+        yield _lateness(*results["lateness"]) + "\n"
+    if "start" in results:
+        yield _start(results) + "\n"
+
+
+def _flights(results: dict[str, Any]) -> str:
+    rows: list[Row] = []
+    flown: dict[float, Flights] = results["three_processes"]
+    for rate, flight in flown.items():
+        name = f"three processes, TCP, log, {rate:g} Hz"
+        rows.append((name, flight.factor.text(), flight.step_us.text(), *PEERS[rate]))
+    for name, (factor, step_us) in results["one_process"].items():
+        rows.append((f"one process, {name}, 500 Hz", factor.text(), step_us.text(), *ONE_PROCESS))
+    head = ("missions/square.plan", "× real time", "µs a step", "mark", "others")
+    return table("FLIGHTS", head, rows)
+
+
+def _costs(costs: list[tuple[Part, Figure]], round_trips: dict[str, tuple[Figure, Figure]]) -> str:
+    rows: list[Row] = []
+    trip, _ = round_trips[WAYS[0].name]
+    floor_us = trip.median
+    rows.append(("TCP round trip, both ends on one processor", trip.text(), "1", short(floor_us)))
+    for part, cost in costs:
+        share_us = cost.median * part.per_step
+        if part.is_floor:
+            floor_us += share_us
+            rows.append((part.name, cost.text(), f"{part.per_step:g}", short(share_us)))
+    rows.append(("floor of a step of two processes", "", "", short(floor_us)))
+    rows.append(("for comparison, or made of the parts above",))
+    rows.extend(
+        (f"  {part.name}", cost.text(), f"{part.per_step:.2g}", short(cost.median * part.per_step))
+        for part, cost in costs
+        if not part.is_floor
+    )
+    return table("PARTS OF A STEP, 500 and 100 Hz", ("", "µs each", "a step", "µs a step"), rows)
+
+
+def _round_trips(trips: dict[str, tuple[Figure, Figure]]) -> str:
+    rows = [(name, median.text(), mean.text()) for name, (median, mean) in trips.items()]
+    return table(
+        "TCP ROUND TRIP between two processes, 158 and 90 bytes", ("", "median, µs", "mean, µs"), rows
+    )
+
+
+def _lateness(figures: dict[str, list[float]], has_compiler: bool) -> str:
+    head = ("", *(f"p{p:g}" if p < 100.0 else "max" for p in PERCENTILES))
+    rows = [(name, *(short(value) for value in values)) for name, values in figures.items()]
+    text = table("LATENESS IN REAL TIME at 500 Hz, µs", head, rows)
+    return text if has_compiler else text + "\n  (no C compiler here: the loop in C was left out)"
+
+
+def _start(results: dict[str, Any]) -> str:
+    rows: list[Row] = [(name, took.text()) for name, took in results["start"].items()]
+    if "three_processes" in results:
+        command_s = results["three_processes"][500.0].command_s
+        rows.append(("gcs fly missions/square.plan (make fly), all of it", command_s.text()))
+    return table("START", ("", "s"), rows)
+
+
+def plain(results: dict[str, Any]) -> dict[str, Any]:
+    """Return the results as values that JSON knows."""
+    out = dict(results)
+    if "costs" in out:
+        out["costs"] = {
+            part.name.strip(): {"us": cost._asdict(), "per_step": part.per_step}
+            for part, cost in out["costs"]
+        }
+    if "lateness" in out:
+        out["lateness"] = {
+            name: dict(zip(map(str, PERCENTILES), values, strict=True))
+            for name, values in out["lateness"][0].items()
+        }
+    return _plain(out)  # type: ignore[no-any-return]
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "_asdict"):
+        return _plain(value._asdict())
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, tuple):  # of a real-time factor and a step, or of median and mean
+        return [_plain(item) for item in value]
+    return value

@@ -1,0 +1,189 @@
+"""What one step costs, part by part, in a vehicle that flies its mission."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.measure import Figure, interleaved_us
+from benchmarks.one_process import BenchWorld
+from flightstack.contract import MAX_ROTORS, LoopRow, Vector3
+from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
+from flightstack.mavlink.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
+from flightstack.mavlink.link import Link
+from flightstack.mavlink.streams import GROUND_RATES_HZ
+from flightstack.mavlink.telemetry import MAKERS
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.compiled_plant import CompiledPlant
+from sim_bridge.lockstep import SimulatorLink
+from sim_bridge.plant import InitialState, PlantOptions
+from sim_bridge.simulator import Simulator
+
+Call = Callable[[], object]
+
+
+class Part(NamedTuple):
+    """One part of a step: how often a step of the inner loop needs it, at 500 and 100 Hz."""
+
+    name: str
+    call: Call
+    per_step: float
+    is_floor: bool
+    """Whether no flight can do without it: the others hold parts of these, or are for comparison."""
+
+
+def _flying() -> BenchWorld:
+    world = BenchWorld(log=True, ground=True, inner_hz=500.0)
+    world.run(6.0)
+    return world
+
+
+def _hover_rad_s(vehicle: Vehicle) -> float:
+    return math.sqrt(vehicle.weight_n / sum(rotor.thrust_coefficient_n_s2 for rotor in vehicle.rotors))
+
+
+def _hovering(vehicle: Vehicle) -> Simulator:
+    """Return a simulator in the air that stays there, however long it runs without control."""
+    options = PlantOptions(initial=InitialState(position_ned_m=Vector3(0.0, 0.0, -100.0)))
+    simulator = Simulator(vehicle, options=options)
+    assert isinstance(simulator.plant, CompiledPlant)
+    simulator.plant.set_rotor_speeds((_hover_rad_s(vehicle),) * len(vehicle.rotors))
+    return simulator
+
+
+def _hot_codec() -> Call:
+    state, actuators = PlantStateFrame(), ActuatorsFrame()
+    other_state, other_actuators = PlantStateFrame(), ActuatorsFrame()
+
+    def exchange() -> None:
+        other_state.open(state.seal(1, 0))
+        actuators.open(other_actuators.seal(1, 0))
+
+    return exchange
+
+
+def _pymavlink_codec() -> Call:
+    """Do the same as ``_hot_codec`` with pymavlink's classes."""
+    sender, receiver = mavlink.MAVLink(None, 1, 1), mavlink.MAVLink(None, 1, 1)
+    messages = []
+    for name in ("FS_PLANT_STATE", "FS_ACTUATORS"):
+        layout = LAYOUT_BY_NAME[name]
+        fields = sorted(layout.fields, key=lambda field: field.declared_index)
+        values = [[1.0] * field.length if field.is_array else 1 for field in fields]
+        messages.append((mavlink.mavlink_map[layout.message_id], values))
+
+    def exchange() -> None:
+        for kind, values in messages:
+            receiver.decode(bytearray(kind(*values).pack(sender)))
+
+    return exchange
+
+
+def _telemetry(world: BenchWorld) -> tuple[Call, Call, Call]:
+    """Make, encode and decode the mix of messages of one second, message by message in turns."""
+    facts = world.stack.ground._facts
+    turns = [number for number, rate in GROUND_RATES_HZ.items() for _ in range(max(1, round(rate)))]
+    makers = [MAKERS[number] for number in turns]
+    messages = [make(facts) for make in makers]
+    link, station = Link(1, 1), Link(255, 190)
+    frames = [link.encode(message) for message in messages]
+    at = [0]
+
+    def turn() -> int:
+        at[0] = (at[0] + 1) % len(turns)
+        return at[0]
+
+    return (
+        lambda: makers[turn()](facts),
+        lambda: link.encode(messages[turn()]),
+        lambda: list(station.decode(frames[turn()])),
+    )
+
+
+def _log(world: BenchWorld) -> Call:
+    """Write five inner rows and one outer row, with their share of making bytes of them."""
+    recorder, autopilot = world.stack.recorder, world.stack.autopilot
+    state, target = np.ones(13), np.ones(5)
+    setpoint, times = autopilot.now.setpoint, [autopilot.now.time_us]
+
+    def five() -> None:
+        for _ in range(5):
+            times[0] += 2000
+            recorder.inner_row(times[0])
+        recorder.outer(times[0], state, setpoint, target)
+
+    return five
+
+
+def parts() -> list[Part]:
+    """Return the parts of a step, simulator first."""
+    world = _flying()
+    stack, simulator = world.stack, world.simulator
+    autopilot, link = stack.autopilot, stack.simulator
+    backend, navigator, now = autopilot._backend, autopilot._navigator, autopilot.now
+    state, speeds = autopilot._state.copy(), autopilot._rotor_speed.copy()
+    row, times = np.zeros(LoopRow.SIZE), [now.time_us]
+    hover = np.zeros(MAX_ROTORS)
+    hover[: len(stack.vehicle.rotors)] = _hover_rad_s(stack.vehicle)
+    actuators_bytes = memoryview(bytearray(link.answer(hover, True)))
+    state_bytes = memoryview(bytearray(simulator.state_frame()))
+    hovering = _hovering(stack.vehicle)
+    sim_link = SimulatorLink(hovering, stack.vehicle, autopilot.home)
+    sim_link.receive(memoryview(link.hello(stack.rates.interval_us)))
+    make, encode, decode = _telemetry(world)
+    messages_per_step = sum(GROUND_RATES_HZ.values()) / 500.0
+
+    def tick() -> None:
+        times[0] += 2000
+        autopilot.tick(times[0])
+
+    def simulator_side() -> None:
+        sim_link.receive(actuators_bytes)
+        sim_link.replies()
+        sim_link.step()
+        sim_link.state()
+
+    def stack_side() -> None:
+        link.receive(state_bytes)
+        link.answer(now.row[LoopRow.ROTOR_COMMAND], True)
+
+    return [
+        Part("frames: state and actuators, sealed and opened", _hot_codec(), 1.0, True),
+        Part("the same two messages by pymavlink", _pymavlink_codec(), 1.0, False),
+        Part(
+            "plant, 2 Runge-Kutta steps of 1 ms",
+            lambda: hovering.plant.advance(hover, ARMED_FLAG, 2),
+            1.0,
+            True,
+        ),
+        Part(
+            "inner loop: reference, attitude, mixer",
+            lambda: backend.step(state, now.setpoint, speeds, False, row),
+            0.8,
+            True,
+        ),
+        Part(
+            "outer and inner loop: position first",
+            lambda: backend.step(state, now.setpoint, speeds, True, row),
+            0.2,
+            True,
+        ),
+        Part("guidance", lambda: navigator.step(now.status.mode, state, now.attitude_target), 0.2, True),
+        Part("log: rows, and bytes of them", _log(world), 0.2, True),
+        Part("simulator, without its socket", simulator_side, 1.0, False),
+        Part("autopilot's tick, log included", tick, 1.0, False),
+        Part("flight stack's end of the simulator link", stack_side, 1.0, False),
+        Part("telemetry: make a message", make, messages_per_step, False),
+        Part("telemetry: encode it (pymavlink)", encode, messages_per_step, False),
+        Part("ground station: decode it (pymavlink)", decode, messages_per_step, False),
+    ]
+
+
+def costs(rounds: int, seconds: float) -> list[tuple[Part, Figure]]:
+    """Time every part."""
+    known = parts()
+    figures = interleaved_us({part.name: part.call for part in known}, rounds, seconds)
+    return [(part, figures[part.name]) for part in known]

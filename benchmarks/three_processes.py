@@ -1,0 +1,104 @@
+"""The real thing: ``gcs fly`` with its two children, and the start-up of each process."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from benchmarks.measure import Figure, figure
+from flightstack.config import DEFAULT_HOME
+from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.params.vehicle import load_vehicle
+
+ROOT = Path(__file__).resolve().parent.parent
+PLAN = ROOT / "missions" / "square.plan"
+INSTANCE = 60
+"""Far from the ports of a flight that the user may have running."""
+
+
+class Flights(NamedTuple):
+    """Figures of ``gcs fly`` at one inner rate."""
+
+    factor: Figure
+    step_us: Figure
+    command_s: Figure
+
+
+def _fly(inner_hz: float) -> tuple[dict[str, Any], float]:
+    with tempfile.TemporaryDirectory() as folder:
+        command = [
+            sys.executable, "-m", "gcs_cli", "fly", str(PLAN), "--json", "--out", folder,
+            "--inner-hz", f"{inner_hz:g}", "--instance", str(INSTANCE),
+        ]  # fmt: skip
+        began_s = time.perf_counter()
+        done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=ROOT)
+        took_s = time.perf_counter() - began_s
+    if done.returncode:
+        raise RuntimeError(f"gcs fly ended with {done.returncode}: {done.stderr.strip()}")
+    summary: dict[str, Any] = json.loads(done.stdout)
+    return summary, took_s
+
+
+def flights(rates_hz: tuple[float, ...], rounds: int) -> dict[float, Flights]:
+    """Fly at each inner rate, interleaved; the first flight of all only warms the caches."""
+    _fly(rates_hz[0])
+    seen: dict[float, list[tuple[float, float, float]]] = {rate: [] for rate in rates_hz}
+    for _ in range(rounds):
+        for rate in rates_hz:
+            summary, took_s = _fly(rate)
+            factor = summary["real_time_factor"]
+            seen[rate].append((factor, 1e6 / factor / rate, took_s))
+    return {
+        rate: Flights(*(figure(values) for values in zip(*flown, strict=True)))
+        for rate, flown in seen.items()
+    }
+
+
+def _run_s(*arguments: str) -> float:
+    began_s = time.perf_counter()
+    subprocess.run(
+        [sys.executable, "-m", *arguments], check=True, capture_output=True, cwd=ROOT, env=os.environ
+    )
+    return time.perf_counter() - began_s
+
+
+def _simulator_s() -> float:
+    """Time from the start of ``sim-bridge`` to its first state."""
+    port = 4560 + INSTANCE
+    hello = SimulatorLink(load_vehicle("paper_quad"), DEFAULT_HOME, lockstep=True).hello(2000)
+    command = [sys.executable, "-m", "sim_bridge", "--speed=max", f"--port={port}"]
+    began_s = time.perf_counter()
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        while True:
+            try:
+                connection = socket.create_connection(("127.0.0.1", port))
+                break
+            except ConnectionRefusedError:
+                if process.poll() is not None:
+                    raise RuntimeError(f"sim-bridge ended with {process.returncode}") from None
+                time.sleep(0.002)
+        with connection:
+            connection.sendall(hello)
+            connection.recv(4096)
+            took_s = time.perf_counter() - began_s
+    return took_s
+
+
+def start_ups(rounds: int) -> dict[str, Figure]:
+    """Return how long each process takes to be of use [s]."""
+    seen: dict[str, list[float]] = {}
+    for _ in range(rounds):
+        for name, took_s in (
+            ("gcs --help", _run_s("gcs_cli", "--help")),
+            ("sim-bridge, to its first state", _simulator_s()),
+            ("flightstack --check (loops loaded, nothing connected)", _run_s("flightstack", "--check")),
+        ):
+            seen.setdefault(name, []).append(took_s)
+    return {name: figure(values) for name, values in seen.items()}
