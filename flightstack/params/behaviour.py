@@ -94,7 +94,7 @@ def with_assignments(behaviour: Behaviour, assignments: list[str]) -> Behaviour:
             number = float(value)
         except ValueError:
             separator = ""
-        if not separator:
+        if not separator or not name.strip():
             raise ConfigError("--param", text, "must be NAME=VALUE with a number")
         behaviour = behaviour.updated(name.strip().upper(), number)
     return behaviour

@@ -1,0 +1,201 @@
+"""Vehicle files: what the built-in ones are, and one sentence for each thing that can be wrong with one."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flightstack.params.errors import ConfigError
+from flightstack.params.vehicle import BUILT_IN, Vehicle, built_in_vehicles, load_vehicle
+
+PAPER = (BUILT_IN / "paper_quad.toml").read_text(encoding="utf-8")
+
+
+def load_text(folder: Path, text: str | bytes) -> Vehicle:
+    path = folder / "my.toml"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return load_vehicle(str(path))
+
+
+def changed(pattern: str, replacement: str, count: int = 0) -> str:
+    text, times = re.subn(pattern, replacement, PAPER, count=count, flags=re.MULTILINE)
+    assert times, pattern
+    return text
+
+
+def value(key: str, text: str) -> str:
+    return changed(rf"^{key} = .*$", f"{key} = {text}", count=1)
+
+
+def rotors(*places: tuple[float, float, str]) -> str:
+    head = PAPER[: PAPER.index("[[rotor]]")]
+    return head + "\n".join(
+        f'[[rotor]]\nposition_frd_m = [{x}, {y}, 0]\nspin = "{spin}"' for x, y, spin in places
+    )
+
+
+def test_built_in_vehicles_load() -> None:
+    assert built_in_vehicles() == ["paper_quad", "x_quad"]
+    for name in built_in_vehicles():
+        vehicle = load_vehicle(name)
+        assert vehicle.name == name
+        assert vehicle.description
+
+
+def test_the_papers_vehicle_is_table_i() -> None:
+    v = load_vehicle("paper_quad")
+    assert (v.mass_kg, v.inertia_kg_m2) == (0.55, (7.2e-3, 7.2e-3, 1.1e-2))
+    rotor = v.rotors[0]
+    assert (rotor.thrust_coefficient_n_s2, rotor.torque_coefficient_n_m_s2) == (2.93e-5, 7.2e-7)
+    assert (rotor.inertia_kg_m2, rotor.lag_s) == (6.3e-5, 0.005)
+    assert [r.spin for r in v.rotors] == [1, -1, 1, -1]
+    assert v.max_thrust_n == pytest.approx(2.0 * v.weight_n, rel=1e-12)
+    # equation 7: front and back make pitch, left and right make roll, counter-clockwise rotors turn clockwise
+    b, d, arm = 2.93e-5, 7.2e-7, 0.2
+    expected = [[b] * 4, [0, -arm * b, 0, arm * b], [arm * b, 0, -arm * b, 0], [-d, d, -d, d]]
+    assert np.allclose(v.effectiveness(), expected, rtol=1e-15, atol=0.0)
+
+
+def test_ideal_rotors_have_no_lag_and_no_limits() -> None:
+    ideal = load_vehicle("x_quad").with_ideal_rotors()
+    assert ideal.ideal_rotors
+    for rotor in ideal.rotors:
+        assert (rotor.lag_s, rotor.min_speed_rad_s, rotor.max_speed_rad_s) == (0.0, -math.inf, math.inf)
+
+
+def test_a_file_loads_by_its_path_with_defaults_and_a_largest_speed(tmp_path: Path) -> None:
+    text = changed(
+        r"^(description|linear_drag_n_s_m|leg_height_m|inertia_kg_m2 = 6|lag_s|min_speed_rad_s).*\n", ""
+    )
+    vehicle = load_text(tmp_path, re.sub(r"thrust_to_weight = .*", "max_speed_rad_s = 400", text))
+    assert (vehicle.description, vehicle.linear_drag_n_s_m, vehicle.leg_height_m) == (
+        "",
+        (0.0, 0.0, 0.0),
+        0.1,
+    )
+    assert (vehicle.rotors[0].max_speed_rad_s, vehicle.rotors[0].min_speed_rad_s) == (400.0, 0.0)
+
+
+HEXA = [(math.cos(i * math.pi / 3), math.sin(i * math.pi / 3), ("cw", "ccw")[i % 2]) for i in range(6)]
+
+
+def test_any_rotor_set_that_hovers_loads(tmp_path: Path) -> None:
+    assert len(load_text(tmp_path, rotors(*HEXA)).rotors) == 6
+
+
+SQUARE = [(0.2, 0.2, "ccw"), (-0.2, -0.2, "ccw"), (0.2, -0.2, "cw"), (-0.2, 0.2, "cw")]
+
+BAD = {
+    "negative mass": (value("mass_kg", "-1"), "body.mass_kg: -1 is outside the allowed range 0.001 to 1000"),
+    "no mass": (changed(r"^mass_kg.*\n", ""), "body.mass_kg: is missing"),
+    "mass that is no number": (value("mass_kg", '"heavy"'), "body.mass_kg: 'heavy' is not a number"),
+    "mass that is true": (value("mass_kg", "true"), "body.mass_kg: True is not a number"),
+    "NaN": (value("mass_kg", "nan"), "body.mass_kg: nan is outside the allowed range 0.001 to 1000"),
+    "infinity": (value("mass_kg", "inf"), "body.mass_kg: inf is outside the allowed range 0.001 to 1000"),
+    "400 digits": (
+        value("mass_kg", "1" + "0" * 400),
+        "body.mass_kg: a number that large is outside the allowed",
+    ),
+    "5000 digits": (value("mass_kg", "1" + "0" * 5000), "is not sane TOML"),
+    "two inertias": (value("inertia_kg_m2", "[1, 2]"), "body.inertia_kg_m2: must be a list of 3 numbers"),
+    "zero inertia": (
+        value("inertia_kg_m2", "[0, 1, 1]"),
+        "body.inertia_kg_m2: 0 is outside the allowed range 1e-08 to 10000",
+    ),
+    "impossible inertia": (
+        value("inertia_kg_m2", "[1e-3, 1e-3, 1e-2]"),
+        "body.inertia_kg_m2: no rigid body has it: each must be at most the sum of the other two",
+    ),
+    "unknown key": (value("leg_height_m", "0.1\nwings = 2"), "body.wings: is not a known key"),
+    "unknown key at the top": ("colour = 'red'\n" + PAPER, "colour: is not a known key"),
+    "misspelt rotor key": (value("lag_s", "0.1\nlagg = 2"), "rotor_type.lagg: is not a known key"),
+    "unknown key of a rotor": (
+        changed(r'^spin = "cw"$', 'spin = "cw"\ntilt = 3', count=1),
+        "rotor[0].tilt: is not a known key",
+    ),
+    "unknown spin": (
+        changed(r'^spin = "ccw"$', 'spin = "left"', count=1),
+        "rotor[1].spin: 'left' is not one of cw, ccw",
+    ),
+    "rotor beyond reach": (
+        changed(r"\[0.2, 0.0, 0.0\]", "[20, 0, 0]"),
+        "rotor[0].position_frd_m: 20 is outside the allowed range -10 to 10",
+    ),
+    "three rotors": (rotors(*SQUARE[:3]), "rotor: 3 rotors given, 4 to 8 are allowed"),
+    "nine rotors": (rotors(*SQUARE, *SQUARE, SQUARE[0]), "rotor: 9 rotors given, 4 to 8 are allowed"),
+    "no rotors": (PAPER[: PAPER.index("[[rotor]]")], "rotor: is missing"),
+    "rotor that is no table": (
+        "rotor = 4\n" + PAPER[: PAPER.index("[[rotor]]")],
+        "rotor: must be an array of tables",
+    ),
+    "rotors in a row": (
+        rotors(*[(x, 0.0, spin) for x, spin in ((0.1, "cw"), (0.2, "ccw"), (-0.1, "cw"), (-0.2, "ccw"))]),
+        "rotor: the rotor geometry is singular",
+    ),
+    "all rotors turn alike, opposite each other": (
+        rotors(*[(x, y, "cw") for x, y, _ in SQUARE]),
+        "rotor: the rotor geometry is singular",
+    ),
+    "rotors all ahead": (
+        rotors(*[(x + 0.5, y, spin) for x, y, spin in SQUARE]),
+        "rotor: the rotors cannot hold the vehicle in hover: number",
+    ),
+    "too heavy": (
+        re.sub("thrust_to_weight = .*", "max_speed_rad_s = 200", PAPER),
+        "rotor: the rotors cannot hold the vehicle in hover: number 1 would need 215 rad/s, its range is 30 to 200",
+    ),
+    "idle speed that lifts off": (
+        value("min_speed_rad_s", "250"),
+        "rotor: the rotors cannot hold the vehicle in hover: number 1 would need 215 rad/s, its range is 250 to 303",
+    ),
+    "one rotor that carries too little": (
+        rotors((0.2, 0.0, "cw"), (0.0, 0.2, "ccw"), (-0.1, 0.0, "cw"), (0.0, -0.2, "ccw")).replace(
+            "thrust_to_weight = 2.0", "thrust_to_weight = 1.2"
+        ),
+        "rotor: the rotors cannot hold the vehicle in hover: number 3 would need 248 rad/s, its range is 30 to 235",
+    ),
+    "idle above the largest speed": (
+        value("min_speed_rad_s", "500"),
+        "rotor_type.min_speed_rad_s: 500 is not below the largest speed 303",
+    ),
+    "weak rotors": (
+        value("thrust_to_weight", "0.9"),
+        "rotor_type.thrust_to_weight: 0.9 is outside the allowed range 1.05 to 20",
+    ),
+    "negative lag": (value("lag_s", "-0.1"), "rotor_type.lag_s: -0.1 is outside the allowed range 0 to 1"),
+    "no body": (PAPER.replace("[body]", "[trunk]"), "body: is missing"),
+    "body that is no table": ("body = 3\n" + PAPER.replace("[body]", "[trunk]"), "body: must be a table"),
+    "no name": (changed(r"^name.*\n", ""), "name: is missing"),
+    "name that is no text": (value("name", "5"), "name: 5 is not a string"),
+    "not TOML": ("mass = = 3", "is not valid TOML: "),
+    "not UTF-8": (b"name = '\xff'", "is not valid TOML: "),
+    "endless nesting": ("a = " + "[" * 20_000, "is not sane TOML"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_wrong_is_one_sentence_with_file_key_and_range(tmp_path: Path, name: str) -> None:
+    text, sentence = BAD[name]
+    with pytest.raises(ConfigError) as error:
+        load_text(tmp_path, text)
+    shown = str(error.value)
+    assert shown.startswith(f"{tmp_path / 'my.toml'}: {sentence}"), shown
+    assert "\n" not in shown
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("nope", "nope: is neither a file nor a built-in vehicle (paper_quad, x_quad)"),
+        ("no/such.toml", "no/such.toml: cannot be read: No such file or directory"),
+        ("/", "/: cannot be read: Is a directory"),
+    ],
+)
+def test_files_that_are_not_there(name: str, sentence: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        load_vehicle(name)
+    assert str(error.value) == sentence
