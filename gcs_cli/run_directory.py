@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 
@@ -20,6 +21,8 @@ def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS) -> Path:
         if log.exists() and log.stat().st_size:
             raise CliError(f"--out {out}: {LOG_NAME} of another flight is there; choose another one", USAGE)
         out.mkdir(parents=True, exist_ok=True)
+        if not os.access(out, os.W_OK | os.X_OK):
+            raise CliError(f"--out {out}: nothing can be written there: permission denied", USAGE)
     except OSError as error:
         raise CliError(f"{out or base}: the directory cannot be made: {error.strerror}", USAGE) from None
     return out
