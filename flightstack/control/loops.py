@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -38,6 +38,8 @@ from flightstack.control.position_pid import (
 from flightstack.geometry import blend, conjugate, quaternion_product, rotation_vector
 from flightstack.params.toml_reader import Table
 from flightstack.params.vehicle import Vehicle
+
+RecordArray: TypeAlias = np.ndarray[Any, np.dtype[np.void]]
 
 POSITION_MEMORY_SIZE = 3
 POSITION_PARAMS_SIZE = 12
@@ -142,40 +144,58 @@ def _status(row: FloatArray) -> int:
     return 2 * int(s.x != 0.0) + 4 * int(s.y != 0.0) + 8 * int(s.z != 0.0) + 16 * int(thrust != 0.0)
 
 
+def inner_layout(rotors: int, controller_memory: int, controller_params: int) -> np.dtype[np.void]:
+    """Layout of all that the inner loop keeps: one record, because each array that a call passes costs time."""
+    return np.dtype(
+        [
+            # what changes
+            ("last_target", "f8", (ATTITUDE_TARGET_SIZE,)),
+            ("target", "f8", (ATTITUDE_TARGET_SIZE,)),
+            ("reference", "f8", (REFERENCE_MEMORY_SIZE,)),
+            ("controller", "f8", (controller_memory,)),
+            ("last", "f8", (LoopRow.SIZE,)),
+            ("work", "f8", (2, rotors)),
+            # what is fixed
+            ("dt_s", "f8"),
+            ("reference_params", "f8", (REFERENCE_PARAMS_SIZE,)),
+            ("controller_params", "f8", (controller_params,)),
+            ("allocation", "f8", (rotors, 4)),
+            ("effectiveness", "f8", (4, rotors)),
+            ("low", "f8", (rotors,)),
+            ("high", "f8", (rotors,)),
+            ("spin", "f8", (rotors,)),
+        ]
+    )
+
+
 def inner_kernel(
     state: FloatArray,
-    last_target: FloatArray,
-    target: FloatArray,
     fraction: float,
     rotor_speed_rad_s: FloatArray,
-    reference_memory: FloatArray,
-    reference_params: FloatArray,
-    memory: FloatArray,
-    params: FloatArray,
-    mixer: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
-    last: FloatArray,
-    dt_s: float,
+    memory: RecordArray,
     row: FloatArray,
 ) -> None:
-    """Run reference filter, attitude controller and mixer on arrays; write ``row`` and a copy to ``last``.
+    """Run reference filter, attitude controller and mixer; write ``row`` (48,) and update ``memory`` (1,).
 
-    ``last`` (48,) is the row of the previous tick: anti-windup and Ω_r come from it, and it is repeated, with
-    a status bit, when an input or what the controller makes of it is not finite. The target moves in a
-    straight line from ``last_target`` (the outer loop's tick before) to ``target`` over an outer period,
-    ``fraction`` of which has passed: its steps would shake the rotors at the outer rate. A template:
-    ``specialise`` binds the controller.
+    ``memory`` is laid out by ``inner_layout``. Its ``last`` is the row of the previous tick: anti-windup and
+    Ω_r come from it, and it is repeated, with a status bit, when an input or what the controller makes of it
+    is not finite. The target moves in a straight line from ``last_target`` (the outer loop's tick before) to
+    ``target`` over an outer period, ``fraction`` of which has passed: its steps would shake the rotors at the
+    outer rate. A template: ``specialise`` binds the controller.
     """
+    m = memory[0]
+    target, last, dt_s = m["target"], m["last"], m["dt_s"]
     if not (all_finite(state) and all_finite(target)):
         row[:] = last
         row[STATUS_AT] = INPUT_NOT_FINITE
         return
-    allocation, effectiveness, low, high, spin, work = mixer
-    n = spin.size
+    mixer = Mixer(m["allocation"], m["effectiveness"], m["low"], m["high"], m["spin"])
+    n = mixer.spin.size
     now, aim = vehicle_state(state), attitude_target(target)
     filtered, reference = attitude_reference_step(
-        ReferenceMemory(*as_tuple(reference_memory, REFERENCE_MEMORY_SIZE)),
-        blend(attitude_target(last_target).attitude, aim.attitude, fraction),
-        ReferenceParams(*as_tuple(reference_params, REFERENCE_PARAMS_SIZE)),
+        ReferenceMemory(*as_tuple(m["reference"], REFERENCE_MEMORY_SIZE)),
+        blend(attitude_target(m["last_target"]).attitude, aim.attitude, fraction),
+        ReferenceParams(*as_tuple(m["reference_params"], REFERENCE_PARAMS_SIZE)),
         dt_s,
     )
     reference = in_body_frame(reference, now.attitude)
@@ -184,13 +204,13 @@ def inner_kernel(
         now.rates_frd_rad_s,
         reference,
         rotation_vector(quaternion_product(conjugate(now.attitude), reference.attitude)),
-        relative_rotor_speed(last[COMMAND_AT:], spin),
+        relative_rotor_speed(last[COMMAND_AT:], mixer.spin),
         _saturation(last),
     )
     advanced, torque = controller_step(
-        ControllerMemory(*as_tuple(memory, CONTROLLER_MEMORY_SIZE)),
+        ControllerMemory(*as_tuple(m["controller"], CONTROLLER_MEMORY_SIZE)),
         inputs,
-        ControllerParams(*as_tuple(params, CONTROLLER_PARAMS_SIZE)),
+        ControllerParams(*as_tuple(m["controller_params"], CONTROLLER_PARAMS_SIZE)),
         dt_s,
     )
     if not (all_finite(advanced) and all_finite(torque)):
@@ -198,9 +218,9 @@ def inner_kernel(
         row[STATUS_AT] = OUTPUT_NOT_FINITE
         return
     demanded = Wrench(aim.thrust_n, torque)
-    achieved = mix(demanded, Mixer(allocation, effectiveness, low, high, spin), row[COMMAND_AT:], work)
-    store(reference_memory, filtered)
-    store(memory, advanced)
+    achieved = mix(demanded, mixer, row[COMMAND_AT:], m["work"])
+    store(m["reference"], filtered)
+    store(m["controller"], advanced)
     row[:STATE_SIZE] = state
     _store_reference(row, reference)
     _store_wrenches(row, demanded, achieved)
@@ -237,14 +257,25 @@ class PythonLoops:
         outer_hz: float,
         max_tilt_rad: float,
     ) -> None:
-        self._inner_dt_s, self._outer_dt_s = 1.0 / inner_hz, 1.0 / outer_hz
+        self._outer_dt_s = 1.0 / outer_hz
         self._fraction_step, self._fraction = outer_hz / inner_hz, 0.0
         self._position_params = np.array(read_position_params(vehicle, gains, max_tilt_rad))
-        self._reference_params = np.array(read_reference_params(gains))
-        self._controller_params = controller_params(controller, vehicle, gains)
         self._initial_memory = np.array(controller.initial_memory, dtype=np.float64)
-        mixer = mixer_for(vehicle)
-        self._mixer = (*mixer, np.zeros((2, len(vehicle.rotors))))
+        reference_params = read_reference_params(gains)
+        params = controller_params(controller, vehicle, gains)
+        layout = inner_layout(len(vehicle.rotors), self._initial_memory.size, params.size)
+        self._memory: RecordArray = np.zeros(1, layout)
+        kept = self._memory[0]
+        kept["dt_s"] = 1.0 / inner_hz
+        kept["reference_params"], kept["controller_params"] = reference_params, params
+        for name, values in mixer_for(vehicle)._asdict().items():
+            kept[name] = values
+        self.attitude_target: FloatArray = kept["target"]
+        self._last_target: FloatArray = kept["last_target"]
+        self._reference_memory: FloatArray = kept["reference"]
+        self._controller_memory: FloatArray = kept["controller"]
+        self._last: FloatArray = kept["last"]
+        self._position_memory = np.zeros(POSITION_MEMORY_SIZE)
         self._idle_speed = np.array([max(0.0, r.min_speed_rad_s) for r in vehicle.rotors])
         self._kernel = specialise(
             inner_kernel,
@@ -253,14 +284,8 @@ class PythonLoops:
             ControllerMemory=controller.memory_type,
             ControllerParams=controller.params_type,
             CONTROLLER_MEMORY_SIZE=len(controller.initial_memory),
-            CONTROLLER_PARAMS_SIZE=len(self._controller_params),
+            CONTROLLER_PARAMS_SIZE=params.size,
         )
-        self.attitude_target = np.zeros(ATTITUDE_TARGET_SIZE)
-        self._last_target = np.zeros(ATTITUDE_TARGET_SIZE)
-        self._position_memory = np.zeros(POSITION_MEMORY_SIZE)
-        self._reference_memory = np.zeros(REFERENCE_MEMORY_SIZE)
-        self._controller_memory = self._initial_memory.copy()
-        self._last = np.zeros(LoopRow.SIZE)
         self._compile(controller.name)
 
     def _compile(self, name: str) -> None:
@@ -268,7 +293,8 @@ class PythonLoops:
         state = np.array([0.0] * 6 + [1.0] + [0.0] * 6)
         self.reset(state)
         try:
-            self._run_inner(state, np.zeros(MAX_ROTORS, np.float32), np.zeros(LoopRow.SIZE))
+            speeds, row = np.zeros(MAX_ROTORS, np.float32), np.zeros(LoopRow.SIZE)
+            self._kernel(state, 1.0, speeds, self._memory, row)
         except Exception as error:  # the controller may be anyone's
             raise compile_error(name, error) from error
         self.reset(state)
@@ -307,24 +333,7 @@ class PythonLoops:
                 self.attitude_target,
             )
         self._fraction += self._fraction_step
-        self._run_inner(state, rotor_speed_rad_s, row)
-
-    def _run_inner(self, state: FloatArray, rotor_speed_rad_s: FloatArray, row: FloatArray) -> None:
-        self._kernel(
-            state,
-            self._last_target,
-            self.attitude_target,
-            self._fraction,
-            rotor_speed_rad_s,
-            self._reference_memory,
-            self._reference_params,
-            self._controller_memory,
-            self._controller_params,
-            self._mixer,
-            self._last,
-            self._inner_dt_s,
-            row,
-        )
+        self._kernel(state, self._fraction, rotor_speed_rad_s, self._memory, row)
 
     def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
         """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""

@@ -91,7 +91,7 @@ def test_the_outer_loop_runs_only_when_it_is_due() -> None:
 def test_between_outer_ticks_the_target_moves_in_a_straight_line() -> None:
     """Without the reference filter, the reference is the target: a fifth of the way in each of five ticks."""
     loops = make()
-    loops._reference_params[0] = 0.0
+    loops._memory[0]["reference_params"][0] = 0.0
     flight = Flight(loops, at_rest(), setpoint((0.4, 0.0, 0.0)))
     flight.tick(5)
     w, x, y, z = loops.attitude_target[:4]
