@@ -55,9 +55,7 @@ def message_class(layout: Layout) -> Any:
         for field in fields:
             value = getattr(self, field.name)
             flat.extend(value) if field.is_array else flat.append(value)
-        packed: bytes = self._pack(
-            mav, layout.crc_extra, unpacker.pack(*flat), force_mavlink1=force_mavlink1
-        )
+        packed: bytes = self._pack(mav, layout.crc_extra, unpacker.pack(*flat), force_mavlink1=force_mavlink1)
         return packed
 
     names = [field.name for field in declared]

@@ -136,7 +136,10 @@ class SimulatorLink:
             controls = [0.0] * 16
         return self._link.encode(
             mavlink.MAVLink_hil_actuator_controls_message(
-                self.time_us, controls, HIL_ARMED if armed else HIL_DISARMED, HIL_LOCKSTEP if self._lockstep else 0
+                self.time_us,
+                controls,
+                HIL_ARMED if armed else HIL_DISARMED,
+                HIL_LOCKSTEP if self._lockstep else 0,
             )
         )
 

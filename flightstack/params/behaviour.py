@@ -37,28 +37,44 @@ class Behaviour:
     descent_speed_m_s: float = _param("MPC_Z_VEL_MAX_DN", 1.5, 0.1, 4, "m/s", "Largest descent speed")
     takeoff_speed_m_s: float = _param("MPC_TKO_SPEED", 1.5, 0.1, 5, "m/s", "Climb speed of a takeoff")
     land_speed_m_s: float = _param("MPC_LAND_SPEED", 0.7, 0.1, 2, "m/s", "Descent speed near the ground")
-    land_slow_altitude_m: float = _param("MPC_LAND_ALT2", 3.0, 0, 100, "m", "Altitude below which landing is slow")
-    acceleration_m_s2: float = _param("MPC_ACC_HOR", 3.0, 0.5, 4.5, "m/s^2", "Horizontal acceleration of the reference")
+    land_slow_altitude_m: float = _param(
+        "MPC_LAND_ALT2", 3.0, 0, 100, "m", "Altitude below which landing is slow"
+    )
+    acceleration_m_s2: float = _param(
+        "MPC_ACC_HOR", 3.0, 0.5, 4.5, "m/s^2", "Horizontal acceleration of the reference"
+    )
     vertical_acceleration_m_s2: float = _param(
         "MPC_ACC_UP_MAX", 3.0, 0.5, 5, "m/s^2", "Vertical acceleration of the reference"
     )
     jerk_m_s3: float = _param("MPC_JERK_AUTO", 20.0, 1, 80, "m/s^3", "Jerk of the reference")
     max_tilt_deg: float = _param("MPC_TILTMAX_AIR", 45, 5, 70, "deg", "Largest tilt")
     yaw_rate_deg_s: float = _param("MPC_YAWRAUTO_MAX", 60, 5, 180, "deg/s", "Largest yaw rate in auto modes")
-    yaw_mode: float = _param("MPC_YAW_MODE", 0, 0, 1, "", "Heading where none is given: 0 to the waypoint, 1 as it is")
-    acceptance_radius_m: float = _param("NAV_ACC_RAD", 0.5, 0.05, 200, "m", "Acceptance radius where none is given")
+    yaw_mode: float = _param(
+        "MPC_YAW_MODE", 0, 0, 1, "", "Heading where none is given: 0 to the waypoint, 1 as it is"
+    )
+    acceptance_radius_m: float = _param(
+        "NAV_ACC_RAD", 0.5, 0.05, 200, "m", "Acceptance radius where none is given"
+    )
     altitude_acceptance_m: float = _param("NAV_MC_ALT_RAD", 0.4, 0.05, 200, "m", "Altitude acceptance")
-    yaw_acceptance_deg: float = _param("MIS_YAW_ERR", 12, 1, 90, "deg", "Heading error at which a heading is reached")
+    yaw_acceptance_deg: float = _param(
+        "MIS_YAW_ERR", 12, 1, 90, "deg", "Heading error at which a heading is reached"
+    )
     return_altitude_m: float = _param("RTL_RETURN_ALT", 15, 0, 150, "m", "Altitude above home of a return")
-    return_min_distance_m: float = _param("RTL_MIN_DIST", 10, 0.5, 100, "m", "Nearer to home a return does not climb")
+    return_min_distance_m: float = _param(
+        "RTL_MIN_DIST", 10, 0.5, 100, "m", "Nearer to home a return does not climb"
+    )
     first_waypoint_distance_m: float = _param(
         "MIS_DIST_1WP", 10000, -1, 100000, "m", "Farthest first waypoint from home; -1 for no limit"
     )
     waypoint_distance_m: float = _param(
         "MIS_DIST_WPS", 10000, -1, 100000, "m", "Farthest waypoint from the one before; -1 for no limit"
     )
-    disarm_after_landing_s: float = _param("COM_DISARM_LAND", 1.0, -1, 20, "s", "Disarm after landing; -1 never")
-    disarm_without_takeoff_s: float = _param("COM_DISARM_PRFLT", 30, -1, 300, "s", "Disarm without takeoff; -1 never")
+    disarm_after_landing_s: float = _param(
+        "COM_DISARM_LAND", 1.0, -1, 20, "s", "Disarm after landing; -1 never"
+    )
+    disarm_without_takeoff_s: float = _param(
+        "COM_DISARM_PRFLT", 30, -1, 300, "s", "Disarm without takeoff; -1 never"
+    )
 
     def updated(self, name: str, value: float) -> Behaviour:
         """Return a copy with the parameter ``name`` changed; raise ConfigError."""
@@ -66,7 +82,9 @@ class Behaviour:
         if spec is None:
             raise ConfigError("parameter", name, "is not known")
         if not math.isfinite(value) or not spec.low <= value <= spec.high:
-            raise ConfigError("parameter", name, f"{value:g} is outside {spec.low:g} to {spec.high:g} {spec.unit}")
+            raise ConfigError(
+                "parameter", name, f"{value:g} is outside {spec.low:g} to {spec.high:g} {spec.unit}"
+            )
         return replace(self, **{spec.field: float(value)})
 
     def by_name(self) -> dict[str, float]:

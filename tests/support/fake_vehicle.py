@@ -55,6 +55,10 @@ class FakeVehicle:
         self._heartbeat_due_s = self._began_s = -1.0
         self._now_s = 0.0
 
+    def greet(self) -> None:
+        """Be heard at once by a new peer."""
+        self._heartbeat_due_s = -1.0
+
     # -- receiving
 
     def receive(self, data: bytes, now_s: float = 0.0) -> None:
@@ -241,6 +245,7 @@ class FakeVehicle:
 def serve(vehicle: FakeVehicle, to_port: int | None = None) -> Iterator[UdpSocket]:
     """Run ``vehicle`` on a free UDP port in a thread; it sends to ``to_port`` first, if given."""
     socket = UdpSocket("127.0.0.1")
+    vehicle.greet()
     stopped = threading.Event()
 
     def run() -> None:

@@ -215,6 +215,13 @@ def test_a_directory_with_a_flight_is_refused(tmp_path: Path) -> None:
     assert error.value.exit_code == USAGE
 
 
+def test_a_directory_without_permission_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gcs_cli.run_directory.os.access", lambda *_: False)  # root may write anywhere
+    with pytest.raises(CliError, match="nothing can be written there: permission denied") as error:
+        make_run_directory(HOP, tmp_path)
+    assert error.value.exit_code == USAGE
+
+
 def test_a_directory_that_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(CliError, match="cannot be made"):
