@@ -1,7 +1,9 @@
-"""The ``gcs`` commands as processes, over UDP, against a scripted vehicle."""
+"""The ``gcs`` commands over UDP against a scripted vehicle; as processes where a process makes a difference."""
 
 from __future__ import annotations
 
+import functools
+import io
 import json
 import os
 import pty
@@ -13,19 +15,20 @@ from pathlib import Path
 
 import pytest
 
+import flightstack
+from flightstack.mavlink.services.command_client import CommandClient, CommandTiming
 from flightstack.transport.udp import UdpSocket
+from gcs_cli import calls
+from gcs_cli.__main__ import main
+from gcs_cli.connection import Connection
 from tests.support.fake_vehicle import ARM, FakeVehicle, serve
+from tests.support.gcs import Ended, gcs
 
 LONG_S = 30  # a bound for a machine that is busy; nothing is expected to take a second
 MISSIONS = Path(__file__).parents[2] / "missions"
 
 
-def gcs(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "gcs_cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=LONG_S, check=False)
-
-
-def told(vehicle: FakeVehicle, *arguments: object) -> subprocess.CompletedProcess[str]:
+def told(vehicle: FakeVehicle, *arguments: object) -> Ended:
     """Run ``gcs`` with the link to ``vehicle``."""
     with serve(vehicle) as socket:
         return gcs("--connect", f"udpout:127.0.0.1:{socket.address[1]}", *arguments)
@@ -68,7 +71,9 @@ def test_a_refusal_tells_the_vehicles_reason() -> None:
     assert result.stderr == "gcs: arming refused: no valid position and attitude yet\n"
 
 
-def test_a_vehicle_that_does_not_answer_is_a_timeout() -> None:
+def test_a_vehicle_that_does_not_answer_is_a_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
+    quick = functools.partial(CommandClient, timing=CommandTiming(timeout_s=0.02))
+    monkeypatch.setattr(calls, "CommandClient", quick)
     result = told(FakeVehicle(deaf_to={ARM}), "arm")
     assert result.returncode == 3
     assert "did not answer MAV_CMD_COMPONENT_ARM_DISARM" in result.stderr
@@ -117,7 +122,7 @@ def test_perf_shows_the_loops() -> None:
 
 
 def test_perf_of_a_vehicle_without_loop_timing() -> None:
-    result = told(FakeVehicle(mute={"FS_LOOP_TIMING"}), "--timeout", "1", "perf")
+    result = told(FakeVehicle(mute={"FS_LOOP_TIMING"}), "--timeout", "0.3", "perf")
     assert result.returncode == 3
     assert "FS_LOOP_TIMING" in result.stderr
 
@@ -169,6 +174,42 @@ def test_wrong_usage_is_one_sentence_and_exit_code_2(arguments: list[str], said:
     assert result.stderr.startswith("gcs: ")
     assert said in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_an_interrupted_wait_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Connection, "meet", interrupt)
+    with UdpSocket("127.0.0.1") as silent:
+        result = gcs("--connect", f"udpout:127.0.0.1:{silent.address[1]}", "arm")
+    assert result == ("", "gcs: interrupted\n", 1)
+
+
+@pytest.mark.parametrize("group", [[], ["mission"]])
+def test_without_a_command_the_help_is_shown(group: list[str]) -> None:
+    result = gcs(*group)
+    assert (result.stdout, result.returncode) == ("", 2)
+    assert result.stderr.startswith("Usage: gcs")
+
+
+def test_the_version() -> None:
+    assert gcs("--version") == (f"gcs {flightstack.__version__}\n", "", 0)
+
+
+def test_an_output_without_special_letters_gets_question_marks(monkeypatch: pytest.MonkeyPatch) -> None:
+    octets = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(octets, encoding="ascii"))
+    with serve(FakeVehicle()) as socket:
+        assert main(["--connect", f"udpout:127.0.0.1:{socket.address[1]}", "perf"]) == 0
+    assert b"52.5? real time" in octets.getvalue()
+
+
+def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
+    command = [sys.executable, "-m", "gcs_cli", "--help"]
+    with Path("/dev/full").open("w") as full:
+        result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, timeout=LONG_S, check=False)
+    assert (result.stderr, result.returncode) == (b"gcs: No space left on device\n", 1)
 
 
 def test_watch_prints_lines_without_a_terminal() -> None:
