@@ -3,32 +3,49 @@
 from __future__ import annotations
 
 import time
+from enum import Enum
 from typing import NamedTuple
 
 from benchmarks.measure import Figure, figure
 from flightstack.logging.flight_log import FlightLog
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.services.mission_client import Done
 from tests.support.world import World
 
 PLAN = "square.plan"
 
 
-class BenchWorld(World):
-    """A world that can fly without its log or, once it flies, without its ground station."""
+class Station(Enum):
+    """What the ground station does once the vehicle flies."""
 
-    def __init__(self, log: bool, ground: bool, inner_hz: float) -> None:
+    READS = "reads all telemetry"
+    HEARS = "is sent all telemetry and leaves it unread, as if it were another process"
+    IS_GONE = "is not there"
+
+
+class BenchWorld(World):
+    """A world that flies its mission, with or without a log and a ground station."""
+
+    def __init__(self, log: bool, station: Station, inner_hz: float = 500.0) -> None:
         self._with_log = log
-        self._with_ground = True
+        self._station = Station.READS
         super().__init__(inner_hz=inner_hz, outer_hz=inner_hz / 5.0)
-        assert self.upload(PLAN) is not None
+        assert isinstance(self.upload(PLAN), Done)
         assert self.start_mission() == 0
-        self._with_ground = ground
+        self._station = station
 
     def _open_log(self) -> FlightLog | None:  # type: ignore[override]
         return super()._open_log() if self._with_log else None
 
     def exchange_with_ground(self) -> None:
-        if self._with_ground:
+        if self._station is Station.READS:
             super().exchange_with_ground()
+        elif self._station is Station.HEARS:
+            if self.time_s >= self._heartbeat_due_s:
+                self._heartbeat_due_s = self.time_s + 1.0
+                self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+            for _ in self.stack.ground.poll(self._link_now_s()):
+                pass
 
 
 class Variant(NamedTuple):
@@ -36,25 +53,25 @@ class Variant(NamedTuple):
 
     name: str
     log: bool
-    ground: bool
-    inner_hz: float = 500.0
+    station: Station
 
 
 VARIANTS = (
-    Variant("log, ground station", True, True),
-    Variant("log", True, False),
-    Variant("neither", False, False),
+    Variant("log, telemetry sent and read", True, Station.READS),
+    Variant("log, telemetry sent", True, Station.HEARS),
+    Variant("log", True, Station.IS_GONE),
+    Variant("neither", False, Station.IS_GONE),
 )
 
 
 def _fly(variant: Variant) -> tuple[float, float]:
     """Return the real-time factor and the time of a step [µs]."""
-    world = BenchWorld(variant.log, variant.ground, variant.inner_hz)
+    world = BenchWorld(variant.log, variant.station)
     began_s, simulated_s = time.perf_counter(), world.time_s
     world.until_disarmed()
     wall_s = time.perf_counter() - began_s
     simulated_s = world.time_s - simulated_s
-    return simulated_s / wall_s, wall_s / simulated_s / variant.inner_hz * 1e6
+    return simulated_s / wall_s, wall_s / simulated_s / world.config.inner_hz * 1e6
 
 
 def flights(rounds: int) -> dict[str, tuple[Figure, Figure]]:

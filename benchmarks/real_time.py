@@ -10,12 +10,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.three_processes import INSTANCE, ROOT
+from benchmarks.ports import free_instance, ground_port, simulator_port
+from benchmarks.three_processes import ROOT
 from flightstack.clock import DeadlineScheduler, LoopTiming, ask_for_punctual_sleeps
 
 PERIOD_NS = 2_000_000
@@ -56,30 +57,39 @@ def _our_scheduler(count: int) -> list[float]:
 
 def _flight_stack(seconds: float) -> list[float]:
     """Run simulator and flight stack, both in real time, and return the lateness of the loop."""
-    with tempfile.TemporaryDirectory() as folder:
+    instance = free_instance()
+    ground = ground_port(instance)
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as running:
         file = Path(folder) / "lateness"
-        port = f"{4560 + INSTANCE}"
-        simulator = subprocess.Popen(
-            [sys.executable, "-m", "sim_bridge", f"--port={port}"], cwd=ROOT, stdout=subprocess.DEVNULL
-        )
-        stack = subprocess.Popen(
-            [
-                sys.executable, "-m", "benchmarks.timed_stack", str(file), "--clock=realtime",
-                f"--sim-port={port}", f"--instance={INSTANCE}", f"--gcs-port={14550 + 10 * INSTANCE}",
-                f"--log={folder}/flight.ulg",
-            ],
-            cwd=ROOT, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+        station = running.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+        station.bind(("127.0.0.1", ground))
+        station.settimeout(30.0)
+        port = f"port={simulator_port(instance)}"
+        simulator = running.enter_context(_child("sim_bridge", f"--{port}", f"--instance={instance}"))
+        stack = running.enter_context(
+            _child(
+                "benchmarks.timed_stack", str(file), "--clock=realtime", f"--sim-{port}",
+                f"--instance={instance}", f"--gcs-port={ground}", f"--log={folder}/flight.ulg",
+            )
         )  # fmt: skip
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
-            station.bind(("127.0.0.1", 14550 + 10 * INSTANCE))
-            station.settimeout(30.0)
-            station.recv(4096)  # its first heartbeat: it runs
-            time.sleep(seconds)
+        station.recv(4096)  # its first heartbeat: it runs
+        time.sleep(seconds)
         for process in (stack, simulator):
             process.send_signal(signal.SIGINT)
             process.wait(timeout=30.0)
         values = [float(line) for line in file.read_text(encoding="ascii").split()]
     return values[250:]  # the first half second is start-up
+
+
+@contextlib.contextmanager
+def _child(module: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    quiet = subprocess.DEVNULL
+    command = [sys.executable, "-m", module, *arguments]
+    with subprocess.Popen(command, cwd=ROOT, stdout=quiet, stderr=quiet) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def lateness(seconds: float) -> tuple[dict[str, list[float]], bool]:

@@ -11,6 +11,7 @@ from benchmarks.round_trip import WAYS
 from benchmarks.step_costs import Part
 from benchmarks.table import Row, table
 from benchmarks.three_processes import Flights
+from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
 
 # on a machine of the same kind: PX4 with an external simulator, ArduCopter's SITL in one process
 PEERS = {500.0: ("≥ 20", "PX4 10"), 250.0: ("≥ 40", "PX4 18–23")}
@@ -27,7 +28,7 @@ def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
     if "three_processes" in results:
         yield _flights(results) + "\n"
     if "costs" in results:
-        yield _costs(results["costs"], results["round_trips"]) + "\n"
+        yield _costs(results) + "\n"
     if "round_trips" in results:
         yield _round_trips(results["round_trips"]) + "\n"
     if "lateness" in results:
@@ -48,9 +49,10 @@ def _flights(results: dict[str, Any]) -> str:
     return table("FLIGHTS", head, rows)
 
 
-def _costs(costs: list[tuple[Part, Figure]], round_trips: dict[str, tuple[Figure, Figure]]) -> str:
+def _costs(results: dict[str, Any]) -> str:
+    costs: list[tuple[Part, Figure]] = results["costs"]
     rows: list[Row] = []
-    trip, _ = round_trips[WAYS[0].name]
+    trip, _ = results["round_trips"][WAYS[0].name]
     floor_us = trip.median
     rows.append(("TCP round trip, both ends on one processor", trip.text(), "1", short(floor_us)))
     for part, cost in costs:
@@ -58,8 +60,11 @@ def _costs(costs: list[tuple[Part, Figure]], round_trips: dict[str, tuple[Figure
         if part.is_floor:
             floor_us += share_us
             rows.append((part.name, cost.text(), f"{part.per_step:g}", short(share_us)))
-    rows.append(("floor of a step of two processes", "", "", short(floor_us)))
-    rows.append(("for comparison, or made of the parts above",))
+    rows.append(("floor of a step, two processes", "", "", short(floor_us)))
+    if "three_processes" in results:
+        step_us = results["three_processes"][500.0].step_us.median
+        rows.append(("a step as flown, three processes", "", "", short(step_us)))
+    rows.append(("for comparison, or made of parts above",))
     rows.extend(
         (f"  {part.name}", cost.text(), f"{part.per_step:.2g}", short(cost.median * part.per_step))
         for part, cost in costs
@@ -70,9 +75,10 @@ def _costs(costs: list[tuple[Part, Figure]], round_trips: dict[str, tuple[Figure
 
 def _round_trips(trips: dict[str, tuple[Figure, Figure]]) -> str:
     rows = [(name, median.text(), mean.text()) for name, (median, mean) in trips.items()]
-    return table(
-        "TCP ROUND TRIP between two processes, 158 and 90 bytes", ("", "median, µs", "mean, µs"), rows
+    title = (
+        f"TCP ROUND TRIP between two processes, {PlantStateFrame().size} and {ActuatorsFrame().size} bytes"
     )
+    return table(title, ("", "median, µs", "mean, µs"), rows)
 
 
 def _lateness(figures: dict[str, list[float]], has_compiler: bool) -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.measure import Figure, interleaved_us
-from benchmarks.one_process import BenchWorld
+from benchmarks.one_process import BenchWorld, Station
 from flightstack.contract import MAX_ROTORS, LoopRow, Vector3
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
 from flightstack.mavlink.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
@@ -36,7 +36,7 @@ class Part(NamedTuple):
 
 
 def _flying() -> BenchWorld:
-    world = BenchWorld(log=True, ground=True, inner_hz=500.0)
+    world = BenchWorld(True, Station.READS)
     world.run(6.0)
     return world
 

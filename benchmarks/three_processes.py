@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.measure import Figure, figure
+from benchmarks.ports import free_instance, simulator_port
 from flightstack.config import DEFAULT_HOME
 from flightstack.mavlink.simulator_link import SimulatorLink
 from flightstack.params.vehicle import load_vehicle
 
 ROOT = Path(__file__).resolve().parent.parent
 PLAN = ROOT / "missions" / "square.plan"
-INSTANCE = 60
-"""Far from the ports of a flight that the user may have running."""
 
 
 class Flights(NamedTuple):
@@ -35,7 +34,7 @@ def _fly(inner_hz: float) -> tuple[dict[str, Any], float]:
     with tempfile.TemporaryDirectory() as folder:
         command = [
             sys.executable, "-m", "gcs_cli", "fly", str(PLAN), "--json", "--out", folder,
-            "--inner-hz", f"{inner_hz:g}", "--instance", str(INSTANCE),
+            "--inner-hz", f"{inner_hz:g}", "--instance", str(free_instance()),
         ]  # fmt: skip
         began_s = time.perf_counter()
         done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=ROOT)
@@ -71,7 +70,7 @@ def _run_s(*arguments: str) -> float:
 
 def _simulator_s() -> float:
     """Time from the start of ``sim-bridge`` to its first state."""
-    port = 4560 + INSTANCE
+    port = simulator_port(free_instance())
     hello = SimulatorLink(load_vehicle("paper_quad"), DEFAULT_HOME, lockstep=True).hello(2000)
     command = [sys.executable, "-m", "sim_bridge", "--speed=max", f"--port={port}"]
     began_s = time.perf_counter()

@@ -1,0 +1,39 @@
+"""An instance number whose ports nobody uses, so that a benchmark disturbs no flight."""
+
+from __future__ import annotations
+
+import socket
+
+_FIRST, _LAST = 60, 99
+
+
+def _is_free(kind: socket.SocketKind, port: int) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        if kind == socket.SOCK_STREAM:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+def simulator_port(instance: int) -> int:
+    """TCP port of the simulator."""
+    return 4560 + instance
+
+
+def ground_port(instance: int) -> int:
+    """UDP port of the ground station."""
+    return 14550 + 10 * instance
+
+
+def free_instance() -> int:
+    """Return the first instance, from 60 on, all of whose ports are free."""
+    for instance in range(_FIRST, _LAST + 1):
+        udp = (ground_port(instance), 18570 + instance, 14580 + instance)
+        if _is_free(socket.SOCK_STREAM, simulator_port(instance)) and all(
+            _is_free(socket.SOCK_DGRAM, port) for port in udp
+        ):
+            return instance
+    raise RuntimeError(f"instances {_FIRST} to {_LAST} are all in use")
