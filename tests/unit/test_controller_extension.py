@@ -1,0 +1,275 @@
+"""A user's own attitude controller: the documented example installed and flown, and broken ones."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from scipy.linalg import solve_continuous_are
+
+from flightstack.assembly import build
+from flightstack.config import StackConfig
+from flightstack.control.controller_loading import controller_names, load_controller
+from flightstack.params.errors import ConfigError
+from flightstack.params.gains_file import BUILT_IN
+from tests.support.world import World
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLE = ROOT / "tests" / "support" / "example_controller"
+MODULE = (EXAMPLE / "lqr_controller.py").read_text(encoding="utf-8")
+GROUP = "flightstack.attitude_controllers"
+
+
+def install(site: Path, project: Path = EXAMPLE) -> Path:
+    """Do what pip does with the project, without a network: its module and its metadata into ``site``."""
+    with (project / "pyproject.toml").open("rb") as file:
+        declared = tomllib.load(file)["project"]
+    for source in project.glob("*.py"):
+        shutil.copy(source, site)
+    info = site / f"{declared['name'].replace('-', '_')}-{declared['version']}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {declared['name']}\nVersion: {declared['version']}\n"
+    )
+    entries = [f"{name} = {value}" for name, value in declared["entry-points"][GROUP].items()]
+    (info / "entry_points.txt").write_text(f"[{GROUP}]\n" + "\n".join(entries) + "\n")
+    return site
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A directory of installed packages that this process and its children see."""
+    folder = tmp_path / "site"
+    folder.mkdir()
+    monkeypatch.syspath_prepend(str(folder))
+    for name in ("lqr_controller", "broken"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    return folder
+
+
+@pytest.fixture
+def installed(site: Path) -> Path:
+    install(site)
+    importlib.invalidate_caches()
+    return site
+
+
+# ---------------------------------------------------------------------- the example
+
+
+def test_the_documentation_shows_the_example_as_it_is() -> None:
+    page = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```(\w*)\n(.*?)```", page, flags=re.DOTALL)
+    assert ("toml", (EXAMPLE / "pyproject.toml").read_text(encoding="utf-8")) in blocks
+    assert ("python", MODULE) in blocks
+
+
+def test_an_installed_controller_is_listed(installed: Path) -> None:
+    assert controller_names() == ["backstepping", "lqr", "pid"]
+    assert load_controller("lqr").name == "lqr"
+
+
+def test_its_gains_solve_the_riccati_equation(installed: Path) -> None:
+    load_controller("lqr")
+    gains = sys.modules["lqr_controller"].lqr_gains(0.2, 2.5, 40.0)
+    a, b = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]])
+    weight, effort = np.diag([1 / 0.2**2, 1 / 2.5**2]), np.array([[1 / 40.0**2]])
+    solution = solve_continuous_are(a, b, weight, effort)
+    assert gains == pytest.approx((b.T @ solution / effort).ravel(), rel=1e-9)
+
+
+@pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
+def test_it_flies_the_square(installed: Path, vehicle: str) -> None:
+    world = World(controller="lqr", vehicle=vehicle)
+    world.upload("square.plan")
+    world.start_mission()
+    world.until_disarmed(60.0)
+    assert world.reached == [0, 1, 2, 3, 4, 5]
+    assert np.linalg.norm(world.position[:2]) < 0.05  # 13 mm seen
+
+
+def test_its_own_table_in_a_gains_file_is_read_and_checked(installed: Path, tmp_path: Path) -> None:
+    tuned = (BUILT_IN / "tuned.toml").read_text(encoding="utf-8")
+    path = tmp_path / "my.toml"
+    path.write_text(tuned + "\n[attitude_lqr]\nlargest_angle_rad = [0.1, 0.1, 0.2]\n")
+    build(StackConfig(controller="lqr", gains=str(path)), lambda: None)
+    for bad, sentence in (
+        ("largest_angle = 1", "attitude_lqr.largest_angle: is not a known key"),
+        (
+            "largest_angle_rad = [9, 9, 9]",
+            "attitude_lqr.largest_angle_rad: 9 is outside the allowed range 0.001 to 3",
+        ),
+    ):
+        path.write_text(f"{tuned}\n[attitude_lqr]\n{bad}\n")
+        with pytest.raises(ConfigError) as error:
+            build(StackConfig(controller="lqr", gains=str(path)), lambda: None)
+        assert str(error.value) == f"{path}: {sentence}"
+
+
+def test_an_edit_is_noticed(site: Path) -> None:
+    """The key of the compiled loops names the sources: of the module, and of its package if it has one."""
+    package = site / "laws"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "helper.py").write_text("GAIN = 1.0\n")
+    (package / "lqr.py").write_text(MODULE)
+    importlib.invalidate_caches()
+    controller = importlib.import_module("laws.lqr").CONTROLLER
+    keys = {controller.key}
+    for name, text in (
+        ("helper.py", "GAIN = 2.0\n"),
+        ("lqr.py", MODULE + "# edited\n"),
+        ("new.py", "X = 1\n"),
+    ):
+        (package / name).write_text(text)
+        keys.add(controller.key)
+    assert len(keys) == 4
+    install(site)
+    importlib.invalidate_caches()
+    alone = load_controller("lqr")
+    key = alone.key
+    (site / "neighbour.py").write_text("X = 1\n")  # another package in the same folder is no part of it
+    assert alone.key == key
+    for name in ("laws.lqr", "laws"):
+        sys.modules.pop(name, None)
+
+
+# ---------------------------------------------------------------------- as a process
+
+
+def run(site: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), str(ROOT)])}
+    command = [sys.executable, "-m", "flightstack", *arguments]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_the_command_takes_an_installed_controller_and_lists_them_for_an_unknown_one(installed: Path) -> None:
+    done = run(installed, "--controller", "lqr", "--check")
+    assert done.returncode == 0, done.stderr
+    assert "lqr" in done.stdout
+    unknown = run(installed, "--controller", "lqg", "--check")
+    assert unknown.returncode == 2
+    assert unknown.stderr == (
+        "flightstack: --controller: lqg: there is no such attitude controller; "
+        "installed are backstepping, lqr, pid\n"
+    )
+
+
+def test_a_controller_that_is_gone_leaves_the_others_compilable(installed: Path) -> None:
+    """Our functions' caches name no type of a user's package: Numba would import it to read any of them."""
+    build(StackConfig(controller="lqr"), lambda: None)
+    indices = list(Path(numba.config.CACHE_DIR).rglob("*.nbi"))
+    kernels = [path for path in indices if "inner_kernel__lqr" in path.name]
+    assert kernels
+    for path in indices:
+        if path not in kernels:
+            assert b"lqr_controller" not in path.read_bytes(), path.name
+
+
+# ---------------------------------------------------------------------- broken ones
+
+
+def replaced(old: str, new: str) -> str:
+    assert old in MODULE
+    return MODULE.replace(old, new)
+
+
+BROKEN = {
+    "its module is missing": (None, "broken:CONTROLLER cannot be loaded: No module named 'broken'"),
+    "its module fails": (
+        "import no_such_thing",
+        "broken:CONTROLLER cannot be loaded: No module named 'no_such_thing'",
+    ),
+    "its module is no Python": (
+        "def",
+        "broken:CONTROLLER cannot be loaded: invalid syntax (broken.py, line 1)",
+    ),
+    "it exits": ("raise RuntimeError('many\\nlines')", "broken:CONTROLLER cannot be loaded: many"),
+    "it has no such name": ("X = 1", "broken:CONTROLLER cannot be loaded: module 'broken' has no attribute"),
+    "it is something else": ("CONTROLLER = 3", "broken:CONTROLLER is not an AttitudeController"),
+    "it has another name": (
+        MODULE,
+        "broken:CONTROLLER calls itself 'lqr', and must bear the name of its entry point",
+    ),
+    "too little memory": (
+        replaced('"lqr", step, Memory, Params, (0.0,)', '"broken", step, Memory, Params, ()'),
+        "broken:CONTROLLER has 0 initial values for the 1 fields of its memory (one at least)",
+    ),
+    "memory of no type": (
+        replaced('"lqr", step, Memory, Params', '"broken", step, dict, Params'),
+        "broken:CONTROLLER has 1 initial values for the 0 fields of its memory (one at least)",
+    ),
+    "no parameters": (
+        replaced('"lqr", step, Memory, Params', '"broken", step, Memory, tuple'),
+        "broken:CONTROLLER has no parameters",
+    ),
+    "parameters fail": (
+        replaced("    pairs = ", "    1 / 0\n    pairs = "),
+        "its parameters cannot be read: division by zero",
+    ),
+    "too few parameters": (
+        replaced("Params(*angle_gains, *rate_gains, *vehicle.inertia_kg_m2)", "(1.0, 2.0)"),
+        "its read_params must return 9 finite numbers",
+    ),
+    "infinite parameters": (
+        replaced("*vehicle.inertia_kg_m2)", "1.0, 1.0, math.inf)"),
+        "its read_params must return 9 finite numbers",
+    ),
+    "unknown attribute in the step": (
+        replaced("inputs.error_rad, inputs.rates", "inputs.errors, inputs.rates"),
+        "its step cannot be compiled: Unknown attribute 'errors' of type AttitudeInputs(",
+    ),
+    "unknown name in the step": (
+        replaced("+ ahead.x", "+ ahead_x"),
+        "its step cannot be compiled: NameError: name 'ahead_x' is not defined",
+    ),
+    "torque that is no vector": (
+        replaced("return memory, Vector3(", "return memory, ("),
+        "its step cannot be compiled: Unknown attribute 'x' of type",
+    ),
+    "one result too many": (
+        replaced("return memory, Vector3(", "return memory, 0.0, Vector3("),
+        "its step cannot be compiled: ",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_controller_is_one_sentence_that_lists_the_installed_ones(site: Path, name: str) -> None:
+    text, sentence = BROKEN[name]
+    if text is not None:
+        if "CONTROLLER has" not in sentence and "calls itself" not in sentence:
+            text = text.replace('AttitudeController("lqr"', 'AttitudeController("broken"')
+        (site / "broken.py").write_text(text)
+    info = site / "broken-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{GROUP}]\nbroken = broken:CONTROLLER\n")
+    importlib.invalidate_caches()
+    with pytest.raises(ConfigError) as error:
+        build(StackConfig(controller="broken"), lambda: None)
+    shown = str(error.value)
+    assert shown.startswith(f"--controller: broken: {sentence}"), shown
+    assert shown.endswith("; installed are backstepping, broken, pid")
+    assert "\n" not in shown
+    assert len(shown) < 400
+
+
+def test_two_packages_with_one_name_are_not_guessed_between(installed: Path) -> None:
+    info = installed / "rival-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: rival\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[{GROUP}]\nlqr = rival:CONTROLLER\n")
+    with pytest.raises(
+        ConfigError, match="several packages have a controller of this name: lqr-controller, rival"
+    ):
+        load_controller("lqr")
