@@ -31,9 +31,9 @@ _ALTITUDE_TOLERANCE_M = 0.01  # a 32-bit float of an altitude above sea level is
 class Limits(NamedTuple):
     """What a mission may ask for; PX4's parameter of the same meaning in brackets. Zero or less: no limit."""
 
-    max_first_distance_m: float = 900.0
+    max_first_distance_m: float = 10_000.0
     """Horizontal distance from home to the first position [MIS_DIST_1WP]."""
-    max_distance_m: float = 900.0
+    max_distance_m: float = 10_000.0
     """Horizontal distance from one position to the next [MIS_DIST_WPS]."""
     max_altitude_m: float = 500.0
     """Altitude above home [GF_MAX_VER_DIST]."""

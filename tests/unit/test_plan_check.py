@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightstack.geodesy import GeoPoint
+from flightstack.params.behaviour import Behaviour
 from flightstack.plan import UNSET_E7, Command, Frame, Limits, MissionItem, MissionResult, check_mission
 from flightstack.plan.item import as_float32, integer_coordinate
 
@@ -76,7 +77,7 @@ REFUSED: list[tuple[MissionItem, MissionResult, str]] = [
     (replace(WAYPOINT, z=501.0), R.INVALID_PARAM7, "altitude 501 m above home"),
     (replace(WAYPOINT, frame=ABSOLUTE, z=480.0), R.INVALID_PARAM7, "altitude -8 m above home"),
     (replace(OPEN_TAKEOFF, z=0.0), R.INVALID_PARAM7, "altitude 0 m above home is outside 0.3 to 500 m"),
-    (replace(WAYPOINT, x=474077420), R.INVALID, "is 1112 m from the position before it, and at most 900 m"),
+    (replace(WAYPOINT, x=474977420), R.INVALID, "m from the position before it, and at most 10000 m"),
     (replace(LOITER, param1=-2.0), R.INVALID_PARAM1, "hold time"),
     (replace(DELAY, param1=-1.0), R.INVALID_PARAM1, "a time of day (-1) is not supported"),
     (replace(DELAY, param1=NAN), R.INVALID_PARAM1, "delay nan"),
@@ -118,11 +119,18 @@ def test_the_mission_as_a_whole() -> None:
         assert (rejection.result, rejection.seq) == (MissionResult.INVALID, None)
 
 
+def test_the_limits_are_those_of_the_vehicle_unless_its_parameters_say_otherwise() -> None:
+    vehicle = Behaviour()
+    limits = Limits()
+    assert limits.max_first_distance_m == vehicle.first_waypoint_distance_m
+    assert limits.max_distance_m == vehicle.waypoint_distance_m
+
+
 def test_limits_are_parameters_and_zero_lifts_them() -> None:
     far = replace(WAYPOINT, x=WAYPOINT.x + 1_000_000)  # 11.1 km north
     rejection = check_mission((far,), HOME)
     assert rejection is not None
-    assert "from home, and at most 900 m" in rejection.reason
+    assert "from home, and at most 10000 m" in rejection.reason
     assert check_mission((far,), HOME, Limits(max_first_distance_m=12_000.0)) is None
     assert check_mission((WAYPOINT, far), HOME, Limits(max_distance_m=0.0)) is None
     high = replace(WAYPOINT, z=9000.0)
