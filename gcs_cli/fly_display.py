@@ -14,9 +14,11 @@ from rich.table import Table
 from rich.text import Text
 
 from gcs_cli.flight import Flight, Phase
+from gcs_cli.view_types import StatusText
 from gcs_cli.watch_lines import text_line
 
 _FRAME_S = 0.1
+_WITH_BAR, _WITH_PLACE = 60, 90  # columns of the terminal
 _WARNING = 4  # MAV_SEVERITY_WARNING
 
 
@@ -43,7 +45,23 @@ class Display(Protocol):
 
 def make_display(console: Console) -> Display:
     """Return the display that fits where ``console`` writes to."""
-    return BarDisplay(console) if console.is_terminal else LineDisplay(console)
+    draws = console.is_terminal and not console.is_dumb_terminal
+    return BarDisplay(console) if draws else LineDisplay(console)
+
+
+class _NewTexts:
+    """Status texts not shown yet; what the vehicle says of being shut down early is of no use to anybody."""
+
+    def __init__(self) -> None:
+        self._seen = 0
+        self._ended = False
+
+    def of(self, flight: Flight) -> tuple[StatusText, ...]:
+        """Return them, once each."""
+        new = () if self._ended else flight.view.texts_since(self._seen)
+        self._seen = flight.view.text_count
+        self._ended = flight.outcome is not None
+        return new
 
 
 class BarDisplay:
@@ -54,18 +72,18 @@ class BarDisplay:
         self._live.start()
         self._spinner = Spinner("dots")
         self._due_s = 0.0
-        self._texts = 0
+        self._texts = _NewTexts()
 
     def update(self, flight: Flight) -> None:
         """Redraw, at most ten times a second."""
-        for entry in flight.view.texts_since(self._texts):
+        for entry in self._texts.of(flight):
             if entry.severity <= _WARNING:
                 self._live.console.print(Text(text_line(entry), style="yellow"))
-        self._texts = flight.view.text_count
         now_s = time.monotonic()
         if now_s >= self._due_s:
             self._due_s = now_s + _FRAME_S
-            self._live.update(progress(flight, now_s, self._spinner), refresh=True)
+            width = self._live.console.width
+            self._live.update(progress(flight, now_s, self._spinner, width), refresh=True)
 
     def close(self) -> None:
         """Remove the line."""
@@ -78,13 +96,12 @@ class LineDisplay:
     def __init__(self, console: Console) -> None:
         self._console = console
         self._before = ""
-        self._texts = 0
+        self._texts = _NewTexts()
 
     def update(self, flight: Flight) -> None:
         """Print what is new."""
-        for entry in flight.view.texts_since(self._texts):
+        for entry in self._texts.of(flight):
             self._print(text_line(entry))
-        self._texts = flight.view.text_count
         words = f"{phase_words(flight)}{item_words(flight)}"
         if words != self._before:
             self._before = words
@@ -97,23 +114,22 @@ class LineDisplay:
         """Nothing is held open."""
 
 
-def progress(flight: Flight, now_s: float, spinner: Spinner) -> RenderableType:
-    """Return the live line."""
-    grid = Table.grid(padding=(0, 1), expand=True)
-    for _ in range(2):
-        grid.add_column(no_wrap=True)
-    grid.add_column(ratio=1)
-    for _ in range(3):
-        grid.add_column(no_wrap=True, justify="right")
+def progress(flight: Flight, now_s: float, spinner: Spinner, width: int) -> RenderableType:
+    """Return the live line; a narrow terminal shows the first of its parts, whole."""
     done, total = _share(flight)
-    grid.add_row(
-        spinner.render(now_s),
-        Text(phase_words(flight), style="bold cyan"),
-        ProgressBar(total=max(1, total), completed=done, complete_style="green"),
-        Text(item_words(flight).strip(), style="bold"),
-        Text(place_words(flight)),
-        Text(speed_words(flight), style="cyan"),
-    )
+    bar = ProgressBar(total=max(1, total), completed=done, complete_style="green")
+    item = Text(item_words(flight).strip(), style="bold")
+    parts: list[RenderableType] = [spinner.render(now_s), Text(phase_words(flight), style="bold cyan")]
+    if width >= _WITH_BAR:
+        parts.append(bar)
+    parts.append(item)
+    if width >= _WITH_PLACE:
+        parts.append(Text(place_words(flight)))
+    parts.append(Text(speed_words(flight), style="cyan"))
+    grid = Table.grid(padding=(0, 1), expand=True)
+    for part in parts:
+        grid.add_column(no_wrap=True, ratio=1 if part is bar else None)
+    grid.add_row(*parts)
     return grid
 
 

@@ -162,7 +162,7 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
     try:
         data = read_flight(log)
     except (ConfigError, OSError) as error:
-        data = None
+        data = FlightData()
         if outcome.completed:
             outcome = Outcome(f"the mission was flown, but its log cannot be read: {error}", FAILED)
     run = RunInfo(
@@ -180,11 +180,10 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
         overruns=flown.overruns,
         log_path=log,
     )
-    summary = summarise(FlightData() if data is None else data, plan, run)
+    summary = summarise(data, plan, run)
     try:
         write_summary(flown.folder / SUMMARY_NAME, summary)
-        if data is not None:
-            write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
+        write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
     except OSError as error:
         raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
     return summary, outcome

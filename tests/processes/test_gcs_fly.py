@@ -16,11 +16,12 @@ from pathlib import Path
 import pytest
 
 from gcs_cli.processes import Child, Children
+from tests.support.free_instance import free_instance
 from tests.support.gcs import gcs
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds
 MISSIONS = Path(__file__).parents[2] / "missions"
-INSTANCE = 60  # far from the default ports, where somebody may be flying
+INSTANCE = free_instance()
 PATIENT = ["--speed", "1"]  # leaves time to interfere
 
 
@@ -153,6 +154,7 @@ def test_a_flight_is_never_overwritten(tmp_path: Path) -> None:
 def test_a_busy_port_is_named_and_nothing_is_started(tmp_path: Path, kind: str, base: int, step: int) -> None:
     port = base + step * INSTANCE
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if kind == "UDP" else socket.SOCK_STREAM) as taken:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # past links of the port are no matter
         taken.bind(("127.0.0.1", port))
         if kind == "TCP":
             taken.listen(1)
@@ -225,6 +227,7 @@ def test_no_vehicle_in_time(tmp_path: Path) -> None:
     assert result.returncode == 3
     assert "within 0.1 s" in result.stderr
     assert "within 0.1 s" in str(summary_of(tmp_path / "run")["outcome"])
+    assert "within 0.1 s" in (tmp_path / "run" / "report.html").read_text()  # also without a log
 
 
 def test_a_child_that_cannot_start_says_why(tmp_path: Path) -> None:

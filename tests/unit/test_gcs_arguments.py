@@ -9,13 +9,15 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
+from rich.spinner import Spinner
+from rich.text import Text
 
 from flightstack.geodesy import GeoPoint
 from flightstack.params.errors import ConfigError
 from gcs_cli.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.flight import Phase
-from gcs_cli.fly_display import LineDisplay
+from gcs_cli.fly_display import LineDisplay, make_display, progress
 from gcs_cli.fly_options import (
     FlyOptions,
     check_ports,
@@ -24,7 +26,8 @@ from gcs_cli.fly_options import (
     stack_arguments,
 )
 from gcs_cli.run_directory import make_run_directory
-from tests.support.fake_vehicle import FakeVehicle
+from tests.support.fake_vehicle import SHUT_DOWN, FakeVehicle
+from tests.support.free_instance import free_instance
 from tests.unit.test_gcs_flight import Story
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -176,21 +179,11 @@ def test_the_children_are_told_everything() -> None:
     ]  # fmt: skip
 
 
-def _free_instance() -> int:
-    """Return an instance whose ports are free, so that a flight on this machine does not disturb."""
-    for instance in range(90, 100):
-        try:
-            check_ports(FlyOptions(HOP, instance=instance))
-        except CliError:
-            continue
-        return instance
-    raise AssertionError("all ports are in use")
-
-
 @pytest.mark.parametrize(("kind", "base"), [(socket.SOCK_STREAM, 4560), (socket.SOCK_DGRAM, 18570)])
 def test_a_busy_port_is_named(kind: socket.SocketKind, base: int) -> None:
-    instance = _free_instance()
+    instance = free_instance()
     with socket.socket(socket.AF_INET, kind) as taken:
+        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # past links of the port are no matter
         taken.bind(("127.0.0.1", base + instance))
         if kind == socket.SOCK_STREAM:
             taken.listen(1)
@@ -226,6 +219,41 @@ def test_a_directory_that_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(CliError, match="cannot be made"):
         make_run_directory(HOP, tmp_path / "file" / "run")
+
+
+@pytest.mark.parametrize(
+    ("width", "bar", "place"), [(40, False, False), (60, True, False), (89, True, False), (100, True, True)]
+)
+def test_the_live_line_fits_the_terminal(width: int, bar: bool, place: bool) -> None:
+    story = Story(FakeVehicle()).run(until=Phase.FLY)
+    story.vehicle.poll(story.now_s)
+    console = Console(file=io.StringIO(), width=width, force_terminal=True, legacy_windows=False)
+    with console.capture() as captured:
+        console.print(progress(story.flight, story.now_s, Spinner("dots"), width))
+    line = Text.from_ansi(captured.get()).plain
+    assert line.count("\n") <= 1
+    assert "…" not in line
+    assert "MISSION" in line
+    assert "t " in line
+    assert ("━" in line, "up " in line) == (bar, place)
+
+
+def test_what_the_vehicle_says_of_an_early_end_is_not_shown() -> None:
+    story = Story(FakeVehicle(refusals={SHUT_DOWN: "Command refused: in the air"})).run(until=Phase.FLY)
+    console = Console(file=io.StringIO(), force_terminal=False)
+    display = LineDisplay(console)
+    story.flight.abort("interrupted", USAGE, story.now_s)
+    display.update(story.flight)
+    story.run(most_s=10.0)
+    display.update(story.flight)
+    assert "Command refused: in the air" in [entry.text for entry in story.flight.view.texts]
+    assert isinstance(console.file, io.StringIO)
+    assert "Command refused" not in console.file.getvalue()
+
+
+def test_a_dumb_terminal_gets_lines() -> None:
+    console = Console(file=io.StringIO(), force_terminal=True, _environ={"TERM": "dumb"})
+    assert isinstance(make_display(console), LineDisplay)
 
 
 def test_lines_tell_the_course_of_a_flight() -> None:

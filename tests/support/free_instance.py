@@ -1,0 +1,25 @@
+"""An instance whose ports nobody uses, so that a flight or another test run on this machine does not disturb."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from flightstack.transport.udp import PortBusyError, UdpSocket
+from gcs_cli.errors import CliError
+from gcs_cli.fly_options import FlyOptions, check_ports
+
+FIRST, COUNT = 60, 40
+
+
+def free_instance() -> int:
+    """Return an instance with free ports; test runs side by side begin to search at different ones."""
+    for offset in range(COUNT):
+        options = FlyOptions(Path(), instance=FIRST + (os.getpid() + offset) % COUNT)
+        try:
+            check_ports(options)
+            UdpSocket("127.0.0.1", options.gcs_port).close()
+        except (CliError, PortBusyError):
+            continue
+        return options.instance
+    raise AssertionError("all ports are in use")
