@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import signal
@@ -83,7 +84,7 @@ def main(argv: list[str] | None = None) -> int:
         sentence, code = "interrupted", FAILED
     except (KeyboardInterrupt, typer.Abort):
         sentence, code = "interrupted", FAILED
-    except BrokenPipeError:  # `gcs watch | head`
+    except (BrokenPipeError, SystemExit):  # `gcs watch | head`, which typer ends itself
         _drop_output()
         return DONE
     except OSError as error:
@@ -106,9 +107,8 @@ def main(argv: list[str] | None = None) -> int:
 def _drop_output() -> None:
     """Send what Python still holds for stdout nowhere, or it would complain at its end."""
     if sys.stdout is not None:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, sys.stdout.fileno())
-        os.close(nowhere)
+        with open(os.devnull, "wb") as nowhere, contextlib.suppress(OSError):  # it may have no descriptor
+            os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def _config_problem(error: Exception) -> str:

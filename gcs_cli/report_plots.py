@@ -134,7 +134,8 @@ def _rotors(flight: Flight, span: tuple[float, float], bands: list[Band]) -> str
         if isinstance(value, float) and math.isfinite(value)
     ]
     chart = time_chart("Rotor speeds", "[rad/s]", lines, span, bands=bands, levels=levels, height=270)
-    return section("Rotor speeds", chart, _legend(lines), "" if levels else "The rotors have no limits.")
+    note = "The rotors have no limits." if lines and not levels else ""
+    return section("Rotor speeds", chart, _legend(lines), note)
 
 
 def _tracking(flight: Flight, span: tuple[float, float], bands: list[Band], rms_error_m: float | None) -> str:

@@ -149,13 +149,18 @@ def _footer(view: VehicleView, width: int) -> Text:
 def _compact(view: VehicleView, now_s: float, width: int, height: int) -> RenderableType:
     """For a window too small for panels."""
     position, mission = view.position_ned_m, view.mission
-    place = "—" if position is None else f"{position.x:.1f} {position.y:.1f} {-position.z:.1f} m"
+    place, item = "—", "none loaded"
+    if position is not None:
+        ned = (position.x, position.y, -position.z)
+        place = " ".join(f"{round(value, 1) + 0.0:.1f}" for value in ned) + " m"  # no -0.0
+    if mission.total:
+        item = f"item {mission.current} of {mission.total - 1}"
     state = f"{view.mode}  {'ARMED' if view.armed else 'disarmed'}  t {clock_text(view.time_s)}"
     rows: list[RenderableType] = [
         Text(state, style="bold", no_wrap=True, overflow="ellipsis"),
         link_text(view, now_s),
         Text(f"north east up {place}", no_wrap=True, overflow="ellipsis"),
-        Text(f"mission item {mission.current} of {mission.total}", no_wrap=True, overflow="ellipsis"),
+        Text(f"mission {item}", no_wrap=True, overflow="ellipsis"),
     ]
     texts = [line for entry in view.texts for line in message_lines(entry, width - 4)]
     rows += texts[-max(1, height - 2 - len(rows)) :]

@@ -85,7 +85,7 @@ def _open(report: Path) -> None:
 def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> None:
     """Print the figures of a flight on a few lines."""
     rows = summary["waypoints"]
-    misses = [row["miss_distance_m"] for row in rows if row["miss_distance_m"] is not None]
+    misses = [row["miss_distance_m"] for row in rows if row["reached"] and row["miss_distance_m"] is not None]
     reached = f"{sum(row['reached'] for row in rows)} of {len(rows)} items reached"
     if misses:
         reached += f", largest miss {max(misses):.3f} m"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ def watch(context: typer.Context, connect: ConnectOption = None, timeout: Timeou
     settings = settings_of(context).merged(connect, timeout)
     with Connection(settings.endpoint) as connection:
         try:
-            if sys.stdout.isatty():
+            if _draws():
                 watch_screen(connection)
             else:
                 if settings.timeout_s is not None:
@@ -33,6 +34,11 @@ def watch(context: typer.Context, connect: ConnectOption = None, timeout: Timeou
                 watch_lines(connection)
         except KeyboardInterrupt:
             return
+
+
+def _draws() -> bool:
+    """Tell whether stdout is a terminal that can be drawn on."""
+    return sys.stdout.isatty() and os.environ.get("TERM") not in ("dumb", "unknown")
 
 
 def watch_screen(connection: Connection) -> None:

@@ -233,6 +233,19 @@ def test_watch_prints_lines_without_a_terminal() -> None:
             assert process.stderr.read() == ""
 
 
+def test_a_reader_that_goes_away_ends_the_watch() -> None:
+    with serve(FakeVehicle()) as socket:
+        link = f"udpout:127.0.0.1:{socket.address[1]}"
+        command = [sys.executable, "-m", "gcs_cli", "watch", "--connect", link]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+            assert process.stdout is not None
+            assert process.stderr is not None
+            process.stdout.readline()
+            process.stdout.close()
+            assert process.wait(LONG_S) == 0
+            assert process.stderr.read() == b""
+
+
 # makes the terminal on stdin the process's own, so that Ctrl-C reaches it
 ON_ITS_TERMINAL = """
 import fcntl, os, sys, termios

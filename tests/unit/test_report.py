@@ -19,7 +19,7 @@ from gcs_cli.analysis import read_flight
 from gcs_cli.flight_data import Flight, Text, loop_timing, series
 from gcs_cli.report import render_report, write_report
 from gcs_cli.report_chart import Level, Line, decimated, time_chart
-from gcs_cli.report_plots import mode_bands
+from gcs_cli.report_plots import mode_bands, plots
 from gcs_cli.report_svg import nice_ticks, tick_text
 from gcs_cli.report_timing import read_loop_timing
 from gcs_cli.summary import RunInfo, summarise
@@ -229,3 +229,7 @@ def test_a_logarithmic_chart_leaves_out_what_is_not_positive() -> None:
     assert svg.count("<circle") == 2
     ticks = re.findall(r'class="tick y"[^>]*>([^<]*)<', svg)
     assert ticks == ["10", "100", "1000", "10000"]
+
+
+def test_a_report_without_a_log_claims_nothing_about_the_rotors() -> None:
+    assert "no limits" not in "".join(plots(Flight(), Plan(()), (), None))

@@ -199,3 +199,9 @@ def test_lines_for_pipes() -> None:
     assert state_line(FULL, 20.0) == "0:41.3 vehicle lost for 10 s"
     assert state_line(BARE, 10.0) == "—  —  disarmed"
     assert text_line(FULL.texts[4]) == "0:12.4  WARN: text number 4"
+
+
+def test_a_small_window_says_that_no_mission_is_loaded_and_shows_no_negative_zero() -> None:
+    text = screen(FULL._replace(position_ned_m=Vector(-0.01, 0.0, 0.0), mission=Mission(0, 0)), 40, 10)
+    assert "north east up 0.0 0.0 0.0 m" in text
+    assert "mission none loaded" in text
