@@ -64,6 +64,7 @@ def _use_cache_directory() -> None:
 
 
 _use_cache_directory()
+_specialised: dict[tuple[Callable[..., Any], str], Callable[..., Any]] = {}
 
 
 def is_own(module_name: str) -> bool:
@@ -84,13 +85,18 @@ def specialise(template: Callable[..., Any], key: str, **names: Any) -> Callable
     """Compile a copy of ``template`` whose global ``names`` are bound to the given functions and types.
 
     This is how a kernel is joined with a controller chosen at run time without losing the disk cache, which
-    closures would (their contents differ from process to process). ``key`` must identify what is bound.
+    closures would (their contents differ from process to process). ``key`` must identify what is bound: within
+    a process the same template and key are the same kernel, read from the disk once.
     """
     assert isinstance(template, FunctionType)
+    known = _specialised.get((template, key))
+    if known is not None:
+        return known
     copy = FunctionType(template.__code__, {**template.__globals__, **names}, f"{template.__name__}__{key}")
     copy.__qualname__ = copy.__name__
     copy.__module__ = template.__module__
-    return compiled(copy)
+    _specialised[template, key] = compiled(copy)
+    return _specialised[template, key]
 
 
 def as_tuple(array: Any, count: int) -> Any:

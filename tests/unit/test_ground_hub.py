@@ -171,7 +171,7 @@ def test_silent_peers_are_forgotten_and_permanent_ones_fall_back_to_heartbeats(n
     alice, bob = net.join(ALICE, heard=False), net.join(BOB)
     net.hub.add_peer(ALICE, permanent=True)
     alice.heartbeat()
-    net.run(29.0)
+    net.run(29.0, step_s=0.02)
     for station in (alice, bob):
         assert station.take("ATTITUDE")
         station.inbox.clear()
@@ -354,7 +354,7 @@ def any_command(draw: st.DrawFn) -> bytes:
     )
 
 
-@settings(derandomize=True, deadline=None, max_examples=120)
+@settings(derandomize=True, deadline=None, max_examples=60)
 @given(st.lists(st.one_of(st.binary(max_size=100), any_frame(), any_command()), min_size=1, max_size=12))
 def test_nothing_that_arrives_raises(storm: list[bytes]) -> None:
     net = Net()

@@ -14,7 +14,7 @@ from flightstack.mavlink.dialect import FsActuators, FsPlantState, mavlink
 from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
 from flightstack.mavlink.link import Link
 
-properties = settings(derandomize=True, deadline=None, max_examples=100)
+properties = settings(derandomize=True, deadline=None, max_examples=60)
 times = st.integers(0, 2**64 - 1)
 doubles = st.floats(allow_nan=True, allow_infinity=True, width=64)
 singles = st.floats(allow_nan=True, allow_infinity=True, width=32)

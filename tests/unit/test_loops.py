@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from flightstack.compiled import compiled
-from flightstack.contract import LoopRow, LoopStatus, Vector3
+from flightstack.contract import LoopRow, LoopStatus
 from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.attitude_pid import CONTROLLER as PID
@@ -18,6 +16,7 @@ from flightstack.control.loops import PythonLoops
 from flightstack.control.mixer import mixer_for
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
+from tests.support.failing_controller import CONTROLLER as FAILING
 
 PAPER = load_vehicle("paper_quad")
 HELD = LoopStatus.INPUT_NOT_FINITE | LoopStatus.OUTPUT_NOT_FINITE
@@ -170,23 +169,8 @@ def test_a_setpoint_that_is_not_finite_keeps_the_attitude_target() -> None:
     assert row[LoopRow.STATUS] == 0.0
 
 
-class OneFloat(NamedTuple):
-    """Memory and parameters of a controller that fails."""
-
-    value: float
-
-
-@compiled
-def _divides_by_nothing(memory: OneFloat, inputs, params: OneFloat, dt_s: float):
-    p = inputs.rates_frd_rad_s.x
-    return OneFloat(memory.value + p), Vector3(math.log(params.value - p), 0.0, 0.0)
-
-
 def test_a_controller_that_fails_holds_the_rotors_and_says_so() -> None:
-    failing = AttitudeController(
-        "failing", _divides_by_nothing, OneFloat, OneFloat, (0.0,), lambda vehicle, gains: (1.0,)
-    )
-    flight = Flight(make(failing), at_rest(), setpoint())
+    flight = Flight(make(FAILING), at_rest(), setpoint())
     good = flight.tick(3)
     flight.state = at_rest(rates=(2.0, 0.0, 0.0))
     held = flight.tick(3)

@@ -1,0 +1,25 @@
+"""An attitude controller whose law fails at a roll rate of 1 rad/s and beyond."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flightstack.compiled import compiled
+from flightstack.contract import Vector3
+from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
+
+
+class OneFloat(NamedTuple):
+    """Memory, and parameters."""
+
+    value: float
+
+
+@compiled
+def step(memory: OneFloat, inputs: AttitudeInputs, params: OneFloat, dt_s: float) -> tuple[OneFloat, Vector3]:
+    p = inputs.rates_frd_rad_s.x
+    return OneFloat(memory.value + p), Vector3(math.log(params.value - p), 0.0, 0.0)
+
+
+CONTROLLER = AttitudeController("failing", step, OneFloat, OneFloat, (0.0,), lambda vehicle, gains: (1.0,))
