@@ -202,12 +202,14 @@ class Autopilot:
     def _watch_mission(self, time_us: int) -> None:
         progress = self._navigator.progress
         if progress != self.now.progress:
-            for seq in self._navigator.reached_items():
+            reached = self._navigator.reached_items()
+            for seq in reached:
                 self.now.reached.append(seq)
                 self._recorder.mission(time_us, progress._replace(reached=seq), len(self.items))
                 self.say(INFO, f"Mission item {seq} reached")
+            if not reached:
+                self._recorder.mission(time_us, progress, len(self.items))
             self.now.progress = progress
-            self._recorder.mission(time_us, progress, len(self.items))
             self._choose_loops()
         if progress.wants_return:
             self.now.mission_complete = True
