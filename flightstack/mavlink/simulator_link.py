@@ -42,7 +42,6 @@ class SimulatorLink:
         self._top_speed = np.array([min(r.max_speed_rad_s, 1e6) for r in vehicle.rotors])
         self._lockstep = LOCKSTEP_FLAG if lockstep else 0
         self._speaks_hil = False
-        self._in_general_decoder = False
         self.state: FloatArray = self._plant.state
         self.state[6] = 1.0
         self.rotor_speed_rad_s = self._plant.rotor_speed_rad_s
@@ -79,8 +78,11 @@ class SimulatorLink:
         )
 
     def receive(self, data: memoryview) -> bool:
-        """Take bytes from the simulator; tell whether a new state arrived."""
-        if not self._in_general_decoder and self._plant.open(data):
+        """Take bytes from the simulator; tell whether a new state arrived.
+
+        A whole state is taken at once, whatever the general decoder waits for: that can only be junk.
+        """
+        if self._plant.open(data):
             self.time_us = self._plant.time_us
             self.has_state = True
             self._speaks_hil = False
@@ -101,7 +103,6 @@ class SimulatorLink:
                 self.request_refused = message.result != mavlink.MAV_RESULT_ACCEPTED
             elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
                 self.peer_said_goodbye = message.system_status == mavlink.MAV_STATE_POWEROFF
-        self._in_general_decoder = self._link.has_partial
         self.has_state = self.has_state or fresh
         return fresh
 
