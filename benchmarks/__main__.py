@@ -19,7 +19,7 @@ SECTIONS = ("steps", "flights", "realtime", "start")
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="few and short rounds: a quarter of a minute")
+    parser.add_argument("--quick", action="store_true", help="few and short rounds: half a minute")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures to FILE too")
     parser.add_argument("--only", choices=SECTIONS, action="append", help="measure only this (repeatable)")
     return parser.parse_args()
