@@ -18,6 +18,7 @@ from queue import Empty, Queue
 import pytest
 from pyulog import ULog
 
+from tests.support.free_instance import free_instance
 from tests.support.world import World
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
@@ -94,12 +95,11 @@ def start() -> Iterator[Start]:
         process.kill()
 
 
-def fly(tmp_path: Path, instance: int, *options: str) -> tuple[dict[str, object], bytes]:
-    out = tmp_path / f"run{instance}"
+def fly(out: Path, *options: str) -> tuple[dict[str, object], bytes]:
     run = subprocess.run(
         [
             sys.executable, "-m", "gcs_cli", "fly", str(MISSIONS / "hop.plan"), "--json", "--out", str(out),
-            "--instance", str(instance), *options,
+            "--instance", str(free_instance()), *options,
         ],
         capture_output=True, text=True, timeout=4 * BOUND_S, check=False,
     )  # fmt: skip
@@ -113,12 +113,12 @@ def fly(tmp_path: Path, instance: int, *options: str) -> tuple[dict[str, object]
 def test_the_same_flight_gives_the_same_log_at_any_speed_and_in_one_process(tmp_path: Path) -> None:
     logs = []
     gusts = ("--gust", "1", "--torque-gust", "0.1", "--seed", "7")
-    for instance, speed in ((41, "max"), (42, "10"), (43, "1")):
-        summary, log = fly(tmp_path, instance, "--speed", speed, "--vehicle", "x_quad", *gusts)
+    for speed in ("max", "10", "1"):
+        summary, log = fly(tmp_path / speed, "--speed", speed, "--vehicle", "x_quad", *gusts)
         assert summary["outcome"] == "completed"
         logs.append(log)
     assert logs[0] == logs[1] == logs[2]
-    world = World(vehicle="x_quad", gust=1.0, torque_gust=0.1, seed=7, system_id=42)
+    world = World(vehicle="x_quad", gust=1.0, torque_gust=0.1, seed=7)
     world.upload("hop.plan")
     world.start_mission()
     world.until_disarmed()
@@ -128,15 +128,17 @@ def test_the_same_flight_gives_the_same_log_at_any_speed_and_in_one_process(tmp_
 @pytest.fixture
 def flying(start: Start, tmp_path: Path) -> dict[str, Process]:
     """Three processes in the middle of a mission, started one by one as in three terminals."""
+    instance = free_instance()
+    port = 14550 + 10 * instance
     processes = {
-        "simulator": start("sim_bridge", "--instance", "44", "--speed", "2"),
+        "simulator": start("sim_bridge", "--instance", str(instance), "--speed", "2"),
         "stack": start(
-            "flightstack", "--instance", "44", "--gcs-port", "14994", "--log", str(tmp_path / "flight.ulg"),
+            "flightstack", "--instance", str(instance), "--gcs-port", str(port), "--log", str(tmp_path / "flight.ulg"),
             "--exit-on-gcs-loss", "3",
         ),
     }  # fmt: skip
     processes["stack"].wait_for("flightstack: paper_quad")
-    connect = ["--connect", "udp:14994", "--timeout", str(BOUND_S)]
+    connect = ["--connect", f"udp:{port}", "--timeout", str(BOUND_S)]
     for arguments in (["mission", "upload", str(MISSIONS / "square.plan")], ["mission", "start"]):
         command = start("gcs_cli", *connect, *arguments)
         assert command.end() == 0, command.output
@@ -181,17 +183,19 @@ def test_ctrl_c_in_flight_leaves_a_readable_log_and_everyone_ends_in_order(
 
 
 def test_without_a_simulator_the_stack_says_so(start: Start) -> None:
-    stack = start("flightstack", "--instance", "45", "--sim-timeout", "0.2", "--log", "none")
+    instance = free_instance()
+    stack = start("flightstack", "--instance", str(instance), "--sim-timeout", "0.2", "--log", "none")
     assert stack.end() == 3
-    assert "no simulator at 127.0.0.1:4605 within 0.2 s" in stack.output
+    assert f"no simulator at 127.0.0.1:{4560 + instance} within 0.2 s" in stack.output
 
 
 def test_a_busy_port_is_named(start: Start) -> None:
-    first = start("flightstack", "--instance", "46", "--log", "none")
+    instance = free_instance()
+    first = start("flightstack", "--instance", str(instance), "--log", "none")
     first.wait_for("flightstack: paper_quad")
-    second = start("flightstack", "--instance", "46", "--log", "none")
+    second = start("flightstack", "--instance", str(instance), "--log", "none")
     assert second.end() == 2
-    assert "UDP port 18616 on 127.0.0.1 is in use" in second.output
+    assert f"UDP port {18570 + instance} on 127.0.0.1 is in use" in second.output
 
 
 @pytest.mark.parametrize(
@@ -211,7 +215,7 @@ def test_a_busy_port_is_named(start: Start) -> None:
     ],
 )
 def test_bad_arguments_are_one_sentence_and_exit_2(start: Start, arguments: list[str], sentence: str) -> None:
-    stack = start("flightstack", "--instance", "47", *arguments)
+    stack = start("flightstack", "--instance", str(free_instance()), *arguments)
     assert stack.end() == 2
     assert sentence in stack.output
     assert len(stack.lines) == 1
@@ -219,17 +223,27 @@ def test_bad_arguments_are_one_sentence_and_exit_2(start: Start, arguments: list
 
 def test_real_time_clock_flies_with_a_simulator_that_does_not_wait(start: Start, tmp_path: Path) -> None:
     log = tmp_path / "flight.ulg"
-    start("sim_bridge", "--instance", "48")
+    instance = free_instance()
+    port = 14550 + 10 * instance
+    start("sim_bridge", "--instance", str(instance))
     stack = start(
-        "flightstack", "--instance", "48", "--gcs-port", "14998", "--clock", "realtime", "--log", str(log)
+        "flightstack",
+        "--instance",
+        str(instance),
+        "--gcs-port",
+        str(port),
+        "--clock",
+        "realtime",
+        "--log",
+        str(log),
     )
     stack.wait_for("flightstack: paper_quad")
     for arguments in (["takeoff", "--alt", "1"], ["arm"]):
-        command = start("gcs_cli", "--connect", "udp:14998", *arguments)
+        command = start("gcs_cli", "--connect", f"udp:{port}", *arguments)
         assert command.end() == 0, command.output
-    station = start("gcs_cli", "--connect", "udp:14998", "watch")
+    station = start("gcs_cli", "--connect", f"udp:{port}", "watch")
     station.wait_for("armed  N")
-    perf = start("gcs_cli", "--connect", "udpout:127.0.0.1:18618", "perf", "--json")
+    perf = start("gcs_cli", "--connect", f"udpout:127.0.0.1:{18570 + instance}", "perf", "--json")
     assert perf.end() == 0, perf.output
     figures = json.loads(perf.output)
     assert figures["lockstep"] is False
