@@ -77,7 +77,7 @@ def test_the_cache_is_one_for_each_state_of_the_sources(
     for name in (
         "flightstack/compiled.py",
         "flightstack/control/law.py",
-        "flightstack/mavlink/m.py",
+        "flightstack/logging/m.py",
         "sim_bridge/p.py",
     ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -88,7 +88,7 @@ def test_the_cache_is_one_for_each_state_of_the_sources(
         (tmp_path / name).write_text("x = 2\n")
         digests.append(module._sources_digest())
     assert len(set(digests)) == 3
-    (tmp_path / "flightstack/mavlink/m.py").write_text("x = 2\n")  # nothing compiled there
+    (tmp_path / "flightstack/logging/m.py").write_text("x = 2\n")  # nothing compiled there
     assert module._sources_digest() == digests[-1]
 
 
