@@ -24,18 +24,27 @@ FORMATS = {
     "uint32_t": "I",
     "uint16_t": "H",
     "uint8_t": "B",
+    "int64_t": "q",
     "int32_t": "i",
+    "int16_t": "h",
+    "int8_t": "b",
+    "char": "s",
     "double": "d",
     "float": "f",
 }
 
 
 def layout_source(message: Any) -> str:
-    """Return the source text of one message's layout; fields in wire order, as the checksum demands."""
+    """Return the source text of one message's layout; fields in wire order, as the checksum demands.
+
+    Extension fields come last on the wire, in their declared order, and count for no checksum.
+    """
     names = [field.name for field in message.fields]
+    first_extension = len(names) if message.extensions_start is None else message.extensions_start
     rows = [
         f'            Field("{field.name}", "{FORMATS[field.type]}", {max(1, field.array_length)}, '
-        f'{bool(field.array_length)}, "{field.type}", "{field.units.strip("[]")}", {names.index(field.name)}),'
+        f'{bool(field.array_length)}, "{field.type}", "{field.units.strip("[]")}", {names.index(field.name)}'
+        f"{', True' if names.index(field.name) >= first_extension else ''}),"
         for field in message.ordered_fields
     ]
     return "\n".join(

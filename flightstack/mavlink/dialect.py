@@ -1,7 +1,9 @@
-"""The dialect that both sides of every link speak: common.xml (pymavlink's) and our few messages.
+"""The dialect that both sides of every link speak: common.xml (pymavlink's) and the messages it has not got.
 
-``mavlink`` is pymavlink's module of common.xml with our messages registered, so that every codec made from it
-(``mavlink.MAVLink``) knows them.
+``mavlink`` is pymavlink's module of common.xml with the messages of ``flightstack.xml`` registered under
+pymavlink's usual names (``MAVLink_available_modes_message``, ``MAVLINK_MSG_ID_AVAILABLE_MODES``), so that every
+codec made from it (``mavlink.MAVLink``) knows them. MISSION_COUNT, MISSION_ACK and MISSION_CURRENT take the place of
+pymavlink's, which lack their last fields: plan ids, zero when left out.
 """
 
 from __future__ import annotations
@@ -16,7 +18,10 @@ from flightstack.mavlink.layout import Layout, message_class
 LAYOUT_BY_NAME: dict[str, Layout] = {layout.name: layout for layout in LAYOUTS}
 
 for _layout in LAYOUTS:
-    mavlink.mavlink_map[_layout.message_id] = message_class(_layout)
+    _class = message_class(_layout)
+    mavlink.mavlink_map[_layout.message_id] = _class
+    setattr(mavlink, _class.__name__, _class)
+    setattr(mavlink, f"MAVLINK_MSG_ID_{_layout.name}", _layout.message_id)
 
 EscStatus: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["ESC_STATUS"].message_id]
 FsLoopTiming: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["FS_LOOP_TIMING"].message_id]

@@ -18,6 +18,25 @@ class Field(NamedTuple):
     type: str
     unit: str
     declared_index: int
+    is_extension: bool = False
+    """Whether the field was added later: a sender may leave it out, and then it is zero."""
+
+    @property
+    def is_text(self) -> bool:
+        """Whether this is an array of characters, which pymavlink takes as bytes and gives as a string."""
+        return self.type == "char" and self.is_array
+
+    @property
+    def code(self) -> str:
+        """Format of the whole field for ``struct``."""
+        return f"{self.length}{self.format}" if self.length > 1 else self.format
+
+    @property
+    def zero(self) -> Any:
+        """The value of an extension field that was left out."""
+        if self.is_text:
+            return b""
+        return [0] * self.length if self.is_array else 0
 
 
 class Layout(NamedTuple):
@@ -31,13 +50,16 @@ class Layout(NamedTuple):
     @property
     def format(self) -> str:
         """Struct format of the whole payload."""
-        return "<" + "".join(f"{f.length}{f.format}" if f.length > 1 else f.format for f in self.fields)
+        return "<" + "".join(field.code for field in self.fields)
 
 
 def message_class(layout: Layout) -> Any:
     """Return a message class for ``layout`` that pymavlink encodes and decodes as one of its own."""
     fields = layout.fields
     declared = sorted(fields, key=lambda field: field.declared_index)
+    names = [field.name for field in declared]
+    texts = frozenset(field.name for field in fields if field.is_text)
+    zeros = {field.name: field.zero for field in declared if field.is_extension}
     unpacker = struct.Struct(layout.format)
 
     def initialise(self: Any, *values: Any, **named: Any) -> None:
@@ -45,20 +67,24 @@ def message_class(layout: Layout) -> Any:
         self._fieldnames = names
         self._instance_field = None
         self._instance_offset = -1
-        for name, value in zip(names, values, strict=False):
-            setattr(self, name, value)
-        for name, value in named.items():
-            setattr(self, name, value)
+        given = {**zeros, **dict(zip(names, values, strict=False)), **named}
+        if len(values) > len(names) or given.keys() != set(names):
+            raise TypeError(f"{layout.name} takes the fields {', '.join(names)}")
+        for name, value in given.items():
+            if name in texts:
+                setattr(self, f"_{name}_raw", value)
+                setattr(self, name, value.split(b"\x00", 1)[0].decode("ascii", errors="replace"))
+            else:
+                setattr(self, name, value)
 
     def pack(self: Any, mav: Any, force_mavlink1: bool = False) -> bytes:
         flat: list[Any] = []
         for field in fields:
-            value = getattr(self, field.name)
-            flat.extend(value) if field.is_array else flat.append(value)
+            value = getattr(self, f"_{field.name}_raw" if field.is_text else field.name)
+            flat.extend(value) if field.is_array and not field.is_text else flat.append(value)
         packed: bytes = self._pack(mav, layout.crc_extra, unpacker.pack(*flat), force_mavlink1=force_mavlink1)
         return packed
 
-    names = [field.name for field in declared]
     return type(
         f"MAVLink_{layout.name.lower()}_message",
         (common.MAVLink_message,),
@@ -72,9 +98,11 @@ def message_class(layout: Layout) -> Any:
             "fielddisplays_by_name": {},
             "fieldenums_by_name": {},
             "fieldunits_by_name": {field.name: field.unit for field in declared if field.unit},
-            "native_format": bytearray(("<" + "".join(f.format for f in fields)).encode()),
+            "native_format": bytearray(
+                ("<" + "".join("c" if f.is_text else f.format for f in fields)).encode()
+            ),
             "orders": [fields.index(field) for field in declared],
-            "lengths": [field.length for field in fields],
+            "lengths": [1 if field.is_text else field.length for field in fields],
             "array_lengths": [field.length if field.is_array else 0 for field in fields],
             "crc_extra": layout.crc_extra,
             "unpacker": unpacker,
