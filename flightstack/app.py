@@ -15,7 +15,7 @@ from types import FrameType
 from flightstack.assembly import Stack, build
 from flightstack.clock import DeadlineScheduler, ask_for_punctual_sleeps
 from flightstack.config import StackConfig
-from flightstack.ground_hub import PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.logging.flight_log import FlightLog
 from flightstack.modes import Mode
 from flightstack.transport.processor import Follower
@@ -292,7 +292,7 @@ class App:
     def _check_stop(self) -> None:
         if self._stop_signal:
             raise Ended(EXIT_OK, "stopped")
-        if self.stack.ground.shutdown_requested:
+        if self.stack.ground.vehicle.shutdown_requested:
             raise Ended(EXIT_OK, "shut down by the ground station")
         limit_s = self._process.exit_on_ground_loss_s
         if limit_s is None:

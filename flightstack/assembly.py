@@ -13,12 +13,14 @@ import numpy as np
 from flightstack import __version__
 from flightstack.autopilot import Autopilot
 from flightstack.clock import LoopTiming, Rates, rates
+from flightstack.commands import VehicleContext
 from flightstack.config import LOOPS, StackConfig
 from flightstack.contract import LoopRow
 from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import load_controller
 from flightstack.control.loops import PythonLoops
-from flightstack.ground_hub import GroundHub
+from flightstack.ground.facts import AutopilotFacts
+from flightstack.ground.hub import GroundHub
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.logging.flight_log import vehicle_info
@@ -29,7 +31,6 @@ from flightstack.params.errors import ConfigError
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.timing_report import TimingReport
-from flightstack.vehicle_facts import AutopilotFacts
 
 
 class Stack(NamedTuple):
@@ -91,8 +92,8 @@ def build(config: StackConfig, open_log: OpenLog) -> Stack:
     warm_up(backend, Navigator(guidance_params(config.behaviour, vehicle.weight_n), pace.outer_hz), simulator)
     timing = LoopTiming(round(1e9 / pace.inner_hz))
     report = TimingReport(timing, pace, config.lockstep)
-    facts = AutopilotFacts(autopilot, vehicle, report.message)
-    ground = GroundHub(autopilot, facts, config.system_id)
+    facts = AutopilotFacts(autopilot, vehicle, config.system_id, report.message)
+    ground = GroundHub(VehicleContext(autopilot), facts, config.system_id)
     return Stack(vehicle, pace, simulator, autopilot, ground, recorder, timing, report)
 
 

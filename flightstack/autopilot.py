@@ -326,6 +326,11 @@ class Autopilot:
         self._mission_changed()
         return None
 
+    def restart_mission(self) -> None:
+        """Begin the mission anew: its first item is the current one, jumps count from zero."""
+        self._navigator.restart_plan()
+        self._mission_changed()
+
     def _mission_changed(self) -> None:
         now = self.now
         now.progress = self._navigator.progress

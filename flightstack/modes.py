@@ -13,6 +13,10 @@ class Mode(IntEnum):
     MISSION = 2
     RETURN = 3
     LAND = 4
+    POSITION = 5
+    ALTITUDE = 6
+    OFFBOARD = 7
+    TERMINATION = 8
 
 
 _AUTO = 4 << 16
@@ -22,13 +26,21 @@ CUSTOM_MODE: dict[Mode, int] = {
     Mode.MISSION: _AUTO | 4 << 24,
     Mode.RETURN: _AUTO | 5 << 24,
     Mode.LAND: _AUTO | 6 << 24,
+    Mode.ALTITUDE: 2 << 16,
+    Mode.POSITION: 3 << 16,
+    Mode.OFFBOARD: 6 << 16,
+    Mode.TERMINATION: 10 << 16,
 }
 MODE_OF_CUSTOM: dict[int, Mode] = {number: mode for mode, number in CUSTOM_MODE.items()}
 
 NAVIGATION_STATE: dict[Mode, int] = {
+    Mode.ALTITUDE: 1,
+    Mode.POSITION: 2,
     Mode.MISSION: 3,
     Mode.HOLD: 4,
     Mode.RETURN: 5,
+    Mode.TERMINATION: 13,
+    Mode.OFFBOARD: 14,
     Mode.TAKEOFF: 17,
     Mode.LAND: 18,
 }

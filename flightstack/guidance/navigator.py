@@ -184,6 +184,10 @@ class Navigator:
         """Take a new plan, to be flown from its first item; ``jumps`` are the repeats of its DO_JUMPs."""
         self._plan = np.ascontiguousarray(plan)
         self._jumps = np.ascontiguousarray(jumps)
+        self.restart_plan()
+
+    def restart_plan(self) -> None:
+        """Make the first item the current one and restore the repeats of the jumps."""
         self._jumps_left = self._jumps.copy()
         self.set_current(0)
 
@@ -226,8 +230,7 @@ class Navigator:
         """
         m = self._mission
         if m[M_FINISHED] > 0.0:
-            self._jumps_left = self._jumps.copy()
-            self.set_current(0)
+            self.restart_plan()
             return
         reached, speed, yaw_is_set, yaw = m[M_REACHED], m[M_SPEED], m[M_YAW_IS_SET], m[M_YAW]
         self.set_current(int(m[M_CURRENT]))

@@ -40,6 +40,28 @@ API_RATES_HZ: dict[int, float] = {
     mavlink.MAVLINK_MSG_ID_VFR_HUD: 10.0,
 }
 
+GROUPS: dict[int, tuple[int, ...]] = {
+    mavlink.MAV_DATA_STREAM_RAW_SENSORS: (),
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT,
+        mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    ),
+    mavlink.MAV_DATA_STREAM_RAW_CONTROLLER: (EscStatus.id,),
+    mavlink.MAV_DATA_STREAM_POSITION: (
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    ),
+    mavlink.MAV_DATA_STREAM_EXTRA1: (
+        mavlink.MAVLINK_MSG_ID_ATTITUDE,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET,
+        mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+    ),
+    mavlink.MAV_DATA_STREAM_EXTRA2: (mavlink.MAVLINK_MSG_ID_VFR_HUD,),
+    mavlink.MAV_DATA_STREAM_EXTRA3: (mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,),
+}
+"""Messages of the groups of REQUEST_DATA_STREAM, as ArduPilot divides them."""
+
 
 class _Stream:
     """A message of a link, due at ``vehicle_s`` on the vehicle's clock and ``link_s`` on the link's."""
@@ -85,6 +107,13 @@ class Streams:
             self._streams[message_id] = _Stream(message_id, interval_us * 1e-6)
         self._soonest_s = -math.inf
         return True
+
+    def set_group(self, group: int, rate_hz: float) -> None:
+        """Set the rate of a MAV_DATA_STREAM group as REQUEST_DATA_STREAM says; 0 stops it."""
+        interval_us = 1e6 / rate_hz if rate_hz > 0.0 else -1.0
+        members = [m for g in GROUPS.values() for m in g] if group == 0 else GROUPS.get(group, ())
+        for message_id in members:
+            self.set_interval(message_id, interval_us)
 
     def due(self, facts: VehicleFacts, link_now_s: float) -> Iterator[Message]:
         """Yield the messages that are due by the vehicle's time and by the link's."""

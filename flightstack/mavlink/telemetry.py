@@ -27,6 +27,7 @@ class VehicleFacts(Protocol):
     setpoint: FloatArray
     attitude_target: FloatArray
     max_thrust_n: float
+    system_id: int
     rotors: int
     home: GeoPoint
     frame: LocalFrame
@@ -265,7 +266,7 @@ def _origin(f: VehicleFacts) -> Message:
     )
 
 
-def autopilot_version(system_id: int) -> Message:
+def autopilot_version(f: VehicleFacts) -> Message:
     """AUTOPILOT_VERSION: what this vehicle can do, and which version of the stack it runs."""
     capabilities = (
         mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
@@ -276,7 +277,7 @@ def autopilot_version(system_id: int) -> Message:
     version = major << 24 | minor << 16 | patch << 8
     nothing = [0] * 8
     return mavlink.MAVLink_autopilot_version_message(
-        capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, system_id
+        capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, f.system_id
     )
 
 
@@ -308,6 +309,7 @@ MAKERS: dict[int, Callable[[VehicleFacts], Message]] = {
     mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: _home,
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: _origin,
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: autopilot_version,
     FS_LOOP_TIMING_ID: lambda f: f.loop_timing(),
 }
 

@@ -22,7 +22,7 @@ from flightstack.assembly import Stack, build
 from flightstack.config import DEFAULT_HOME, StackConfig
 from flightstack.contract import Vector3
 from flightstack.geodesy import LocalFrame
-from flightstack.ground_hub import GROUND, PeerAddress
+from flightstack.ground.peer import GROUND, PeerAddress
 from flightstack.logging.flight_log import FlightLog
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.hot_frames import ActuatorsFrame

@@ -34,7 +34,7 @@ def facts(**changes: object) -> SimpleNamespace:
         "state": np.array([10.0, -20.0, -30.0, 1.0, -2.0, 0.5, W, X, Y, Z, 0.01, 0.02, 0.03]),
         "setpoint": np.arange(11.0),
         "attitude_target": np.array([1.0, 0.0, 0.0, 0.0, 5.0]),
-        "row": row, "time_us": 12_345_678, "max_thrust_n": 12.0, "rotors": 4,
+        "row": row, "time_us": 12_345_678, "max_thrust_n": 12.0, "rotors": 4, "system_id": 1,
         "home": HOME, "frame": LocalFrame(HOME),
         "armed": True, "mode": Mode.MISSION, "landed": False, "climbing": False, "descending": False,
         "mission_current": 2, "mission_count": 5, "mission_state": 3, "can_arm": True, "has_state": True,
@@ -164,7 +164,7 @@ def test_time_wraps_as_the_field_does() -> None:
 
 
 def test_version_is_ours() -> None:
-    m = autopilot_version(3)
+    m = autopilot_version(facts(system_id=3))
     assert m.uid == 3
     assert m.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
 

@@ -55,7 +55,7 @@ class MissionRefused(NamedTuple):
 MissionEvent: TypeAlias = MissionReplaced | MissionCleared | CurrentRequested | MissionRefused
 Check: TypeAlias = Callable[[Items], Rejection | None]
 
-_PROTOCOL = frozenset(
+PROTOCOL = frozenset(
     {
         "MISSION_ACK",
         "MISSION_CLEAR_ALL",
@@ -101,7 +101,7 @@ class MissionServer:
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take any message from ``peer``; what is not of this protocol or not for us is ignored."""
         kind = message.get_type()
-        if kind not in _PROTOCOL or not is_for(message, self.own):
+        if kind not in PROTOCOL or not is_for(message, self.own):
             return
         client = Client(peer, sender(message))
         if kind == "MISSION_SET_CURRENT":

@@ -17,10 +17,13 @@ from flightstack.params.vehicle import Vehicle
 class AutopilotFacts:
     """Implements ``telemetry.VehicleFacts``; every property reads the present."""
 
-    def __init__(self, autopilot: Autopilot, vehicle: Vehicle, loop_timing: Callable[[], Message]) -> None:
+    def __init__(
+        self, autopilot: Autopilot, vehicle: Vehicle, system_id: int, loop_timing: Callable[[], Message]
+    ) -> None:
         self._autopilot = autopilot
         self._now = autopilot.now
         self.loop_timing = loop_timing
+        self.system_id = system_id
         self.rotors = len(vehicle.rotors)
         self.max_thrust_n = vehicle.weight_n * 2.0 if vehicle.ideal_rotors else vehicle.max_thrust_n
         self.home: GeoPoint = autopilot.home

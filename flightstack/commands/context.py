@@ -1,0 +1,41 @@
+"""What a command of MAVLink may touch, and how it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+from flightstack.autopilot import Autopilot
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.services.command_server import Command
+
+ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
+REJECTED = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+DENIED = int(mavlink.MAV_RESULT_DENIED)
+UNSUPPORTED = int(mavlink.MAV_RESULT_UNSUPPORTED)
+FAILED = int(mavlink.MAV_RESULT_FAILED)
+
+
+class Answer(NamedTuple):
+    """Result of a command, and why it was refused."""
+
+    result: int
+    reason: str = ""
+
+
+def answer_to(refusal: str | None) -> Answer:
+    """Return the answer of an event that may be refused for the moment."""
+    return Answer(ACCEPTED) if refusal is None else Answer(REJECTED, refusal)
+
+
+@dataclass
+class VehicleContext:
+    """The vehicle as its commands see it."""
+
+    autopilot: Autopilot
+    shutdown_requested: bool = False
+    reboot_requested: bool = False
+
+
+Handler: TypeAlias = Callable[[VehicleContext, Command], Answer]

@@ -1,0 +1,1 @@
+"""The vehicle's side of its ground links, without I/O: peers, services, telemetry."""

@@ -1,0 +1,62 @@
+"""Commands of the command protocol: those of a link are answered for the link, the others by the vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+
+from flightstack.autopilot import WARNING
+from flightstack.commands import HANDLERS, VehicleContext, execute
+from flightstack.commands.context import ACCEPTED, UNSUPPORTED, Answer
+from flightstack.commands.modes import select_custom_mode
+from flightstack.ground.link_commands import LINK_COMMANDS
+from flightstack.ground.peer import Peer
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.command_server import Command, CommandServer
+
+
+class CommandService:
+    """COMMAND_LONG, COMMAND_INT and the old SET_MODE."""
+
+    handles = frozenset({"COMMAND_LONG", "COMMAND_INT", "SET_MODE"})
+
+    def __init__(
+        self,
+        own: Address,
+        vehicle: VehicleContext,
+        peer_at: Callable[[Hashable], Peer],
+        link_answer: Callable[[Peer, Command], Answer],
+    ) -> None:
+        self._own = own
+        self._vehicle = vehicle
+        self._peer_at = peer_at
+        self._link_answer = link_answer
+        self._server = CommandServer(own, [*HANDLERS, *LINK_COMMANDS])
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Execute a command and answer it."""
+        if message.get_type() == "SET_MODE":  # has no answer: success shows in the heartbeat
+            if message.target_system in (0, self._own.system):
+                self._report(select_custom_mode(self._vehicle.autopilot, message.custom_mode), "Mode change")
+            return
+        command = self._server.receive(message, peer, now_s)
+        if command is None:
+            return
+        if command.command in LINK_COMMANDS:
+            answer = self._link_answer(self._peer_at(peer), command)
+        else:
+            answer = execute(self._vehicle, command)
+        self._server.answer(command, answer.result)
+        self._report(answer, "Command refused")
+
+    def _report(self, answer: Answer, what: str) -> None:
+        if answer.result not in (ACCEPTED, UNSUPPORTED) and answer.reason:
+            self._vehicle.autopilot.say(WARNING, f"{what}: {answer.reason}")
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return the answers."""
+        return list(self._server.poll(now_s))
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next."""
+        return self._server.next_deadline()

@@ -1,0 +1,78 @@
+"""Requests that concern one link only: which messages it gets, and how often."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable
+
+from flightstack.commands.context import ACCEPTED, DENIED, Answer
+from flightstack.ground.facts import AutopilotFacts
+from flightstack.ground.peer import Peer
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.services.addressing import Address, is_for
+from flightstack.mavlink.services.command_server import Command
+from flightstack.mavlink.telemetry import MAKERS, messages
+
+LINK_COMMANDS = frozenset(
+    {
+        mavlink.MAV_CMD_REQUEST_MESSAGE,
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+        mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
+    }
+)
+HIGHEST_MESSAGE_ID = 0xFFFFFF
+
+
+def _message_id(value: float) -> int:
+    """Return a message id, or -1 for what is none."""
+    return int(value) if math.isfinite(value) and 0.0 <= value <= HIGHEST_MESSAGE_ID else -1
+
+
+class LinkCommands:
+    """Answers the commands of a link, and REQUEST_DATA_STREAM, their forerunner."""
+
+    handles = frozenset({"REQUEST_DATA_STREAM"})
+
+    def __init__(self, own: Address, facts: AutopilotFacts, peer_at: Callable[[Hashable], Peer]) -> None:
+        self._own = own
+        self._facts = facts
+        self._peer_at = peer_at
+
+    def answer(self, peer: Peer, command: Command) -> Answer:
+        """Carry out one of ``LINK_COMMANDS`` for ``peer``."""
+        number, argument = _message_id(command.params[0]), command.params[1]
+        if command.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
+            done = peer.streams.set_interval(number, argument)
+            return Answer(ACCEPTED) if done else Answer(DENIED, "no such message or interval")
+        if command.command == mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
+            return self._send_interval(peer, number)
+        return self._send_message(peer, number, argument)
+
+    def _send_message(self, peer: Peer, number: int, argument: float) -> Answer:
+        if number == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+            return self._send_interval(peer, _message_id(argument))
+        if number not in MAKERS:
+            return Answer(DENIED, f"message {number} is not available")
+        peer.outbox.extend(messages(number, self._facts))
+        return Answer(ACCEPTED)
+
+    def _send_interval(self, peer: Peer, about: int) -> Answer:
+        if not 0 <= about <= 0xFFFF:
+            return Answer(DENIED, "that message has no place in MESSAGE_INTERVAL")
+        peer.outbox.append(mavlink.MAVLink_message_interval_message(about, peer.streams.interval_us(about)))
+        return Answer(ACCEPTED)
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take REQUEST_DATA_STREAM: set the rate of a group of messages, or stop it."""
+        if is_for(message, self._own):
+            rate_hz = float(message.req_message_rate) if message.start_stop else 0.0
+            self._peer_at(peer).streams.set_group(message.req_stream_id, rate_hz)
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return nothing: answers go into the peer's own outbox."""
+        return []
+
+    def next_deadline(self) -> float | None:
+        """Return None."""
+        return None

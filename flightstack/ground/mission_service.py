@@ -1,0 +1,58 @@
+"""Mission, fence and rally points: the mission protocol joined to the autopilot."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+from flightstack.autopilot import NOTICE, WARNING, Autopilot
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.mission_server import (
+    PROTOCOL,
+    CurrentRequested,
+    MissionCleared,
+    MissionRefused,
+    MissionReplaced,
+    MissionServer,
+)
+
+
+class MissionService:
+    """Lets the autopilot follow what clients upload."""
+
+    handles = PROTOCOL
+
+    def __init__(self, own: Address, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+        self._server = MissionServer(own, autopilot.check_mission)
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take a message of the mission protocol."""
+        self._server.receive(message, peer, now_s)
+        self._take_events()
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return requests, items and acknowledgements."""
+        self._server.current_seq = self._autopilot.now.progress.current
+        outbox = list(self._server.poll(now_s))
+        self._take_events()
+        return outbox
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next."""
+        return self._server.next_deadline()
+
+    def _take_events(self) -> None:
+        autopilot = self._autopilot
+        for event in self._server.events():
+            if isinstance(event, MissionReplaced):
+                autopilot.set_mission(event.items)
+                autopilot.say(NOTICE, f"Mission of {len(event.items)} items loaded")
+            elif isinstance(event, MissionCleared):
+                autopilot.set_mission(())
+            elif isinstance(event, CurrentRequested):
+                refusal = autopilot.set_current_item(event.seq)
+                if refusal is not None:
+                    autopilot.say(WARNING, f"Mission item: {refusal}")
+            elif isinstance(event, MissionRefused):
+                autopilot.say(WARNING, f"Mission refused: {event.reason}")

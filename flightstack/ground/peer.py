@@ -1,0 +1,38 @@
+"""One ground station or companion: where it is, its link, and what waits to be sent to it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.streams import Streams
+
+GROUND = "ground"
+"""The channel of ground stations; any other gets the rates of an API client."""
+
+
+class PeerAddress(NamedTuple):
+    """Where a peer is: the channel it uses, and its address there."""
+
+    channel: str
+    host: str
+    port: int
+
+
+@dataclass
+class Peer:
+    """One ground station or companion."""
+
+    link: Link
+    streams: Streams
+    permanent: bool
+    heard_s: float = -math.inf
+    heartbeat_due_s: float = -math.inf
+    outbox: list[Message] = field(default_factory=list)
+
+    @property
+    def heard(self) -> bool:
+        """Whether it has ever sent a valid message: only then telemetry is streamed to it."""
+        return self.heard_s > -math.inf

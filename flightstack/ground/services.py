@@ -1,0 +1,26 @@
+"""The services of the vehicle, put together: one line each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+
+from flightstack.commands import VehicleContext
+from flightstack.ground.command_service import CommandService
+from flightstack.ground.facts import AutopilotFacts
+from flightstack.ground.link_commands import LinkCommands
+from flightstack.ground.mission_service import MissionService
+from flightstack.ground.peer import Peer
+from flightstack.ground.service import Service
+from flightstack.mavlink.services.addressing import Address
+
+
+def make_services(
+    own: Address, vehicle: VehicleContext, facts: AutopilotFacts, peer_at: Callable[[Hashable], Peer]
+) -> list[Service]:
+    """Return every service, in the order in which their messages are sent; ``peer_at`` finds a known peer."""
+    link_commands = LinkCommands(own, facts, peer_at)
+    return [
+        MissionService(own, vehicle.autopilot),
+        CommandService(own, vehicle, peer_at, link_commands.answer),
+        link_commands,
+    ]
