@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, fields, replace
-from typing import NamedTuple
+from typing import Any
 
 from flightstack.params.errors import ConfigError
+from flightstack.params.spec import ParamSpec, group_of
+from flightstack.params.store import read_assignment
 
 
-class ParamSpec(NamedTuple):
-    """Declaration of one parameter: its MAVLink name, range, unit and a line of help."""
+def _param(
+    name: str,
+    default: float,
+    low: float,
+    high: float,
+    unit: str,
+    text: str,
+    *,
+    integer: bool = False,
+    choices: tuple[tuple[int, str], ...] = (),
+    decimals: int = 2,
+    group: str = "",
+    reboot: bool = False,
+) -> Any:
+    """Declare a parameter. With ``choices`` it is an integer that has only these values, each with its meaning.
 
-    name: str
-    field: str
-    default: float
-    low: float
-    high: float
-    unit: str
-    help: str
-
-
-def _param(name: str, default: float, low: float, high: float, unit: str, text: str) -> float:
-    value: float = field(default=default, metadata={"param": (name, low, high, unit, text)})
-    return value
+    The group follows from the name's first part (``spec.GROUPS``) unless it is given.
+    """
+    whole = integer or bool(choices)
+    spec = ParamSpec(
+        name, default, low, high, unit, text, whole, group or group_of(name), 0 if whole else decimals, choices, reboot
+    )  # fmt: skip
+    return field(default=spec.number(default), metadata={"spec": spec})
 
 
 @dataclass(frozen=True)
@@ -49,9 +58,10 @@ class Behaviour:
     jerk_m_s3: float = _param("MPC_JERK_AUTO", 20.0, 1, 80, "m/s^3", "Jerk of the reference")
     max_tilt_deg: float = _param("MPC_TILTMAX_AIR", 45, 5, 70, "deg", "Largest tilt")
     yaw_rate_deg_s: float = _param("MPC_YAWRAUTO_MAX", 60, 5, 180, "deg/s", "Largest yaw rate in auto modes")
-    yaw_mode: float = _param(
-        "MPC_YAW_MODE", 0, 0, 1, "", "Heading where none is given: 0 to the waypoint, 1 as it is"
-    )
+    yaw_mode: int = _param(
+        "MPC_YAW_MODE", 0, 0, 1, "", "Heading where none is given",
+        choices=((0, "Towards the waypoint"), (1, "As it is")),
+    )  # fmt: skip
     acceptance_radius_m: float = _param(
         "NAV_ACC_RAD", 0.5, 0.05, 200, "m", "Acceptance radius where none is given"
     )
@@ -96,38 +106,30 @@ class Behaviour:
         spec = SPECS.get(name)
         if spec is None:
             raise ConfigError("parameter", name, "is not known")
-        if not math.isfinite(value) or not spec.low <= value <= spec.high:
-            raise ConfigError(
-                "parameter", name, f"{value:g} is outside {spec.low:g} to {spec.high:g} {spec.unit}"
-            )
-        return replace(self, **{spec.field: float(value)})
+        accepted = spec.accepted(value)
+        if isinstance(accepted, str):
+            raise ConfigError("parameter", name, accepted)
+        change: dict[str, Any] = {FIELDS[name]: accepted}
+        return replace(self, **change)
 
     def by_name(self) -> dict[str, float]:
         """Return all parameters under their MAVLink names."""
-        return {name: getattr(self, spec.field) for name, spec in SPECS.items()}
-
-
-def _spec(attribute: str, default: float, param: tuple[str, float, float, str, str]) -> ParamSpec:
-    name, low, high, unit, text = param
-    return ParamSpec(name, attribute, default, low, high, unit, text)
+        return {name: getattr(self, attribute) for name, attribute in FIELDS.items()}
 
 
 SPECS: dict[str, ParamSpec] = {
-    item.metadata["param"][0]: _spec(item.name, float(item.default), item.metadata["param"])
-    for item in fields(Behaviour)
-    if isinstance(item.default, int | float)
+    item.metadata["spec"].name: item.metadata["spec"] for item in fields(Behaviour) if "spec" in item.metadata
 }
+"""Declarations by name."""
+
+FIELDS: dict[str, str] = {
+    item.metadata["spec"].name: item.name for item in fields(Behaviour) if "spec" in item.metadata
+}
+"""The field of ``Behaviour`` that holds a parameter, by the parameter's name."""
 
 
 def with_assignments(behaviour: Behaviour, assignments: list[str]) -> Behaviour:
     """Apply ``NAME=VALUE`` texts; raise ConfigError."""
     for text in assignments:
-        name, separator, value = text.partition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            separator = ""
-        if not separator or not name.strip():
-            raise ConfigError("--param", text, "must be NAME=VALUE with a number")
-        behaviour = behaviour.updated(name.strip().upper(), number)
+        behaviour = behaviour.updated(*read_assignment(text))
     return behaviour

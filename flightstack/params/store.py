@@ -1,0 +1,105 @@
+"""The parameters of one vehicle: their declarations, their values, and who wants to hear of a change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+
+from flightstack.params.errors import ConfigError
+from flightstack.params.spec import ParamSpec
+
+Listener = Callable[[str, float], None]
+
+
+class ParamStore:
+    """Holds the value of every declared parameter. A value is always one that its declaration accepts."""
+
+    def __init__(self, specs: Iterable[ParamSpec]) -> None:
+        """Take the declarations, each name once; every parameter has its default."""
+        ordered = sorted(specs, key=lambda spec: spec.name)
+        self.specs: Mapping[str, ParamSpec] = MappingProxyType({spec.name: spec for spec in ordered})
+        """Declarations by name, sorted by name: a parameter's index in MAVLink is its place here."""
+        if len(self.specs) != len(ordered):
+            raise ValueError("a parameter is declared twice")
+        self._values = {spec.name: spec.number(spec.default) for spec in ordered}
+        self._overridden: set[str] = set()
+        self._listeners: list[Listener] = []
+
+    def value(self, name: str) -> float:
+        """Return the value, an ``int`` if the parameter is an integer; raise KeyError for an unknown name."""
+        return self._values[name]
+
+    def values(self) -> dict[str, float]:
+        """Return all values by name, in the order of the names."""
+        return dict(self._values)
+
+    def set(self, name: str, value: float) -> str | None:
+        """Set a parameter; return the sentence why it is refused, or None. A refused one changes nothing."""
+        return self._set(name, value, override=False)
+
+    def override(self, name: str, value: float) -> str | None:
+        """Set a parameter for this run only: ``is_overridden`` until somebody sets or resets it."""
+        return self._set(name, value, override=True)
+
+    def _set(self, name: str, value: float, override: bool) -> str | None:
+        spec = self.specs.get(name)
+        if spec is None:
+            return "there is no such parameter"
+        accepted = spec.accepted(value)
+        if isinstance(accepted, str):
+            return accepted
+        self._adopt(name, accepted, override)
+        return None
+
+    def _adopt(self, name: str, value: float, override: bool) -> None:
+        news = value != self._values[name] or (name in self._overridden and not override)
+        self._values[name] = value
+        if override:
+            self._overridden.add(name)
+        else:
+            self._overridden.discard(name)
+        if news:
+            for listener in self._listeners:
+                listener(name, value)
+
+    def reset(self, names: Iterable[str] | None = None) -> None:
+        """Give these parameters, or all, their defaults; unknown names are passed over."""
+        for name in list(self.specs if names is None else names):
+            spec = self.specs.get(name)
+            if spec is not None:
+                self._adopt(name, spec.number(spec.default), override=False)
+
+    def is_default(self, name: str) -> bool:
+        """Tell whether a parameter has its default."""
+        return self._values[name] == self.specs[name].default
+
+    def is_overridden(self, name: str) -> bool:
+        """Tell whether the value came from ``override``: it is not for the parameter file."""
+        return name in self._overridden
+
+    def subscribe(self, listener: Listener) -> None:
+        """Call ``listener(name, value)`` at once for every change from now on."""
+        self._listeners.append(listener)
+
+
+def read_assignment(text: str) -> tuple[str, float]:
+    """Read ``NAME=VALUE``, the name in any case; raise ConfigError."""
+    name, separator, value = text.partition("=")
+    try:
+        number = float(value)
+    except ValueError:
+        separator = ""
+    if not separator or not name.strip():
+        raise ConfigError("--param", text, "must be NAME=VALUE with a number")
+    return name.strip().upper(), number
+
+
+def apply_assignments(store: ParamStore, assignments: Iterable[str]) -> None:
+    """Override parameters by ``NAME=VALUE`` texts, in order; raise ConfigError."""
+    for text in assignments:
+        name, value = read_assignment(text)
+        if name not in store.specs:
+            raise ConfigError("parameter", name, "is not known")
+        refusal = store.override(name, value)
+        if refusal is not None:
+            raise ConfigError("parameter", name, refusal)
