@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from typing import Any, TypeAlias
 
+from fastcrc import crc16
+
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.frames import MAGIC_V1, MAGIC_V2, Frame, FrameReader
 
 Message: TypeAlias = Any
 """A pymavlink message object."""
+
+_HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, two flags, sequence, system, component, id (24 bits)
+_crc16 = crc16.mcrf4xx
 
 
 class Link:
     """Encodes and decodes one link. Bytes that make no message are counted, never raised."""
 
-    def __init__(self, system_id: int, component_id: int) -> None:
+    def __init__(self, system_id: int, component_id: int, keeps_unknown: bool = False) -> None:
+        """``keeps_unknown``: let ``decode`` yield messages that the dialect lacks too, to be passed on."""
         self._codec = mavlink.MAVLink(None, system_id, component_id)
         self._codec.robust_parsing = True
+        self._reader = FrameReader()
+        self._keeps_unknown = keeps_unknown
         self.received = 0
         self.sent = 0
         self.bad = 0
@@ -28,30 +38,85 @@ class Link:
         self.sent += 1
         return bytes(frame)
 
+    def encode_shared(self, message: Message) -> bytes:
+        """Do as ``encode``, for a message that goes to several links and does not change between.
+
+        The payload is packed by the first of them. The others have to write header and checksum only.
+        """
+        codec = self._codec
+        payload: bytes | None = message.get_payload()
+        packed = (
+            payload is not None and len(payload) == message.get_header().mlen
+        )  # of a received one it is not
+        if payload is None or not packed or codec.signing.sign_outgoing:
+            return self.encode(message)
+        number = message.get_msgId()  # ``id`` may be a field
+        seq, system, component = codec.seq, codec.srcSystem, codec.srcComponent
+        header = _HEADER.pack(
+            MAGIC_V2, len(payload), 0, 0, seq, system, component, number & 0xFFFF, number >> 16
+        )
+        frame = header + payload
+        crc: int = _crc16(b"%b%c" % (frame[1:], message.crc_extra))
+        codec.seq = (seq + 1) % 256
+        self.sent += 1
+        return frame + crc.to_bytes(2, "little")
+
     @property
     def has_partial(self) -> bool:
         """Tell whether the decoder holds the beginning of a frame."""
-        return int(self._codec.buf_len()) > 0
+        return self._reader.has_partial
 
     def decode(self, data: bytes) -> Iterator[Message]:
-        """Yield the messages that ``data`` completes; what is not a message is counted in ``bad``."""
-        try:
-            if self._is_one_frame(data):  # the usual datagram: no need to look for frames
-                messages = [self._codec.decode(bytearray(data))]
-            else:
-                messages = self._codec.parse_buffer(data) or []
-        except mavlink.MAVError:  # robust parsing reports most faults as BAD_DATA; a signature fault raises
-            self.bad += 1
-            return
-        for message in messages:
-            if message.get_msgId() < 0:  # BAD_DATA and unknown messages
-                self.bad += 1
-            else:
-                self.received += 1
+        """Yield the messages that ``data`` completes; what is not a message is counted in ``bad``.
+
+        Each has its frame as it was received in ``get_msgbuf()``.
+        """
+        if self._is_one_frame(data):  # the usual datagram: no need to look for frames
+            message = self._message(data)
+            if message is not None:
                 yield message
+            return
+        faults_before = self._reader.faults
+        frames = self._reader.feed(data)
+        self.bad += self._reader.faults - faults_before
+        for frame in frames:
+            if frame.known:
+                message = self._message(frame.data)
+                if message is not None:
+                    yield message
+            else:
+                self.bad += 1
+                if self._keeps_unknown:
+                    yield _unknown(frame)
+
+    def _message(self, frame: bytes) -> Message | None:
+        """Decode one known frame; None when its checksum or signature is wrong."""
+        try:
+            message = self._codec.decode(bytearray(frame))
+        except mavlink.MAVError:
+            self.bad += 1
+            return None
+        self.received += 1
+        return message
 
     def _is_one_frame(self, data: bytes) -> bool:
-        """Tell whether ``data`` is one whole unsigned frame and the decoder holds no beginning of another."""
-        if len(data) < 12 or data[0] != 0xFD or data[2] != 0:
+        """Tell whether ``data`` is one whole unsigned frame that we know and no beginning of another is held."""
+        if len(data) < 12 or data[0] != MAGIC_V2 or data[2] != 0:
             return False
-        return data[1] == len(data) - 12 and not self.has_partial
+        if data[1] != len(data) - 12 or self.has_partial:
+            return False
+        return (data[7] | data[8] << 8 | data[9] << 16) in mavlink.mavlink_map
+
+
+def is_unknown(message: Message) -> bool:
+    """Tell whether the dialect lacks ``message``: its checksum could not be verified."""
+    return isinstance(message, mavlink.MAVLink_unknown)
+
+
+def _unknown(frame: Frame) -> Message:
+    """Return pymavlink's stand-in for a message that the dialect lacks, with its sender."""
+    message = mavlink.MAVLink_unknown(frame.message_id, frame.data)
+    sequence, system, component = frame.data[2:5] if frame.data[0] == MAGIC_V1 else frame.data[4:7]
+    header = mavlink.MAVLink_header(frame.message_id, 0, 0, frame.data[1], sequence, system, component)
+    message._header = header
+    return message
