@@ -35,6 +35,9 @@ def _param(
     return field(default=spec.number(default), metadata={"spec": spec})
 
 
+_LINK_LOSS = ((0, "Disabled"), (1, "Hold"), (2, "Return"), (3, "Land"), (5, "Terminate"), (6, "Disarm"))
+
+
 @dataclass(frozen=True)
 class Behaviour:
     """How the vehicle flies its modes."""
@@ -100,6 +103,92 @@ class Behaviour:
     disarm_without_takeoff_s: float = _param(
         "COM_DISARM_PRFLT", 30, -1, 300, "s", "Disarm without takeoff; -1 never"
     )
+    # failsafes: commander/failsafe.py is the table that uses them
+    failsafe_delay_s: float = _param(
+        "COM_FAIL_ACT_T", 5.0, 0, 25, "s", "Hold before a failsafe returns or lands, for a user to take over"
+    )
+    gcs_loss_s: float = _param(
+        "COM_DL_LOSS_T", 10, 5, 300, "s", "Silence after which a ground station is lost", integer=True
+    )
+    gcs_loss_action: int = _param(
+        "NAV_DLL_ACT", 0, 0, 6, "", "Ground station lost", choices=_LINK_LOSS,
+    )  # fmt: skip
+    manual_loss_s: float = _param(
+        "COM_RC_LOSS_T", 0.5, 0, 35, "s", "Silence after which manual control is lost"
+    )
+    manual_loss_action: int = _param(
+        "NAV_RCL_ACT", 2, 1, 6, "", "Manual control lost in position or altitude mode", choices=_LINK_LOSS[1:],
+    )  # fmt: skip
+    offboard_loss_s: float = _param(
+        "COM_OF_LOSS_T", 1.0, 0, 60, "s", "Silence after which offboard setpoints are lost"
+    )
+    offboard_loss_action: int = _param(
+        "COM_OBL_RC_ACT", 0, 0, 7, "", "Offboard setpoints lost; without sticks 0 and 1 do as NAV_RCL_ACT",
+        choices=((0, "Position mode"), (1, "Altitude mode"), (3, "Return"), (4, "Land"), (5, "Hold"),
+                 (6, "Terminate"), (7, "Disarm")),
+    )  # fmt: skip
+    battery_low: float = _param("BAT_LOW_THR", 0.15, 0.12, 0.5, "norm", "Low battery: warn, and do not arm")
+    battery_critical: float = _param("BAT_CRIT_THR", 0.07, 0.05, 0.5, "norm", "Critical battery level")
+    battery_emergency: float = _param("BAT_EMERGEN_THR", 0.05, 0.03, 0.5, "norm", "Emergency battery level")
+    low_battery_action: int = _param(
+        "COM_LOW_BAT_ACT", 0, 0, 3, "", "Critical and emergency battery level",
+        choices=((0, "Warning"), (2, "Land"), (3, "Return at critical, land at emergency level")),
+    )  # fmt: skip
+    max_roll_deg: float = _param(
+        "FD_FAIL_R", 60, 0, 180, "deg", "Roll of lost control, at least 15 above MPC_TILTMAX_AIR; 0 off",
+        integer=True,
+    )  # fmt: skip
+    max_pitch_deg: float = _param(
+        "FD_FAIL_P", 60, 0, 180, "deg", "Pitch of lost control, at least 15 above MPC_TILTMAX_AIR; 0 off",
+        integer=True,
+    )  # fmt: skip
+    max_roll_s: float = _param("FD_FAIL_R_TTRI", 0.3, 0.02, 5, "s", "How long roll must be beyond FD_FAIL_R")
+    max_pitch_s: float = _param(
+        "FD_FAIL_P_TTRI", 0.3, 0.02, 5, "s", "How long pitch must be beyond FD_FAIL_P"
+    )
+    max_tilt_error_deg: float = _param(
+        "FS_ATT_ERR", 30, 0, 180, "deg", "Angle of lost control between thrust axis and its reference; 0 off",
+        group="Failure Detector",
+    )  # fmt: skip
+    max_tilt_error_s: float = _param(
+        "FS_ATT_ERR_T", 0.5, 0.02, 5, "s", "How long it must be beyond FS_ATT_ERR", group="Failure Detector"
+    )
+    attitude_failure_action: int = _param(
+        "FS_ATT_ACT", 4, 0, 4, "", "Attitude beyond its limits",
+        choices=((0, "Warning"), (2, "Land"), (4, "Terminate")), group="Failure Detector",
+    )  # fmt: skip
+    max_position_error_m: float = _param(
+        "FS_POS_ERR", 10, 0, 1000, "m", "Distance from the setpoint that counts as lost; 0 off",
+        group="Failure Detector",
+    )  # fmt: skip
+    max_position_error_s: float = _param(
+        "FS_POS_ERR_T", 1.0, 0.02, 30, "s", "How long it must be beyond FS_POS_ERR", group="Failure Detector"
+    )
+    position_error_action: int = _param(
+        "FS_POS_ACT", 2, 0, 4, "", "Position far from its setpoint",
+        choices=((0, "Warning"), (2, "Land"), (4, "Terminate")), group="Failure Detector",
+    )  # fmt: skip
+    rotor_check: int = _param(
+        "FD_ACT_EN", 1, 0, 1, "", "Compare commanded and measured rotor speeds", choices=((0, "Off"), (1, "On")),
+    )  # fmt: skip
+    rotor_error: float = _param(
+        "FS_ROT_ERR", 0.3, 0.05, 1, "norm", "Share by which a rotor's speed may differ from its command",
+        group="Failure Detector",
+    )  # fmt: skip
+    rotor_error_ms: float = _param(
+        "FD_ACT_MOT_TOUT", 100, 10, 10000, "ms", "How long a rotor may differ by more", integer=True,
+    )  # fmt: skip
+    rotor_failure_action: int = _param(
+        "COM_ACT_FAIL_ACT", 2, 0, 4, "", "A rotor does not follow its command",
+        choices=((0, "Warning"), (1, "Hold"), (2, "Land"), (3, "Return"), (4, "Terminate")),
+    )  # fmt: skip
+    stale_s: float = _param(
+        "FS_STALE_T", 0.5, 0.05, 10, "s", "Age at which a state is stale", group="Failure Detector"
+    )
+    blind_time_s: float = _param(
+        "FS_BLIND_T", 2.0, -1, 60, "s", "Without a state the rotors hold their speeds so long, then stop; -1 ever",
+        group="Failure Detector",
+    )  # fmt: skip
 
     def updated(self, name: str, value: float) -> Behaviour:
         """Return a copy with the parameter ``name`` changed; raise ConfigError."""
