@@ -81,6 +81,15 @@ def rotation_vector(q: Quaternion) -> Vector3:
 
 
 @compiled
+def rotation_over(rates: Vector3, dt_s: float) -> Quaternion:
+    """Rotation that constant body rates make in ``dt_s``; with 1, the exponential of a rotation vector."""
+    norm = math.sqrt(rates.x * rates.x + rates.y * rates.y + rates.z * rates.z)
+    half = 0.5 * norm * dt_s
+    scale = 0.5 * dt_s if half < 1e-9 else math.sin(half) / norm
+    return Quaternion(math.cos(half), rates.x * scale, rates.y * scale, rates.z * scale)
+
+
+@compiled
 def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
     """Quaternion of yaw, then pitch, then roll (3-2-1)."""
     cr, sr = math.cos(0.5 * roll_rad), math.sin(0.5 * roll_rad)

@@ -7,7 +7,16 @@ from typing import NamedTuple
 
 from flightstack.compiled import compiled
 from flightstack.contract import AttitudeReference, Quaternion, Vector3
-from flightstack.geometry import conjugate, normalised, quaternion_product, rotate, rotation_vector
+from flightstack.geometry import (
+    conjugate,
+    normalised,
+    quaternion_product,
+    rotate,
+    rotation_over,
+    rotation_vector,
+)
+from flightstack.params.toml_reader import Table
+from flightstack.params.tunable import Tunable
 
 
 class ReferenceMemory(NamedTuple):
@@ -29,6 +38,14 @@ class ReferenceParams(NamedTuple):
     damping: float
     max_rate_rad_s: float
     max_acceleration_rad_s2: float
+
+
+REFERENCE_TUNABLES = (
+    Tunable("bandwidth_rad_s", "ATT_REF_BW", 0.0, 1e3, "rad/s", "Natural frequency of the attitude target's filter; 0 for none"),
+    Tunable("damping", "ATT_REF_DAMP", 0.1, 5.0, "", "Damping of the attitude target's filter"),
+    Tunable("max_rate_rad_s", "ATT_REF_RATE", 0.1, 100.0, "rad/s", "Largest turning rate of the attitude reference"),
+    Tunable("max_acceleration_rad_s2", "ATT_REF_ACC", 0.1, 1e5, "rad/s^2", "Largest angular acceleration of the attitude reference"),
+)  # fmt: skip
 
 
 @compiled
@@ -80,18 +97,9 @@ def attitude_reference_step(
         (rates.y - memory.q_rad_s) / dt_s,
         (rates.z - memory.r_rad_s) / dt_s,
     )
-    attitude = normalised(quaternion_product(attitude, _rotation_over(rates, dt_s)))
+    attitude = normalised(quaternion_product(attitude, rotation_over(rates, dt_s)))
     advanced = ReferenceMemory(attitude.w, attitude.x, attitude.y, attitude.z, rates.x, rates.y, rates.z)
     return advanced, AttitudeReference(attitude, rates, acceleration)
-
-
-@compiled
-def _rotation_over(rates: Vector3, dt_s: float) -> Quaternion:
-    """Rotation that constant body rates make in ``dt_s``."""
-    norm = math.sqrt(rates.x * rates.x + rates.y * rates.y + rates.z * rates.z)
-    half = 0.5 * norm * dt_s
-    scale = 0.5 * dt_s if half < 1e-9 else math.sin(half) / norm
-    return Quaternion(math.cos(half), rates.x * scale, rates.y * scale, rates.z * scale)
 
 
 @compiled
@@ -103,3 +111,16 @@ def in_body_frame(reference: AttitudeReference, attitude: Quaternion) -> Attitud
         rotate(turn, reference.rates_frd_rad_s),
         rotate(turn, reference.acceleration_frd_rad_s2),
     )
+
+
+def read_reference_params(gains: Table) -> ReferenceParams:
+    """Read ``[attitude_reference]``."""
+    table = gains.table("attitude_reference")
+    params = ReferenceParams(
+        table.number("bandwidth_rad_s", 0.0, 1e3),
+        table.number("damping", 0.1, 5.0),
+        table.number("max_rate_rad_s", 0.1, 100.0),
+        table.number("max_acceleration_rad_s2", 0.1, 1e5),
+    )
+    table.finish()
+    return params

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from flightstack.arrays import store_position_setpoint, vehicle_state
-from flightstack.compiled import as_tuple, compiled, store
-from flightstack.contract import SETPOINT_SIZE, FloatArray, VehicleState
+from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, FloatArray
 from flightstack.geometry import euler_from_quaternion
-from flightstack.guidance.land_detector import LandMemory, land_detector_step
+from flightstack.guidance.aim import (
+    A_HOME_X,
+    A_HOME_Y,
+    A_HOME_Z,
+    A_PHASE,
+    A_SPEED,
+    A_START_X,
+    A_START_Y,
+    A_X,
+    A_Y,
+    A_YAW,
+    A_Z,
+    AIM_SIZE,
+    CLIMBING,
+)
+from flightstack.guidance.kernels import T_YAW, TRAJECTORY_SIZE, goal_kernel, stream_kernel
+from flightstack.guidance.land_detector import CLIMB_M, LandMemory
+from flightstack.guidance.manual import TAKEOFF_STICK, shaped
 from flightstack.guidance.mission import (
     COMMAND,
     CONDITION_YAW,
@@ -30,100 +47,31 @@ from flightstack.guidance.mission import (
     MISSION_MEMORY_SIZE,
     NAV_DELAY,
     PLAN_COLUMNS,
-    landing_speed,
-    mission_goal,
     mission_start,
-    mission_step,
 )
 from flightstack.guidance.mission import LAND as LAND_ITEM
 from flightstack.guidance.params import GuidanceParams
-from flightstack.guidance.trajectory import (
-    BRAKING,
-    Goal,
-    Trajectory,
-    TrajectoryLimits,
-    setpoint_of,
-    trajectory_step,
+from flightstack.guidance.setpoints import (
+    ATTITUDE,
+    POINT,
+    S_ACCELERATION,
+    S_KIND,
+    S_POSITION,
+    S_THRUST,
+    S_VELOCITY,
+    STICKS_AT,
+    OffboardSetpoint,
+    Sticks,
+    empty_stream,
+    store_setpoint,
 )
+from flightstack.guidance.speeds import SpeedOverrides
+from flightstack.guidance.trajectory import BRAKING, Trajectory, setpoint_of
 from flightstack.modes import Mode
 
-TAKEOFF, MISSION, RETURN, LAND = int(Mode.TAKEOFF), int(Mode.MISSION), int(Mode.RETURN), int(Mode.LAND)
-
-TRAJECTORY_SIZE = 11
-T_YAW = 9
-GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
-LAND_MEMORY_SIZE = 3
-# the target of every mode but the mission: position, heading, and the phase of a return
-A_X, A_Y, A_Z, A_YAW, A_PHASE, A_START_X, A_START_Y = range(7)
-AIM_SIZE = 7
-CLIMBING, CRUISING, DESCENDING = 0.0, 1.0, 2.0
-THRUST_AT = 4  # of the attitude target's array form
-
-
-@compiled
-def _advance_return(aim: FloatArray, state: VehicleState, params: GuidanceParams) -> None:
-    """Return: climb, go home, descend."""
-    p = state.position_ned_m
-    if aim[A_PHASE] == CLIMBING and abs(p.z - aim[A_Z]) <= params.altitude_acceptance_m:
-        aim[A_PHASE] = CRUISING
-        aim[A_X], aim[A_Y] = 0.0, 0.0
-    elif aim[A_PHASE] == CRUISING and p.x * p.x + p.y * p.y <= params.acceptance_radius_m**2:
-        aim[A_PHASE] = DESCENDING
-
-
-@compiled
-def _mode_goal(mode: int, aim: FloatArray, state: VehicleState, params: GuidanceParams) -> Goal:
-    z, climb, descent = aim[A_Z], params.climb_speed_m_s, params.descent_speed_m_s
-    if mode == TAKEOFF:
-        climb = params.takeoff_speed_m_s
-    elif mode == LAND or (mode == RETURN and aim[A_PHASE] == DESCENDING):
-        z = params.far_below_m
-        descent = landing_speed(state.position_ned_m.z, params)
-    return Goal(
-        aim[A_X], aim[A_Y], z, aim[A_YAW], params.cruise_speed_m_s, climb, descent, params.yaw_rate_rad_s, 0.0
-    )
-
-
-@compiled
-def guidance_kernel(
-    mode: int,
-    state_array: FloatArray,
-    trajectory: FloatArray,
-    mission: FloatArray,
-    plan: FloatArray,
-    jumps_left: FloatArray,
-    aim: FloatArray,
-    land: FloatArray,
-    attitude_target: FloatArray,
-    params_array: FloatArray,
-    dt_s: float,
-    setpoint: FloatArray,
-) -> None:
-    """Advance guidance by one outer tick; write the setpoint (11,) and update the memories in place.
-
-    Nothing moves while the state is not finite: the loops then hold their output and set a status bit.
-    """
-    for value in state_array:
-        if not np.isfinite(value):
-            return
-    state = vehicle_state(state_array)
-    params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
-    if mode == MISSION:
-        mission_step(mission, plan, jumps_left, state, trajectory[T_YAW], land[0] > 0.0, params, dt_s)
-        goal = mission_goal(mission, plan, aim[A_START_X], aim[A_START_Y], state.position_ned_m.z, params)
-    else:
-        if mode == RETURN:
-            _advance_return(aim, state, params)
-        goal = _mode_goal(mode, aim, state, params)
-    limits = TrajectoryLimits(params.acceleration_m_s2, params.vertical_acceleration_m_s2, params.jerk_m_s3)
-    reference = trajectory_step(Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE)), goal, limits, dt_s)
-    store(trajectory, reference)
-    store_position_setpoint(setpoint, setpoint_of(reference))
-    descending = reference.vz > 0.1
-    memory = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE))
-    store(
-        land, land_detector_step(memory, state, attitude_target[THRUST_AT], params.weight_n, descending, dt_s)
-    )
+STREAM_MODES = (Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
+"""Modes in which guidance follows what is streamed to the vehicle."""
+_STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)  # found faster than members of an enumeration
 
 
 class MissionProgress(NamedTuple):
@@ -139,8 +87,9 @@ class Navigator:
     """Holds the memories of guidance and enters modes. No I/O, no clock."""
 
     def __init__(self, params: GuidanceParams, outer_hz: float) -> None:
-        self._params_array = np.array(params, dtype=np.float64)
-        self.params = params
+        self._speeds = SpeedOverrides()
+        self._given_params = params
+        self.set_params(params)
         self._dt_s = 1.0 / outer_hz
         self.setpoint = np.zeros(SETPOINT_SIZE)
         self._trajectory = np.zeros(TRAJECTORY_SIZE)
@@ -148,9 +97,33 @@ class Navigator:
         self._reported = 0
         self._aim = np.zeros(AIM_SIZE)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0))
+        self._stream = empty_stream()
+        self.attitude_target = np.zeros(ATTITUDE_TARGET_SIZE)
+        """What the loops fly in place of the outer loop's target while ``flies_attitude``; array form."""
         self._plan = np.zeros((0, PLAN_COLUMNS))
         self._jumps_left = np.zeros(0)
         self.set_plan(self._plan, self._jumps_left)
+
+    # ------------------------------------------------------------------ parameters
+
+    def set_params(self, params: GuidanceParams) -> None:
+        """Take new numbers, from the next outer tick on; speeds that were commanded stay in force."""
+        self._given_params = params
+        self.params = self._speeds.applied_to(params)
+        self._params_array = np.array(self.params, dtype=np.float64)
+
+    def set_speed(self, speeds: SpeedOverrides) -> None:
+        """Fly at other speeds than the parameters' until the end of the flight."""
+        self._speeds = speeds
+        self.set_params(self._given_params)
+        self._mission[M_SPEED] = self.params.cruise_speed_m_s
+
+    @property
+    def speeds(self) -> SpeedOverrides:
+        """The speeds that were commanded."""
+        return self._speeds
+
+    # ------------------------------------------------------------------ what is
 
     @property
     def landed(self) -> bool:
@@ -208,7 +181,7 @@ class Navigator:
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
         """Aim for ``mode`` from where the reference is now."""
         t, aim, p = self._trajectory, self._aim, self.params
-        aim[A_X], aim[A_Y], aim[A_Z], aim[A_YAW] = t[0], t[1], t[2], t[T_YAW]
+        aim[A_X], aim[A_Y], aim[A_Z], aim[A_YAW], aim[A_SPEED] = t[0], t[1], t[2], t[T_YAW], 0.0
         if mode == Mode.TAKEOFF:
             aim[A_Z] = -takeoff_altitude_m
         elif mode == Mode.HOLD:  # where the reference comes to rest
@@ -217,11 +190,40 @@ class Navigator:
             aim[A_X], aim[A_Y] = t[0] + t[3] * ahead_s, t[1] + t[4] * ahead_s
             aim[A_Z] = t[2] + t[5] * abs(t[5]) / (2.0 * BRAKING * p.vertical_acceleration_m_s2)
         elif mode == Mode.RETURN:
-            aim[A_PHASE] = CLIMBING
-            if np.hypot(t[0], t[1]) > p.return_min_distance_m:
-                aim[A_Z] = min(t[2], -p.return_altitude_m)
+            self._enter_return()
         elif mode == Mode.MISSION:
             self._enter_mission()
+
+    def _enter_return(self) -> None:
+        """Climb to the return altitude above the place of the return, unless it is near or the vehicle higher."""
+        t, aim, p = self._trajectory, self._aim, self.params
+        aim[A_PHASE] = CLIMBING
+        if np.hypot(t[0] - aim[A_HOME_X], t[1] - aim[A_HOME_Y]) > p.return_min_distance_m:
+            aim[A_Z] = min(t[2], aim[A_HOME_Z] - p.return_altitude_m)
+
+    def return_to(self, north_m: float, east_m: float, ground_down_m: float) -> None:
+        """Let the next return end at this place [m NED]: home, or a rally point."""
+        self._aim[A_HOME_X], self._aim[A_HOME_Y], self._aim[A_HOME_Z] = north_m, east_m, ground_down_m
+
+    def reposition(
+        self, north_m: float, east_m: float, down_m: float, yaw_rad: float, speed_m_s: float = math.nan
+    ) -> None:
+        """Hold at another place [m NED]; NaN keeps what is, for the heading as MPC_YAW_MODE says.
+
+        Call it after entering HOLD.
+        """
+        t, aim = self._trajectory, self._aim
+        if math.isfinite(north_m) and math.isfinite(east_m):
+            aim[A_X], aim[A_Y] = north_m, east_m
+            away_m = math.hypot(north_m - t[0], east_m - t[1])
+            if math.isnan(yaw_rad) and self.params.yaw_mode < 0.5 and away_m > 1.0:
+                yaw_rad = math.atan2(east_m - t[1], north_m - t[0])
+        if math.isfinite(down_m):
+            aim[A_Z] = down_m
+        if math.isfinite(yaw_rad):
+            aim[A_YAW] = yaw_rad
+        if speed_m_s > 0.0:
+            aim[A_SPEED] = min(speed_m_s, self.params.max_speed_m_s)
 
     def _enter_mission(self) -> None:
         """Begin the current item anew from here, at the speed and with the heading set by those before it.
@@ -243,9 +245,55 @@ class Navigator:
         m = self._mission
         self._aim[A_X], self._aim[A_Y], self._aim[A_Z], self._aim[A_YAW] = m[M_X], m[M_Y], m[M_Z], m[M_YAW]
 
+    # ------------------------------------------------------------------ streams
+
+    def set_offboard(self, setpoint: OffboardSetpoint, max_thrust_n: float) -> None:
+        """Remember the newest offboard setpoint; OFFBOARD flies it."""
+        store_setpoint(self._stream, setpoint, max_thrust_n)
+
+    def set_sticks(self, sticks: Sticks) -> None:
+        """Remember the sticks; POSITION and ALTITUDE fly by them."""
+        self._stream[STICKS_AT:] = sticks
+
+    def flies_attitude(self, mode: Mode) -> bool:
+        """Tell whether guidance gives attitude and thrust itself, in ``attitude_target``."""
+        return mode is Mode.OFFBOARD and bool(self._stream[S_KIND] >= ATTITUDE)
+
+    def wants_to_rise(self, mode: Mode, down_m: float) -> bool:
+        """Tell whether the stream asks a vehicle that stands at ``down_m`` to take off."""
+        s, p = self._stream, self.params
+        if mode is not Mode.OFFBOARD:
+            return shaped(s[STICKS_AT + 2], p.stick_deadzone, p.stick_z_expo) > TAKEOFF_STICK
+        if s[S_KIND] >= ATTITUDE:
+            return bool(s[S_THRUST] > 0.5 * p.weight_n)
+        if s[S_KIND] != POINT:
+            return False
+        z, vz, az = (float(s[at + 2]) for at in (S_POSITION, S_VELOCITY, S_ACCELERATION))
+        if math.isfinite(z):
+            return z < down_m - CLIMB_M
+        return vz < 0.0 if math.isfinite(vz) else az < 0.0
+
+    # ------------------------------------------------------------------ the tick
+
     def step(self, mode: Mode, state: FloatArray, attitude_target: FloatArray) -> None:
-        """Advance by one outer tick and write ``setpoint``."""
-        guidance_kernel(
-            int(mode), state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim,
+        """Advance by one outer tick and write ``setpoint``, and ``attitude_target`` while ``flies_attitude``.
+
+        ``attitude_target`` (5,) is the loops' last one.
+        """
+        number = int(mode)
+        if number in _STREAM_NUMBERS:
+            stream_kernel(
+                number, state, self._trajectory, self._stream, self._land, attitude_target,
+                self._params_array, self._dt_s, self.setpoint, self.attitude_target,
+            )  # fmt: skip
+            return
+        goal_kernel(
+            number, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim,
             self._land, attitude_target, self._params_array, self._dt_s, self.setpoint,
         )  # fmt: skip
+
+    def warm_up(self, state: FloatArray, attitude_target: FloatArray) -> None:
+        """Compile every kernel, or load it from the cache."""
+        for mode in (Mode.HOLD, Mode.POSITION):
+            self.rest_at(state)
+            self.step(mode, state, attitude_target)

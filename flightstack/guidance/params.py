@@ -34,6 +34,13 @@ class GuidanceParams(NamedTuple):
     return_min_distance_m: float
     weight_n: float
     far_below_m: float
+    manual_speed_m_s: float
+    manual_tilt_rad: float
+    manual_yaw_rate_rad_s: float
+    stick_deadzone: float
+    stick_xy_expo: float
+    stick_z_expo: float
+    stick_yaw_expo: float
 
 
 def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:
@@ -63,4 +70,11 @@ def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:
         return_min_distance_m=b.return_min_distance_m,
         weight_n=weight_n,
         far_below_m=FAR_BELOW_M,
+        manual_speed_m_s=b.manual_speed_m_s,
+        manual_tilt_rad=math.radians(b.manual_tilt_deg),
+        manual_yaw_rate_rad_s=math.radians(b.manual_yaw_rate_deg_s),
+        stick_deadzone=b.stick_deadzone,
+        stick_xy_expo=b.stick_xy_expo,
+        stick_z_expo=b.stick_z_expo,
+        stick_yaw_expo=b.stick_yaw_expo,
     )

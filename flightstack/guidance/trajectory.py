@@ -65,17 +65,20 @@ BRAKING = 0.5  # share of the acceleration planned for braking; the rest covers 
 
 
 @compiled
-def approach_speed(distance_m: float, top_m_s: float, acceleration_m_s2: float) -> float:
+def approach_speed(
+    distance_m: float, top_m_s: float, acceleration_m_s2: float, gain_1_s: float = KP
+) -> float:
     """Speed at ``distance_m`` from the goal: linear near it, then constant braking, at most ``top``."""
     braking = BRAKING * acceleration_m_s2
-    linear_m = braking / (KP * KP)
+    linear_m = braking / (gain_1_s * gain_1_s)
     if distance_m <= linear_m:
-        return min(top_m_s, KP * distance_m)
+        return min(top_m_s, gain_1_s * distance_m)
     return min(top_m_s, math.sqrt(2.0 * braking * (distance_m - 0.5 * linear_m)))
 
 
 @compiled
-def _clipped(x: float, y: float, limit: float) -> tuple[float, float]:
+def clipped(x: float, y: float, limit: float) -> tuple[float, float]:
+    """Shorten a vector to at most ``limit``."""
     norm = math.sqrt(x * x + y * y)
     if norm <= limit:
         return x, y
@@ -83,22 +86,26 @@ def _clipped(x: float, y: float, limit: float) -> tuple[float, float]:
 
 
 @compiled
-def _horizontal(
+def approach_horizontally(
     t: Trajectory, goal: Goal, limits: TrajectoryLimits, dt_s: float
 ) -> tuple[float, float, float, float, float, float]:
+    """Return the reference's next x, y, vx, vy, ax, ay on its way to ``goal``."""
     dx, dy = goal.x - t.x, goal.y - t.y
     distance = math.sqrt(dx * dx + dy * dy)
     speed = approach_speed(distance, goal.speed_m_s, limits.acceleration_m_s2)
     scale = speed / distance if distance > 1e-9 else 0.0
-    ax, ay = _clipped(KV * (dx * scale - t.vx), KV * (dy * scale - t.vy), limits.acceleration_m_s2)
-    jx, jy = _clipped(KA * (ax - t.ax), KA * (ay - t.ay), limits.jerk_m_s3)
+    ax, ay = clipped(KV * (dx * scale - t.vx), KV * (dy * scale - t.vy), limits.acceleration_m_s2)
+    jx, jy = clipped(KA * (ax - t.ax), KA * (ay - t.ay), limits.jerk_m_s3)
     ax, ay = t.ax + jx * dt_s, t.ay + jy * dt_s
     vx, vy = t.vx + ax * dt_s, t.vy + ay * dt_s
     return t.x + vx * dt_s, t.y + vy * dt_s, vx, vy, ax, ay
 
 
 @compiled
-def _vertical(t: Trajectory, goal: Goal, limits: TrajectoryLimits, dt_s: float) -> tuple[float, float, float]:
+def approach_vertically(
+    t: Trajectory, goal: Goal, limits: TrajectoryLimits, dt_s: float
+) -> tuple[float, float, float]:
+    """Return the reference's next z, vz, az on its way to ``goal``."""
     dz = goal.z - t.z
     top = goal.descent_m_s if dz > 0.0 else goal.climb_m_s
     limit = limits.vertical_acceleration_m_s2
@@ -129,8 +136,8 @@ def trajectory_step(t: Trajectory, goal: Goal, limits: TrajectoryLimits, dt_s: f
     A cascade with vector limits: position gives a velocity (square-root approach), velocity an acceleration,
     acceleration a jerk. Horizontal limits act on the vector, so that a leg from rest is a straight line.
     """
-    x, y, vx, vy, ax, ay = _horizontal(t, goal, limits, dt_s)
-    z, vz, az = _vertical(t, goal, limits, dt_s)
+    x, y, vx, vy, ax, ay = approach_horizontally(t, goal, limits, dt_s)
+    z, vz, az = approach_vertically(t, goal, limits, dt_s)
     yaw, yaw_rate = _heading(t, goal, dt_s)
     return Trajectory(x, y, z, vx, vy, vz, ax, ay, az, yaw, yaw_rate)
 

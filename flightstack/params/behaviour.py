@@ -61,9 +61,22 @@ class Behaviour:
     jerk_m_s3: float = _param("MPC_JERK_AUTO", 20.0, 1, 80, "m/s^3", "Jerk of the reference")
     max_tilt_deg: float = _param("MPC_TILTMAX_AIR", 45, 5, 70, "deg", "Largest tilt")
     yaw_rate_deg_s: float = _param("MPC_YAWRAUTO_MAX", 60, 5, 180, "deg/s", "Largest yaw rate in auto modes")
+    manual_speed_m_s: float = _param(
+        "MPC_VEL_MANUAL", 10.0, 0.5, 20, "m/s", "Speed of a full stick in Position mode"
+    )
+    manual_tilt_deg: float = _param(
+        "MPC_MAN_TILT_MAX", 35, 1, 70, "deg", "Tilt of a full stick in Altitude mode"
+    )
+    manual_yaw_rate_deg_s: float = _param("MPC_MAN_Y_MAX", 150, 0, 400, "deg/s", "Yaw rate of a full stick")
+    stick_deadzone: float = _param("MPC_HOLD_DZ", 0.1, 0, 0.9, "", "Dead zone around the sticks' centre")
+    stick_xy_expo: float = _param(
+        "MPC_XY_MAN_EXPO", 0.6, 0, 1, "", "Softness of the horizontal sticks' centre"
+    )
+    stick_z_expo: float = _param("MPC_Z_MAN_EXPO", 0.6, 0, 1, "", "Softness of the throttle's centre")
+    stick_yaw_expo: float = _param("MPC_YAW_EXPO", 0.6, 0, 1, "", "Softness of the yaw stick's centre")
     yaw_mode: int = _param(
-        "MPC_YAW_MODE", 0, 0, 1, "", "Heading where none is given",
-        choices=((0, "Towards the waypoint"), (1, "As it is")),
+        "MPC_YAW_MODE", 0, 0, 5, "", "Heading where none is given",
+        choices=((0, "Towards the waypoint"), (5, "As it is")),
     )  # fmt: skip
     acceptance_radius_m: float = _param(
         "NAV_ACC_RAD", 0.5, 0.05, 200, "m", "Acceptance radius where none is given"

@@ -1,0 +1,133 @@
+"""Fly what a companion streams: points of a trajectory, or attitudes and body rates with their thrust."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack.arrays import attitude_target, store_attitude_target
+from flightstack.compiled import compiled
+from flightstack.contract import AttitudeTarget, FloatArray, Quaternion, Vector3, VehicleState
+from flightstack.geometry import (
+    conjugate,
+    euler_from_quaternion,
+    normalised,
+    quaternion_product,
+    rotate,
+    rotation_over,
+    rotation_vector,
+)
+from flightstack.guidance.follow import follow_heading, follow_horizontally, follow_vertically, leashed
+from flightstack.guidance.params import GuidanceParams
+from flightstack.guidance.setpoints import (
+    ATTITUDE,
+    POINT,
+    S_ACCELERATION,
+    S_AGE,
+    S_ATTITUDE,
+    S_KIND,
+    S_POSITION,
+    S_RATES,
+    S_THRUST,
+    S_VELOCITY,
+    S_YAW,
+    S_YAW_RATE,
+)
+from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, clipped
+from flightstack.params.vehicle import GRAVITY_M_S2
+
+EXTRAPOLATION_S = 0.25
+"""How long a moving point goes on along its velocity until the next one: a stream of 4 Hz stays smooth."""
+RATE_LEAD_RAD = 0.5
+"""How far an attitude turned by body rates may lead the vehicle: farther, the vehicle cannot follow it."""
+
+
+@compiled
+def _given(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
+
+
+@compiled
+def _vector(stream: FloatArray, at: int) -> Vector3:
+    return Vector3(stream[at], stream[at + 1], stream[at + 2])
+
+
+@compiled
+def _moved(position: float, velocity: float, acceleration: float, age_s: float) -> float:
+    return position + age_s * (_given(velocity) + 0.5 * age_s * _given(acceleration))
+
+
+@compiled
+def point_step(
+    t: Trajectory,
+    stream: FloatArray,
+    state: VehicleState,
+    params: GuidanceParams,
+    limits: TrajectoryLimits,
+    dt_s: float,
+) -> Trajectory:
+    """Move the reference by one outer tick along the newest point; without any it brakes and stays."""
+    p, v, a = _vector(stream, S_POSITION), _vector(stream, S_VELOCITY), _vector(stream, S_ACCELERATION)
+    yaw_wanted, turn = stream[S_YAW], stream[S_YAW_RATE]
+    if stream[S_KIND] != POINT:
+        none = math.nan
+        p, v, a = Vector3(none, none, none), Vector3(0.0, 0.0, 0.0), Vector3(none, none, none)
+        yaw_wanted, turn = none, none
+    age_s = stream[S_AGE]
+    stream[S_AGE] = min(age_s + dt_s, EXTRAPOLATION_S)
+    p = Vector3(_moved(p.x, v.x, a.x, age_s), _moved(p.y, v.y, a.y, age_s), _moved(p.z, v.z, a.z, age_s))
+    here = state.position_ned_m
+    x, y, vx, vy, ax, ay = follow_horizontally(t, p, v, a, params.max_speed_m_s, limits, dt_s)
+    z, vz, az = follow_vertically(
+        t, p.z, v.z, a.z, params.climb_speed_m_s, params.descent_speed_m_s, limits, dt_s
+    )
+    if not math.isfinite(p.x):
+        x, y = leashed(x, here.x), leashed(y, here.y)
+    if not math.isfinite(p.z):
+        z = leashed(z, here.z)
+    present_yaw = euler_from_quaternion(state.attitude).z
+    yaw, yaw_rate = follow_heading(t, yaw_wanted, turn, params.yaw_rate_rad_s, present_yaw, dt_s)
+    return Trajectory(x, y, z, vx, vy, vz, ax, ay, az, yaw, yaw_rate)
+
+
+@compiled
+def _turned(target: Quaternion, rates: Vector3, present: Quaternion, dt_s: float) -> Quaternion:
+    """Turn the attitude target by body rates, no farther from the present attitude than it can catch up."""
+    turned = normalised(quaternion_product(target, rotation_over(rates, dt_s)))
+    lead = rotation_vector(quaternion_product(conjugate(present), turned))
+    angle = math.sqrt(lead.x * lead.x + lead.y * lead.y + lead.z * lead.z)
+    if angle <= RATE_LEAD_RAD:
+        return turned
+    scale = RATE_LEAD_RAD / angle
+    bounded = Vector3(lead.x * scale, lead.y * scale, lead.z * scale)
+    return normalised(quaternion_product(present, rotation_over(bounded, 1.0)))
+
+
+@compiled
+def attitude_step(
+    stream: FloatArray,
+    last_target: FloatArray,
+    state: VehicleState,
+    params: GuidanceParams,
+    limits: TrajectoryLimits,
+    dt_s: float,
+    target: FloatArray,
+) -> Trajectory:
+    """Write the attitude target (5,) to fly, from the loops' ``last_target`` (5,); return the reference.
+
+    The reference goes along with the vehicle, accelerated as the target's thrust does: whatever mode comes
+    next begins with the motion and the attitude at hand.
+    """
+    if stream[S_KIND] == ATTITUDE:
+        q = Quaternion(
+            stream[S_ATTITUDE], stream[S_ATTITUDE + 1], stream[S_ATTITUDE + 2], stream[S_ATTITUDE + 3]
+        )
+    else:
+        q = _turned(attitude_target(last_target).attitude, _vector(stream, S_RATES), state.attitude, dt_s)
+    thrust_n = stream[S_THRUST]
+    store_attitude_target(target, AttitudeTarget(q, thrust_n))
+    lift = rotate(q, Vector3(0.0, 0.0, -GRAVITY_M_S2 * thrust_n / params.weight_n))
+    ax, ay = clipped(lift.x, lift.y, limits.acceleration_m_s2)
+    limit = limits.vertical_acceleration_m_s2
+    az = min(max(lift.z + GRAVITY_M_S2, -limit), limit)
+    p, v, yaw = state.position_ned_m, state.velocity_ned_m_s, euler_from_quaternion(q).z
+    return Trajectory(p.x, p.y, p.z, v.x, v.y, v.z, ax, ay, az, yaw, 0.0)
