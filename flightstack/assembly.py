@@ -26,6 +26,7 @@ from flightstack.guidance.params import guidance_params
 from flightstack.logging.flight_log import vehicle_info
 from flightstack.logging.recorder import FlightRecorder, OpenLog
 from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.mavlink.telemetry.facts import NoBattery
 from flightstack.modes import Mode
 from flightstack.params.errors import ConfigError
 from flightstack.params.gains_file import open_gains
@@ -92,7 +93,7 @@ def build(config: StackConfig, open_log: OpenLog) -> Stack:
     warm_up(backend, Navigator(guidance_params(config.behaviour, vehicle.weight_n), pace.outer_hz), simulator)
     timing = LoopTiming(round(1e9 / pace.inner_hz))
     report = TimingReport(timing, pace, config.lockstep)
-    facts = AutopilotFacts(autopilot, vehicle, config.system_id, report.message)
+    facts = AutopilotFacts(autopilot, vehicle, config.system_id, report.message, NoBattery)
     ground = GroundHub(VehicleContext(autopilot), facts, config.system_id)
     return Stack(vehicle, pace, simulator, autopilot, ground, recorder, timing, report)
 

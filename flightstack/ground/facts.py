@@ -10,6 +10,7 @@ from flightstack.contract import FloatArray
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
+from flightstack.mavlink.telemetry.facts import BatteryView, FlightTimes, PlanIds
 from flightstack.modes import Mode
 from flightstack.params.vehicle import Vehicle
 
@@ -18,7 +19,12 @@ class AutopilotFacts:
     """Implements ``telemetry.VehicleFacts``; every property reads the present."""
 
     def __init__(
-        self, autopilot: Autopilot, vehicle: Vehicle, system_id: int, loop_timing: Callable[[], Message]
+        self,
+        autopilot: Autopilot,
+        vehicle: Vehicle,
+        system_id: int,
+        loop_timing: Callable[[], Message],
+        battery: Callable[[], BatteryView],
     ) -> None:
         self._autopilot = autopilot
         self._now = autopilot.now
@@ -26,8 +32,10 @@ class AutopilotFacts:
         self.system_id = system_id
         self.rotors = len(vehicle.rotors)
         self.max_thrust_n = vehicle.weight_n * 2.0 if vehicle.ideal_rotors else vehicle.max_thrust_n
-        self.home: GeoPoint = autopilot.home
+        self.is_generic = False
         self.frame = LocalFrame(autopilot.home)
+        self.top_speed_rad_s = [min(rotor.max_speed_rad_s, 1e6) for rotor in vehicle.rotors]
+        self._battery = battery
         self.state: FloatArray = self._now.state
         self.setpoint: FloatArray = self._now.setpoint
         self.attitude_target: FloatArray = self._now.attitude_target
@@ -88,6 +96,36 @@ class AutopilotFacts:
             return int(mavlink.MISSION_STATE_ACTIVE if self.armed else mavlink.MISSION_STATE_NOT_STARTED)
         begun = self._now.progress.reached >= 0
         return int(mavlink.MISSION_STATE_PAUSED if begun else mavlink.MISSION_STATE_NOT_STARTED)
+
+    @property
+    def home(self) -> GeoPoint:
+        """Where a return goes to."""
+        return self._autopilot.home
+
+    @property
+    def system_status(self) -> int:
+        """MAV_STATE: active when armed, else standing by."""
+        return int(mavlink.MAV_STATE_ACTIVE if self.armed else mavlink.MAV_STATE_STANDBY)
+
+    @property
+    def flight(self) -> FlightTimes:
+        """When the present flight began."""
+        return FlightTimes()
+
+    @property
+    def plan_ids(self) -> PlanIds:
+        """Identifiers of the stored plans."""
+        return PlanIds()
+
+    @property
+    def battery(self) -> BatteryView:
+        """The battery as the simulator last told it."""
+        return self._battery()
+
+    @property
+    def fence_breached(self) -> bool:
+        """Whether the vehicle is outside its fence."""
+        return False
 
     @property
     def has_state(self) -> bool:

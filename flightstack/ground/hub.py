@@ -54,6 +54,11 @@ class GroundHub:
         """Forget a peer whose connection has ended."""
         self._peers.pop(address, None)
 
+    def is_heard(self, address: PeerAddress) -> bool:
+        """Tell whether a valid message of ``address`` has come, not too long ago."""
+        peer = self._peers.get(address)
+        return peer is not None and peer.heard
+
     def _peer_at(self, address: Hashable) -> Peer:
         """Find the peer that a service names: one that it heard, in the same call."""
         assert isinstance(address, PeerAddress)

@@ -12,15 +12,22 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address, is_for
 from flightstack.mavlink.services.command_server import Command
-from flightstack.mavlink.telemetry import MAKERS, messages
+from flightstack.mavlink.telemetry import is_available, messages
 
 LINK_COMMANDS = frozenset(
     {
         mavlink.MAV_CMD_REQUEST_MESSAGE,
         mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
         mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
+        mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
+        mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,
     }
 )
+FORERUNNERS: dict[int, int] = {
+    mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION,
+}
+"""Commands from before REQUEST_MESSAGE, and what they ask for."""
 HIGHEST_MESSAGE_ID = 0xFFFFFF
 
 
@@ -47,14 +54,16 @@ class LinkCommands:
             return Answer(ACCEPTED) if done else Answer(DENIED, "no such message or interval")
         if command.command == mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
             return self._send_interval(peer, number)
+        if command.command in FORERUNNERS:
+            return self._send_message(peer, FORERUNNERS[command.command], 0.0)
         return self._send_message(peer, number, argument)
 
     def _send_message(self, peer: Peer, number: int, argument: float) -> Answer:
         if number == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._send_interval(peer, _message_id(argument))
-        if number not in MAKERS:
+        if not is_available(number):
             return Answer(DENIED, f"message {number} is not available")
-        peer.outbox.extend(messages(number, self._facts))
+        peer.outbox.extend(messages(number, self._facts, argument))
         return Answer(ACCEPTED)
 
     def _send_interval(self, peer: Peer, about: int) -> Answer:

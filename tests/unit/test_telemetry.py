@@ -17,7 +17,8 @@ from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, FsLoopTimi
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
 from flightstack.mavlink.telemetry import MAKERS, autopilot_version, heartbeat, messages, status_texts
-from flightstack.modes import Mode
+from flightstack.mavlink.telemetry.facts import FlightTimes, NoBattery, PlanIds
+from flightstack.modes import CUSTOM_MODE, Mode
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 EULER = (0.1, -0.2, 2.5)
@@ -37,6 +38,8 @@ def facts(**changes: object) -> SimpleNamespace:
         "row": row, "time_us": 12_345_678, "max_thrust_n": 12.0, "rotors": 4, "system_id": 1,
         "home": HOME, "frame": LocalFrame(HOME),
         "armed": True, "mode": Mode.MISSION, "landed": False, "climbing": False, "descending": False,
+        "is_generic": False, "system_status": 4, "top_speed_rad_s": [600.0] * 4, "battery": NoBattery(),
+        "flight": FlightTimes(), "plan_ids": PlanIds(), "fence_breached": False,
         "mission_current": 2, "mission_count": 5, "mission_state": 3, "can_arm": True, "has_state": True,
         "loop_timing": lambda: FsLoopTiming(1, 2, 0, 0, 500.0, 100.0, 30.0, *[1.0] * 6, 0),
     }  # fmt: skip
@@ -123,7 +126,7 @@ def test_landed_state(changes: dict[str, bool], state: int) -> None:
 
 
 def test_heartbeat_is_px4s() -> None:
-    armed, disarmed = heartbeat(facts()), heartbeat(facts(armed=False, mode=Mode.HOLD))
+    armed, disarmed = heartbeat(facts()), heartbeat(facts(armed=False, mode=Mode.HOLD, system_status=3))
     assert (armed.type, armed.autopilot) == (mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
     assert (armed.custom_mode, disarmed.custom_mode) == (4 << 16 | 4 << 24, 4 << 16 | 3 << 24)
     assert armed.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
@@ -161,6 +164,63 @@ def test_time_wraps_as_the_field_does() -> None:
     late = on_the_wire(ATTITUDE, time_us=(2**32 + 5) * 1000)
     assert late.time_boot_ms == 5
     assert on_the_wire(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME).time_boot_ms == 12345
+
+
+def test_gps_altitude_and_battery_say_what_is_known() -> None:
+    gps = on_the_wire(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT)
+    assert (gps.fix_type, gps.satellites_visible, gps.alt) == (3, 255, 518_000)
+    assert gps.vel == round(math.hypot(1.0, -2.0) * 100)
+    assert gps.cog == round(math.degrees(math.atan2(-2, 1)) % 360 * 100)
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, has_state=False).fix_type == 1
+    lower_home = GeoPoint(HOME.latitude_deg, HOME.longitude_deg, HOME.altitude_m - 8.0)
+    altitude = on_the_wire(mavlink.MAVLINK_MSG_ID_ALTITUDE, home=lower_home)
+    assert (altitude.altitude_amsl, altitude.altitude_local, altitude.altitude_relative) == (
+        518.0,
+        30.0,
+        38.0,
+    )
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, home=lower_home).relative_alt == 38_000
+    none = on_the_wire(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS)
+    assert (none.voltages[0], none.current_battery, none.battery_remaining) == (0xFFFF, -1, -1)
+    pack = SimpleNamespace(voltage_v=11.72, current_a=8.51, remaining=0.473, valid=True)
+    battery = on_the_wire(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, battery=pack)
+    assert (battery.voltages[0], battery.current_battery, battery.battery_remaining) == (11_720, 851, 47)
+    status = on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, battery=pack)
+    assert (status.voltage_battery, status.current_battery, status.battery_remaining) == (11_720, 851, 47)
+
+
+def test_odometry_has_its_velocity_in_the_body_frame() -> None:
+    m = on_the_wire(mavlink.MAVLINK_MSG_ID_ODOMETRY)
+    expected = Rotation.from_quat((X, Y, Z, W)).inv().apply((1.0, -2.0, 0.5))
+    assert (m.vx, m.vy, m.vz) == pytest.approx(expected, abs=1e-6)
+    assert (m.frame_id, m.child_frame_id) == (mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_BODY_FRD)
+
+
+def test_a_breached_fence_is_ill() -> None:
+    fence = mavlink.MAV_SYS_STATUS_GEOFENCE
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS).onboard_control_sensors_health & fence
+    ill = on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, fence_breached=True)
+    assert not ill.onboard_control_sensors_health & fence
+    assert ill.onboard_control_sensors_enabled & fence
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, fence_breached=True).breach_status == 1
+
+
+def test_every_mode_is_listed_and_named_once() -> None:
+    listed = list(messages(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, facts(), 0.0))
+    assert sorted(m.custom_mode for m in listed) == sorted(CUSTOM_MODE.values())
+    assert [m.mode_index for m in listed] == list(range(1, len(listed) + 1))
+    assert {m.number_modes for m in listed} == {len(listed)}
+    (third,) = messages(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, facts(), 3.0)
+    assert third.custom_mode == listed[2].custom_mode
+    for index in (-1.0, 0.5, len(listed) + 1.0, math.inf, 1e30):
+        assert len(list(messages(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, facts(), index))) in (0, len(listed))
+    (decoded,) = Link(255, 190).decode(Link(1, 1).encode(listed[0]))
+    assert decoded.mode_name == "Hold"
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_CURRENT_MODE).custom_mode == CUSTOM_MODE[Mode.MISSION]
+
+
+def test_a_generic_vehicle_does_not_call_itself_px4() -> None:
+    assert heartbeat(facts(is_generic=True)).autopilot == mavlink.MAV_AUTOPILOT_GENERIC
 
 
 def test_version_is_ours() -> None:
@@ -254,7 +314,7 @@ def test_after_a_gap_nothing_is_made_up_for() -> None:
 
 def test_intervals_can_be_set_stopped_and_reset() -> None:
     streams = Streams(GROUND_RATES_HZ)
-    quaternion = mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION
+    quaternion = mavlink.MAVLINK_MSG_ID_ODOMETRY  # one that this link does not send by itself
     assert [streams.interval_us(number) for number in (ATTITUDE, quaternion, 9999)] == [20_000, -1, 0]
     assert streams.set_interval(ATTITUDE, 100_000)
     assert streams.set_interval(quaternion, 50_000)
