@@ -1,15 +1,23 @@
-"""Plans: mission items, their files (``.plan``, ``.waypoints``), and the missions that the vehicle takes."""
+"""Plans: missions, geofences and rally points, their files (``.plan``, ``.waypoints``), and what the vehicle takes."""
 
-from flightstack.plan.check import DEFAULT_LIMITS, Limits, Rejection, check_mission
+from flightstack.plan.check import DEFAULT_LIMITS, Limits, check_mission
+from flightstack.plan.fence import check_fence, fence_shape
+from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.files import load_plan, save_plan
 from flightstack.plan.item import MissionItem
 from flightstack.plan.plan import Plan
+from flightstack.plan.rally import check_rally
+from flightstack.plan.rejection import Rejection
 from flightstack.plan.vocabulary import (
+    MAX_FENCE_ITEMS,
     MAX_MISSION_ITEMS,
+    MAX_RALLY_POINTS,
     NAV_COMMANDS,
     POSITION_COMMANDS,
+    RALLY_POINT,
     UNSET_E7,
     Command,
+    FenceCommand,
     Frame,
     MissionResult,
     MissionType,
@@ -19,11 +27,16 @@ from flightstack.plan.vocabulary import (
 
 __all__ = [
     "DEFAULT_LIMITS",
+    "MAX_FENCE_ITEMS",
     "MAX_MISSION_ITEMS",
+    "MAX_RALLY_POINTS",
     "NAV_COMMANDS",
     "POSITION_COMMANDS",
+    "RALLY_POINT",
     "UNSET_E7",
     "Command",
+    "FenceCommand",
+    "FenceShape",
     "Frame",
     "Limits",
     "MissionItem",
@@ -31,8 +44,11 @@ __all__ = [
     "MissionType",
     "Plan",
     "Rejection",
+    "check_fence",
     "check_mission",
+    "check_rally",
     "command_name",
+    "fence_shape",
     "load_plan",
     "result_name",
     "save_plan",

@@ -10,9 +10,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.item import MissionItem
 from flightstack.plan.jumps import find_idle_loop
-from flightstack.plan.parameter_rules import Fault, parameter_fault
+from flightstack.plan.legs import leg_rejection
+from flightstack.plan.parameter_rules import parameter_fault
+from flightstack.plan.rejection import Fault, Rejection, item_rejection, range_fault
 from flightstack.plan.vocabulary import (
     GLOBAL_FRAMES,
     MAX_MISSION_ITEMS,
@@ -22,7 +25,6 @@ from flightstack.plan.vocabulary import (
     Command,
     Frame,
     MissionResult,
-    command_name,
 )
 
 _ALTITUDE_TOLERANCE_M = 0.01  # a 32-bit float of an altitude above sea level is good to half a millimetre
@@ -37,47 +39,41 @@ class Limits(NamedTuple):
     """Horizontal distance from one position to the next [MIS_DIST_WPS]."""
     max_altitude_m: float = 500.0
     """Altitude above home [GF_MAX_VER_DIST]."""
+    max_home_distance_m: float = 0.0
+    """Horizontal distance from home [GF_MAX_HOR_DIST]."""
     min_takeoff_altitude_m: float = 0.3
     """Altitude above home that a takeoff must reach, or landing would be detected at once."""
     max_items: int = MAX_MISSION_ITEMS
-
-
-class Rejection(NamedTuple):
-    """Why a mission is refused."""
-
-    result: MissionResult
-    seq: int | None
-    """Number of the item at fault; None when it is the mission as a whole."""
-    reason: str
-    """One sentence, naming the item."""
 
 
 DEFAULT_LIMITS = Limits()
 
 
 def check_mission(
-    items: Sequence[MissionItem], home: GeoPoint, limits: Limits = DEFAULT_LIMITS
+    items: Sequence[MissionItem],
+    home: GeoPoint,
+    limits: Limits = DEFAULT_LIMITS,
+    fence: FenceShape | None = None,
 ) -> Rejection | None:
-    """Return why the vehicle refuses ``items``, or None if it takes them."""
+    """Return why the vehicle refuses ``items``, or None if it takes them.
+
+    With a ``fence`` in force, every position and the straight way to it must be inside.
+    """
     if len(items) > limits.max_items:
         reason = f"the mission has {len(items)} items, and at most {limits.max_items} are allowed"
         return Rejection(MissionResult.NO_SPACE, None, reason)
     for seq, item in enumerate(items):
         fault = _item_fault(item, seq, len(items)) or _altitude_fault(item, home, limits)
         if fault:
-            return _rejection(seq, item, fault)
+            return item_rejection(seq, item, fault)
     if not any(item.command in NAV_COMMANDS for item in items):
         reason = "the mission has no item to fly to (takeoff, waypoint, loiter, land or return)"
         return Rejection(MissionResult.INVALID, None, reason)
     loop = find_idle_loop(items)
     if loop is not None:
         fault = Fault(MissionResult.INVALID_PARAM1, "jumps in a loop that holds no item to fly")
-        return _rejection(loop, items[loop], fault)
-    return _distance_rejection(items, home, limits)
-
-
-def _rejection(seq: int, item: MissionItem, fault: Fault) -> Rejection:
-    return Rejection(fault.result, seq, f"item {seq} ({command_name(item.command)}): {fault.reason}")
+        return item_rejection(loop, items[loop], fault)
+    return _distance_rejection(items, home, limits) or leg_rejection(items, home, fence)
 
 
 def _item_fault(item: MissionItem, seq: int, count: int) -> Fault | None:
@@ -100,14 +96,7 @@ def _position_fault(item: MissionItem) -> Fault | None:
         if item.command in OPEN_POSITION_COMMANDS:
             return None
         return Fault(MissionResult.INVALID_PARAM5_X, "latitude and longitude must be given")
-    latitude, longitude = item.position_deg
-    if abs(latitude) > 90.0:
-        reason = f"latitude {latitude:.7f} is outside -90 to 90 degrees"
-        return Fault(MissionResult.INVALID_PARAM5_X, reason)
-    if abs(longitude) > 180.0:
-        reason = f"longitude {longitude:.7f} is outside -180 to 180 degrees"
-        return Fault(MissionResult.INVALID_PARAM6_Y, reason)
-    return None
+    return range_fault(*item.position_deg)
 
 
 def _altitude_fault(item: MissionItem, home: GeoPoint, limits: Limits) -> Fault | None:
@@ -138,7 +127,12 @@ def _distance_rejection(items: Sequence[MissionItem], home: GeoPoint, limits: Li
         distance_m = math.hypot(there.x - north_m, there.y - east_m)
         if limit_m > 0.0 and distance_m > limit_m:
             reason = f"is {distance_m:.0f} m from {start}, and at most {limit_m:g} m are allowed"
-            return _rejection(seq, item, Fault(MissionResult.INVALID, reason))
+            return item_rejection(seq, item, Fault(MissionResult.INVALID, reason))
+        if 0.0 < limits.max_home_distance_m < (from_home_m := math.hypot(there.x, there.y)):
+            reason = (
+                f"is {from_home_m:.0f} m from home, and at most {limits.max_home_distance_m:g} m are allowed"
+            )
+            return item_rejection(seq, item, Fault(MissionResult.INVALID, reason))
         north_m, east_m = there.x, there.y
         limit_m, start = limits.max_distance_m, "the position before it"
     return None

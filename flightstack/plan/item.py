@@ -10,7 +10,7 @@ from flightstack.plan.vocabulary import (
     ALSO_UNSET_E7,
     GLOBAL_FRAMES,
     OPEN_POSITION_COMMANDS,
-    POSITION_COMMANDS,
+    PLACE_COMMANDS,
     RELATIVE_FRAMES,
     UNSET_E7,
 )
@@ -61,7 +61,7 @@ class MissionItem:
 
         A takeoff or landing at exactly 0, 0 leaves it open too: that is how clients without NaN say it.
         """
-        if self.command not in POSITION_COMMANDS or not self.is_global:
+        if self.command not in PLACE_COMMANDS or not self.is_global:
             return None
         if is_unset(self.x) or is_unset(self.y):
             return None

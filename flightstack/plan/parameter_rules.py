@@ -7,14 +7,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from flightstack.plan.item import MissionItem
+from flightstack.plan.rejection import Fault
 from flightstack.plan.vocabulary import Command, MissionResult
-
-
-class Fault(NamedTuple):
-    """What is wrong with an item, without its number."""
-
-    result: MissionResult
-    reason: str
 
 
 class Rule(NamedTuple):

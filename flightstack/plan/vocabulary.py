@@ -5,6 +5,9 @@ from __future__ import annotations
 from enum import IntEnum
 
 MAX_MISSION_ITEMS = 2000
+MAX_FENCE_ITEMS = 200
+"""Vertices and circles of a geofence. Its check compares every pair of edges."""
+MAX_RALLY_POINTS = 100
 
 UNSET_E7 = 2**31 - 1
 """x or y of an item that leaves its latitude or longitude open: NaN, which an integer cannot hold."""
@@ -25,6 +28,20 @@ class Command(IntEnum):
     CONDITION_YAW = 115
     DO_JUMP = 177
     DO_CHANGE_SPEED = 178
+
+
+class FenceCommand(IntEnum):
+    """MAV_CMD of the items of a geofence."""
+
+    RETURN_POINT = 5000
+    POLYGON_VERTEX_INCLUSION = 5001
+    POLYGON_VERTEX_EXCLUSION = 5002
+    CIRCLE_INCLUSION = 5003
+    CIRCLE_EXCLUSION = 5004
+
+
+RALLY_POINT = 5100
+"""MAV_CMD_NAV_RALLY_POINT, the only item of a list of rally points."""
 
 
 class Frame(IntEnum):
@@ -72,6 +89,9 @@ POSITION_COMMANDS = frozenset(
 )
 """Commands whose x, y and z are a position."""
 
+PLACE_COMMANDS: frozenset[int] = POSITION_COMMANDS | frozenset(FenceCommand) | {RALLY_POINT}
+"""Commands whose x and y are a latitude and longitude."""
+
 OPEN_POSITION_COMMANDS = frozenset({Command.NAV_LAND, Command.NAV_TAKEOFF})
 """Commands that may leave their position open: the vehicle's own is meant."""
 
@@ -92,6 +112,10 @@ def result_name(result: int) -> str:
 
 def command_name(command: int) -> str:
     """Return the name of a command, or its number when it is not one of ours."""
+    if command == RALLY_POINT:
+        return "RALLY_POINT"
+    if command in FenceCommand.__members__.values():
+        return f"FENCE_{FenceCommand(command).name}"
     try:
         return Command(command).name
     except ValueError:

@@ -16,7 +16,7 @@ from flightstack.mavlink.services.addressing import Address, is_for, sender
 from flightstack.mavlink.services.mission_downloads import Downloads
 from flightstack.mavlink.services.mission_messages import DEFAULT_TIMING, Timing, ack_message, mission_id
 from flightstack.mavlink.services.mission_upload import Client, Upload
-from flightstack.plan.check import Rejection
+from flightstack.plan.rejection import Rejection
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MAX_MISSION_ITEMS, MissionResult, MissionType
 

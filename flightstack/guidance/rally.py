@@ -1,0 +1,50 @@
+"""Where a return goes: home or a rally point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.plan import MissionItem
+from flightstack.plan.rally import rally_altitude_m
+
+NEAREST, RALLY_FIRST = 0, 1
+"""Values of RTL_TYPE, as PX4's: to the nearest of home and rally points, or of the rally points if there are any.
+
+PX4's other values need a landing pattern in the mission.
+"""
+
+
+class ReturnPlace(NamedTuple):
+    """A place to return to and land at: north, east and altitude above home [m].
+
+    The altitude is that of the ground. As with PX4, a return to a rally point flies RTL_RETURN_ALT above it.
+    """
+
+    north_m: float
+    east_m: float
+    altitude_m: float
+
+
+HOME = ReturnPlace(0.0, 0.0, 0.0)
+
+
+def rally_points(items: Iterable[MissionItem], frame: LocalFrame) -> tuple[ReturnPlace, ...]:
+    """Return the places of rally points that ``plan.check_rally`` accepted, seen from the frame's origin."""
+    points = []
+    for item in items:
+        if item.position_deg is not None:
+            local = frame.to_ned(GeoPoint(*item.position_deg, frame.origin.altitude_m))
+            points.append(ReturnPlace(local.x, local.y, rally_altitude_m(item, frame.origin)))
+    return tuple(points)
+
+
+def choose(
+    position_ne_m: tuple[float, float], home: ReturnPlace, points: Sequence[ReturnPlace], return_type: float
+) -> ReturnPlace:
+    """Return the place that a return from ``position_ne_m`` goes to; of equally near ones home, then the first."""
+    candidates = list(points) if return_type == RALLY_FIRST and points else [home, *points]
+    north_m, east_m = position_ne_m
+    return min(candidates, key=lambda place: math.hypot(place.north_m - north_m, place.east_m - east_m))

@@ -1,0 +1,52 @@
+"""Why the vehicle refuses a mission, a geofence or rally points."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flightstack.plan.item import MissionItem
+from flightstack.plan.vocabulary import GLOBAL_FRAMES, MissionResult, command_name
+
+
+class Fault(NamedTuple):
+    """What is wrong with an item, without its number."""
+
+    result: MissionResult
+    reason: str
+
+
+class Rejection(NamedTuple):
+    """Why a plan is refused."""
+
+    result: MissionResult
+    seq: int | None
+    """Number of the item at fault; None when it is the plan as a whole."""
+    reason: str
+    """One sentence, naming the item."""
+
+
+def item_rejection(seq: int, item: MissionItem, fault: Fault) -> Rejection:
+    """Return the rejection of item ``seq``."""
+    return Rejection(fault.result, seq, f"item {seq} ({command_name(item.command)}): {fault.reason}")
+
+
+def place_fault(item: MissionItem) -> Fault | None:
+    """Return the fault of an item that must have a latitude and a longitude, or None."""
+    if item.frame not in GLOBAL_FRAMES:
+        return Fault(
+            MissionResult.UNSUPPORTED_FRAME, f"needs a global frame (0, 3, 5 or 6), not {item.frame}"
+        )
+    if item.position_deg is None:
+        return Fault(MissionResult.INVALID_PARAM5_X, "latitude and longitude must be given")
+    return range_fault(*item.position_deg)
+
+
+def range_fault(latitude_deg: float, longitude_deg: float) -> Fault | None:
+    """Return the fault of a latitude and longitude beyond their ranges, or None."""
+    if not abs(latitude_deg) <= 90.0:
+        reason = f"latitude {latitude_deg:.7f} is outside -90 to 90 degrees"
+        return Fault(MissionResult.INVALID_PARAM5_X, reason)
+    if not abs(longitude_deg) <= 180.0:
+        reason = f"longitude {longitude_deg:.7f} is outside -180 to 180 degrees"
+        return Fault(MissionResult.INVALID_PARAM6_Y, reason)
+    return None

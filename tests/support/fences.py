@@ -1,0 +1,65 @@
+"""Geofences and rally points for tests, in metres from a home position."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flightstack.contract import Vector3
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.plan import RALLY_POINT, FenceCommand, Frame, MissionItem
+
+HOME = GeoPoint(47.397742, 8.545594, 488.0)
+Place = tuple[float, float]
+
+
+def degrees(place: Place, home: GeoPoint = HOME) -> tuple[float, float]:
+    """Latitude and longitude of a place north and east of home [m]."""
+    point = LocalFrame(home).to_geo(Vector3(place[0], place[1], 0.0))
+    return point.latitude_deg, point.longitude_deg
+
+
+def _item(
+    command: int, point: tuple[float, float], *params: float, frame: int = Frame.GLOBAL, z: float = 0.0
+):
+    param1, param2 = (*params, 0.0, 0.0)[:2]
+    x, y = round(point[0] * 1e7), round(point[1] * 1e7)
+    return MissionItem(command, frame, param1, param2, 0.0, 0.0, x, y, z)
+
+
+def vertex_items(
+    command: int, points_deg: Sequence[tuple[float, float]], group: float = 0.0
+) -> list[MissionItem]:
+    """The items of one polygon."""
+    return [_item(command, point, float(len(points_deg)), group) for point in points_deg]
+
+
+def polygon(
+    places: Sequence[Place], inclusion: bool = True, group: float = 0.0, home: GeoPoint = HOME
+) -> list[MissionItem]:
+    """A polygon of places north and east of home."""
+    command = FenceCommand.POLYGON_VERTEX_INCLUSION if inclusion else FenceCommand.POLYGON_VERTEX_EXCLUSION
+    return vertex_items(command, [degrees(place, home) for place in places], group)
+
+
+def circle(
+    centre: Place, radius_m: float, inclusion: bool = True, group: float = 0.0, home: GeoPoint = HOME
+) -> MissionItem:
+    """A circle."""
+    command = FenceCommand.CIRCLE_INCLUSION if inclusion else FenceCommand.CIRCLE_EXCLUSION
+    return _item(command, degrees(centre, home), radius_m, group)
+
+
+def return_point(place: Place, altitude_m: float = 10.0) -> MissionItem:
+    """The return point of a geofence."""
+    return _item(FenceCommand.RETURN_POINT, degrees(place), frame=Frame.GLOBAL_RELATIVE_ALT, z=altitude_m)
+
+
+def rally_point(place: Place, altitude_m: float = 0.0, home: GeoPoint = HOME) -> MissionItem:
+    """A rally point."""
+    return _item(RALLY_POINT, degrees(place, home), frame=Frame.GLOBAL_RELATIVE_ALT, z=altitude_m)
+
+
+def square(half_m: float, at: Place = (0.0, 0.0)) -> list[Place]:
+    """The corners of a square."""
+    north, east = at
+    return [(north + half_m * n, east + half_m * e) for n, e in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
