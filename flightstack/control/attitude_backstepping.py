@@ -8,6 +8,7 @@ from flightstack.compiled import compiled
 from flightstack.contract import Vector3
 from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
 from flightstack.params.toml_reader import Table
+from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import Vehicle
 
 
@@ -32,6 +33,18 @@ class BacksteppingParams(NamedTuple):
     iy_kg_m2: float
     iz_kg_m2: float
     rotor_inertia_kg_m2: float
+
+
+BACKSTEPPING_TUNABLES = (
+    Tunable("c1", "BS_ROLL_C1", 0.0, 1e4, "1/s", "c1 of the law: decay of the angle error, roll"),
+    Tunable("c2", "BS_ROLL_C2", 0.0, 1e4, "1/s", "c2 of the law: decay of the rate error, roll"),
+    Tunable("c3", "BS_PITCH_C3", 0.0, 1e4, "1/s", "c3 of the law: decay of the angle error, pitch"),
+    Tunable("c4", "BS_PITCH_C4", 0.0, 1e4, "1/s", "c4 of the law: decay of the rate error, pitch"),
+    Tunable("c5", "BS_YAW_C5", 0.0, 1e4, "1/s", "c5 of the law: decay of the angle error, yaw"),
+    Tunable("c6", "BS_YAW_C6", 0.0, 1e4, "1/s", "c6 of the law: decay of the rate error, yaw"),
+    Tunable("rate_feedforward", "BS_RATE_FF", 0.0, 1.0, "", "Share of the reference rate fed ahead"),
+    Tunable("acceleration_feedforward", "BS_ACC_FF", 0.0, 1.0, "", "Share of the reference acceleration fed ahead"),
+)  # fmt: skip
 
 
 @compiled
@@ -88,4 +101,5 @@ CONTROLLER = AttitudeController(
     BacksteppingParams,
     (0.0,),
     read_backstepping_params,
+    BACKSTEPPING_TUNABLES,
 )

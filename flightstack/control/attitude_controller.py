@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from flightstack.compiled import is_own
 from flightstack.contract import AttitudeReference, Quaternion, Vector3
 from flightstack.params.toml_reader import Table
+from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import Vehicle
 
 
@@ -44,6 +45,9 @@ class AttitudeController(NamedTuple):
     only, one at least; ``initial_memory`` is what a reset restores. ``read_params(vehicle, gains)`` makes the
     parameters from the vehicle and the table ``[attitude_<name>]`` of the gains file, which is empty when
     the file has none.
+
+    ``tunables`` declares which fields of ``params_type`` are parameters of the vehicle, to be read and changed in
+    flight. Without it, all are, under names made of the controller's and the field's.
     """
 
     name: str
@@ -52,6 +56,7 @@ class AttitudeController(NamedTuple):
     params_type: type
     initial_memory: tuple[float, ...]
     read_params: Callable[[Vehicle, Table], tuple[float, ...]]
+    tunables: tuple[Tunable, ...] | None = None
 
     @property
     def key(self) -> str:

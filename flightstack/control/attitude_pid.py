@@ -8,6 +8,7 @@ from flightstack.compiled import compiled
 from flightstack.contract import Vector3
 from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
 from flightstack.params.toml_reader import Table
+from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import Vehicle
 
 
@@ -36,6 +37,21 @@ class PidParams(NamedTuple):
     ix_kg_m2: float
     iy_kg_m2: float
     iz_kg_m2: float
+
+
+PID_TUNABLES = (
+    Tunable("kp_roll", "PID_ROLL_P", 0.0, 1e5, "1/s^2", "Acceleration per angle error, roll"),
+    Tunable("kp_pitch", "PID_PITCH_P", 0.0, 1e5, "1/s^2", "Acceleration per angle error, pitch"),
+    Tunable("kp_yaw", "PID_YAW_P", 0.0, 1e5, "1/s^2", "Acceleration per angle error, yaw"),
+    Tunable("ki_roll", "PID_ROLL_I", 0.0, 1e5, "1/s^3", "Acceleration per error integral, roll", integrates="roll"),
+    Tunable("ki_pitch", "PID_PITCH_I", 0.0, 1e5, "1/s^3", "Acceleration per error integral, pitch", integrates="pitch"),
+    Tunable("ki_yaw", "PID_YAW_I", 0.0, 1e5, "1/s^3", "Acceleration per error integral, yaw", integrates="yaw"),
+    Tunable("kd_roll", "PID_ROLL_D", 0.0, 1e4, "1/s", "Acceleration per rate error, roll"),
+    Tunable("kd_pitch", "PID_PITCH_D", 0.0, 1e4, "1/s", "Acceleration per rate error, pitch"),
+    Tunable("kd_yaw", "PID_YAW_D", 0.0, 1e4, "1/s", "Acceleration per rate error, yaw"),
+    Tunable("rate_feedforward", "PID_RATE_FF", 0.0, 1.0, "", "Share of the reference rate fed ahead"),
+    Tunable("acceleration_feedforward", "PID_ACC_FF", 0.0, 1.0, "", "Share of the reference acceleration fed ahead"),
+)  # fmt: skip
 
 
 @compiled
@@ -100,5 +116,5 @@ def read_pid_params(vehicle: Vehicle, gains: Table) -> PidParams:
 
 
 CONTROLLER = AttitudeController(
-    "pid", attitude_pid_step, PidMemory, PidParams, (0.0, 0.0, 0.0), read_pid_params
+    "pid", attitude_pid_step, PidMemory, PidParams, (0.0, 0.0, 0.0), read_pid_params, PID_TUNABLES
 )

@@ -41,10 +41,10 @@ class ReferenceParams(NamedTuple):
 
 
 REFERENCE_TUNABLES = (
-    Tunable("bandwidth_rad_s", "ATT_REF_BW", 0.0, 1e3, "rad/s", "Natural frequency of the attitude target's filter; 0 for none"),
-    Tunable("damping", "ATT_REF_DAMP", 0.1, 5.0, "", "Damping of the attitude target's filter"),
-    Tunable("max_rate_rad_s", "ATT_REF_RATE", 0.1, 100.0, "rad/s", "Largest turning rate of the attitude reference"),
-    Tunable("max_acceleration_rad_s2", "ATT_REF_ACC", 0.1, 1e5, "rad/s^2", "Largest angular acceleration of the attitude reference"),
+    Tunable("bandwidth_rad_s", "ATT_REF_BW", 0.0, 1e3, "rad/s", "Bandwidth of the target filter; 0 for none"),
+    Tunable("damping", "ATT_REF_DAMP", 0.1, 5.0, "", "Damping of the target filter"),
+    Tunable("max_rate_rad_s", "ATT_REF_RATE", 0.1, 100.0, "rad/s", "Largest rate of the reference"),
+    Tunable("max_acceleration_rad_s2", "ATT_REF_ACC", 0.1, 1e5, "rad/s^2", "Largest acceleration of the reference"),
 )  # fmt: skip
 
 

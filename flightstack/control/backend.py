@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from flightstack.contract import FloatArray
+from flightstack.params.spec import ParamSpec
 
 
 class ControlBackend(Protocol):
@@ -18,8 +20,25 @@ class ControlBackend(Protocol):
     attitude_target: FloatArray
     """Array form of the latest ``AttitudeTarget``, shape (5,)."""
 
+    parameter_specs: Sequence[ParamSpec]
+    """Declarations of all that may be tuned of the loops, with the defaults that vehicle and gains file give."""
+
+    def get_parameter(self, name: str) -> float:
+        """Return a parameter as the loops use it; raise KeyError if they have none of that name."""
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Change a parameter, checked by its declaration, from the next tick on; raise KeyError if unknown."""
+
     def reset(self, state: FloatArray) -> None:
         """Forget the past: integrators zero, the reference at the present attitude, at rest."""
+
+    def set_attitude_target(self, target: FloatArray) -> None:
+        """Fly ``target``, shape (5,), in place of the outer loop's: call it once in each outer period.
+
+        The attitude moves there in a straight line over an outer period, as the outer loop's targets do; the
+        thrust is taken at once. ``step`` is then called with ``outer_due`` false; the outer loop's integrators
+        rest, and its next target starts from this one.
+        """
 
     def step(
         self,

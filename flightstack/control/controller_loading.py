@@ -11,6 +11,7 @@ from flightstack.contract import FloatArray
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.params.errors import ConfigError
 from flightstack.params.toml_reader import Table
+from flightstack.params.tunable import Tunable, declaration_problem, undeclared
 from flightstack.params.vehicle import Vehicle
 
 ENTRY_POINT_GROUP = "flightstack.attitude_controllers"
@@ -60,7 +61,29 @@ def _form_problem(name: str, controller: object) -> str | None:
         return f"has {initial} initial values for the {fields} fields of its memory (one at least)"
     if not getattr(controller.params_type, "_fields", ()):
         return "has no parameters: params_type must be a NamedTuple of one float at least"
-    return None
+    return _tunables_problem(controller)
+
+
+def _tunables_problem(controller: AttitudeController) -> str | None:
+    tunables: object = controller.tunables
+    if tunables is None:
+        return None
+    if not isinstance(tunables, tuple) or not all(isinstance(item, Tunable) for item in tunables):
+        return "must declare its parameters as a tuple of Tunable"
+    return declaration_problem(tunables, fields_of(controller.params_type), fields_of(controller.memory_type))
+
+
+def fields_of(kind: type) -> tuple[str, ...]:
+    """Return the names of a NamedTuple's fields; of anything else, none."""
+    names: tuple[str, ...] = getattr(kind, "_fields", ())
+    return names
+
+
+def controller_tunables(controller: AttitudeController) -> tuple[Tunable, ...]:
+    """Return the declarations of the controller's parameters, made of its fields if it has none."""
+    if controller.tunables is not None:
+        return controller.tunables
+    return undeclared(controller.name, fields_of(controller.params_type))
 
 
 def controller_params(controller: AttitudeController, vehicle: Vehicle, gains: Table) -> FloatArray:

@@ -27,13 +27,13 @@ from flightstack.control.attitude_reference import (
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.control.controller_loading import compile_error, controller_params
+from flightstack.control.controller_loading import compile_error
+from flightstack.control.loop_parameters import LoopParameters, loop_numbers
 from flightstack.control.mixer import Mixer, mix, mixer_for, relative_rotor_speed
 from flightstack.control.position_pid import (
     PositionMemory,
     PositionParams,
     position_pid_step,
-    read_position_params,
 )
 from flightstack.geometry import blend, conjugate, quaternion_product, rotation_vector
 from flightstack.params.toml_reader import Table
@@ -235,19 +235,6 @@ def inner_kernel(
     last[:] = row
 
 
-def read_reference_params(gains: Table) -> ReferenceParams:
-    """Read ``[attitude_reference]``."""
-    table = gains.table("attitude_reference")
-    params = ReferenceParams(
-        table.number("bandwidth_rad_s", 0.0, 1e3),
-        table.number("damping", 0.1, 5.0),
-        table.number("max_rate_rad_s", 0.1, 100.0),
-        table.number("max_acceleration_rad_s2", 0.1, 1e5),
-    )
-    table.finish()
-    return params
-
-
 class PythonLoops:
     """The loops as compiled Python; implements ``ControlBackend``."""
 
@@ -264,21 +251,23 @@ class PythonLoops:
     ) -> None:
         self._outer_dt_s = 1.0 / outer_hz
         self._fraction_step, self._fraction = outer_hz / inner_hz, 0.0
-        self._position_params = np.array(read_position_params(vehicle, gains, max_tilt_rad))
+        numbers = loop_numbers(vehicle, controller, gains, max_tilt_rad)
+        self._position_params = numbers.position
         self._initial_memory = np.array(controller.initial_memory, dtype=np.float64)
-        reference_params = read_reference_params(gains)
-        params = controller_params(controller, vehicle, gains)
-        layout = inner_layout(len(vehicle.rotors), self._initial_memory.size, params.size)
+        layout = inner_layout(len(vehicle.rotors), self._initial_memory.size, numbers.controller.size)
         self._memory: RecordArray = np.zeros(1, layout)
         kept = self._memory[0]
         kept["dt_s"] = 1.0 / inner_hz
-        kept["reference_params"], kept["controller_params"] = reference_params, params
+        kept["reference_params"], kept["controller_params"] = numbers.reference, numbers.controller
         for name, values in mixer_for(vehicle)._asdict().items():
             kept[name] = values
         self.attitude_target: FloatArray = kept["target"]
         self._last_target: FloatArray = kept["last_target"]
         self._reference_memory: FloatArray = kept["reference"]
         self._controller_memory: FloatArray = kept["controller"]
+        live = numbers._replace(reference=kept["reference_params"], controller=kept["controller_params"])
+        self._parameters = LoopParameters(live, controller, self._controller_memory)
+        self.parameter_specs = numbers.specs
         self._last: FloatArray = kept["last"]
         self._position_memory = np.zeros(POSITION_MEMORY_SIZE)
         self._idle_speed = np.array([max(0.0, r.min_speed_rad_s) for r in vehicle.rotors])
@@ -289,7 +278,7 @@ class PythonLoops:
             ControllerMemory=controller.memory_type,
             ControllerParams=controller.params_type,
             CONTROLLER_MEMORY_SIZE=len(controller.initial_memory),
-            CONTROLLER_PARAMS_SIZE=params.size,
+            CONTROLLER_PARAMS_SIZE=numbers.controller.size,
         )
         self._compile(controller.name)
 
@@ -304,6 +293,14 @@ class PythonLoops:
             raise compile_error(name, error) from error
         self.reset(state)
 
+    def get_parameter(self, name: str) -> float:
+        """Return a parameter as the loops use it; raise KeyError if they have none of that name."""
+        return self._parameters.get(name)
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Change a parameter from the next tick on; raise KeyError if unknown."""
+        self._parameters.set(name, value)
+
     def reset(self, state: FloatArray) -> None:
         """Forget the past: integrators zero, the reference at the present attitude, at rest."""
         self._position_memory[:] = 0.0
@@ -315,6 +312,12 @@ class PythonLoops:
         self._last_target[:] = self.attitude_target
         self._fraction = 0.0
         self._last[:] = 0.0
+
+    def set_attitude_target(self, target: FloatArray) -> None:
+        """Fly ``target``, shape (5,), in place of the outer loop's: call it once in each outer period."""
+        self._last_target[:] = self.attitude_target
+        self._fraction = 0.0
+        self.attitude_target[:] = target
 
     def step(
         self,

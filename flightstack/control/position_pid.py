@@ -9,6 +9,7 @@ from flightstack.compiled import compiled
 from flightstack.contract import AttitudeTarget, PositionSetpoint, VehicleState
 from flightstack.geometry import quaternion_from_euler
 from flightstack.params.toml_reader import Table
+from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 
 
@@ -35,6 +36,20 @@ class PositionParams(NamedTuple):
     max_thrust_n: float
     max_tilt_rad: float
     max_integral_m_s2: float
+
+
+POSITION_TUNABLES = (
+    Tunable("kp_xy", "POS_XY_P", 0.0, 1e3, "1/s^2", "Horizontal acceleration per position error"),
+    Tunable("ki_xy", "POS_XY_I", 0.0, 1e3, "1/s^3", "Horizontal acceleration per integral of the position error"),
+    Tunable("kd_xy", "POS_XY_D", 0.0, 1e3, "1/s", "Horizontal acceleration per velocity error"),
+    Tunable("kp_z", "POS_Z_P", 0.0, 1e3, "1/s^2", "Vertical acceleration per altitude error"),
+    Tunable("ki_z", "POS_Z_I", 0.0, 1e3, "1/s^3", "Vertical acceleration per integral of the altitude error"),
+    Tunable("kd_z", "POS_Z_D", 0.0, 1e3, "1/s", "Vertical acceleration per climb rate error"),
+    Tunable("max_integral_m_s2", "POS_I_MAX", 0.0, 20.0, "m/s^2", "Largest acceleration by an integral, per axis"),
+    Tunable("min_thrust_n", "POS_THR_MIN", 0.0, 1e3, "N", "Least thrust that the position loop asks for"),
+    Tunable("max_thrust_n", "POS_THR_MAX", 0.0, 1e3, "N", "Largest thrust that the position loop asks for"),
+)  # fmt: skip
+"""What may be tuned of ``PositionParams``; the largest tilt is MPC_TILTMAX_AIR, in degrees."""
 
 
 @compiled

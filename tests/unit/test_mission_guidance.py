@@ -80,7 +80,7 @@ def test_without_a_heading_the_nose_leads_or_stays() -> None:
     toward = flying(waypoint(0.0, 10.0, hold=1.0))
     toward.until_finished()
     assert toward.yaw == pytest.approx(math.pi / 2, abs=1e-3)
-    kept = flying(waypoint(0.0, 10.0, hold=1.0), MPC_YAW_MODE=1.0)
+    kept = flying(waypoint(0.0, 10.0, hold=1.0), MPC_YAW_MODE=5.0)
     kept.until_finished()
     assert kept.yaw == 0.0
     near = flying(waypoint(0.0, 0.9, hold=1.0))  # too near for a direction
