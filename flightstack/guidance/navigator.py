@@ -43,6 +43,7 @@ from flightstack.guidance.mission import (
     M_Y,
     M_YAW,
     M_YAW_IS_SET,
+    M_YAW_RATE,
     M_Z,
     MISSION_MEMORY_SIZE,
     NAV_DELAY,
@@ -88,8 +89,8 @@ class Navigator:
 
     def __init__(self, params: GuidanceParams, outer_hz: float) -> None:
         self._speeds = SpeedOverrides()
-        self._given_params = params
-        self.set_params(params)
+        self._given_params = self.params = params
+        self._params_array = np.array(params, dtype=np.float64)
         self._dt_s = 1.0 / outer_hz
         self.setpoint = np.zeros(SETPOINT_SIZE)
         self._trajectory = np.zeros(TRAJECTORY_SIZE)
@@ -107,10 +108,18 @@ class Navigator:
     # ------------------------------------------------------------------ parameters
 
     def set_params(self, params: GuidanceParams) -> None:
-        """Take new numbers, from the next outer tick on; speeds that were commanded stay in force."""
+        """Take new numbers, from the next outer tick on; speeds that were commanded stay in force.
+
+        A mission flies at the new speed too, unless one of its items has set another.
+        """
         self._given_params = params
-        self.params = self._speeds.applied_to(params)
-        self._params_array = np.array(self.params, dtype=np.float64)
+        before, self.params = self.params, self._speeds.applied_to(params)
+        self._params_array[:] = self.params
+        m = self._mission
+        if m[M_SPEED] == before.cruise_speed_m_s:
+            m[M_SPEED] = self.params.cruise_speed_m_s
+        if m[M_YAW_RATE] == before.yaw_rate_rad_s:
+            m[M_YAW_RATE] = self.params.yaw_rate_rad_s
 
     def set_speed(self, speeds: SpeedOverrides) -> None:
         """Fly at other speeds than the parameters' until the end of the flight."""
