@@ -66,6 +66,23 @@ def run(
     torque_gust: _TorqueGustOption = 0.0,
     ideal_rotors: Annotated[bool, typer.Option("--ideal-rotors", help="No rotor lag, no limits.")] = False,
     physics_hz: Annotated[float, typer.Option(help="Lowest rate of the integration steps.")] = 1000.0,
+    battery_start: Annotated[
+        float | None, typer.Option(metavar="PERCENT", help="Charge at the start.  [default: 100]")
+    ] = None,
+    battery_capacity: Annotated[
+        float | None, typer.Option(metavar="MAH", help="Capacity.  [default: the vehicle's]")
+    ] = None,
+    battery_drain: Annotated[
+        float | None, typer.Option(metavar="FACTOR", help="Let the charge fall so many times as fast.")
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SPEC",
+            help="rotor:N:off, rotor:N:weak=SHARE, rotor:N:stuck=RAD_S, state:freeze, state:nan, state:drop or "
+            "battery:level=SHARE, each with @BEGIN or @BEGIN-END in seconds; may be repeated.",
+        ),
+    ] = None,
     home: Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Where the vehicle stands.")] = (
         "47.397742,8.545594,488.0"
     ),
@@ -87,10 +104,16 @@ def run(
     from sim_bridge.server import ServerOptions, serve  # noqa: PLC0415
     from sim_bridge.simulator import FASTEST_PHYSICS_HZ, SLOWEST_PHYSICS_HZ  # noqa: PLC0415
 
+    loaded = load_vehicle(vehicle)
     options = ServerOptions(
-        vehicle=load_vehicle(vehicle),
+        vehicle=loaded,
         plant=plant,
-        plant_options=PlantOptions(_disturbance(wind, gust, force, torque, torque_gust), seed),
+        plant_options=PlantOptions(
+            _disturbance(wind, gust, force, torque, torque_gust),
+            seed,
+            battery=arguments.battery(loaded, battery_start, battery_capacity, battery_drain),
+        ),
+        faults=arguments.faults(fault or [], loaded),
         home=arguments.home(home),
         speed=arguments.speed(speed),
         host=host,

@@ -7,7 +7,9 @@ import math
 from flightstack.contract import Vector3
 from flightstack.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.battery import BatteryOptions
 from sim_bridge.errors import UsageProblemError
+from sim_bridge.faults import Fault, Kind, parse_fault
 
 PLANT_NAMES = ("rigid", "paper")
 _LONGEST_QUOTE = 60
@@ -86,3 +88,26 @@ def rotor_speeds(text: str, vehicle: Vehicle) -> tuple[float, ...]:
     for value in speeds:
         in_range("--rotors", value, -1e5, 1e5)
     return speeds
+
+
+def battery(
+    vehicle: Vehicle, start_percent: float | None, capacity_mah: float | None, drain: float | None
+) -> BatteryOptions:
+    """Check the choices about the battery; None is the default of each."""
+    given = {"--battery-start": start_percent, "--battery-capacity": capacity_mah, "--battery-drain": drain}
+    flags = [flag for flag, value in given.items() if value is not None]
+    if flags and vehicle.battery is None:
+        raise UsageProblemError(f"{flags[0]}: the vehicle {vehicle.name} has no [battery]")
+    start = 100.0 if start_percent is None else in_range("--battery-start", start_percent, 0.0, 100.0)
+    if capacity_mah is not None:
+        in_range("--battery-capacity", capacity_mah, 1.0, 1e6)
+    factor = 1.0 if drain is None else in_range("--battery-drain", drain, 0.0, 1e4)
+    return BatteryOptions(start / 100.0, capacity_mah, factor)
+
+
+def faults(texts: list[str], vehicle: Vehicle) -> tuple[Fault, ...]:
+    """Read the faults."""
+    found = tuple(parse_fault(text, len(vehicle.rotors)) for text in texts)
+    if vehicle.battery is None and any(fault.kind is Kind.BATTERY_LEVEL for fault in found):
+        raise UsageProblemError(f"--fault battery:level: the vehicle {vehicle.name} has no [battery]")
+    return found

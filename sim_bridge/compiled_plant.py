@@ -9,9 +9,10 @@ import numpy as np
 from flightstack.contract import FloatArray, Quaternion, Vector3
 from flightstack.geometry import quaternion_from_euler, rotate
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.battery import BatteryState, battery_state, set_battery
 from sim_bridge.ground import Ground, ground_contact
 from sim_bridge.integrator import advance_kernel, slope_kernel
-from sim_bridge.layout import MEMORY, OUTPUT, RecordArray
+from sim_bridge.layout import DRAG, HIGHEST, LOWEST, MEMORY, OUTPUT, THRUST, RecordArray
 from sim_bridge.plant import InitialState, PlantOptions
 from sim_bridge.turbulence import Turbulence
 
@@ -37,6 +38,9 @@ class CompiledPlant:
         m["mass"], m["weight"] = vehicle.mass_kg, vehicle.weight_n
         m["inertia"], m["drag"] = vehicle.inertia_kg_m2, vehicle.linear_drag_n_s_m
         self._set_rotors(options.limits)
+        self._has_battery = vehicle.battery is not None and options.battery is not None
+        if vehicle.battery is not None and options.battery is not None:
+            set_battery(m, vehicle.battery, options.battery)
         self.set_step(DEFAULT_STEP_S)
         self._set_state(options.initial)
 
@@ -57,6 +61,26 @@ class CompiledPlant:
                 rotor.max_speed_rad_s if limits else math.inf,
                 0.0,  # set with the step
             )
+        self._healthy: FloatArray = m["rotor"].copy()
+
+    def set_rotor_fault(self, rotor: int, share: float = 1.0, speed_rad_s: float | None = None) -> None:
+        """Let a rotor give a share of its thrust and torque, and turn at one speed only; see ``Plant``."""
+        m, healthy = self._memory[0], self._healthy[rotor]
+        row = m["rotor"][rotor]
+        row[THRUST : DRAG + 1] = share * healthy[THRUST : DRAG + 1]
+        row[LOWEST], row[HIGHEST] = healthy[LOWEST], healthy[HIGHEST]
+        if speed_rad_s is not None:
+            row[LOWEST] = row[HIGHEST] = speed_rad_s
+            m["command"][rotor] = speed_rad_s  # also where the next command is not a number
+
+    @property
+    def battery(self) -> BatteryState | None:
+        """The battery; None for a vehicle without one."""
+        return battery_state(self._memory[0]) if self._has_battery else None
+
+    def set_charge(self, share: float) -> None:
+        """Set the charge of the battery."""
+        self._memory[0]["charge"] = share
 
     def _set_state(self, initial: InitialState) -> None:
         body = self._memory[0]["body"]

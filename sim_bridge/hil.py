@@ -40,7 +40,9 @@ def _int32(value: float) -> int:
 
 def hil_state(simulator: Simulator, frame: LocalFrame) -> Message:
     """HIL_STATE_QUATERNION of the present state, positions relative to the origin of ``frame``."""
-    x = simulator.frame.state.tolist()
+    shown = simulator.shown.state.tolist()
+    # integers cannot say "not a number": then only attitude and rates do
+    x = shown if all(map(math.isfinite, shown)) else simulator.frame.state.tolist()
     velocity, attitude = x[3:6], Quaternion(*x[6:10])
     geo = frame.to_geo(Vector3(*x[0:3]))
     a = simulator.plant.acceleration_ned_m_s2()
@@ -48,8 +50,8 @@ def hil_state(simulator: Simulator, frame: LocalFrame) -> Message:
     airspeed = _integer(simulator.plant.airspeed_m_s() * 100.0, 0, 65535)
     return mavlink.MAVLink_hil_state_quaternion_message(
         simulator.time_us,
-        attitude,
-        *x[10:13],
+        shown[6:10],
+        *shown[10:13],
         _int32(geo.latitude_deg * 1e7),
         _int32(geo.longitude_deg * 1e7),
         _int32(geo.altitude_m * 1e3),

@@ -14,6 +14,7 @@ from typing import Any
 from flightstack.compiled import compiled, specialise
 from flightstack.contract import STATE_SIZE, FloatArray
 from sim_bridge import paper, rigid
+from sim_bridge.battery import discharge
 from sim_bridge.layout import DIVERGED, Record, RecordArray
 from sim_bridge.rotors import half_step, rotor_forces, take_commands
 
@@ -64,6 +65,7 @@ def _advance(memory: RecordArray, command: FloatArray, flags: int, steps: int, o
     k1, k2, k3, k4 = slopes[0], slopes[1], slopes[2], slopes[3]
     h = m["step_s"]
     gusty = m["gust_scale"][0] > 0.0 or m["torque_gust_scale"][0] > 0.0
+    has_battery = m["curve_count"] > 0
     if steps > 0:
         take_commands(m, command, flags)
     at_end = rotor_forces(m)
@@ -85,6 +87,8 @@ def _advance(memory: RecordArray, command: FloatArray, flags: int, steps: int, o
         derivative(stage, at_end, m, k4)
         _combine(x, h, k1, k2, k3, k4)
         after_step(x)
+        if has_battery:
+            discharge(m, (at_start.power_w + 4.0 * at_middle.power_w + at_end.power_w) / 6.0, h)
     result = show(m, o["state"])
     total = 0.0
     for i in range(STATE_SIZE):

@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from flightstack.contract import MAX_ROTORS, STATE_SIZE
+from flightstack.params.battery import MAX_CURVE_POINTS
 
 Record: TypeAlias = Any
 """One element of an array of ``MEMORY`` or ``OUTPUT``, indexed by the names of its fields."""
@@ -38,6 +39,11 @@ MEMORY = np.dtype(
         ("noise", "f8", (NOISE_ROWS, 3)),  # unit normal deviates of the wind, one row for each step
         ("torque_noise", "f8", (NOISE_ROWS, 3)),  # and of the torque
         ("noise_row", "i8"),
+        ("charge", "f8"),  # of the battery, share of the capacity
+        ("voltage", "f8"),  # of the battery, V
+        ("current", "f8"),  # A
+        ("consumed", "f8"),  # A s since the start
+        ("energy", "f8"),  # J since the start
         # what is fixed
         ("step_s", "f8"),
         ("rotor_count", "i8"),
@@ -48,6 +54,13 @@ MEMORY = np.dtype(
         ("drag", "f8", 3),  # N s/m, body axes
         ("force", "f8", 3),  # external, N NED
         ("steady_torque", "f8", 3),  # external, N m FRD
+        ("curve_count", "i8"),  # 0 without a battery
+        ("curve", "f8", MAX_CURVE_POINTS),  # V, open circuit, at equal steps of charge from empty to full
+        ("resistance", "f8"),  # ohm
+        ("capacity", "f8"),  # A s
+        ("drain", "f8"),  # the charge falls so many times as fast as the current says
+        ("inverse_efficiency", "f8"),  # electric over mechanical power of the rotors
+        ("avionics", "f8"),  # W
         ("wind", "f8", 3),  # steady, m/s NED
         ("gust_decay", "f8"),  # over one step
         ("gust_scale", "f8", 3),  # m/s, zero without gusts

@@ -9,14 +9,17 @@ on its own clock: then the simulator does so too and uses the newest commands.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_ACTUATORS_ID, FS_PLANT_STATE_ID, mavlink
+from flightstack.mavlink.frame_finder import FrameFinder
 from flightstack.mavlink.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.failure_command import inject_failure
+from sim_bridge.faults import Kind
 from sim_bridge.hil import HilControls, hil_state
 from sim_bridge.simulator import (
     DEFAULT_INTERVAL_US,
@@ -30,26 +33,8 @@ Bytes: TypeAlias = bytes | bytearray | memoryview
 
 HIL_STATE_QUATERNION_ID = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 HIL_ACTUATOR_CONTROLS_ID = mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
+_INJECT_FAILURE = mavlink.MAV_CMD_INJECT_FAILURE
 _SET_INTERVAL = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
-
-
-def split_frames(data: bytearray) -> Iterator[bytes]:
-    """Take the complete MAVLink frames, and junk between them, off the front of ``data``."""
-    while data:
-        if data[0] == 0xFD:
-            if len(data) < 3:
-                return
-            size = 12 + data[1] + (13 if data[2] & 1 else 0)
-        elif data[0] == 0xFE:
-            if len(data) < 2:
-                return
-            size = 8 + data[1]
-        else:
-            size = next((i for i, byte in enumerate(data) if byte in (0xFD, 0xFE)), len(data))
-        if len(data) < size:
-            return
-        yield bytes(data[:size])
-        del data[:size]
 
 
 class SimulatorLink:
@@ -70,21 +55,24 @@ class SimulatorLink:
         self._controls = HilControls(vehicle)
         self._rotor_count = len(vehicle.rotors)
         self._requested = 0  # id of the message asked for
-        self._pending = bytearray()
+        self._finder = FrameFinder()
         self._replies: list[bytes] = []
+        self._may_drop = False  # in lockstep: looked through the faults for one that it cannot do
 
     @property
     def bad(self) -> int:
-        """Frames that were no message."""
-        return self._link.bad
+        """Frames that were no message, and stretches of bytes that were no frame."""
+        return self._link.bad + self._finder.junk
 
     def receive(self, data: memoryview) -> None:
-        """Take in what arrived: any bytes, cut anywhere."""
-        if not self._pending and self.actuators.open(data):
+        """Take in what arrived: any bytes, cut anywhere.
+
+        Whole actuators are taken at once, whatever came before them: in lockstep lost ones would be the last.
+        """
+        if self.actuators.open(data):
             self._take_actuators()
             return
-        self._pending += data
-        for frame in split_frames(self._pending):
+        for frame in self._finder.find(data):
             if self._is_answered():
                 if self._spare.open(frame):
                     self.stale += 1
@@ -107,11 +95,20 @@ class SimulatorLink:
         return replies
 
     def state(self) -> Bytes:
-        """Return the message to send for the present state; it awaits its answer from now on."""
+        """Return the bytes to send for the present state; it awaits its answer from now on.
+
+        Nothing but a due BATTERY_STATUS while the fault ``state:drop`` is active.
+        """
         self.answered = False
+        simulator = self.simulator
         if self._requested == FS_PLANT_STATE_ID:
-            return self.simulator.state_frame()
-        return self._link.encode(hil_state(self.simulator, self._frame))
+            return simulator.outgoing()
+        battery = simulator.battery_frame()
+        return (
+            battery
+            if simulator.drops_state
+            else battery + self._link.encode(hil_state(simulator, self._frame))
+        )
 
     def step(self) -> None:
         """Advance the plant with the newest commands; raise PlantDivergedError."""
@@ -137,10 +134,21 @@ class SimulatorLink:
                 f"{self._rotor_count}: start both with the same --vehicle"
             )
         self.free_running = not actuators.flags & LOCKSTEP_FLAG
+        if not self.free_running and not self._may_drop:
+            self._refuse_drops()
         if self.ready and actuators.time_us == self.simulator.time_us:
             self.answered = True
         elif not self.free_running:
             self.stale += 1
+
+    def _refuse_drops(self) -> None:
+        """End the session when a fault asks for what lockstep cannot do; looked at once after each new fault."""
+        self._may_drop = True
+        if any(fault.kind is Kind.STATE_DROP for fault in self.simulator.faults):
+            self.fault = (
+                "state:drop needs a flight stack on its own clock (--clock realtime): in lockstep it would wait "
+                "for the state for ever; use state:freeze or state:nan"
+            )
 
     def _take(self, message: Message) -> None:
         kind, by = message.get_msgId(), message.get_srcSystem()
@@ -168,10 +176,14 @@ class SimulatorLink:
             )
 
     def _command(self, message: Any) -> int:
-        """Carry out SET_MESSAGE_INTERVAL; return the MAV_RESULT of any command."""
+        """Carry out SET_MESSAGE_INTERVAL and INJECT_FAILURE; return the MAV_RESULT of any command."""
+        if message.command == _INJECT_FAILURE:
+            return inject_failure(self.simulator, message.param1, message.param2, message.param3)
         if message.command != _SET_INTERVAL:
             return int(mavlink.MAV_RESULT_UNSUPPORTED)
-        kind, interval = message.param1, message.param2
+        return self._set_interval(message.param1, message.param2)
+
+    def _set_interval(self, kind: float, interval: float) -> int:
         if kind not in (FS_PLANT_STATE_ID, HIL_STATE_QUATERNION_ID):
             return int(mavlink.MAV_RESULT_DENIED)
         if kind != FS_PLANT_STATE_ID and self._requested == FS_PLANT_STATE_ID:

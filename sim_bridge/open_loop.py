@@ -98,7 +98,7 @@ def run_open_loop(run: OpenLoop, warn: Callable[[str], None] = lambda _: None) -
     """
     check_length(run.seconds, run.dt_s)
     vehicle = run.vehicle if run.lag else run.vehicle.with_ideal_rotors()
-    options = PlantOptions(run.disturbance, run.seed, run.initial, run.ground, limits=False)
+    options = PlantOptions(run.disturbance, run.seed, run.initial, run.ground, limits=False, battery=None)
     plant = CompiledPlant(vehicle, run.plant, options)
     command = np.zeros(MAX_ROTORS)
     command[: len(run.rotor_speed_rad_s)] = run.rotor_speed_rad_s

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 from flightstack.contract import FloatArray, Vector3
+from sim_bridge.battery import FULL, BatteryOptions, BatteryState
 from sim_bridge.disturbance import NO_DISTURBANCE, Disturbance
 from sim_bridge.layout import RecordArray
 
@@ -29,6 +30,7 @@ class PlantOptions(NamedTuple):
     initial: InitialState = AT_REST
     ground: bool = True
     limits: bool = True  # of the rotor speeds
+    battery: BatteryOptions | None = FULL  # None: the vehicle flies without one
 
 
 class Plant(Protocol):
@@ -53,6 +55,22 @@ class Plant(Protocol):
         """Advance with the rotor speed commands held; ``flags`` as in FS_ACTUATORS.
 
         Returns the bits CONTACT and DIVERGED of ``layout``.
+        """
+        ...
+
+    @property
+    def battery(self) -> BatteryState | None:
+        """The battery; None for a vehicle without one."""
+        ...
+
+    def set_charge(self, share: float) -> None:
+        """Set the charge of the battery."""
+        ...
+
+    def set_rotor_fault(self, rotor: int, share: float = 1.0, speed_rad_s: float | None = None) -> None:
+        """Let a rotor (from 0) give a share of its thrust and torque, and turn at one speed only.
+
+        The defaults make it whole again.
         """
         ...
 

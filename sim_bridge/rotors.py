@@ -34,16 +34,18 @@ class RotorForces(NamedTuple):
     drag_torque_n_m: float  # about z, reaction of the air's drag on the rotors
     spin_up_torque_n_m: float  # about z, reaction of the rotors' acceleration: −Σ s·J_r·Ω̇
     momentum_n_m_s: float  # about z: Σ s·J_r·Ω, s = +1 for a clockwise rotor
+    power_w: float  # mechanical, against the air's drag: Σ d·|Ω|³
 
 
 @compiled
 def take_commands(m: Record, command: FloatArray, flags: int) -> None:
-    """Store the commands [rad/s] within the limits; rotors stop when not armed.
+    """Store the commands [rad/s] within the limits; rotors stop when not armed or without power.
 
     A command that is not a sane number is counted, and the last good one holds.
     """
     rotor, held, speed = m["rotor"], m["command"], m["rotor_speed"]
-    armed = flags & _ARMED != 0
+    has_power = m["curve_count"] == 0 or m["charge"] > 0.0
+    armed = flags & _ARMED != 0 and has_power
     for i in range(m["rotor_count"]):
         if not armed:
             held[i] = 0.0
@@ -67,7 +69,7 @@ def half_step(m: Record) -> None:
 def rotor_forces(m: Record) -> RotorForces:
     """Forces and torques at the present rotor speeds; thrust of a rotor is b·Ω·|Ω|."""
     rotor, held, speed = m["rotor"], m["command"], m["rotor_speed"]
-    thrust, roll, pitch, drag, spin_up, momentum = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    thrust, roll, pitch, drag, spin_up, momentum, power = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(m["rotor_count"]):
         w = speed[i]
         w2 = w * abs(w)
@@ -76,6 +78,7 @@ def rotor_forces(m: Record) -> RotorForces:
         pitch += rotor[i, PITCH] * w2
         drag += rotor[i, DRAG] * w2
         momentum += rotor[i, MOMENTUM] * w
+        power += abs(rotor[i, DRAG] * w2 * w)
         if held[i] != w:  # never where there is no lag
             spin_up -= rotor[i, MOMENTUM] * (held[i] - w) * rotor[i, LAG_RATE]
-    return RotorForces(thrust, roll, pitch, drag, spin_up, momentum)
+    return RotorForces(thrust, roll, pitch, drag, spin_up, momentum, power)

@@ -22,6 +22,7 @@ from sim_bridge.connection import (
 )
 from sim_bridge.disturbance import wind_warning
 from sim_bridge.errors import PlantDivergedError
+from sim_bridge.faults import Fault
 from sim_bridge.lockstep import SimulatorLink
 from sim_bridge.plant import PlantOptions
 from sim_bridge.session import Session
@@ -45,6 +46,7 @@ class ServerOptions(NamedTuple):
     ideal_rotors: bool
     physics_hz: float
     timeout_s: float | None  # None: wait for a client for ever
+    faults: tuple[Fault, ...] = ()
 
 
 def say(text: str) -> None:
@@ -111,13 +113,16 @@ def _await_client(listener: socket.socket, stop: StopSignal, timeout_s: float | 
 
 def _simulator(options: ServerOptions) -> Simulator:
     vehicle = options.vehicle.with_ideal_rotors() if options.ideal_rotors else options.vehicle
-    return Simulator(
+    simulator = Simulator(
         vehicle,
         options.plant,
         options.plant_options,
         physics_hz=options.physics_hz,
         system_id=options.system_id,
     )
+    for fault in options.faults:
+        simulator.inject(fault)
+    return simulator
 
 
 def _fly(session: Session, connection: Connection, timeout_s: float) -> int:

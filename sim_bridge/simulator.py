@@ -1,6 +1,6 @@
-"""The simulator without I/O: one plant, its time, and the exchange of state and actuators.
+"""The simulator without I/O: one plant, its time, its faults, and the exchange of state and actuators.
 
-Same vehicle, options, seed and commands give the same bytes, at any speed.
+Same vehicle, options, faults, seed and commands give the same bytes, at any speed.
 """
 
 from __future__ import annotations
@@ -10,9 +10,13 @@ import math
 import numpy as np
 
 from flightstack.mavlink.hot_frames import GROUND_CONTACT_FLAG, HEADER_SIZE, ActuatorsFrame, PlantStateFrame
+from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.battery import INTERVAL_US as BATTERY_INTERVAL_US
+from sim_bridge.battery import battery_status
 from sim_bridge.compiled_plant import CompiledPlant
 from sim_bridge.errors import PlantDivergedError
+from sim_bridge.faults import Fault, Kind, Schedule
 from sim_bridge.layout import CONTACT, DIVERGED, OUTPUT
 from sim_bridge.plant import Plant, PlantOptions
 
@@ -25,6 +29,7 @@ FASTEST_PHYSICS_HZ = 100_000.0
 
 _STATE_AT = HEADER_SIZE + 8  # after the time
 _FLAGS = (0, GROUND_CONTACT_FLAG)
+_NEVER_US = 1 << 64
 
 
 class Simulator:
@@ -48,6 +53,15 @@ class Simulator:
         self._frame.set_rotor_count(len(vehicle.rotors))
         self.plant.output = np.frombuffer(self._frame.frame, OUTPUT, 1, _STATE_AT)
         self._flags = 0
+        self._codec = Link(system_id, SIMULATOR_COMPONENT)
+        self._battery_due_us = _NEVER_US if self.plant.battery is None else 0
+        self._schedule = Schedule()
+        self._change_us = _NEVER_US
+        self._faulty: PlantStateFrame | None = None  # what is sent instead of the state while it has a fault
+        self._faulty_flags = 0
+        self.drops_state = False
+        self._state_fault: Kind | None = None
+        self._system_id = system_id
         self.set_interval_us(interval_us)
         self._note(self.plant.show())
 
@@ -69,14 +83,102 @@ class Simulator:
         self._steps = max(1, math.ceil(interval_us / self._physics_dt_us - 1e-9))
         self.plant.set_step(interval_us * 1e-6 / self._steps)
 
+    def outgoing(self) -> bytes | memoryview:
+        """Return the bytes to send for the present state, valid until the next call of ``apply``.
+
+        FS_PLANT_STATE, ten times a second after BATTERY_STATUS; nothing while ``state:drop`` is active.
+        """
+        if self.time_us < self._battery_due_us and not self.drops_state:
+            return self.state_frame()
+        battery = self.battery_frame()
+        return battery if self.drops_state else battery + self.state_frame()
+
     def state_frame(self) -> memoryview:
         """Return the FS_PLANT_STATE frame of the present state, valid until the next call of ``apply``."""
+        if self._faulty is not None:
+            return self._faulty.seal(self.time_us, self._faulty_flags)
         return self._frame.seal(self.time_us, self._flags)
+
+    def battery_frame(self) -> bytes:
+        """Return the BATTERY_STATUS frame if one is due, else nothing."""
+        battery = self.plant.battery
+        if self.time_us < self._battery_due_us or battery is None or self.vehicle.battery is None:
+            return b""
+        self._battery_due_us = (self.time_us // BATTERY_INTERVAL_US + 1) * BATTERY_INTERVAL_US
+        return self._codec.encode(battery_status(battery, self.vehicle.battery.cells))
 
     @property
     def frame(self) -> PlantStateFrame:
-        """The state that ``state_frame`` sends; read only."""
+        """The true state; read only."""
         return self._frame
+
+    @property
+    def shown(self) -> PlantStateFrame:
+        """The state that is sent, with its faults; read only."""
+        return self._frame if self._faulty is None else self._faulty
+
+    # ------------------------------------------------------------------ faults
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """The faults that act now or later."""
+        return tuple(self._schedule.faults)
+
+    def inject(self, fault: Fault) -> None:
+        """Add a fault; it begins at its time, at once if that has passed. Later ones overrule earlier ones."""
+        self._schedule.faults.append(fault)
+        self._change_faults()
+
+    def clear_faults(self, rotor: int | None = None) -> None:
+        """End all faults, planned ones too; or, with ``rotor``, those that act on it now."""
+        self._schedule.faults = [
+            fault
+            for fault in self._schedule.faults
+            if rotor is not None and (fault.rotor != rotor or fault.begin_us > self.time_us)
+        ]
+        self._change_faults()
+
+    def _change_faults(self) -> None:
+        """Let the faults of this moment act, and note when the next one begins or ends."""
+        schedule, now_us = self._schedule, self.time_us
+        for rotor in range(len(self.vehicle.rotors)):
+            self.plant.set_rotor_fault(rotor)
+        state_fault: Fault | None = None
+        for fault in schedule.take_due_levels(now_us):
+            self.plant.set_charge(fault.value)
+            if self.plant.battery is not None:
+                self._battery_due_us = now_us  # news
+        for fault in schedule.active(now_us):
+            if fault.kind is Kind.ROTOR_OFF:
+                self.plant.set_rotor_fault(fault.rotor, 1.0, 0.0)
+            elif fault.kind is Kind.ROTOR_WEAK:
+                self.plant.set_rotor_fault(fault.rotor, fault.value)
+            elif fault.kind is Kind.ROTOR_STUCK:
+                self.plant.set_rotor_fault(fault.rotor, 1.0, fault.value)
+            else:
+                state_fault = fault
+        self._fault_state(None if state_fault is None else state_fault.kind)
+        schedule.forget_past(now_us)
+        change_us = schedule.next_change_us(now_us)
+        self._change_us = _NEVER_US if change_us is None else change_us
+
+    def _fault_state(self, kind: Kind | None) -> None:
+        """Choose what is sent as the state from now on."""
+        self.drops_state = kind is Kind.STATE_DROP
+        if kind not in (Kind.STATE_FREEZE, Kind.STATE_NAN):
+            self._faulty = None
+            self._state_fault = kind
+            return
+        if self._faulty is not None and kind is self._state_fault:
+            return  # another fault began or ended
+        self._state_fault = kind
+        self._faulty = PlantStateFrame(self._system_id, SIMULATOR_COMPONENT)
+        self._faulty.frame[:] = self._frame.frame
+        self._faulty_flags = self._flags
+        if kind is Kind.STATE_NAN:
+            self._faulty.state[:] = math.nan
+
+    # ------------------------------------------------------------------ time
 
     def apply(self, actuators: ActuatorsFrame) -> None:
         """Advance by one interval with the commands held; raise PlantDivergedError on overflow."""
@@ -85,6 +187,8 @@ class Simulator:
         if result > CONTACT:
             self._note(result)
         self._flags = _FLAGS[result]
+        if self.time_us >= self._change_us:
+            self._change_faults()
 
     def _note(self, result: int) -> None:
         if result & DIVERGED:

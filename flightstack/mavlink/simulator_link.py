@@ -7,12 +7,14 @@ HIL_STATE_QUATERNION, as PX4 asks; whichever arrives is answered in kind.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from flightstack.contract import MAX_ROTORS, STATE_SIZE, FloatArray
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, mavlink
+from flightstack.mavlink.frame_finder import FrameFinder
 from flightstack.mavlink.hot_frames import (
     ARMED_FLAG,
     LOCKSTEP_FLAG,
@@ -27,10 +29,45 @@ HIL_DISARMED = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 HIL_LOCKSTEP = 1
 
 
+LATEST_START_US = 1 << 53
+"""Largest time of a first state that is believed: three centuries."""
+
+LONGEST_STEP_US = 2_000_000
+"""Largest step between two states' times that the vehicle's clock follows: twice that of the slowest loops."""
+
+_UNUSED_CELL = 0xFFFF
+
+
+class Battery(NamedTuple):
+    """The battery as the simulator last reported it; what it does not know is NaN."""
+
+    voltage_v: float = math.nan
+    current_a: float = math.nan
+    remaining: float = math.nan  # share of the charge, 0 to 1
+    time_us: int = 0  # vehicle time of the state that it came with
+    valid: bool = False  # a charge was ever reported
+
+
+NO_BATTERY = Battery()
+
+
+class Freshness(NamedTuple):
+    """How old the newest state is, in the vehicle's time."""
+
+    age_us: int  # since it arrived
+    frozen_us: (
+        int  # since any of its numbers changed in any bit; while the vehicle stands that is nothing odd
+    )
+
+
 class SimulatorLink:
     """Takes the simulator's bytes, keeps the newest state, and makes the answer to it.
 
     ``state`` (13,) and ``rotor_speed_rad_s`` (8,) are the same arrays for the link's whole life.
+
+    ``time_us`` is the vehicle's clock. It follows the steps between the states' times. A step back, or one longer
+    than ``LONGEST_STEP_US`` (a simulator that started anew, or nonsense), is counted in ``odd_times``; the state
+    is taken, and the clock stands still for that step.
     """
 
     def __init__(self, vehicle: Vehicle, home: GeoPoint, lockstep: bool, system_id: int = 1) -> None:
@@ -46,6 +83,14 @@ class SimulatorLink:
         self.state[6] = 1.0
         self.rotor_speed_rad_s = self._plant.rotor_speed_rad_s
         self.time_us = 0
+        self.odd_times = 0
+        self.battery = NO_BATTERY
+        self._finder = FrameFinder()
+        self._state_us = 0  # the newest state's own time
+        self._arrived = False  # a state, since ``freshness`` was last asked for
+        self._arrived_us = 0
+        self._changed_us = 0
+        self._seen = b""
         self.has_state = False
         self.request_refused = False
         self.peer_said_goodbye = False
@@ -80,38 +125,101 @@ class SimulatorLink:
     def receive(self, data: memoryview) -> bool:
         """Take bytes from the simulator; tell whether a new state arrived.
 
-        A whole state is taken at once, whatever the general decoder waits for: that can only be junk.
+        A whole state is taken at once, whatever came before it: that can only be junk.
         """
         if self._plant.open(data):
-            self.time_us = self._plant.time_us
-            self.has_state = True
+            self._take_time(self._plant.time_us)
             self._speaks_hil = False
             return True
-        return self._receive_any(bytes(data))
+        return self._receive_any(data)
 
-    def _receive_any(self, data: bytes) -> bool:
+    def _receive_any(self, data: memoryview) -> bool:
         fresh = False
-        for message in self._link.decode(data):
-            kind = message.get_msgId()
-            if kind == FS_PLANT_STATE_ID:
-                self._take_plant_state(message)
+        battery: Message | None = None
+        for frame in self._finder.find(data):
+            if self._plant.open(frame):
+                self._take_time(self._plant.time_us)
+                self._speaks_hil = False
                 fresh = True
-            elif kind == mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
-                self._take_hil(message)
-                fresh = True
-            elif kind == mavlink.MAVLINK_MSG_ID_COMMAND_ACK:
-                self.request_refused = message.result != mavlink.MAV_RESULT_ACCEPTED
-            elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-                self.peer_said_goodbye = message.system_status == mavlink.MAV_STATE_POWEROFF
-        self.has_state = self.has_state or fresh
+                continue
+            for message in self._link.decode(frame):
+                kind = message.get_msgId()
+                if kind == FS_PLANT_STATE_ID:
+                    self._take_plant_state(message)
+                    fresh = True
+                elif kind == mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
+                    self._take_hil(message)
+                    fresh = True
+                elif kind == mavlink.MAVLINK_MSG_ID_BATTERY_STATUS:
+                    battery = message
+                else:
+                    self._take_other(message)
+        if battery is not None:
+            self._take_battery(battery)  # last: it has the time of the state that came with it
         return fresh
+
+    def _take_other(self, message: Message) -> None:
+        kind = message.get_msgId()
+        if kind == mavlink.MAVLINK_MSG_ID_COMMAND_ACK:
+            if message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
+                self.request_refused = message.result != mavlink.MAV_RESULT_ACCEPTED
+        elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            self.peer_said_goodbye = message.system_status == mavlink.MAV_STATE_POWEROFF
+
+    def _take_time(self, state_us: int) -> None:
+        step_us = state_us - self._state_us
+        self._state_us = state_us
+        self._arrived = True
+        if 0 <= step_us <= LONGEST_STEP_US:
+            self.time_us += step_us
+        elif self.has_state:
+            self.odd_times += 1
+        else:  # the first one says when the flight begins
+            self.time_us = state_us if state_us < LATEST_START_US else 0
+        self.has_state = True
+
+    def freshness(self, now_us: int) -> Freshness:
+        """Tell how old the newest state is at ``now_us``, the time of this tick; to be asked for in regular ticks.
+
+        In lockstep a state can be frozen but never old.
+        """
+        if self._arrived:
+            self._arrived = False
+            self._arrived_us = now_us
+            content = self.state.tobytes()
+            if content != self._seen:
+                self._seen = content
+                self._changed_us = now_us
+        return Freshness(now_us - self._arrived_us, now_us - self._changed_us)
+
+    def _take_battery(self, m: Message) -> None:
+        """Take BATTERY_STATUS of the first battery; −1 and unused cells mean unknown."""
+        if m.id != 0:
+            return
+        cells = [v for v in m.voltages if v != _UNUSED_CELL] + [
+            v for v in m.voltages_ext if v != _UNUSED_CELL
+        ]
+        self.battery = Battery(
+            sum(cells) * 1e-3 if any(cells) else math.nan,
+            m.current_battery * 0.01 if m.current_battery >= 0 else math.nan,
+            min(m.battery_remaining, 100) * 0.01 if m.battery_remaining >= 0 else math.nan,
+            self.time_us,
+            m.battery_remaining >= 0,
+        )
+
+    def failure_request(self, unit: int, failure: int, instance: int) -> bytes:
+        """Return the bytes that ask the simulator for a failure: MAV_CMD_INJECT_FAILURE with its values."""
+        number = mavlink.MAV_CMD_INJECT_FAILURE
+        return self._link.encode(
+            mavlink.MAVLink_command_long_message(0, 0, number, 0, unit, failure, instance, 0, 0, 0, 0)
+        )
 
     def _take_plant_state(self, m: Message) -> None:
         """Take a frame that the general decoder read: it may be signed, or cut where its payload ends in zeros."""
         self._speaks_hil = False
         self.state[:] = (*m.position_ned_m, *m.velocity_ned_m_s, *m.q, *m.rates_frd_rad_s)
         self.rotor_speed_rad_s[:] = m.rotor_speed_rad_s
-        self.time_us = m.time_us
+        self._take_time(m.time_us)
 
     def _take_hil(self, m: Message) -> None:
         self._speaks_hil = True
@@ -119,14 +227,14 @@ class SimulatorLink:
         velocity = (m.vx / 100.0, m.vy / 100.0, m.vz / 100.0)
         rates = (m.rollspeed, m.pitchspeed, m.yawspeed)
         self.state[:STATE_SIZE] = (*position, *velocity, *m.attitude_quaternion, *rates)
-        self.time_us = m.time_usec
+        self._take_time(m.time_usec)
 
     def answer(self, rotor_speed_rad_s: FloatArray, armed: bool) -> bytes | memoryview:
         """Return the answer to the newest state: rotor speeds (8,), commanded."""
         if self._speaks_hil:
             return self._hil_answer(rotor_speed_rad_s, armed)
         self._actuators.rotor_speed_rad_s[:] = rotor_speed_rad_s
-        return self._actuators.seal(self.time_us, self._lockstep | (ARMED_FLAG if armed else 0))
+        return self._actuators.seal(self._state_us, self._lockstep | (ARMED_FLAG if armed else 0))
 
     def _hil_answer(self, rotor_speed_rad_s: FloatArray, armed: bool) -> bytes:
         count = self._top_speed.size
@@ -137,7 +245,7 @@ class SimulatorLink:
             controls = [0.0] * 16
         return self._link.encode(
             mavlink.MAVLink_hil_actuator_controls_message(
-                self.time_us,
+                self._state_us,
                 controls,
                 HIL_ARMED if armed else HIL_DISARMED,
                 HIL_LOCKSTEP if self._lockstep else 0,

@@ -54,6 +54,15 @@ class Table:
             raise self.error(key, f"must be a list of {count} numbers")
         return tuple(self._in_range(key, item, low, high) for item in value)
 
+    def number_list(
+        self, key: str, fewest: int, most: int, low: float, high: float, default: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """Return a list of ``fewest`` to ``most`` finite numbers in [low, high]."""
+        value = self._get(key, default)
+        if not isinstance(value, list | tuple) or not fewest <= len(value) <= most:
+            raise self.error(key, f"must be a list of {fewest} to {most} numbers")
+        return tuple(self._in_range(key, item, low, high) for item in value)
+
     def text(self, key: str, default: str | None = None) -> str:
         """Return a string."""
         value = self._get(key, default)

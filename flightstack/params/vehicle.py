@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from flightstack.contract import MAX_ROTORS, FloatArray
+from flightstack.params.battery import Battery, read_battery
 from flightstack.params.errors import ConfigError
 from flightstack.params.toml_reader import Table, read_toml
 
@@ -43,6 +44,7 @@ class Vehicle:
     leg_height_m: float
     rotors: tuple[Rotor, ...]
     ideal_rotors: bool = False
+    battery: Battery | None = None
 
     @property
     def weight_n(self) -> float:
@@ -105,6 +107,7 @@ def _vehicle(top: Table) -> Vehicle:
         linear_drag_n_s_m=body.numbers("linear_drag_n_s_m", 3, 0.0, 1e3, (0.0, 0.0, 0.0)),  # type: ignore[arg-type]
         leg_height_m=body.number("leg_height_m", 0.0, 10.0, 0.1),
         rotors=_rotors(top, rotor_type, mass_kg),
+        battery=read_battery(top),
     )
     for table in (top, body, rotor_type):
         table.finish()

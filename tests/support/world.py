@@ -96,7 +96,7 @@ class World:
         self.reached: list[int] = []
         self._next_log_us = 0
         self._ticks = 0
-        self.stack.simulator.receive(self.simulator.state_frame())
+        self.stack.simulator.receive(memoryview(self.simulator.outgoing()))
         self.stack.autopilot.has_state = True
         self.stack.ground.add_peer(PEER, permanent=True)
 
@@ -156,7 +156,7 @@ class World:
                 stack.recorder.timing(time_us, **stack.report.log_fields(time_us // stack.rates.interval_us))
             self.exchange_with_ground()
         self.simulator.apply(self._actuators)
-        assert stack.simulator.receive(self.simulator.state_frame())
+        assert stack.simulator.receive(memoryview(self.simulator.outgoing()))
 
     def run(self, seconds: float) -> None:
         """Let simulated time pass."""

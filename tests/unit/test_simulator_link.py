@@ -38,7 +38,9 @@ class Client:
         return ack.result
 
     def state(self):
-        (message,) = self.codec.decode(bytes(self.sim.state()))
+        """The state; where a battery is due, it comes just before."""
+        *before, message = self.codec.decode(bytes(self.sim.state()))
+        assert [one.get_type() for one in before] in ([], ["BATTERY_STATUS"])
         return message
 
 
