@@ -30,10 +30,20 @@ def run(
     instance: Annotated[
         int, typer.Option(min=0, max=250, help="Number of this vehicle; shifts ports and id.")
     ] = 0,
-    gcs_port: Annotated[int, typer.Option(help="UDP port of the ground station.")] = 14550,
+    gcs: Annotated[
+        list[str] | None,
+        typer.Option(help="Ground station to address unasked: HOST:PORT. May be repeated [127.0.0.1:14550]."),
+    ] = None,
+    gcs_port: Annotated[int, typer.Option(help="UDP port of the ground station, without --gcs.")] = 14550,
     api_port: Annotated[
         int | None, typer.Option(help="UDP port of the API client [14540 + instance].")
     ] = None,
+    tcp_port: Annotated[
+        int | None, typer.Option(help="TCP port to listen on [5760 + 10 per instance]; 0 for none.")
+    ] = None,
+    listen: Annotated[
+        str, typer.Option(help="Address of this machine to listen on for MAVLink; 0.0.0.0 for all.")
+    ] = "127.0.0.1",
     log: Annotated[
         str | None, typer.Option(help="Log file [runs/<stamp>-flight.ulg]; 'none' for no log.")
     ] = None,
@@ -61,6 +71,7 @@ def run(
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.params.behaviour import Behaviour, with_assignments
     from flightstack.params.errors import ConfigError
+    from flightstack.ports import described, ports_config, warning
     from flightstack.transport.udp import PortBusyError
 
     try:
@@ -82,9 +93,7 @@ def run(
             sim_host,
             4560 + instance if sim_port is None else sim_port,
             sim_timeout,
-            gcs_port,
-            14540 + instance if api_port is None else api_port,
-            instance,
+            ports_config(instance, gcs or [], gcs_port, api_port, listen, tcp_port),
             None if log == "none" else path,
             wait_for_start,
             exit_on_gcs_loss,
@@ -95,9 +104,11 @@ def run(
         sys.exit(EXIT_USAGE)
     print(
         f"flightstack: {stack.stack.vehicle.name}, {controller} ({gains}), {inner_hz:g}/{outer_rate:g} Hz, {clock}; "
-        f"simulator {sim_host}:{process.simulator_port}, ground station UDP {gcs_port}, API UDP {process.api_port}",
+        f"simulator {sim_host}:{process.simulator_port}, {described(process.ports)}",
         flush=True,
     )
+    if (caution := warning(process.ports)) is not None:
+        print(f"flightstack: {caution}", file=sys.stderr, flush=True)
     sys.exit(stack.run())
 
 

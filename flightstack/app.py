@@ -20,7 +20,7 @@ from flightstack.logging.flight_log import FlightLog
 from flightstack.modes import Mode
 from flightstack.transport.processor import Follower
 from flightstack.transport.tcp import LinkClosedError, TcpClient
-from flightstack.transport.vehicle_ports import VehiclePorts
+from flightstack.transport.vehicle_ports import Place, PortsConfig, VehiclePorts
 
 EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
 GROUND_POLL_NS = 500_000
@@ -38,9 +38,7 @@ class ProcessConfig:
     simulator_host: str
     simulator_port: int
     simulator_timeout_s: float
-    ground_port: int
-    api_port: int
-    instance: int
+    ports: PortsConfig
     log: Path | None
     wait_for_start: bool
     exit_on_ground_loss_s: float | None
@@ -61,10 +59,10 @@ class App:
         self._process = process
         self._log_count = 0
         self.stack: Stack = build(config, self._open_log)
-        self._ports = VehiclePorts(process.instance, process.ground_port, process.api_port)
+        self._ports = VehiclePorts(process.ports)
         self._lockstep = config.lockstep
         self._stop_signal = 0
-        for channel, peer in self._ports.first_peers.items():
+        for channel, peer in self._ports.first_peers:
             self.stack.ground.add_peer(PeerAddress(channel, *peer), permanent=True)
         self._began_s = time.monotonic()
         self._next_report_s = self._began_s + REPORT_S
@@ -120,6 +118,7 @@ class App:
         if orderly:
             for (channel, host, port), data in self.stack.ground.farewell():
                 self._ports.send(channel, (host, port), data)
+            self._ports.flush()
         if simulator is not None:
             if orderly:
                 with contextlib.suppress(LinkClosedError):
@@ -281,11 +280,20 @@ class App:
         if now_s >= self._next_report_s:
             self._next_report_s = now_s + REPORT_S
             self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
-        ground = self.stack.ground
-        for channel, peer, data in self._ports.receive():
+        ground, ports = self.stack.ground, self._ports
+        for channel, peer, data in ports.receive(self._is_heard):
             ground.receive(PeerAddress(channel, *peer), data, now_s)
+        for channel, peer in ports.opened():
+            ground.add_peer(PeerAddress(channel, *peer), permanent=True)
+        for channel, peer in ports.closed():
+            ground.drop_peer(PeerAddress(channel, *peer))
         for (channel, host, port), data in ground.poll(now_s):
-            self._ports.send(channel, (host, port), data)
+            ports.send(channel, (host, port), data)
+        ports.flush()
+
+    def _is_heard(self, place: Place) -> bool:
+        channel, peer = place
+        return self.stack.ground.is_heard(PeerAddress(channel, *peer))
 
     # ------------------------------------------------------------------ reasons to stop
 

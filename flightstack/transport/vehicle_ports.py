@@ -1,46 +1,127 @@
-"""The vehicle's UDP ports, numbered as PX4's: one channel for ground stations, one for companions (API)."""
+"""The vehicle's ports, numbered as PX4's and ArduPilot's: UDP for ground stations and for companions, and TCP."""
 
 from __future__ import annotations
 
+import ipaddress
 import select
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
+from flightstack.transport.fair_queue import FairQueue
+from flightstack.transport.tcp_server import TcpServer
 from flightstack.transport.udp import Address, PortBusyError, UdpSocket
 
-GROUND, API = "ground", "api"
-GROUND_LOCAL_PORT, API_LOCAL_PORT = 18570, 14580
+GROUND, API, TCP = "ground", "api", "tcp"
+GROUND_LOCAL_PORT, API_LOCAL_PORT, TCP_PORT = 18570, 14580, 5760
+TCP_PORT_STEP = 10
 LOOPBACK = "127.0.0.1"
+DATAGRAMS_A_POLL = 32
+"""Pieces handed out in one poll, all peers together: a third of a millisecond of work."""
+
+Place = tuple[str, Address]
+"""A channel, and an address on it."""
+
+
+def tcp_port(instance: int) -> int:
+    """Return the usual TCP port of a vehicle."""
+    return TCP_PORT + TCP_PORT_STEP * instance
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether an IPv4 address reaches this machine only."""
+    return ipaddress.IPv4Address(host).is_loopback
+
+
+@dataclass(frozen=True)
+class PortsConfig:
+    """Where the vehicle listens and whom it addresses unasked. Hosts are IPv4 addresses."""
+
+    instance: int
+    ground_stations: tuple[Address, ...] = ((LOOPBACK, 14550),)
+    api_client: Address = (LOOPBACK, 14540)
+    listen: str = LOOPBACK
+    tcp_port: int = 0
+    """0: no TCP."""
 
 
 class VehiclePorts:
-    """Two sockets on the loopback interface, bound to 18570 and 14580, each plus the instance."""
+    """Two UDP sockets, bound to 18570 and 14580, each plus the instance, and a TCP server."""
 
-    def __init__(self, instance: int, ground_port: int, api_port: int) -> None:
-        """Bind both; raise PortBusyError. ``first_peers`` are those whom the vehicle addresses unasked."""
-        self._sockets = {GROUND: UdpSocket(LOOPBACK, GROUND_LOCAL_PORT + instance)}
+    def __init__(self, config: PortsConfig) -> None:
+        """Bind all; raise PortBusyError."""
+        self._poller = select.poll()
+        self._sockets: dict[str, UdpSocket] = {}
+        self._tcp: TcpServer | None = None
+        self._queue: FairQueue[Place] = FairQueue()
         try:
-            self._sockets[API] = UdpSocket(LOOPBACK, API_LOCAL_PORT + instance)
+            for channel, port in ((GROUND, GROUND_LOCAL_PORT), (API, API_LOCAL_PORT)):
+                self._sockets[channel] = UdpSocket(config.listen, port + config.instance)
+                self._poller.register(self._sockets[channel], select.POLLIN)
+            if config.tcp_port:
+                self._tcp = TcpServer(config.listen, config.tcp_port, self._poller)
         except PortBusyError:
             self.close()
             raise
-        self.first_peers: dict[str, Address] = {GROUND: (LOOPBACK, ground_port), API: (LOOPBACK, api_port)}
+        self.first_peers: list[Place] = [(GROUND, station) for station in config.ground_stations]
+        self.first_peers.append((API, config.api_client))
+        """Those whom the vehicle addresses unasked."""
 
-    def receive(self) -> Iterator[tuple[str, Address, bytes]]:
-        """Yield (channel, peer, datagram) of what is here."""
-        for channel, socket in self._sockets.items():
-            for data, peer in socket.receive():
-                yield channel, peer, data
+    def receive(
+        self, is_known: Callable[[Place], bool] = lambda _: False, most: int = DATAGRAMS_A_POLL
+    ) -> Iterator[tuple[str, Address, bytes]]:
+        """Yield up to ``most`` pieces (channel, peer, octets) of what is here, peer by peer in turns.
+
+        ``is_known`` tells from whom a valid message has come: strangers have to share what is left to them.
+        """
+        filenos = [fileno for fileno, _ in self._poller.poll(0)]
+        if filenos:
+            self._collect(filenos, is_known)
+        for (channel, peer), data in self._queue.take(most):
+            yield channel, peer, data
+
+    def _collect(self, filenos: list[int], is_known: Callable[[Place], bool]) -> None:
+        """Move what is here into the queue: a UDP socket is shared by peers, and so by those who flood it."""
+        for channel, udp in self._sockets.items():
+            if udp.fileno() in filenos:
+                for data, peer in udp.receive():
+                    self._queue.push((channel, peer), data, is_known)
+        if self._tcp is not None:
+            for peer, data in self._tcp.receive(filenos, lambda peer: (TCP, peer) not in self._queue):
+                self._queue.push((TCP, peer), data, lambda _: True)
+
+    def opened(self) -> list[Place]:
+        """Return who has connected since the last call: such a peer expects to be addressed at once."""
+        return [(TCP, peer) for peer in self._tcp.opened()] if self._tcp else []
+
+    def closed(self) -> list[Place]:
+        """Return whose connection has ended since the last call; ask after ``opened``."""
+        closed = [(TCP, peer) for peer in self._tcp.closed()] if self._tcp else []
+        for place in closed:
+            self._queue.forget(place)
+        return closed
 
     def send(self, channel: str, peer: Address, data: bytes) -> None:
-        """Send a datagram."""
-        self._sockets[channel].send(data, peer)
+        """Send a frame: one datagram over UDP; over TCP, with the next ``flush``."""
+        if channel in self._sockets:
+            self._sockets[channel].send(data, peer)
+        elif self._tcp is not None:
+            self._tcp.send(peer, data)
+
+    def flush(self) -> None:
+        """Send what waits for TCP clients."""
+        if self._tcp is not None:
+            self._tcp.flush()
 
     def register(self, poller: select.poll) -> None:
-        """Let ``poller`` wake up when a datagram is here."""
+        """Let ``poller`` wake up when something is here."""
         for socket in self._sockets.values():
             poller.register(socket, select.POLLIN)
+        if self._tcp is not None:
+            self._tcp.register(poller)
 
     def close(self) -> None:
         """Close the sockets."""
         for socket in self._sockets.values():
             socket.close()
+        if self._tcp is not None:
+            self._tcp.close()
