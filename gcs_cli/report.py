@@ -7,8 +7,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from flightstack.atomic_file import write_text_atomically
 from flightstack.plan import Plan, command_name
-from gcs_cli.atomic_file import write_text_atomically
 from gcs_cli.flight_data import Flight, LoopTiming
 from gcs_cli.report_plots import plots, section
 from gcs_cli.report_timing import read_loop_timing

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from flightstack.atomic_file import write_text_atomically
 from flightstack.contract import FloatArray
 from flightstack.geodesy import LocalFrame
 from flightstack.plan import NAV_COMMANDS, MissionItem, Plan
-from gcs_cli.atomic_file import write_text_atomically
 from gcs_cli.flight_data import Flight
 
 _DIGITS = 6
