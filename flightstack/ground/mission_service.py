@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from flightstack.autopilot import NOTICE, WARNING, Autopilot
+from flightstack.autopilot import Autopilot
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.mission_server import (
-    PROTOCOL,
+from flightstack.mavlink.services.mission_messages import PROTOCOL
+from flightstack.mavlink.services.mission_server import MissionServer
+from flightstack.mavlink.services.mission_store import (
     CurrentRequested,
     MissionCleared,
     MissionRefused,
     MissionReplaced,
-    MissionServer,
 )
+from flightstack.plan import MissionType
+from flightstack.snapshot import NOTICE, WARNING
 
 
 class MissionService:
@@ -24,7 +26,7 @@ class MissionService:
 
     def __init__(self, own: Address, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
-        self._server = MissionServer(own, autopilot.check_mission)
+        self._server = MissionServer(own, {MissionType.MISSION: autopilot.check_mission})
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a message of the mission protocol."""

@@ -102,6 +102,14 @@ RELATIVE_FRAMES = frozenset({Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_AL
 GLOBAL_FRAMES = RELATIVE_FRAMES | {Frame.GLOBAL, Frame.GLOBAL_INT}
 
 
+PLAN_NAMES = {
+    MissionType.MISSION: "mission",
+    MissionType.FENCE: "geofence",
+    MissionType.RALLY: "list of rally points",
+}
+"""What a user calls the plan of each type."""
+
+
 def result_name(result: int) -> str:
     """Return the name of a MAV_MISSION_RESULT, whatever its value on the wire."""
     try:

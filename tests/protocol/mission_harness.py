@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from flightstack.geodesy import GeoPoint
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.mission_client import Done, MissionClient
-from flightstack.mavlink.services.mission_server import MissionEvent, MissionServer
-from flightstack.plan import Command, Frame, MissionItem, MissionType, check_mission
+from flightstack.mavlink.services.mission_server import MissionServer
+from flightstack.mavlink.services.mission_store import MissionEvent
+from flightstack.plan import Command, Frame, MissionItem, MissionType, check_fence, check_mission, check_rally
 from flightstack.transport.memory import LOSSLESS, Conditions, LossyLink
+from tests.support.fences import HOME
 
-HOME = GeoPoint(47.397742, 8.545594, 488.0)
 VEHICLE = Address(1, 1)
 LOSSY = Conditions(loss=0.2, duplication=0.2, reordering=0.2, delay_s=0.02, jitter_s=0.03)
 NAN = float("nan")
@@ -28,6 +28,13 @@ def waypoint(north_e7: int = 0, altitude_m: float = 5.0, hold_s: float = 0.0) ->
 def mission(count: int, mark: int = 0) -> tuple[MissionItem, ...]:
     """A mission of ``count`` waypoints, told from others by ``mark``."""
     return tuple(waypoint(10 * seq, hold_s=float(mark)) for seq in range(count))
+
+
+CHECKS = {
+    MissionType.MISSION: lambda items: check_mission(items, HOME),
+    MissionType.FENCE: lambda items: check_fence(items, HOME),
+    MissionType.RALLY: lambda items: check_rally(items, HOME),
+}
 
 
 class GroundStation:
@@ -56,7 +63,7 @@ class World:
     ) -> None:
         self.now_s = 100.0
         self.stations = {station.name: station for station in stations}
-        self.server = MissionServer(VEHICLE, lambda items: check_mission(items, HOME), stored)
+        self.server = MissionServer(VEHICLE, {kind: CHECKS[kind] for kind in stored})
         self.events: list[MissionEvent] = []
 
     def step(self) -> bool:

@@ -16,9 +16,9 @@ from flightstack.mavlink.services.command_server import CommandServer
 from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
 from flightstack.mavlink.services.mission_messages import mission_id
 from flightstack.mavlink.services.mission_server import MissionServer
-from flightstack.plan import Command, Frame, MissionItem, MissionResult, MissionType, check_mission
+from flightstack.plan import Command, Frame, MissionItem, MissionResult, MissionType
 from flightstack.plan import vocabulary as words
-from tests.protocol.mission_harness import HOME, NAN, VEHICLE, mission, waypoint
+from tests.protocol.mission_harness import CHECKS, NAN, VEHICLE, mission, waypoint
 
 GCS = Address(255, 190)
 
@@ -32,7 +32,7 @@ class Vehicle:
     """A mission server with one hand-driven client."""
 
     def __init__(self) -> None:
-        self.server = MissionServer(VEHICLE, lambda items: check_mission(items, HOME))
+        self.server = MissionServer(VEHICLE, {MissionType.MISSION: CHECKS[MissionType.MISSION]})
         self.now_s = 0.0
 
     def tell(self, message: Message, source: Address = GCS, peer: str = "gcs") -> list[Message]:
@@ -294,7 +294,7 @@ def upload_three(client: MissionClient) -> None:
 
 def test_no_storm_of_messages_raises() -> None:
     for seed in range(40):
-        server = MissionServer(VEHICLE, lambda items: check_mission(items, HOME), tuple(MissionType)[:3])
+        server = MissionServer(VEHICLE, CHECKS)
         commands = CommandServer(VEHICLE, range(400))
         client = MissionClient(VEHICLE, GCS)
         chance = random.Random(seed)

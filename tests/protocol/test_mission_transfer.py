@@ -7,7 +7,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from flightstack.mavlink.services.mission_client import Done, Failed
-from flightstack.mavlink.services.mission_server import (
+from flightstack.mavlink.services.mission_store import (
     CurrentRequested,
     MissionCleared,
     MissionRefused,
@@ -268,15 +268,7 @@ def test_an_equal_mission_again_is_no_change() -> None:
     assert first.mission_id == second.mission_id != 0
 
 
-def test_fence_and_rally_are_kept_apart_when_stored_and_refused_when_not() -> None:
-    fence = GroundStation("fence", mission_type=MissionType.FENCE)
-    world = World(GroundStation("gcs"), fence, stored=(MissionType.MISSION, MissionType.FENCE))
-    vertex = tuple(MissionItem(5001, 0, 3.0, x=n, y=n) for n in range(3))
-    assert world.upload("fence", vertex) == Done(vertex)
-    assert world.upload("gcs", mission(2)) == Done(mission(2))
-    assert world.server.items(MissionType.FENCE) == vertex
-    assert world.download("fence") == vertex
-
+def test_types_that_are_not_stored_are_refused() -> None:
     world = World(GroundStation("rally", mission_type=MissionType.RALLY))
     result = world.upload("rally", mission(2))
     assert isinstance(result, Failed)

@@ -15,12 +15,11 @@ from flightstack.mavlink.services.mission_messages import DEFAULT_TIMING, Timing
 from flightstack.mavlink.services.mission_operations import (
     Clear,
     Done,
-    Download,
     Failed,
     Operation,
     SetCurrent,
-    Upload,
 )
+from flightstack.mavlink.services.mission_transfers import Download, Upload
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionResult, MissionType
 
@@ -86,6 +85,11 @@ class MissionClient:
     def result(self) -> Done | Failed | None:
         """How the operation ended; None while it is under way."""
         return self._operation.result if self._operation else None
+
+    @property
+    def plan_id(self) -> int:
+        """MAVLink's opaque id of the plan that was uploaded or downloaded; 0 if the vehicle gives none."""
+        return self._operation.plan_id if self._operation else 0
 
     @property
     def progress(self) -> tuple[int, int]:

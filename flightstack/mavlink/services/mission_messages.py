@@ -16,6 +16,21 @@ from flightstack.mavlink.services.addressing import Address
 from flightstack.plan.item import MissionItem, as_float32, float_coordinate, integer_coordinate
 from flightstack.plan.vocabulary import GLOBAL_FRAMES
 
+PROTOCOL = frozenset(
+    {
+        "MISSION_ACK",
+        "MISSION_CLEAR_ALL",
+        "MISSION_COUNT",
+        "MISSION_ITEM",
+        "MISSION_ITEM_INT",
+        "MISSION_REQUEST",
+        "MISSION_REQUEST_INT",
+        "MISSION_REQUEST_LIST",
+        "MISSION_SET_CURRENT",
+    }
+)
+"""Messages of the protocol that go to a vehicle."""
+
 _ITEM = struct.Struct("<ffffiifHB?")
 
 
@@ -81,13 +96,16 @@ def message_from_item(
     )  # fmt: skip
 
 
-def ack_message(to: Address, result: int, mission_type: int) -> Message:
-    """Return a MISSION_ACK."""
-    return mavlink.MAVLink_mission_ack_message(to.system, to.component, result, mission_type)
+def ack_message(to: Address, result: int, mission_type: int, opaque_id: int = 0) -> Message:
+    """Return a MISSION_ACK; the id is that of the plan that a vehicle has accepted."""
+    return mavlink.MAVLink_mission_ack_message(to.system, to.component, result, mission_type, opaque_id)
 
 
 def mission_id(items: Sequence[MissionItem]) -> int:
-    """Return a number that stands for the contents of a mission; 0 for an empty one."""
+    """Return a number that stands for the contents of a plan; 0 for an empty one.
+
+    It is MAVLink's opaque id: the same plan has it whenever and by whomever it was uploaded.
+    """
     checksum = 0
     for item in items:
         floats = [as_float32(value) for value in (*item.params, item.z)]

@@ -1,102 +1,57 @@
-"""The vehicle's side of the mission protocol, without I/O.
+"""The vehicle's side of the mission protocol, without I/O: mission, geofence and rally points.
 
-A stored mission is replaced only by a whole one that passed the check. One upload at a time; downloads go to
-any number of clients at once. Everything is answered to the peer it came from.
+A stored plan is replaced only by a whole one that passed its check. Of each type there is one upload at a time, so
+that plans of different types, or of different clients, never mix; downloads go to any number of clients at once.
+Everything is answered to the peer it came from.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Hashable
-from typing import NamedTuple, TypeAlias
+from collections.abc import Hashable, Iterable, Mapping
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address, is_for, sender
 from flightstack.mavlink.services.mission_downloads import Downloads
-from flightstack.mavlink.services.mission_messages import DEFAULT_TIMING, Timing, ack_message, mission_id
+from flightstack.mavlink.services.mission_messages import DEFAULT_TIMING, PROTOCOL, Timing, ack_message
+from flightstack.mavlink.services.mission_store import (
+    Check,
+    CurrentRequested,
+    Items,
+    MissionEvent,
+    MissionRefused,
+    PlanStore,
+)
 from flightstack.mavlink.services.mission_upload import Client, Upload
 from flightstack.plan.rejection import Rejection
-from flightstack.plan.item import MissionItem
-from flightstack.plan.vocabulary import MAX_MISSION_ITEMS, MissionResult, MissionType
-
-Items: TypeAlias = tuple[MissionItem, ...]
-
-
-class MissionReplaced(NamedTuple):
-    """A new mission is in force. A mission equal to the old one counts, with ``is_changed`` false."""
-
-    mission_type: MissionType
-    items: Items
-    mission_id: int
-    is_changed: bool
-
-
-class MissionCleared(NamedTuple):
-    """The mission was removed."""
-
-    mission_type: MissionType
-
-
-class CurrentRequested(NamedTuple):
-    """A client asks to continue at this item, which exists."""
-
-    seq: int
-
-
-class MissionRefused(NamedTuple):
-    """A client's wish was refused; the reason is for a STATUSTEXT, since MISSION_ACK has no room for it."""
-
-    result: MissionResult
-    seq: int | None
-    reason: str
-
-
-MissionEvent: TypeAlias = MissionReplaced | MissionCleared | CurrentRequested | MissionRefused
-Check: TypeAlias = Callable[[Items], Rejection | None]
-
-PROTOCOL = frozenset(
-    {
-        "MISSION_ACK",
-        "MISSION_CLEAR_ALL",
-        "MISSION_COUNT",
-        "MISSION_ITEM",
-        "MISSION_ITEM_INT",
-        "MISSION_REQUEST",
-        "MISSION_REQUEST_INT",
-        "MISSION_REQUEST_LIST",
-        "MISSION_SET_CURRENT",
-    }
-)
+from flightstack.plan.vocabulary import PLAN_NAMES, MissionResult, MissionType
 
 
 class MissionServer:
-    """Keeps one mission of each stored type, and lets clients upload, download and clear it."""
+    """Keeps one plan of each type in ``checks``, and lets clients upload, download and clear it."""
 
     def __init__(
-        self,
-        own: Address,
-        check: Check,
-        stored_types: Collection[MissionType] = (MissionType.MISSION,),
-        max_items: int = MAX_MISSION_ITEMS,
-        timing: Timing = DEFAULT_TIMING,
+        self, own: Address, checks: Mapping[MissionType, Check], timing: Timing = DEFAULT_TIMING
     ) -> None:
         self.own = own
         self.current_seq = 0
         """The item being flown, for the ``current`` flag of a download; the owner keeps it."""
-        self._check = check
-        self._max_items = max_items
         self._timing = timing
-        self._stored: dict[int, Items] = dict.fromkeys(stored_types, ())
-        self._upload: Upload | None = None
-        self._ended: tuple[Client, int, int, MissionResult] | None = None
+        self._store = PlanStore(checks)
+        self._uploads: dict[int, Upload] = {}
+        self._ended: dict[int, tuple[Client, int, MissionResult]] = {}
         self._downloads = Downloads()
         self._outbox: list[tuple[Hashable, Message]] = []
         self._events: list[MissionEvent] = []
 
     def items(self, mission_type: MissionType = MissionType.MISSION) -> Items:
-        """Return the mission in force."""
-        return self._stored.get(mission_type, ())
+        """Return the plan in force."""
+        return self._store.items(mission_type)
+
+    def plan_id(self, mission_type: MissionType = MissionType.MISSION) -> int:
+        """Return MAVLink's opaque id of the plan in force, for MISSION_CURRENT; 0 for none."""
+        return self._store.plan_id(mission_type)
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take any message from ``peer``; what is not of this protocol or not for us is ignored."""
@@ -110,7 +65,7 @@ class MissionServer:
             self._on_ack(message, client, now_s)
         elif kind == "MISSION_CLEAR_ALL":
             self._on_clear(message.mission_type, client)
-        elif message.mission_type not in self._stored:
+        elif not self._store.has(message.mission_type):
             self._ack(client, MissionResult.UNSUPPORTED, message.mission_type)
         elif kind == "MISSION_COUNT":
             self._on_count(message, client, now_s)
@@ -123,8 +78,9 @@ class MissionServer:
 
     def poll(self, now_s: float) -> list[tuple[Hashable, Message]]:
         """Return the messages to send now, each with the peer it goes to."""
-        upload = self._upload
-        if upload is not None and now_s >= upload.deadline_s:
+        for upload in list(self._uploads.values()):
+            if now_s < upload.deadline_s:
+                continue
             if upload.is_silent(now_s):
                 reason = f"the upload stopped at item {len(upload.items)} of {upload.count}: no answer"
                 self._refuse_upload(upload, Rejection(MissionResult.OPERATION_CANCELLED, None, reason))
@@ -137,7 +93,7 @@ class MissionServer:
         """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
         if self._outbox:
             return -math.inf
-        return self._upload.deadline_s if self._upload else None
+        return min((upload.deadline_s for upload in self._uploads.values()), default=None)
 
     def events(self) -> list[MissionEvent]:
         """Return what happened since the last call."""
@@ -148,100 +104,104 @@ class MissionServer:
 
     def _on_count(self, message: Message, client: Client, now_s: float) -> None:
         kind, count = message.mission_type, message.count
-        if self._is_busy_for(client, kind):
+        if self._is_busy_for(client, [kind], kind):
             return
-        self._upload = None  # the same client begins again: nothing of its first try may mix in
-        self._ended = None
-        if count > self._max_items:
-            reason = f"the mission has {count} items, and at most {self._max_items} are allowed"
+        self._forget_upload(kind)  # the same client begins again: nothing of its first try may mix in
+        reason = self._store.too_long(kind, count)
+        if reason is not None:
             self._ack(client, MissionResult.NO_SPACE, kind)
-            self._events.append(MissionRefused(MissionResult.NO_SPACE, None, reason))
+            self._refused(MissionResult.NO_SPACE, None, reason, kind)
         elif count == 0:
             self._clear([kind])
             self._ack(client, MissionResult.ACCEPTED, kind)
         else:
-            self._upload = Upload(client, kind, count, self._timing, now_s)
+            self._uploads[kind] = Upload(client, kind, count, self._timing, now_s)
 
     def _on_item(self, message: Message, client: Client, now_s: float) -> None:
-        upload = self._upload
-        if upload is None or upload.client != client or upload.mission_type != message.mission_type:
+        kind = message.mission_type
+        upload = self._uploads.get(kind)
+        if upload is None or upload.client != client:
             # The last item again: our MISSION_ACK got lost.
-            if self._ended is not None and self._ended[:3] == (client, message.mission_type, message.seq):
-                self._ack(client, self._ended[3], message.mission_type)
+            ended = self._ended.get(kind)
+            if ended is not None and ended[:2] == (client, message.seq):
+                self._ack(client, ended[2], kind)
         elif upload.accept(message, now_s) and upload.is_complete:
             self._complete(upload)
 
     def _complete(self, upload: Upload) -> None:
-        items = tuple(upload.items)
-        kind = MissionType(upload.mission_type)
-        rejection = self._check(items) if kind == MissionType.MISSION else None
-        if rejection is not None:
-            self._refuse_upload(upload, rejection)
-            return
-        is_changed = items != self._stored[kind]
-        self._stored[kind] = items
-        self._events.append(MissionReplaced(kind, items, mission_id(items), is_changed))
-        self._end(upload, MissionResult.ACCEPTED)
+        outcome = self._store.replace(upload.mission_type, tuple(upload.items))
+        if isinstance(outcome, Rejection):
+            self._refuse_upload(upload, outcome)
+        else:
+            self._events.append(outcome)
+            self._end(upload, MissionResult.ACCEPTED)
 
     def _refuse_upload(self, upload: Upload, rejection: Rejection) -> None:
-        self._events.append(MissionRefused(*rejection))
+        self._refused(*rejection, upload.mission_type)
         self._end(upload, rejection.result)
 
     def _end(self, upload: Upload, result: MissionResult) -> None:
-        self._upload = None
-        self._ended = (upload.client, upload.mission_type, upload.count - 1, result)
-        self._ack(upload.client, result, upload.mission_type)
+        kind = upload.mission_type
+        del self._uploads[kind]
+        self._ended[kind] = (upload.client, upload.count - 1, result)
+        self._ack(upload.client, result, kind)
 
-    def _is_busy_for(self, client: Client, kind: int) -> bool:
+    def _forget_upload(self, kind: int) -> None:
+        self._uploads.pop(kind, None)
+        self._ended.pop(kind, None)
+
+    def _is_busy_for(self, client: Client, kinds: Iterable[int], asked: int) -> bool:
         """Deny ``client`` while another one uploads; the upload goes on unharmed."""
-        if self._upload is None or self._upload.client == client:
-            return False
-        self._ack(client, MissionResult.DENIED, kind)
-        reason = "another ground station is uploading a mission; try again when it is done"
-        self._events.append(MissionRefused(MissionResult.DENIED, None, reason))
-        return True
+        for kind in kinds:
+            upload = self._uploads.get(kind)
+            if upload is not None and upload.client != client:
+                self._ack(client, MissionResult.DENIED, asked)
+                name = PLAN_NAMES[MissionType(kind)]
+                reason = f"another ground station is uploading a {name}; try again when it is done"
+                self._refused(MissionResult.DENIED, None, reason, kind)
+                return True
+        return False
 
     def _on_ack(self, message: Message, client: Client, now_s: float) -> None:
         """A client ends its download, or calls off its upload: any error does."""
         kind, result = message.mission_type, message.type
         self._downloads.end(client, kind)
-        upload = self._upload
-        if upload is None or upload.client != client or upload.mission_type != kind:
+        upload = self._uploads.get(kind)
+        if upload is None or upload.client != client:
             return
         if result == MissionResult.UNSUPPORTED and upload.change_kind(now_s):
             return  # it may know the other kind of request: PX4 reads this answer the same way
         if result != MissionResult.ACCEPTED:
-            self._upload = None
+            del self._uploads[kind]
 
     # -- the rest
 
     def _on_list(self, message: Message, client: Client, now_s: float) -> None:
         kind = message.mission_type
-        count = self._downloads.begin(client, kind, self._stored[kind], now_s)
-        self._send(client, mavlink.MAVLink_mission_count_message(*client.address, count, kind))
+        items, plan_id = self._store.items(kind), self._store.plan_id(kind)
+        count = self._downloads.begin(client, kind, items, now_s)
+        self._send(client, mavlink.MAVLink_mission_count_message(*client.address, count, kind, plan_id))
 
     def _on_request(self, message: Message, client: Client, now_s: float) -> None:
         kind = message.mission_type
-        answer = self._downloads.answer(message, client, self._stored[kind], self.current_seq, now_s)
+        answer = self._downloads.answer(message, client, self._store.items(kind), self.current_seq, now_s)
         if answer is None:
             self._ack(client, MissionResult.INVALID_SEQUENCE, kind)
         else:
             self._send(client, answer)
 
     def _on_clear(self, kind: int, client: Client) -> None:
-        if self._is_busy_for(client, kind):
-            return
-        if kind != MissionType.ALL and kind not in self._stored:
+        kinds = list(self._store.kinds) if kind == MissionType.ALL else [kind]
+        if not all(self._store.has(each) for each in kinds):
             self._ack(client, MissionResult.UNSUPPORTED, kind)
-            return
-        self._upload = None
-        self._clear(list(self._stored) if kind == MissionType.ALL else [kind])
-        self._ack(client, MissionResult.ACCEPTED, kind)
+        elif not self._is_busy_for(client, kinds, kind):
+            self._clear(kinds)
+            self._ack(client, MissionResult.ACCEPTED, kind)
 
-    def _clear(self, kinds: list[int]) -> None:
+    def _clear(self, kinds: Iterable[int]) -> None:
         for kind in kinds:
-            self._stored[kind] = ()
-            self._events.append(MissionCleared(MissionType(kind)))
+            self._uploads.pop(kind, None)
+            self._events.append(self._store.clear(kind))
 
     def _on_set_current(self, seq: int) -> None:
         count = len(self.items())
@@ -249,10 +209,14 @@ class MissionServer:
             self._events.append(CurrentRequested(seq))
         else:
             reason = f"item {seq} cannot be made current: the mission has {count} items"
-            self._events.append(MissionRefused(MissionResult.INVALID_SEQUENCE, seq, reason))
+            self._refused(MissionResult.INVALID_SEQUENCE, seq, reason, MissionType.MISSION)
+
+    def _refused(self, result: MissionResult, seq: int | None, reason: str, kind: int) -> None:
+        self._events.append(MissionRefused(result, seq, reason, MissionType(kind)))
 
     def _ack(self, client: Client, result: MissionResult, kind: int) -> None:
-        self._send(client, ack_message(client.address, result, kind))
+        plan_id = self._store.plan_id(kind) if result == MissionResult.ACCEPTED else 0
+        self._send(client, ack_message(client.address, result, kind, plan_id))
 
     def _send(self, client: Client, message: Message) -> None:
         self._outbox.append((client.peer, message))
