@@ -234,3 +234,113 @@ def test_goodbye_is_heard_and_said() -> None:
     assert stack.peer_said_goodbye
     (message,) = Link(1, 51).decode(stack.heartbeat(False, leaving=True))
     assert message.system_status == mavlink.MAV_STATE_POWEROFF
+
+
+# ---------------------------------------------------------------------- battery, age and time
+
+
+def battery(**changes) -> bytes:
+    fields = {
+        "id": 0, "battery_function": 1, "type": 1, "temperature": 0x7FFF,
+        "voltages": [3900, 3910, 3920] + [0xFFFF] * 7, "current_battery": 1250, "current_consumed": 100,
+        "energy_consumed": -1, "battery_remaining": 64,
+    }  # fmt: skip
+    return Link(1, 200).encode(mavlink.MAVLink_battery_status_message(**{**fields, **changes}))
+
+
+def test_a_battery_is_taken_with_the_time_of_its_state() -> None:
+    stack = link()
+    assert not stack.battery.valid
+    assert receive(stack, plant_state(2000))
+    assert receive(stack, battery() + plant_state(4000))
+    assert stack.battery == (pytest.approx(11.73), pytest.approx(12.5), pytest.approx(0.64), 4000, True)
+    assert stack.state.tolist() == STATE
+    assert not receive(stack, battery(battery_remaining=50))
+    assert (stack.battery.remaining, stack.battery.time_us) == (0.5, 4000)
+
+
+def test_what_a_battery_does_not_know_is_not_a_number() -> None:
+    stack = link()
+    receive(stack, battery(voltages=[0xFFFF] * 10, current_battery=-1, battery_remaining=-1))
+    assert all(math.isnan(value) for value in stack.battery[:3])
+    assert not stack.battery.valid
+    receive(stack, battery(voltages=[65534, 9466] + [0xFFFF] * 8, voltages_ext=[0xFFFF, 0, 0, 0]))
+    assert stack.battery.voltage_v == pytest.approx(75.0)  # more than one place holds
+    receive(stack, battery(id=1, battery_remaining=3))
+    assert stack.battery.remaining == pytest.approx(0.64)
+    receive(stack, battery(battery_remaining=127))
+    assert stack.battery.remaining == 1.0
+
+
+def test_a_state_that_stays_away_grows_old() -> None:
+    stack = link()
+    receive(stack, plant_state(0))
+    assert stack.freshness(0) == (0, 0)
+    assert stack.freshness(10_000) == (10_000, 10_000)
+    receive(stack, plant_state(12_000, [2.0, *STATE[1:]]))
+    assert stack.freshness(20_000) == (0, 0)
+    assert stack.freshness(30_000).age_us == 10_000
+
+
+def test_a_state_that_comes_but_never_changes_is_frozen() -> None:
+    stack = link()
+    for time_us in range(0, 60_000, 10_000):
+        receive(stack, plant_state(time_us))
+        fresh = stack.freshness(time_us)
+    assert fresh == (0, 50_000)
+    receive(stack, plant_state(60_000, [math.nextafter(STATE[0], 2.0), *STATE[1:]]))
+    assert stack.freshness(60_000) == (0, 0)
+    for time_us in (70_000, 80_000, 90_000):
+        receive(stack, plant_state(time_us, [math.nan] * 13))
+        fresh = stack.freshness(time_us)
+    assert fresh == (0, 20_000)
+
+
+@pytest.mark.parametrize("odd", [0, 100_000, 10_000_000_000, 2**64 - 1])
+def test_the_clock_neither_goes_back_nor_jumps(odd: int) -> None:
+    """The step to an odd time is not followed; those after it are, and answers carry the state's own time."""
+    stack, answer = link(), ActuatorsFrame()
+    receive(stack, plant_state(1_000_000))
+    receive(stack, plant_state(1_002_000))
+    receive(stack, plant_state(odd, [5.0, *STATE[1:]]))
+    assert (stack.time_us, stack.odd_times, stack.state[0]) == (1_002_000, 1, 5.0)
+    assert answer.open(stack.answer(np.zeros(8), True))
+    assert answer.time_us == odd
+    receive(stack, plant_state((odd + 4000) % 2**64))
+    expected = 1_002_000 if odd == 2**64 - 1 else 1_006_000
+    assert stack.time_us == expected
+    receive(stack, plant_state((odd + 6000) % 2**64))
+    assert stack.time_us == expected + 2000
+
+
+def test_the_first_time_begins_the_clock_if_it_is_believable() -> None:
+    stack = link()
+    receive(stack, plant_state(5_000_000_000))
+    assert (stack.time_us, stack.odd_times) == (5_000_000_000, 0)
+    other = link()
+    receive(other, plant_state(2**64 - 1))
+    receive(other, plant_state(2000))
+    receive(other, plant_state(4000))
+    assert other.time_us == 2000
+
+
+def test_a_failure_is_asked_for_by_the_standard_command() -> None:
+    (m,) = Link(1, 51).decode(link().failure_request(101, 1, 2))
+    assert (m.command, m.param1, m.param2, m.param3) == (mavlink.MAV_CMD_INJECT_FAILURE, 101.0, 1.0, 2.0)
+
+
+@pytest.mark.parametrize("junk", [b"\xfd\xff\x00", b"\xfe\xff", b"\xfd\xff\x00" * 90, b"\xfd" * 500])
+def test_junk_in_the_same_piece_costs_no_state(junk: bytes) -> None:
+    stack = link()
+    for time_us in range(2000, 22_000, 2000):
+        data = junk + plant_state(time_us)
+        cut = len(junk) + 40
+        assert receive(stack, data[:cut]) | receive(stack, data[cut:])
+        assert stack.time_us == time_us
+        assert receive(stack, junk + plant_state(time_us + 1000))
+
+
+def test_an_ack_of_another_command_refuses_nothing() -> None:
+    stack = link()
+    receive(stack, Link(1, 1).encode(mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_INJECT_FAILURE, 3)))
+    assert not stack.request_refused
