@@ -17,6 +17,9 @@ SELECT: dict[Mode, Event] = {
     Mode.MISSION: Event.SELECT_MISSION,
     Mode.RETURN: Event.SELECT_RETURN,
     Mode.LAND: Event.SELECT_LAND,
+    Mode.POSITION: Event.SELECT_POSITION,
+    Mode.ALTITUDE: Event.SELECT_ALTITUDE,
+    Mode.OFFBOARD: Event.SELECT_OFFBOARD,
 }
 
 

@@ -8,9 +8,11 @@ from flightstack.commands import VehicleContext
 from flightstack.ground.command_service import CommandService
 from flightstack.ground.facts import AutopilotFacts
 from flightstack.ground.link_commands import LinkCommands
+from flightstack.ground.link_loss import LinkLossService
 from flightstack.ground.mission_service import MissionService
 from flightstack.ground.peer import Peer
 from flightstack.ground.service import Service
+from flightstack.ground.stream_services import stream_services
 from flightstack.mavlink.services.addressing import Address
 
 
@@ -23,4 +25,6 @@ def make_services(
         MissionService(own, vehicle.autopilot),
         CommandService(own, vehicle, peer_at, link_commands.answer),
         link_commands,
+        *stream_services(own, vehicle.autopilot),
+        LinkLossService(vehicle.autopilot),
     ]

@@ -99,7 +99,7 @@ class Navigator:
         self._aim = np.zeros(AIM_SIZE)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0))
         self._stream = empty_stream()
-        self.attitude_target = np.zeros(ATTITUDE_TARGET_SIZE)
+        self.attitude_target = np.eye(1, ATTITUDE_TARGET_SIZE)[0]
         """What the loops fly in place of the outer loop's target while ``flies_attitude``; array form."""
         self._plan = np.zeros((0, PLAN_COLUMNS))
         self._jumps_left = np.zeros(0)
@@ -123,6 +123,8 @@ class Navigator:
 
     def set_speed(self, speeds: SpeedOverrides) -> None:
         """Fly at other speeds than the parameters' until the end of the flight."""
+        if speeds == self._speeds:
+            return
         self._speeds = speeds
         self.set_params(self._given_params)
         self._mission[M_SPEED] = self.params.cruise_speed_m_s
