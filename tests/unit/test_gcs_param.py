@@ -1,0 +1,344 @@
+"""``gcs param`` against a scripted vehicle, its table, its files and the metadata it reads."""
+
+from __future__ import annotations
+
+import io
+import json
+import lzma
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+
+from flightstack.mavlink.services.param_client import ParamTiming
+from flightstack.mavlink.services.param_values import Parameter
+from flightstack.params.errors import ConfigError
+from gcs_cli.param_file import load_parameters, render_parameters
+from gcs_cli.param_info import ParamInfo, number_text, parse_metadata
+from gcs_cli.param_table import matching, parameter_table
+from tests.support.fake_vehicle import serve
+from tests.support.gcs import Ended, gcs
+from tests.support.param_vehicle import METADATA, ParamVehicle
+
+
+def told(vehicle: ParamVehicle, *arguments: object) -> Ended:
+    with serve(vehicle) as socket:
+        return gcs("--connect", f"udpout:127.0.0.1:{socket.address[1]}", "param", *arguments)
+
+
+@pytest.fixture
+def vehicle() -> ParamVehicle:
+    return ParamVehicle()
+
+
+# ---------------------------------------------------------------------- commands
+
+
+def test_the_list_shows_value_unit_range_and_help(vehicle: ParamVehicle) -> None:
+    result = told(vehicle, "list")
+    assert (result.stderr, result.returncode) == ("", 0)
+    line = next(line for line in result.stdout.splitlines() if line.startswith("MPC_XY_CRUISE"))
+    assert line.split() == [
+        "MPC_XY_CRUISE",
+        "4",
+        "m/s",
+        "0.1",
+        "to",
+        "20",
+        "Horizontal",
+        "speed",
+        "in",
+        "auto",
+        "modes",
+    ]
+    assert "default" not in result.stdout  # all have it: no column for it
+
+
+def test_the_list_shows_the_default_of_what_was_changed(vehicle: ParamVehicle) -> None:
+    vehicle.values["MPC_XY_CRUISE"] = 7.5
+    lines = told(vehicle, "list", "cruise").stdout.splitlines()
+    assert "default" in lines[0]
+    assert lines[-1].split()[:4] == ["MPC_XY_CRUISE", "7.5", "m/s", "4"]
+    assert len(lines) == 3
+
+
+def test_a_vehicle_without_metadata_is_listed_all_the_same() -> None:
+    result = told(ParamVehicle(tells=False), "list", "MPC_*")
+    assert result.returncode == 0
+    assert [line.split() for line in result.stdout.splitlines()[-2:]] == [
+        ["MPC_XY_CRUISE", "4"],
+        ["MPC_YAW_MODE", "0"],
+    ]
+
+
+def test_the_list_as_json(vehicle: ParamVehicle) -> None:
+    facts = json.loads(told(vehicle, "list", "yaw", "--json").stdout)
+    assert facts == [
+        {
+            "name": "MPC_YAW_MODE", "value": 0, "default": 0.0, "min": 0.0, "max": 5.0, "unit": None,
+            "help": "Heading where none is given", "choices": {"0": "Towards the waypoint", "5": "As it is"},
+        }
+    ]  # fmt: skip
+
+
+def test_a_pattern_that_matches_nothing(vehicle: ParamVehicle) -> None:
+    result = told(vehicle, "list", "NOTHING")
+    assert (result.stderr, result.returncode) == ("gcs: no parameter matches NOTHING\n", 1)
+
+
+def test_get_tells_all_about_one(vehicle: ParamVehicle) -> None:
+    assert told(vehicle, "get", "mpc_xy_cruise").stdout == (
+        "MPC_XY_CRUISE = 4 m/s\n  Horizontal speed in auto modes\n  default 4, range 0.1 to 20\n"
+    )
+    assert told(vehicle, "get", "MPC_YAW_MODE").stdout == (
+        "MPC_YAW_MODE = 0\n  Heading where none is given\n  default 0, takes effect after a restart\n"
+        "  0: Towards the waypoint\n  5: As it is\n"
+    )
+    assert json.loads(told(vehicle, "get", "ROLL_P", "--json").stdout)["value"] == 0.38729835
+
+
+def test_get_of_an_unknown_name(vehicle: ParamVehicle) -> None:
+    result = told(vehicle, "get", "NONE")
+    assert (result.stderr, result.returncode) == ("gcs: NONE refused: the vehicle has no such parameter\n", 1)
+
+
+def test_set_says_what_it_changed(vehicle: ParamVehicle) -> None:
+    assert told(vehicle, "set", "MPC_XY_CRUISE", "5.5").stdout == "MPC_XY_CRUISE = 5.5 m/s (was 4)\n"
+    assert vehicle.values["MPC_XY_CRUISE"] == 5.5
+    assert told(vehicle, "set", "MPC_XY_CRUISE", "5.5").stdout == "MPC_XY_CRUISE is 5.5 m/s already\n"
+    assert told(vehicle, "set", "MPC_YAW_MODE", "5").stdout == (
+        "MPC_YAW_MODE = 5 (was 0); it takes effect after a restart\n"
+    )
+    assert vehicle.values["MPC_YAW_MODE"] == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence", "code"),
+    [
+        (["MPC_XY_CRUISE", "25"], "MPC_XY_CRUISE = 25 refused: 25 is outside 0.1 to 20", 1),
+        (["MPC_XY_CRUISE", "-1"], "MPC_XY_CRUISE = -1 refused: -1 is outside 0.1 to 20", 1),
+        (["MPC_YAW_MODE", "0.5"], "MPC_YAW_MODE = 0.5 refused: the parameter is an integer", 1),
+        (["NONE", "1"], "NONE refused: the vehicle has no such parameter", 1),
+        (["MPC_XY_CRUISE", "fast"], "fast: expected a number", 2),
+        (["MPC_XY_CRUISE", "nan"], "nan: expected a number", 2),
+    ],
+)
+def test_a_refused_set_is_one_sentence(
+    vehicle: ParamVehicle, arguments: list[str], sentence: str, code: int
+) -> None:
+    before = dict(vehicle.values)
+    result = told(vehicle, "set", *arguments)
+    assert (result.stderr, result.returncode) == (f"gcs: {sentence}\n", code)
+    assert result.stdout == ""
+    assert vehicle.values == before
+
+
+def test_reset_of_some(vehicle: ParamVehicle) -> None:
+    vehicle.values.update(MPC_XY_CRUISE=9.0, MPC_YAW_MODE=5)
+    result = told(vehicle, "reset", "MPC_XY_CRUISE", "ROLL_P")
+    assert result.stdout == "MPC_XY_CRUISE = 4 m/s (was 9)\nROLL_P is 0.38729835 already\n"
+    assert (vehicle.values["MPC_XY_CRUISE"], vehicle.values["MPC_YAW_MODE"]) == (4.0, 5)
+
+
+def test_reset_of_all(vehicle: ParamVehicle) -> None:
+    vehicle.values.update(MPC_XY_CRUISE=9.0, MPC_YAW_MODE=5)
+    assert told(vehicle, "reset", "--all").stdout == "all parameters have their defaults\n"
+    assert (vehicle.values["MPC_XY_CRUISE"], vehicle.values["MPC_YAW_MODE"]) == (4.0, 0)
+
+
+def test_reset_needs_to_know_what(vehicle: ParamVehicle) -> None:
+    for arguments in ((), ("ROLL_P", "--all")):
+        result = told(vehicle, "reset", *arguments)
+        assert (result.stderr, result.returncode) == (
+            "gcs: reset: expected names of parameters, or --all\n",
+            2,
+        )
+
+
+def test_reset_without_known_defaults_changes_nothing() -> None:
+    vehicle = ParamVehicle(tells=False)
+    vehicle.values["MPC_XY_CRUISE"] = 9.0
+    result = told(vehicle, "reset", "MPC_XY_CRUISE")
+    assert result.returncode == 1
+    assert "does not tell its default" in result.stderr
+    assert vehicle.values["MPC_XY_CRUISE"] == 9.0
+
+
+def test_what_was_saved_is_loaded(vehicle: ParamVehicle, tmp_path: Path) -> None:
+    file = tmp_path / "tuned.params"
+    vehicle.values.update(MPC_XY_CRUISE=9.25, MPC_YAW_MODE=5)
+    assert told(vehicle, "save", file).stdout == f"3 parameters saved to {file}\n"
+    assert "1\t1\tMPC_XY_CRUISE\t9.25\t9\n1\t1\tMPC_YAW_MODE\t5\t6\n" in file.read_text()
+    assert told(vehicle, "diff", file).stdout == f"all parameters are as in {file}\n"
+    other = ParamVehicle()
+    difference = told(other, "diff", file).stdout.splitlines()
+    assert difference[0].split() == ["name", "value", "unit", "file", "range", "help"]
+    assert difference[2].split()[:4] == ["MPC_XY_CRUISE", "4", "m/s", "9.25"]
+    assert told(other, "load", file).stdout == "2 of 3 parameters changed\n"
+    assert other.values == vehicle.values
+    assert told(other, "load", file).stdout == "0 of 3 parameters changed\n"
+
+
+def test_what_cannot_be_loaded_is_named_and_the_rest_is_loaded(vehicle: ParamVehicle, tmp_path: Path) -> None:
+    file = tmp_path / "other.params"
+    file.write_text("1 1 FOREIGN 1 9\n1 1 MPC_XY_CRUISE 99 9\n1 1 MPC_YAW_MODE 5 6\n")
+    result = told(vehicle, "load", file)
+    assert result.returncode == 1
+    assert result.stdout == "1 of 3 parameters changed\n"
+    assert result.stderr.splitlines() == [
+        "gcs: FOREIGN: the vehicle has no such parameter",
+        "gcs: MPC_XY_CRUISE = 99 refused: 99 is outside 0.1 to 20",
+        f"gcs: 2 parameters of {file} were not set",
+    ]
+    assert vehicle.values["MPC_YAW_MODE"] == 5
+
+
+def test_diff_from_the_defaults(vehicle: ParamVehicle) -> None:
+    assert told(vehicle, "diff").stdout == "all parameters have their defaults\n"
+    vehicle.values["MPC_XY_CRUISE"] = 9.0
+    lines = told(vehicle, "diff").stdout.splitlines()
+    assert lines[-1].split()[:4] == ["MPC_XY_CRUISE", "9", "m/s", "4"]
+    assert len(lines) == 3
+    result = told(ParamVehicle(tells=False), "diff")
+    assert result.returncode == 1
+    assert "name a file" in result.stderr
+
+
+def test_a_bad_file_is_a_usage_error_before_anything_is_asked(tmp_path: Path) -> None:
+    for command in ("load", "diff"):
+        result = gcs("param", command, tmp_path / "none.params")
+        assert result.returncode == 2
+        assert "No such file" in result.stderr
+
+
+def test_a_vehicle_that_does_not_answer_about_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gcs_cli.param_calls.TIMING", ParamTiming(timeout_s=0.1, retries=1))
+    vehicle = ParamVehicle(deaf_to={"PARAM_REQUEST_READ"})
+    result = told(vehicle, "get", "ROLL_P")
+    assert (result.returncode, result.stdout) == (3, "")
+    assert "did not answer about ROLL_P" in result.stderr
+
+
+# ---------------------------------------------------------------------- table, files and metadata
+
+
+@pytest.mark.parametrize(
+    ("pattern", "names"),
+    [
+        ("*", ["AB_C", "AB_D", "XAB"]),
+        ("ab", ["AB_C", "AB_D", "XAB"]),
+        ("AB*", ["AB_C", "AB_D"]),
+        ("ab_?", ["AB_C", "AB_D"]),
+        ("AB_[C]", ["AB_C"]),
+        ("q", []),
+    ],
+)
+def test_patterns(pattern: str, names: list[str]) -> None:
+    parameters = [Parameter(name, 0.0, False, 0, 3) for name in ("AB_C", "AB_D", "XAB")]
+    assert [told.name for told in matching(parameters, pattern)] == names
+
+
+def test_the_table_fits_a_terminal_of_80_columns() -> None:
+    infos = parse_metadata(lzma.compress(json.dumps({"parameters": METADATA}).encode()))
+    parameters = [
+        Parameter("MPC_XY_CRUISE", 7.123456, False, 0, 3),
+        Parameter("ABCDEFGHIJKLMNOP", 0.38729835, False, 1, 3),
+    ]
+    infos["ABCDEFGHIJKLMNOP"] = ParamInfo(1.0, -1e38, 1e38, "rad/s^2", "A long line of help " * 4)
+    console = Console(width=80, file=io.StringIO(), force_terminal=False)
+    console.print(parameter_table(parameters, infos))
+    output = console.file
+    assert isinstance(output, io.StringIO)
+    lines = output.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "ABCDEFGHIJKLMNOP" in output.getvalue()
+    assert "0.38729835" in output.getvalue()
+
+
+@settings(derandomize=True, deadline=None)
+@given(
+    st.dictionaries(
+        st.text("ABC_", min_size=1, max_size=16),
+        st.tuples(st.floats(width=32, allow_nan=False, allow_infinity=False), st.booleans()),
+        max_size=9,
+    )
+)
+def test_a_file_brings_every_value_back(
+    tmp_path_factory: pytest.TempPathFactory, values: dict[str, tuple[float, bool]]
+) -> None:
+    path = tmp_path_factory.mktemp("params") / "all.params"
+    parameters = [Parameter(name, value, kind, 0, 1) for name, (value, kind) in values.items()]
+    path.write_text(render_parameters(parameters, 1, 1), encoding="utf-8")
+    loaded = load_parameters(path)
+    assert {name: number_text(value) for name, value in loaded.items()} == {
+        told.name: number_text(told.value) for told in parameters
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("1 1 NAME", "line 1: expected system, component, name, value and type"),
+        ("# fine\n\n1 1 NAME x 9", "line 3: x is not a number"),
+        ("1 1 NAME nan 9", "line 1: nan is not a number"),
+        ("1 1 NAME inf 9", "line 1: inf is not a number"),
+        ("1 1 NAME_OF_TOO_MANY_LETTERS 1 9", "line 1: has no name of 1 to 16 characters"),
+        ("1\t1\t\t1\t9", "line 1: has no name"),
+        ("1 1 NÄME 1 9", "line 1: has no name"),
+        ("1 1 A 1 9\n1 1 A 2 9", "line 2: A stands twice"),
+    ],
+)
+def test_a_bad_line_is_named(tmp_path: Path, text: str, problem: str) -> None:
+    path = tmp_path / "bad.params"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=problem):
+        load_parameters(path)
+
+
+def test_a_file_that_is_no_text(tmp_path: Path) -> None:
+    path = tmp_path / "bad.params"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match="is no text"):
+        load_parameters(path)
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=8,
+)
+KEYS = st.sampled_from(
+    [
+        "name",
+        "default",
+        "min",
+        "max",
+        "units",
+        "shortDesc",
+        "values",
+        "rebootRequired",
+        "value",
+        "description",
+    ]
+)
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(st.lists(st.dictionaries(KEYS, JSON | st.just("P"), max_size=8) | JSON, max_size=4))
+def test_any_metadata_is_read_or_passed_over(entries: list[object]) -> None:
+    infos = parse_metadata(lzma.compress(json.dumps({"parameters": entries}).encode()))
+    for name, info in infos.items():
+        assert isinstance(name, str)
+        assert info.help.isprintable()
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.binary(max_size=40) | st.binary(max_size=40).map(lzma.compress))
+def test_bytes_that_are_no_metadata_are_none(data: bytes) -> None:
+    assert parse_metadata(data) == {}
+
+
+def test_a_small_file_that_grows_without_end_is_cut() -> None:
+    assert parse_metadata(lzma.compress(b" " * 40_000_000 + b'{"parameters": [{"name": "A"}]}')) == {}
