@@ -2,88 +2,48 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from flightstack.commander.transitions import Event, Facts, Outcome, Status, transition
+from flightstack.commander.arming_checks import arming_refusals
+from flightstack.commander.conditions import LinkFacts, StateSource
+from flightstack.commander.failsafe import Action, Decision
+from flightstack.commander.supervisor import Supervisor
+from flightstack.commander.transitions import Event, Facts, Need, Outcome, Status, transition
 from flightstack.contract import FloatArray, LoopRow, LoopStatus
 from flightstack.control.backend import ControlBackend
 from flightstack.geodesy import GeoPoint
 from flightstack.guidance.mission import NAV_DELAY, TAKEOFF
-from flightstack.guidance.navigator import MissionProgress, Navigator
+from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.guidance.plan_table import plan_table
+from flightstack.guidance.setpoints import OffboardSetpoint, Sticks
+from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.modes import Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
 from flightstack.plan import MissionItem, Rejection, check_mission
 from flightstack.plan.check import Limits
+from flightstack.snapshot import CRITICAL, EMERGENCY, INFO, NOTICE, WARNING, Recorder, Snapshot, Text
 
-EMERGENCY, ALERT, CRITICAL, ERROR, WARNING, NOTICE, INFO = range(7)
-"""MAV_SEVERITY of texts."""
-
-COS_MAX_ARMING_TILT = math.cos(math.radians(30.0))
-HELD = LoopStatus.INPUT_NOT_FINITE | LoopStatus.OUTPUT_NOT_FINITE
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
 """Modes that make a standing vehicle fly, now or later."""
+STREAM_MODES = (Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
+"""Modes in which a stream from the ground says where to fly, and whether to leave the ground."""
 
+FAILSAFE_EVENTS: dict[Action, tuple[Event, ...]] = {
+    Action.POSITION: (Event.SELECT_POSITION, Event.SELECT_HOLD, Event.SELECT_LAND),
+    Action.ALTITUDE: (Event.SELECT_ALTITUDE, Event.SELECT_HOLD, Event.SELECT_LAND),
+    Action.HOLD: (Event.SELECT_HOLD, Event.SELECT_LAND),
+    Action.RETURN: (Event.SELECT_RETURN, Event.SELECT_LAND),
+    Action.LAND: (Event.SELECT_LAND,),
+    Action.DISARM: (Event.FORCE_DISARM,),
+    Action.TERMINATE: (Event.TERMINATE,),
+}
+"""What a failsafe's action means to the commander: the first event that is not refused."""
 
-class Recorder(Protocol):
-    """Where the autopilot writes what happens; ``logging.recorder`` makes a flight log of it."""
-
-    def inner_row(self, time_us: int) -> FloatArray:
-        """Return the row, shape (48,), that the inner loop fills in this tick."""
-
-    def outer(
-        self, time_us: int, state: FloatArray, setpoint: FloatArray, attitude_target: FloatArray
-    ) -> None:
-        """Record one outer tick."""
-
-    def status(self, time_us: int, status: Status) -> None:
-        """Record a change of mode or arming."""
-
-    def landed(self, time_us: int, landed: bool) -> None:
-        """Record a change of the land detector."""
-
-    def mission(self, time_us: int, progress: MissionProgress, count: int) -> None:
-        """Record progress of the mission."""
-
-    def text(self, time_us: int, severity: int, text: str) -> None:
-        """Record a text."""
-
-
-DISARMED = Status()
-NO_PROGRESS = MissionProgress(0, -1, False, False)
-
-
-class Text(NamedTuple):
-    """A text for the operator."""
-
-    severity: int
-    text: str
-
-
-@dataclass
-class Snapshot:
-    """What telemetry reads: the arrays are live, the rest is copied once per change."""
-
-    state: FloatArray
-    setpoint: FloatArray
-    attitude_target: FloatArray
-    row: FloatArray
-    time_us: int = 0
-    status: Status = DISARMED
-    landed: bool = True
-    progress: MissionProgress = NO_PROGRESS
-    mission_count: int = 0
-    mission_complete: bool = False
-    reached: list[int] = field(default_factory=list)
-    """Mission items reached that telemetry has yet to announce."""
-    texts: list[Text] = field(default_factory=list)
+USERS_CHOICES = frozenset(event for event in Event if event.name.startswith("SELECT_"))
 
 
 class Autopilot:
@@ -100,20 +60,24 @@ class Autopilot:
         recorder: Recorder,
         state: FloatArray,
         rotor_speed_rad_s: FloatArray,
+        source: StateSource,
     ) -> None:
-        """Use ``state`` (13,) and ``rotor_speed_rad_s`` (8,), which the simulator link writes in place."""
-        self.behaviour = behaviour
+        """Use ``state`` (13,) and ``rotor_speed_rad_s`` (8,), which ``source`` writes in place."""
+        self._vehicle = vehicle
+        self._behaviour = behaviour
         self.home = home
+        self.supervisor = Supervisor(vehicle, behaviour, outer_hz, state, source)
         self.items: tuple[MissionItem, ...] = ()
         self._divisor = divisor
         self._backend = backend
         self._recorder = recorder
+        self._weight_n = vehicle.weight_n
         self._navigator = Navigator(guidance_params(behaviour, vehicle.weight_n), outer_hz)
+        self._max_thrust_n = 2.0 * vehicle.weight_n if vehicle.ideal_rotors else vehicle.max_thrust_n
         self._state = state
         self._rotor_speed = rotor_speed_rad_s
         self._tick = 0
         self._flying = False
-        self._faults = 0
         self._armed_us = 0
         self._landed_us = 0
         self._has_flown = False
@@ -133,24 +97,38 @@ class Autopilot:
         self._tick += 1
         if outer_due:
             self._supervise(time_us)
-            if self._flying or now.status.mode is Mode.MISSION:  # a mission also waits on the ground
-                self._navigator.step(now.status.mode, state, now.attitude_target)
+            self._guide()
         row = self._recorder.inner_row(time_us)
-        if self._flying:
-            self._backend.step(state, now.setpoint, self._rotor_speed, outer_due, row)
-        else:
+        if not self._flying:
             self._backend.idle(state, self._rotor_speed, now.status.armed, row)
+        elif self.supervisor.holds_rotors:
+            row[:] = now.row
+            row[LoopRow.STATUS] = LoopStatus.INPUT_STALE
+        else:
+            aims = outer_due and not self._navigator.flies_attitude(now.status.mode)
+            self._backend.step(state, now.setpoint, self._rotor_speed, aims, row)
         now.row = row
         if outer_due:
             self._recorder.outer(time_us, state, now.setpoint, now.attitude_target)
         commands: FloatArray = row[LoopRow.ROTOR_COMMAND]
         return commands
 
+    def _guide(self) -> None:
+        """Let guidance say where to fly; it rests while the state is not to be flown by."""
+        now = self.now
+        mode = now.status.mode
+        waits = mode is Mode.MISSION  # a mission also waits on the ground
+        if self.supervisor.holds_rotors or not (self._flying or waits):
+            return
+        self._navigator.step(mode, self._state, now.attitude_target)
+        if self._flying and self._navigator.flies_attitude(mode):
+            self._backend.set_attitude_target(self._navigator.attitude_target)
+
     # ------------------------------------------------------------------ events of the flight
 
     def _supervise(self, time_us: int) -> None:
-        """Turn what guidance and the land detector found into events; once per outer tick."""
-        self._watch_input()
+        """Turn what failsafes, guidance and the land detector found into events; once per outer tick."""
+        self._watch_failsafes(time_us)
         if not self.now.status.armed:
             return
         self._watch_ground(time_us)
@@ -158,19 +136,25 @@ class Autopilot:
         if mode is Mode.MISSION:
             self._watch_mission(time_us)
         elif mode is Mode.TAKEOFF and self._flying and self._takeoff_is_reached():
-            self.happen(Event.TAKEOFF_REACHED)
+            self._apply(Event.TAKEOFF_REACHED)
+        elif mode in STREAM_MODES and self.now.landed and self._rises() is not self._flying:
+            self._choose_loops()
 
-    def _watch_input(self) -> None:
-        faults = int(self.now.row[LoopRow.STATUS]) & HELD
-        if faults == self._faults:
+    def _watch_failsafes(self, time_us: int) -> None:
+        now, supervisor = self.now, self.supervisor
+        flies_attitude = self._navigator.flies_attitude(now.status.mode)
+        supervisor.position_is_controlled = self._flying and not flies_attitude
+        acted = supervisor.decision
+        for severity, text in supervisor.step(time_us, now.status, now.landed, now.setpoint, now.row):
+            self.say(severity, text)
+        decision: Decision = supervisor.decision
+        if decision.action <= Action.WARN:
             return
-        self._faults = faults
-        if faults & LoopStatus.INPUT_NOT_FINITE:
-            self.say(CRITICAL, "State is not finite: the loops hold their last output")
-        elif faults:
-            self.say(CRITICAL, "Controller output is not finite: the loops hold their last output")
-        else:
-            self.say(NOTICE, "State and controller output are finite again")
+        if decision != acted:
+            self._recorder.status(time_us, now.status, failsafe=True)
+        for event in FAILSAFE_EVENTS.get(decision.action, ()):
+            if self._apply(event) is None:
+                break
 
     def _watch_ground(self, time_us: int) -> None:
         landed = self._navigator.landed
@@ -186,14 +170,15 @@ class Autopilot:
         b = self.behaviour
         if self._has_flown:
             if self._waited(time_us, self._landed_us, b.disarm_after_landing_s) and not self._is_taking_off():
-                self.happen(Event.LANDED_LONG_ENOUGH)
+                self._apply(Event.LANDED_LONG_ENOUGH)
         elif self._waited(time_us, self._armed_us, b.disarm_without_takeoff_s):
             self.say(WARNING, "Disarmed: no takeoff")
-            self.happen(Event.NO_TAKEOFF)
+            self._apply(Event.NO_TAKEOFF)
 
     def _is_taking_off(self) -> bool:
         """After a landing, only a mission that goes on flying keeps the vehicle armed."""
-        return self.now.status.mode in AIRBORNE_MODES
+        mode = self.now.status.mode
+        return mode in AIRBORNE_MODES or (mode in STREAM_MODES and self._flying)
 
     @staticmethod
     def _waited(time_us: int, since_us: int, wait_s: float) -> bool:
@@ -214,11 +199,11 @@ class Autopilot:
         if progress.wants_return:
             self.now.mission_complete = True
             self.say(INFO, "Mission finished: returning home")
-            self.happen(Event.MISSION_ASKS_RETURN)
+            self._apply(Event.MISSION_ASKS_RETURN)
         elif progress.finished:
             self.now.mission_complete = True
             self.say(INFO, "Mission finished")
-            self.happen(Event.MISSION_FINISHED)
+            self._apply(Event.MISSION_FINISHED)
 
     def _takeoff_is_reached(self) -> bool:
         return abs(float(self._state[2]) + self._takeoff_altitude_m) <= self.behaviour.altitude_acceptance_m
@@ -226,17 +211,39 @@ class Autopilot:
     # ------------------------------------------------------------------ commands
 
     @property
+    def behaviour(self) -> Behaviour:
+        """The parameters of guidance and commander; a new set takes effect with the next outer tick."""
+        return self._behaviour
+
+    @behaviour.setter
+    def behaviour(self, behaviour: Behaviour) -> None:
+        self._behaviour = behaviour
+        self._navigator.set_params(guidance_params(behaviour, self._vehicle.weight_n))
+        self.supervisor.set_behaviour(behaviour)
+
+    @property
+    def links(self) -> LinkFacts:
+        """What is known of the ground links; each service writes its own field."""
+        return self.supervisor.links
+
+    @property
     def facts(self) -> Facts:
         """What the transition table asks about."""
-        qx, qy = float(self._state[7]), float(self._state[8])
-        finite = bool(np.isfinite(self._state).all())
+        known = self.supervisor.arming_facts(self.now.status.mode, self.has_state)
         return Facts(
-            state_is_valid=finite and self.has_state,
-            upright=finite and 1.0 - 2.0 * (qx * qx + qy * qy) >= COS_MAX_ARMING_TILT,
+            state_is_valid=known.state_is_valid and known.state_is_fresh,
+            upright=known.upright,
             landed=self.now.landed,
             has_mission=bool(self.items),
             mission_begins_with_takeoff=self._mission_begins_with_takeoff(),
+            manual_fresh=known.manual_fresh,
+            offboard_fresh=known.offboard_fresh,
         )
+
+    def arming_refusals(self) -> tuple[str, ...]:
+        """Return every reason for which the vehicle would not arm now; empty when it would."""
+        known = self.supervisor.arming_facts(self.now.status.mode, self.has_state)
+        return arming_refusals(known, self._behaviour)
 
     def _mission_begins_with_takeoff(self) -> bool:
         for item in self.items:
@@ -245,7 +252,25 @@ class Autopilot:
         return False
 
     def happen(self, event: Event, takeoff_altitude_m: float | None = None) -> str | None:
-        """Apply an event; return why it was refused, or None."""
+        """Apply what a user asks for; return why it was refused, or None.
+
+        Arming is refused with all reasons at once. A mode that a user selects overrides the failsafes of the moment.
+        """
+        if event is Event.ARM:
+            reasons = self.arming_refusals()
+            if reasons:
+                return "; ".join(reasons)
+        refusal = self._apply(event, takeoff_altitude_m)
+        if refusal is None and event in USERS_CHOICES:
+            self.supervisor.override()
+        return refusal
+
+    def terminate(self, reason: str) -> None:
+        """Stop the rotors for good: nothing flies again before a reboot."""
+        self.say(EMERGENCY, f"Flight terminated: {reason}")
+        self._apply(Event.TERMINATE)
+
+    def _apply(self, event: Event, takeoff_altitude_m: float | None = None) -> str | None:
         before = self.now.status
         outcome: Outcome = transition(before, self.facts, event)
         if outcome.refusal is not None:
@@ -264,6 +289,7 @@ class Autopilot:
         self.now.status = after
         if after.armed and not before.armed:
             self._armed_us = self.now.time_us
+            self.supervisor.armed()
             self._has_flown = False
             self.now.landed = True
         if before.armed and not after.armed:  # the log ends with disarming: its last words come first
@@ -275,6 +301,7 @@ class Autopilot:
             self.say(NOTICE, "Armed")
         if not after.armed:
             self.now.landed = True
+            self._navigator.set_speed(SpeedOverrides())
         if after.mode is Mode.MISSION and before.mode is not Mode.MISSION:
             self.now.mission_complete = False
         if event in (Event.TAKEOFF_REACHED, Event.MISSION_FINISHED):
@@ -288,8 +315,7 @@ class Autopilot:
     def _choose_loops(self, entering: bool = False) -> None:
         """Start or stop the loops, and let guidance enter the mode."""
         status = self.now.status
-        rises = status.mode is Mode.TAKEOFF or (status.mode is Mode.MISSION and self._navigator.mission_flies)
-        flying = status.armed and (not self.now.landed or rises)
+        flying = status.armed and (not self.now.landed or self._rises())
         starting = flying and not self._flying
         if starting:
             self._backend.reset(self._state)
@@ -297,6 +323,48 @@ class Autopilot:
         if starting or (flying and entering):
             self._navigator.enter(status.mode, self._takeoff_altitude_m)
         self._flying = flying
+
+    def _rises(self) -> bool:
+        """Tell whether the mode makes a standing vehicle leave the ground."""
+        mode = self.now.status.mode
+        if mode in STREAM_MODES:
+            return self._navigator.wants_to_rise(mode, float(self._state[2]))
+        return mode is Mode.TAKEOFF or (mode is Mode.MISSION and self._navigator.mission_flies)
+
+    # ------------------------------------------------------------------ guided flight
+
+    def take_offboard(self, setpoint: OffboardSetpoint) -> None:
+        """Remember the newest offboard setpoint; it is flown in OFFBOARD."""
+        self._navigator.set_offboard(setpoint, self._max_thrust_n)
+
+    def take_sticks(self, sticks: Sticks) -> None:
+        """Remember the sticks; they are flown in POSITION and ALTITUDE."""
+        self._navigator.set_sticks(sticks)
+
+    def go_to(
+        self, north_m: float, east_m: float, down_m: float, yaw_rad: float, speed_m_s: float
+    ) -> str | None:
+        """Hold at a place [m NED]; NaN leaves what is. Return why not, or None."""
+        if not self.now.status.armed or self.now.landed:
+            return Need.IN_AIR.value
+        refusal = self.happen(Event.SELECT_HOLD)
+        if refusal is None:
+            self._navigator.reposition(north_m, east_m, down_m, yaw_rad, speed_m_s)
+        return refusal
+
+    @property
+    def speeds(self) -> SpeedOverrides:
+        """Speeds that were commanded in place of the parameters'."""
+        return self._navigator.speeds
+
+    def set_speeds(self, speeds: SpeedOverrides) -> None:
+        """Fly at other speeds until disarmed."""
+        self._navigator.set_speed(speeds)
+
+    def set_behaviour(self, behaviour: Behaviour) -> None:
+        """Fly by other parameters, from the next outer tick on."""
+        self.behaviour = behaviour
+        self._navigator.set_params(guidance_params(behaviour, self._weight_n))
 
     # ------------------------------------------------------------------ mission
 

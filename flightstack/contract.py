@@ -48,6 +48,7 @@ class LoopStatus:
     THRUST_SATURATED = 16
     IDLE = 32
     OUTPUT_NOT_FINITE = 64
+    INPUT_STALE = 128
 
 
 class Vector3(NamedTuple):

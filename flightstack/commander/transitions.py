@@ -23,11 +23,15 @@ class Event(Enum):
     SELECT_HOLD = auto()
     SELECT_RETURN = auto()
     SELECT_LAND = auto()
+    SELECT_POSITION = auto()
+    SELECT_ALTITUDE = auto()
+    SELECT_OFFBOARD = auto()
     TAKEOFF_REACHED = auto()
     MISSION_FINISHED = auto()
     MISSION_ASKS_RETURN = auto()
     LANDED_LONG_ENOUGH = auto()
     NO_TAKEOFF = auto()
+    TERMINATE = auto()
 
 
 class Facts(NamedTuple):
@@ -38,6 +42,8 @@ class Facts(NamedTuple):
     landed: bool
     has_mission: bool
     mission_begins_with_takeoff: bool
+    manual_fresh: bool
+    offboard_fresh: bool
 
 
 class Status(NamedTuple):
@@ -57,6 +63,8 @@ class Need(Enum):
     ARMED = "the vehicle is disarmed"
     MISSION = "no mission is loaded"
     TAKEOFF_ITEM = "the vehicle is on the ground and the mission does not begin with a takeoff"
+    MANUAL_STREAM = "no manual control is received"
+    OFFBOARD_STREAM = "no offboard setpoints are received"
 
 
 def is_met(need: Need, status: Status, facts: Facts) -> bool:
@@ -69,33 +77,43 @@ def is_met(need: Need, status: Status, facts: Facts) -> bool:
         Need.ARMED: status.armed,
         Need.MISSION: facts.has_mission,
         Need.TAKEOFF_ITEM: not facts.landed or facts.mission_begins_with_takeoff,
+        Need.MANUAL_STREAM: facts.manual_fresh,
+        Need.OFFBOARD_STREAM: facts.offboard_fresh,
     }[need]
 
 
 class Rule(NamedTuple):
-    """One row: in these modes (None: any) the event needs this and leads there (None: unchanged)."""
+    """One row: in these modes the event needs this and leads there (None: unchanged)."""
 
     event: Event
-    modes: tuple[Mode, ...] | None
+    modes: tuple[Mode, ...]
     needs: tuple[Need, ...]
     armed: bool | None
     mode: Mode | None
 
 
+FLYABLE = tuple(mode for mode in Mode if mode is not Mode.TERMINATION)
+TERMINATED = "the flight was terminated: reboot the vehicle first"
+"""Refusal of every event but one after a termination: it ends with the process."""
+
 RULES = (
-    Rule(Event.ARM, None, (Need.STATE, Need.UPRIGHT), True, None),
-    Rule(Event.DISARM, None, (Need.ON_GROUND,), False, Mode.HOLD),
-    Rule(Event.FORCE_DISARM, None, (), False, Mode.HOLD),
-    Rule(Event.SELECT_TAKEOFF, None, (Need.STATE, Need.ON_GROUND), None, Mode.TAKEOFF),
-    Rule(Event.SELECT_MISSION, None, (Need.STATE, Need.MISSION, Need.TAKEOFF_ITEM), None, Mode.MISSION),
-    Rule(Event.SELECT_HOLD, None, (Need.STATE,), None, Mode.HOLD),
-    Rule(Event.SELECT_RETURN, None, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.RETURN),
-    Rule(Event.SELECT_LAND, None, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.LAND),
+    Rule(Event.ARM, FLYABLE, (Need.STATE, Need.UPRIGHT), True, None),
+    Rule(Event.DISARM, FLYABLE, (Need.ON_GROUND,), False, Mode.HOLD),
+    Rule(Event.FORCE_DISARM, FLYABLE, (), False, Mode.HOLD),
+    Rule(Event.TERMINATE, tuple(Mode), (), False, Mode.TERMINATION),
+    Rule(Event.SELECT_TAKEOFF, FLYABLE, (Need.STATE, Need.ON_GROUND), None, Mode.TAKEOFF),
+    Rule(Event.SELECT_MISSION, FLYABLE, (Need.STATE, Need.MISSION, Need.TAKEOFF_ITEM), None, Mode.MISSION),
+    Rule(Event.SELECT_HOLD, FLYABLE, (Need.STATE,), None, Mode.HOLD),
+    Rule(Event.SELECT_RETURN, FLYABLE, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.RETURN),
+    Rule(Event.SELECT_LAND, FLYABLE, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.LAND),
+    Rule(Event.SELECT_POSITION, FLYABLE, (Need.STATE, Need.MANUAL_STREAM), None, Mode.POSITION),
+    Rule(Event.SELECT_ALTITUDE, FLYABLE, (Need.STATE, Need.MANUAL_STREAM), None, Mode.ALTITUDE),
+    Rule(Event.SELECT_OFFBOARD, FLYABLE, (Need.STATE, Need.OFFBOARD_STREAM), None, Mode.OFFBOARD),
     Rule(Event.TAKEOFF_REACHED, (Mode.TAKEOFF,), (Need.ARMED,), None, Mode.HOLD),
     Rule(Event.MISSION_FINISHED, (Mode.MISSION,), (), None, Mode.HOLD),
     Rule(Event.MISSION_ASKS_RETURN, (Mode.MISSION,), (Need.ARMED,), None, Mode.RETURN),
-    Rule(Event.LANDED_LONG_ENOUGH, None, (Need.ON_GROUND,), False, Mode.HOLD),
-    Rule(Event.NO_TAKEOFF, None, (Need.ON_GROUND,), False, Mode.HOLD),
+    Rule(Event.LANDED_LONG_ENOUGH, FLYABLE, (Need.ON_GROUND,), False, Mode.HOLD),
+    Rule(Event.NO_TAKEOFF, FLYABLE, (Need.ON_GROUND,), False, Mode.HOLD),
 )
 
 
@@ -109,7 +127,7 @@ class Outcome(NamedTuple):
 def transition(status: Status, facts: Facts, event: Event) -> Outcome:
     """Apply ``event``: the first rule for it and the present mode decides."""
     for rule in RULES:
-        if rule.event is not event or (rule.modes is not None and status.mode not in rule.modes):
+        if rule.event is not event or status.mode not in rule.modes:
             continue
         for need in rule.needs:
             if not is_met(need, status, facts):
@@ -121,4 +139,6 @@ def transition(status: Status, facts: Facts, event: Event) -> Outcome:
             ),
             None,
         )
+    if status.mode is Mode.TERMINATION:
+        return Outcome(status, TERMINATED)
     return Outcome(status, f"not possible in mode {status.mode.name.lower()}")

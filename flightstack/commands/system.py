@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from flightstack.commands.context import ACCEPTED, DENIED, UNSUPPORTED, Answer, Handler, VehicleContext
+from flightstack.commander.transitions import Need
+from flightstack.commands.context import (
+    ACCEPTED,
+    DENIED,
+    UNSUPPORTED,
+    Answer,
+    Handler,
+    VehicleContext,
+    answer_to,
+)
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.services.command_server import Command
 
@@ -24,4 +33,18 @@ def reboot_or_shut_down(vehicle: VehicleContext, command: Command) -> Answer:
     return Answer(ACCEPTED)
 
 
-HANDLERS: dict[int, Handler] = {mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: reboot_or_shut_down}
+def terminate_flight(vehicle: VehicleContext, command: Command) -> Answer:
+    """DO_FLIGHTTERMINATION: parameter 1 above 0.5 stops the rotors for good, in the air too (PX4's threshold)."""
+    autopilot = vehicle.autopilot
+    if not command.params[0] > 0.5:  # NaN too
+        return Answer(DENIED, "parameter 1 must be 1; a termination cannot be taken back")
+    if not autopilot.now.status.armed:
+        return answer_to(Need.ARMED.value)
+    autopilot.terminate("commanded")
+    return Answer(ACCEPTED)
+
+
+HANDLERS: dict[int, Handler] = {
+    mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: reboot_or_shut_down,
+    mavlink.MAV_CMD_DO_FLIGHTTERMINATION: terminate_flight,
+}

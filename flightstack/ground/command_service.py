@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
-from flightstack.autopilot import WARNING
 from flightstack.commands import HANDLERS, VehicleContext, execute
 from flightstack.commands.context import ACCEPTED, UNSUPPORTED, Answer
 from flightstack.commands.modes import select_custom_mode
@@ -13,6 +12,7 @@ from flightstack.ground.peer import Peer
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.command_server import Command, CommandServer
+from flightstack.snapshot import WARNING
 
 
 class CommandService:

@@ -14,6 +14,7 @@ from flightstack.ground.peer import Peer
 from flightstack.ground.service import Service
 from flightstack.ground.stream_services import stream_services
 from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.timesync import TimeService
 
 
 def make_services(
@@ -27,4 +28,5 @@ def make_services(
         link_commands,
         *stream_services(own, vehicle.autopilot),
         LinkLossService(vehicle.autopilot),
+        TimeService(lambda: facts.time_us),
     ]

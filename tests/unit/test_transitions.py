@@ -6,7 +6,16 @@ import itertools
 
 import pytest
 
-from flightstack.commander.transitions import RULES, Event, Facts, Need, Status, is_met, transition
+from flightstack.commander.transitions import (
+    RULES,
+    TERMINATED,
+    Event,
+    Facts,
+    Need,
+    Status,
+    is_met,
+    transition,
+)
 from flightstack.modes import CUSTOM_MODE, MODE_OF_CUSTOM, NAVIGATION_STATE, Mode
 
 ALL_FACTS = [Facts(*values) for values in itertools.product((False, True), repeat=len(Facts._fields))]
@@ -14,7 +23,13 @@ ALL_STATUSES = [Status(armed, mode) for armed in (False, True) for mode in Mode]
 EVERYTHING = list(itertools.product(ALL_STATUSES, ALL_FACTS, Event))
 
 READY = Facts(
-    state_is_valid=True, upright=True, landed=True, has_mission=True, mission_begins_with_takeoff=True
+    state_is_valid=True,
+    upright=True,
+    landed=True,
+    has_mission=True,
+    mission_begins_with_takeoff=True,
+    manual_fresh=True,
+    offboard_fresh=True,
 )
 IN_AIR = READY._replace(landed=False)
 STANDING, FLYING = Status(), Status(True, Mode.HOLD)
@@ -25,7 +40,7 @@ def flying(mode: Mode) -> Status:
 
 
 def test_every_combination_has_one_outcome_and_a_refusal_changes_nothing() -> None:
-    assert len(EVERYTHING) == 2 * len(Mode) * 32 * len(Event)
+    assert len(EVERYTHING) == 2 * len(Mode) * 2 ** len(Facts._fields) * len(Event)
     for status, facts, event in EVERYTHING:
         after, refusal = transition(status, facts, event)
         assert isinstance(after, Status)
@@ -48,13 +63,23 @@ def test_in_the_air_only_force_disarms() -> None:
         for status, facts, event in EVERYTHING
         if status.armed and not facts.landed and not transition(status, facts, event).status.armed
     }
-    assert disarmed_by == {Event.FORCE_DISARM}
+    assert disarmed_by == {Event.FORCE_DISARM, Event.TERMINATE}
 
 
-def test_force_disarm_always_disarms() -> None:
+def test_force_disarm_always_disarms_who_flies() -> None:
     for status, facts in itertools.product(ALL_STATUSES, ALL_FACTS):
-        after, refusal = transition(status, facts, Event.FORCE_DISARM)
-        assert (after, refusal) == (Status(False, Mode.HOLD), None)
+        if status.mode is not Mode.TERMINATION:
+            after, refusal = transition(status, facts, Event.FORCE_DISARM)
+            assert (after, refusal) == (Status(False, Mode.HOLD), None)
+
+
+def test_termination_is_always_possible_and_never_ends() -> None:
+    ended = Status(False, Mode.TERMINATION)
+    for status, facts, event in EVERYTHING:
+        if event is Event.TERMINATE:
+            assert transition(status, facts, event) == (ended, None)
+        elif status.mode is Mode.TERMINATION:
+            assert transition(status, facts, event) == (status, TERMINATED)
 
 
 def test_a_disarmed_vehicle_that_was_disarmed_waits_in_hold() -> None:
@@ -62,7 +87,7 @@ def test_a_disarmed_vehicle_that_was_disarmed_waits_in_hold() -> None:
     for status, facts, event in EVERYTHING:
         after, refusal = transition(status, facts, event)
         if status.armed and refusal is None and not after.armed:
-            assert after.mode is Mode.HOLD
+            assert after.mode is (Mode.TERMINATION if event is Event.TERMINATE else Mode.HOLD)
 
 
 def test_modes_change_only_to_where_the_event_leads() -> None:
@@ -72,6 +97,10 @@ def test_modes_change_only_to_where_the_event_leads() -> None:
         Event.SELECT_HOLD: Mode.HOLD,
         Event.SELECT_RETURN: Mode.RETURN,
         Event.SELECT_LAND: Mode.LAND,
+        Event.SELECT_POSITION: Mode.POSITION,
+        Event.SELECT_ALTITUDE: Mode.ALTITUDE,
+        Event.SELECT_OFFBOARD: Mode.OFFBOARD,
+        Event.TERMINATE: Mode.TERMINATION,
         Event.TAKEOFF_REACHED: Mode.HOLD,
         Event.MISSION_FINISHED: Mode.HOLD,
         Event.MISSION_ASKS_RETURN: Mode.RETURN,
@@ -89,7 +118,7 @@ def test_modes_change_only_to_where_the_event_leads() -> None:
 def test_without_a_valid_state_nothing_flies() -> None:
     for status, facts, event in EVERYTHING:
         if not facts.state_is_valid and event.name.startswith("SELECT"):
-            assert transition(status, facts, event).refusal == Need.STATE.value
+            assert transition(status, facts, event).refusal in (Need.STATE.value, TERMINATED)
 
 
 REFUSALS = [
@@ -108,6 +137,9 @@ REFUSALS = [
     (Need.ARMED, Status(False, Mode.MISSION), READY, Event.MISSION_ASKS_RETURN),
     (Need.MISSION, STANDING, READY._replace(has_mission=False), Event.SELECT_MISSION),
     (Need.TAKEOFF_ITEM, FLYING, READY._replace(mission_begins_with_takeoff=False), Event.SELECT_MISSION),
+    (Need.MANUAL_STREAM, FLYING, IN_AIR._replace(manual_fresh=False), Event.SELECT_POSITION),
+    (Need.MANUAL_STREAM, FLYING, IN_AIR._replace(manual_fresh=False), Event.SELECT_ALTITUDE),
+    (Need.OFFBOARD_STREAM, FLYING, IN_AIR._replace(offboard_fresh=False), Event.SELECT_OFFBOARD),
 ]
 
 
@@ -143,6 +175,11 @@ def test_every_need_is_used_and_tested() -> None:
         (flying(Mode.MISSION), IN_AIR, Event.MISSION_ASKS_RETURN, flying(Mode.RETURN)),
         (flying(Mode.LAND), READY, Event.LANDED_LONG_ENOUGH, STANDING),
         (FLYING, READY, Event.NO_TAKEOFF, STANDING),
+        (FLYING, IN_AIR, Event.SELECT_POSITION, flying(Mode.POSITION)),
+        (FLYING, IN_AIR, Event.SELECT_ALTITUDE, flying(Mode.ALTITUDE)),
+        (FLYING, IN_AIR, Event.SELECT_OFFBOARD, flying(Mode.OFFBOARD)),
+        (STANDING, READY, Event.SELECT_OFFBOARD, Status(False, Mode.OFFBOARD)),
+        (FLYING, IN_AIR, Event.TERMINATE, Status(False, Mode.TERMINATION)),
     ],
 )
 def test_the_way_of_a_flight(status: Status, facts: Facts, event: Event, after: Status) -> None:
@@ -158,9 +195,7 @@ def test_ends_of_a_mode_mean_nothing_in_another(event: Event) -> None:
 
 def test_every_event_has_a_rule_and_one_rule_for_each_mode() -> None:
     for event, mode in itertools.product(Event, Mode):
-        matching = [
-            rule for rule in RULES if rule.event is event and (rule.modes is None or mode in rule.modes)
-        ]
+        matching = [rule for rule in RULES if rule.event is event and mode in rule.modes]
         assert len(matching) <= 1
         assert any(rule.event is event for rule in RULES)
 

@@ -1,0 +1,50 @@
+"""What keeps a vehicle from arming: every reason at once, each a sentence. Pure."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flightstack.commander.transitions import TERMINATED, Need
+from flightstack.modes import Mode
+from flightstack.params.behaviour import Behaviour
+
+
+class ArmingFacts(NamedTuple):
+    """What the checks look at."""
+
+    mode: Mode
+    state_is_valid: bool
+    state_is_fresh: bool
+    upright: bool
+    gcs_lost: bool
+    manual_fresh: bool
+    offboard_fresh: bool
+    fence_breach: str
+    """How the geofence is breached, as the end of a sentence; empty: it is not."""
+    battery_level: int
+    """0 enough or unknown, 1 low, 2 critical, 3 emergency."""
+    battery_remaining: float
+
+
+def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]:
+    """Return every reason not to arm; empty when the vehicle may.
+
+    What a failsafe would act on in the air keeps the vehicle on the ground, unless its action is switched off.
+    """
+    if facts.mode is Mode.TERMINATION:
+        return (TERMINATED,)
+    b = behaviour
+    ordered = b.battery_emergency < b.battery_critical < b.battery_low
+    sticks = facts.manual_fresh or facts.mode not in (Mode.POSITION, Mode.ALTITUDE)
+    checks = (
+        (facts.state_is_valid, Need.STATE.value),
+        (facts.state_is_fresh or not facts.state_is_valid, "the state is frozen or missing"),
+        (facts.upright or not facts.state_is_valid, Need.UPRIGHT.value),
+        (facts.battery_level == 0, f"the battery is low: {facts.battery_remaining:.0%} left"),
+        (ordered, "BAT_EMERGEN_THR, BAT_CRIT_THR and BAT_LOW_THR do not rise in this order"),
+        (not facts.fence_breach or not b.fence_action, f"the vehicle {facts.fence_breach}"),
+        (not facts.gcs_lost or not b.gcs_loss_action, "the ground station is lost"),
+        (sticks, Need.MANUAL_STREAM.value),
+        (facts.offboard_fresh or facts.mode is not Mode.OFFBOARD, Need.OFFBOARD_STREAM.value),
+    )
+    return tuple(sentence for passed, sentence in checks if not passed)

@@ -1,0 +1,73 @@
+"""What the supervisor is told by others: links, battery, the state's age, the geofence. Types only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from flightstack.contract import FloatArray
+
+
+@dataclass
+class LinkFacts:
+    """What the services of the ground links know; each writes its own field.
+
+    A ground station that never spoke is not lost; without a stream there are no setpoints and no sticks.
+    """
+
+    gcs_lost: bool = False
+    offboard_lost: bool = True
+    manual_lost: bool = True
+
+
+class BatteryReading(Protocol):
+    """What is known of the battery."""
+
+    @property
+    def remaining(self) -> float:
+        """Share of the charge, 0 to 1."""
+        ...
+
+    @property
+    def valid(self) -> bool:
+        """Whether anything is known."""
+        ...
+
+
+class Freshness(Protocol):
+    """How old the state is."""
+
+    @property
+    def age_us(self) -> int:
+        """Vehicle time since the newest state arrived."""
+        ...
+
+    @property
+    def frozen_us(self) -> int:
+        """Vehicle time since any of its numbers changed."""
+        ...
+
+
+class StateSource(Protocol):
+    """Where states come from, and what else is known there; ``SimulatorLink`` is one."""
+
+    @property
+    def battery(self) -> BatteryReading:
+        """The newest word about the battery."""
+        ...
+
+    def freshness(self, now_us: int) -> Freshness:
+        """Tell how old the state is at vehicle time ``now_us``."""
+        ...
+
+
+class FenceWatch(Protocol):
+    """The geofence; ``guidance.fence.FenceMonitor`` is one."""
+
+    def step(self, state: FloatArray) -> int:
+        """Return the kinds of breach at ``state`` (13,) as bits; 0 inside."""
+        ...
+
+    def text(self, flags: int) -> str:
+        """Return what the bits mean, as the end of a sentence; empty for none."""
+        ...

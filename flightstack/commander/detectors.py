@@ -1,0 +1,163 @@
+"""What notices that a flight goes wrong: limits of attitude and position, rotors, the battery, frozen states. Pure.
+
+Each detector has a time for which its limit must be passed before it triggers, and needs ``RELEASE_S`` of good
+behaviour to let go, so that a value at the limit does not chatter.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from flightstack.arrays import vehicle_state
+from flightstack.compiled import compiled
+from flightstack.contract import MAX_ROTORS, FloatArray, LoopRow, LoopStatus
+from flightstack.params.behaviour import Behaviour
+from flightstack.params.vehicle import Vehicle
+
+RELEASE_S = 1.0
+NOT_FINITE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT, MOVING = 1, 2, 4, 8, 16
+"""Bits of what ``detect`` returns."""
+MOVING_ABOVE = 1e-6
+"""Speed [m/s] or rate [rad/s] that must change the state within a tick: its last digit is a billion times smaller."""
+BATTERY_HYSTERESIS = 0.02
+TILT_MARGIN_DEG = 15
+LAG_MARGIN_S = 0.01
+"""On top of a rotor's lag: the way of command and measurement."""
+
+ROLL, PITCH, TILT_ERROR, POSITION, ROTORS = range(5)
+TIMERS = 5
+M_TRIGGERED, M_EXPECTED = TIMERS, 2 * TIMERS
+DETECTOR_MEMORY_SIZE = 2 * TIMERS + MAX_ROTORS
+P_LIMIT, P_TIME, P_BLEND, P_ROTORS, P_SLOW = 0, TIMERS, 2 * TIMERS, 2 * TIMERS + 1, 2 * TIMERS + 2
+
+_REFERENCE_AT = LoopRow.REFERENCE_ATTITUDE.start
+_COMMAND_AT = LoopRow.ROTOR_COMMAND.start
+_SPEED_AT = LoopRow.ROTOR_SPEED.start
+_STATUS_AT = LoopRow.STATUS
+_BAD_OUTPUT = LoopStatus.OUTPUT_NOT_FINITE
+
+
+def detector_params(behaviour: Behaviour, vehicle: Vehicle, dt_s: float) -> FloatArray:
+    """Return the numbers that ``detect`` takes, shape (13,); a limit of 0 is off.
+
+    Limits and times are in the order roll, pitch, tilt error [rad], position error [m], rotor speed [share]. Then
+    come how much of a rotor's lag passes in ``dt_s``, the number of rotors, and the speed below which errors count
+    as shares of that speed.
+    """
+    b = behaviour
+    least_deg = b.max_tilt_deg + TILT_MARGIN_DEG
+    limits = (
+        math.radians(max(b.max_roll_deg, least_deg)) if b.max_roll_deg > 0 else 0.0,
+        math.radians(max(b.max_pitch_deg, least_deg)) if b.max_pitch_deg > 0 else 0.0,
+        math.radians(b.max_tilt_error_deg),
+        b.max_position_error_m,
+        b.rotor_error if b.rotor_check else 0.0,
+    )
+    times = (b.max_roll_s, b.max_pitch_s, b.max_tilt_error_s, b.max_position_error_s, b.rotor_error_ms * 1e-3)
+    lag_s = max(rotor.lag_s for rotor in vehicle.rotors) + LAG_MARGIN_S
+    slow_rad_s = 0.1 * min(1e4, *(rotor.max_speed_rad_s for rotor in vehicle.rotors))
+    rest = (1.0 - math.exp(-dt_s / lag_s), len(vehicle.rotors), slow_rad_s)
+    return np.array([*limits, *times, *rest], dtype=np.float64)
+
+
+@compiled
+def _watch(memory: FloatArray, index: int, beyond: bool, time_s: float, dt_s: float) -> bool:
+    """Advance one timer; tell whether the detector is triggered.
+
+    The timer counts how long the value has been on the other side than the detector's answer.
+    """
+    triggered = memory[M_TRIGGERED + index] > 0.0
+    if beyond == triggered:
+        memory[index] = 0.0
+        return bool(triggered)
+    memory[index] += dt_s
+    if memory[index] >= (RELEASE_S if triggered else time_s) - 1e-9:
+        memory[index] = 0.0
+        triggered = not triggered
+        memory[M_TRIGGERED + index] = 1.0 if triggered else 0.0
+    return bool(triggered)
+
+
+@compiled
+def _rotor_error(row: FloatArray, memory: FloatArray, params: FloatArray) -> float:
+    """Return the largest share by which a measured speed differs from what its command leads to.
+
+    The expectation follows the command with the rotor's lag. A simulator that measures no speeds sends zeros:
+    then nothing is known, and the error is 0.
+    """
+    worst, measured = 0.0, False
+    for i in range(int(params[P_ROTORS])):
+        expected = memory[M_EXPECTED + i]
+        expected += (row[_COMMAND_AT + i] - expected) * params[P_BLEND]
+        memory[M_EXPECTED + i] = expected
+        speed = row[_SPEED_AT + i]
+        measured = measured or speed != 0.0
+        worst = max(worst, abs(speed - expected) / max(abs(expected), params[P_SLOW]))
+    return worst if measured else 0.0
+
+
+@compiled
+def detect(
+    state: FloatArray,
+    setpoint: FloatArray,
+    row: FloatArray,
+    memory: FloatArray,
+    params: FloatArray,
+    dt_s: float,
+) -> int:
+    """Advance all detectors by one outer tick; return the bits of what is wrong, and ``MOVING``.
+
+    ``state`` (13,), ``setpoint`` (11,) and ``row`` (48,), the newest row of the inner loop, as in ``contract``;
+    ``memory`` (18,) is updated, ``params`` come from ``detector_params``. A state that is not finite leaves the
+    other detectors as they are.
+    """
+    status = int(row[_STATUS_AT])
+    for value in state:
+        if not math.isfinite(value):
+            return NOT_FINITE
+    result = NOT_FINITE if status & _BAD_OUTPUT != 0 else 0
+    now = vehicle_state(state)
+    v, w = now.velocity_ned_m_s, now.rates_frd_rad_s
+    if max(abs(v.x), abs(v.y), abs(v.z), abs(w.x), abs(w.y), abs(w.z)) > MOVING_ABOVE:
+        result |= MOVING
+    qw, qx, qy, qz = now.attitude
+    roll = math.atan2(2.0 * (qw * qx + qy * qz), 1.0 - 2.0 * (qx * qx + qy * qy))
+    pitch = math.asin(min(1.0, max(-1.0, 2.0 * (qw * qy - qz * qx))))
+    # cosine between the thrust axes: third columns of the two rotation matrices
+    rw, rx, ry, rz = (
+        row[_REFERENCE_AT],
+        row[_REFERENCE_AT + 1],
+        row[_REFERENCE_AT + 2],
+        row[_REFERENCE_AT + 3],
+    )
+    cosine = (
+        4.0 * (qx * qz + qw * qy) * (rx * rz + rw * ry)
+        + 4.0 * (qy * qz - qw * qx) * (ry * rz - rw * rx)
+        + (1.0 - 2.0 * (qx * qx + qy * qy)) * (1.0 - 2.0 * (rx * rx + ry * ry))
+    )
+    tilt_error = math.acos(min(1.0, max(-1.0, cosine)))
+    p = now.position_ned_m
+    distance = math.sqrt((p.x - setpoint[0]) ** 2 + (p.y - setpoint[1]) ** 2 + (p.z - setpoint[2]) ** 2)
+    errors = (abs(roll), abs(pitch), tilt_error, distance, _rotor_error(row, memory, params))
+    bits = (BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT)
+    for index in range(TIMERS):
+        limit = params[P_LIMIT + index]
+        beyond = limit > 0.0 and not errors[index] <= limit
+        if _watch(memory, index, beyond, params[P_TIME + index], dt_s):
+            result |= bits[index]
+    return result
+
+
+def battery_level(before: int, remaining: float, thresholds: tuple[float, float, float]) -> int:
+    """Return how low the battery is: 0 enough or unknown (NaN), 1 low, 2 critical, 3 emergency.
+
+    ``thresholds`` are the shares of charge for low, critical and emergency. A level once reached is left
+    only when the charge lies ``BATTERY_HYSTERESIS`` above its threshold.
+    """
+    if math.isnan(remaining):
+        return 0
+    reached = sum(remaining <= threshold for threshold in thresholds)
+    kept = sum(remaining <= threshold + BATTERY_HYSTERESIS for threshold in thresholds)
+    return max(reached, min(before, kept))

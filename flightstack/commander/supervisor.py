@@ -1,0 +1,187 @@
+"""Watches a flight: gathers what the detectors, links, battery and fence say, and what the failsafes make of it.
+
+No I/O and no clock. The autopilot calls ``step`` once per outer tick and carries out the action.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from flightstack.commander.arming_checks import ArmingFacts
+from flightstack.commander.conditions import FenceWatch, LinkFacts, StateSource
+from flightstack.commander.detectors import (
+    BEYOND_ATTITUDE,
+    BEYOND_POSITION,
+    DETECTOR_MEMORY_SIZE,
+    MOVING,
+    NOT_FINITE,
+    ROTOR_FAULT,
+    battery_level,
+    detect,
+    detector_params,
+)
+from flightstack.commander.failsafe import Decision, Failsafe, phase_of
+from flightstack.commander.failsafe_step import (
+    IDLE,
+    Announcement,
+    Situation,
+    active,
+    failsafe_step,
+    override,
+)
+from flightstack.commander.transitions import Status
+from flightstack.contract import SETPOINT_SIZE, FloatArray
+from flightstack.modes import Mode
+from flightstack.params.behaviour import Behaviour
+from flightstack.params.vehicle import Vehicle
+
+UPRIGHT_COSINE = math.cos(math.radians(30.0))
+STREAM_MODES = (Mode.POSITION, Mode.ALTITUDE, Mode.OFFBOARD)
+BATTERY_FAILSAFES = (Failsafe.BATTERY_LOW, Failsafe.BATTERY_CRITICAL, Failsafe.BATTERY_EMERGENCY)
+FAULTS = (
+    (NOT_FINITE, Failsafe.NOT_FINITE),
+    (BEYOND_ATTITUDE, Failsafe.ATTITUDE),
+    (BEYOND_POSITION, Failsafe.POSITION_ERROR),
+    (ROTOR_FAULT, Failsafe.ROTOR),
+)
+NO_CONDITION: frozenset[Failsafe] = frozenset()
+
+
+class Supervisor:
+    """Holds what the detectors and failsafes remember."""
+
+    def __init__(
+        self, vehicle: Vehicle, behaviour: Behaviour, outer_hz: float, state: FloatArray, source: StateSource
+    ) -> None:
+        """Watch ``state`` (13,), which ``source`` writes in place."""
+        self.links = LinkFacts()
+        self.fence: FenceWatch | None = None
+        self.position_is_controlled = False
+        """Whether the setpoint's place is flown to: not on the ground, nor while a stream gives attitudes."""
+        self.battery_level = 0
+        self._vehicle = vehicle
+        self._source = source
+        self._state = state
+        self._dt_s = 1.0 / outer_hz
+        self.set_behaviour(behaviour)
+        self._detector = np.zeros(DETECTOR_MEMORY_SIZE)
+        self._nowhere = np.zeros(SETPOINT_SIZE)
+        self._memory = IDLE
+        self._stale = False
+
+    def warm_up(self, row: FloatArray) -> None:
+        """Compile the detectors, or load them from the cache."""
+        detect(self._state, self._nowhere, row, self._detector, self._params, self._dt_s)
+        self.armed()
+
+    # ------------------------------------------------------------------ what is
+
+    @property
+    def failsafes(self) -> tuple[Failsafe, ...]:
+        """Active failsafes in order of priority, those overridden by a user too."""
+        return active(self._memory)
+
+    @property
+    def decision(self) -> Decision:
+        """What the failsafes ask for, and the cause."""
+        return self._memory.decision
+
+    @property
+    def holds_rotors(self) -> bool:
+        """Whether the state must not be flown by: it is frozen or missing."""
+        return self._stale
+
+    def arming_facts(self, mode: Mode, has_state: bool) -> ArmingFacts:
+        """Return what the arming checks look at."""
+        self._watch_battery()
+        finite = bool(np.isfinite(self._state).all())
+        qx, qy = float(self._state[7]), float(self._state[8])
+        breach = "" if self.fence is None or not finite else self.fence.text(self.fence.step(self._state))
+        return ArmingFacts(
+            mode=mode,
+            state_is_valid=finite and has_state,
+            state_is_fresh=not self._stale,
+            upright=finite and 1.0 - 2.0 * (qx * qx + qy * qy) >= UPRIGHT_COSINE,
+            gcs_lost=self.links.gcs_lost,
+            manual_fresh=not self.links.manual_lost,
+            offboard_fresh=not self.links.offboard_lost,
+            fence_breach=breach,
+            battery_level=self.battery_level,
+            battery_remaining=self._source.battery.remaining,
+        )
+
+    # ------------------------------------------------------------------ time passes
+
+    def set_behaviour(self, behaviour: Behaviour) -> None:
+        """Take new parameters, from the next outer tick on."""
+        self._behaviour = behaviour
+        self._params = detector_params(behaviour, self._vehicle, self._dt_s)
+
+    def armed(self) -> None:
+        """Forget what the detectors saw before: a flight begins."""
+        self._detector[:] = 0.0
+
+    def override(self) -> None:
+        """A user has selected a mode: what is active now acts no more."""
+        self._memory = override(self._memory)
+
+    def step(
+        self, time_us: int, status: Status, landed: bool, setpoint: FloatArray, row: FloatArray
+    ) -> tuple[Announcement, ...]:
+        """Advance by one outer tick; ``decision`` is what to do then.
+
+        ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop.
+        """
+        self._watch_battery()
+        found = 0
+        if status.armed:
+            if not self.position_is_controlled:
+                self._nowhere[:3] = self._state[:3]
+                setpoint = self._nowhere
+            found = detect(self._state, setpoint, row, self._detector, self._params, self._dt_s)
+        self._stale = self._is_stale(time_us, status.armed and not landed and bool(found & MOVING))
+        if not status.armed:
+            self._memory = IDLE
+            return ()
+        conditions = self._conditions(found, status.mode)
+        if not conditions and not self._memory.entries:
+            return ()
+        phase = phase_of(status.armed, landed, status.mode)
+        situation = Situation(time_us, phase, not self.links.manual_lost)
+        self._memory, said = failsafe_step(self._memory, conditions, situation, self._behaviour)
+        return said
+
+    def _conditions(self, found: int, mode: Mode) -> frozenset[Failsafe]:
+        """Return what is wrong now."""
+        breached = self.fence is not None and self.fence.step(self._state) != 0
+        quiet = not (found & ~MOVING or self._stale or self.battery_level or breached or self.links.gcs_lost)
+        if quiet and mode not in STREAM_MODES:
+            return NO_CONDITION
+        links = self.links
+        conditions = {
+            Failsafe.STATE_STALE: self._stale,
+            Failsafe.FENCE: breached,
+            Failsafe.GCS_LOST: links.gcs_lost,
+            Failsafe.OFFBOARD_LOST: links.offboard_lost and mode is Mode.OFFBOARD,
+            Failsafe.MANUAL_LOST: links.manual_lost and mode in (Mode.POSITION, Mode.ALTITUDE),
+        }
+        present = {failsafe for failsafe, holds in conditions.items() if holds}
+        present.update(failsafe for bit, failsafe in FAULTS if found & bit)
+        return frozenset(present.union(BATTERY_FAILSAFES[: self.battery_level]))
+
+    def _is_stale(self, time_us: int, must_change: bool) -> bool:
+        """Tell whether the state is too old, or does not change although its own speeds say that it must.
+
+        At rest on the ground, and in the calm at the end of a long hover, it may stay the same to the last bit.
+        """
+        fresh = self._source.freshness(time_us)
+        limit_us = self._behaviour.stale_s * 1e6
+        return fresh.age_us >= limit_us or (must_change and fresh.frozen_us >= limit_us)
+
+    def _watch_battery(self) -> None:
+        battery, b = self._source.battery, self._behaviour
+        remaining = battery.remaining if battery.valid else math.nan
+        thresholds = (b.battery_low, b.battery_critical, b.battery_emergency)
+        self.battery_level = battery_level(self.battery_level, remaining, thresholds)

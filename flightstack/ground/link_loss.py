@@ -1,0 +1,39 @@
+"""Notes when the ground stations were last heard, for the failsafe of a lost link."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+
+from flightstack.autopilot import Autopilot
+from flightstack.commander.link_watch import LinkWatch
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+
+
+class LinkLossService:
+    """A ground station is lost when none of them sent a heartbeat for COM_DL_LOSS_T.
+
+    Only MAV_TYPE_GCS counts, as with PX4: a companion computer's heartbeat does not keep a link alive.
+    """
+
+    handles = frozenset({"HEARTBEAT"})
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+        self._watch = LinkWatch()
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take a heartbeat."""
+        if message.type == mavlink.MAV_TYPE_GCS:
+            self._watch.heard(now_s, self._autopilot.now.time_us)
+
+    def poll(self, now_s: float) -> Iterable[tuple[Hashable | None, Message]]:
+        """Tell the autopilot; there is nothing to send."""
+        autopilot = self._autopilot
+        limit_s = autopilot.behaviour.gcs_loss_s
+        autopilot.links.gcs_lost = self._watch.lost(now_s, autopilot.now.time_us, limit_s)
+        return ()
+
+    def next_deadline(self) -> float | None:
+        """Never: the hub polls at least as often as it sends heartbeats."""
+        return None

@@ -1,0 +1,66 @@
+"""What the autopilot shows of itself: to telemetry, to the log, to the operator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+from flightstack.commander.transitions import Status
+from flightstack.contract import FloatArray
+from flightstack.guidance.navigator import MissionProgress
+
+EMERGENCY, ALERT, CRITICAL, ERROR, WARNING, NOTICE, INFO = range(7)
+"""MAV_SEVERITY of texts."""
+
+DISARMED = Status()
+NO_PROGRESS = MissionProgress(0, -1, False, False)
+
+
+class Recorder(Protocol):
+    """Where the autopilot writes what happens; ``logging.recorder`` makes a flight log of it."""
+
+    def inner_row(self, time_us: int) -> FloatArray:
+        """Return the row, shape (48,), that the inner loop fills in this tick."""
+
+    def outer(
+        self, time_us: int, state: FloatArray, setpoint: FloatArray, attitude_target: FloatArray
+    ) -> None:
+        """Record one outer tick."""
+
+    def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
+        """Record mode and arming, and whether a failsafe acts, when one of them has changed."""
+
+    def landed(self, time_us: int, landed: bool) -> None:
+        """Record a change of the land detector."""
+
+    def mission(self, time_us: int, progress: MissionProgress, count: int) -> None:
+        """Record progress of the mission."""
+
+    def text(self, time_us: int, severity: int, text: str) -> None:
+        """Record a text."""
+
+
+class Text(NamedTuple):
+    """A text for the operator."""
+
+    severity: int
+    text: str
+
+
+@dataclass
+class Snapshot:
+    """What telemetry reads: the arrays are live, the rest is copied once per change."""
+
+    state: FloatArray
+    setpoint: FloatArray
+    attitude_target: FloatArray
+    row: FloatArray
+    time_us: int = 0
+    status: Status = DISARMED
+    landed: bool = True
+    progress: MissionProgress = NO_PROGRESS
+    mission_count: int = 0
+    mission_complete: bool = False
+    reached: list[int] = field(default_factory=list)
+    """Mission items reached that telemetry has yet to announce."""
+    texts: list[Text] = field(default_factory=list)
