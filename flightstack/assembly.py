@@ -28,8 +28,12 @@ from flightstack.logging.recorder import FlightRecorder, OpenLog
 from flightstack.mavlink.simulator_link import SimulatorLink
 from flightstack.mavlink.telemetry.facts import NoBattery
 from flightstack.modes import Mode
+from flightstack.parameters import behaviour_of, connect_parameters, load_parameters
 from flightstack.params.errors import ConfigError
 from flightstack.params.gains_file import open_gains
+from flightstack.params.identity import SYSTEM_ID
+from flightstack.params.param_file import LoadedParams
+from flightstack.params.store import ParamStore
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.timing_report import TimingReport
 
@@ -45,6 +49,9 @@ class Stack(NamedTuple):
     recorder: FlightRecorder
     timing: LoopTiming
     report: TimingReport
+    params: ParamStore
+    loaded_params: LoadedParams
+    """What the parameter file held at the start."""
 
 
 def vehicle_of(config: StackConfig) -> Vehicle:
@@ -77,12 +84,14 @@ def build(config: StackConfig, open_log: OpenLog) -> Stack:
         "inner_hz": pace.inner_hz,
         "outer_hz": pace.outer_hz,
     }
-    recorder = FlightRecorder(open_log, info, config.behaviour.by_name(), config.home)
-    simulator = SimulatorLink(vehicle, config.home, config.lockstep, config.system_id)
+    params, loaded = load_parameters(config, backend)
+    behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
+    recorder = FlightRecorder(open_log, info, params.values, config.home)
+    simulator = SimulatorLink(vehicle, config.home, config.lockstep, system_id)
     autopilot = Autopilot(
         vehicle,
         backend,
-        config.behaviour,
+        behaviour,
         config.home,
         pace.divisor,
         pace.outer_hz,
@@ -90,12 +99,13 @@ def build(config: StackConfig, open_log: OpenLog) -> Stack:
         simulator.state,
         simulator.rotor_speed_rad_s,
     )
-    warm_up(backend, Navigator(guidance_params(config.behaviour, vehicle.weight_n), pace.outer_hz), simulator)
+    warm_up(backend, Navigator(guidance_params(behaviour, vehicle.weight_n), pace.outer_hz), simulator)
+    connect_parameters(params, autopilot, backend, recorder)
     timing = LoopTiming(round(1e9 / pace.inner_hz))
     report = TimingReport(timing, pace, config.lockstep)
-    facts = AutopilotFacts(autopilot, vehicle, config.system_id, report.message, NoBattery)
-    ground = GroundHub(VehicleContext(autopilot), facts, config.system_id)
-    return Stack(vehicle, pace, simulator, autopilot, ground, recorder, timing, report)
+    facts = AutopilotFacts(autopilot, vehicle, system_id, report.message, NoBattery)
+    ground = GroundHub(VehicleContext(autopilot, params), facts, system_id)
+    return Stack(vehicle, pace, simulator, autopilot, ground, recorder, timing, report, params, loaded)
 
 
 def warm_up(backend: ControlBackend, navigator: Navigator, simulator: SimulatorLink) -> None:

@@ -33,6 +33,10 @@ class StackConfig:
     home: GeoPoint = DEFAULT_HOME
     system_id: int = 1
     behaviour: Behaviour = field(default_factory=Behaviour)
+    params_file: str | None = None
+    """Parameter file to start from."""
+    params: tuple[str, ...] = ()
+    """``NAME=VALUE`` of any parameter; stronger than file and ``behaviour``, in force for this run alone."""
 
 
 def parse_home(text: str) -> GeoPoint:

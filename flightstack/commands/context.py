@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeAlias
 from flightstack.autopilot import Autopilot
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.services.command_server import Command
+from flightstack.params.store import ParamStore
 
 ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
 REJECTED = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
@@ -34,6 +35,7 @@ class VehicleContext:
     """The vehicle as its commands see it."""
 
     autopilot: Autopilot
+    params: ParamStore
     shutdown_requested: bool = False
     reboot_requested: bool = False
 

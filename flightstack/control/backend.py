@@ -20,8 +20,9 @@ class ControlBackend(Protocol):
     attitude_target: FloatArray
     """Array form of the latest ``AttitudeTarget``, shape (5,)."""
 
-    parameter_specs: Sequence[ParamSpec]
-    """Declarations of all that may be tuned of the loops, with the defaults that vehicle and gains file give."""
+    @property
+    def parameter_specs(self) -> Sequence[ParamSpec]:
+        """Declarations of all that may be tuned of the loops, with the defaults that vehicle and gains file give."""
 
     def get_parameter(self, name: str) -> float:
         """Return a parameter as the loops use it; raise KeyError if they have none of that name."""

@@ -152,6 +152,11 @@ class FlightLog:
         self.flush()
         self._write(ulog.logged_string(time_us, level, text))
 
+    def parameter(self, name: str, value: float) -> None:
+        """Write a parameter's new value; it is in force after the rows before it."""
+        self.flush()
+        self._write(ulog.parameter(name, value))
+
     def close(self) -> None:
         """Write what waits and close the file; a second call does nothing."""
         if self._closed:

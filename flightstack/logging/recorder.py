@@ -25,9 +25,10 @@ class FlightRecorder:
         self,
         open_log: OpenLog,
         info: Mapping[str, str | int | float],
-        parameters: Mapping[str, float],
+        parameters: Callable[[], Mapping[str, float]],
         home: GeoPoint,
     ) -> None:
+        """``parameters`` returns the present values, which begin a log."""
         self._open_log = open_log
         self._info = info
         self._parameters = parameters
@@ -74,7 +75,7 @@ class FlightRecorder:
         self._log = self._open_log()
         if self._log is None:
             return
-        self._log.start(time_us, self._info, self._parameters, self._home)
+        self._log.start(time_us, self._info, self._parameters(), self._home)
         self.landed(time_us, True)
         self._write_mission(time_us)
 
@@ -109,6 +110,11 @@ class FlightRecorder:
         """Record the timing of the loops; only what is the same in every run of the same flight, in lockstep."""
         if self._log is not None:
             self._log.event("loop_timing", time_us, **figures)
+
+    def parameter(self, name: str, value: float) -> None:
+        """Record a change of a parameter."""
+        if self._log is not None:
+            self._log.parameter(name, value)
 
     def text(self, time_us: int, severity: int, text: str) -> None:
         """Record a text."""

@@ -31,7 +31,6 @@ from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.command_client import CommandClient
 from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
 from flightstack.modes import Mode
-from flightstack.params.behaviour import Behaviour, with_assignments
 from flightstack.plan import MissionItem, load_plan
 from sim_bridge.disturbance import Disturbance
 from sim_bridge.plant import PlantOptions
@@ -75,8 +74,7 @@ class World:
         **config: object,
     ) -> None:
         self.logs: list[LogBuffer] = []
-        behaviour = with_assignments(Behaviour(), list(params))
-        self.config = StackConfig(behaviour=behaviour, **config)  # type: ignore[arg-type]
+        self.config = StackConfig(params=tuple(params), **config)  # type: ignore[arg-type]
         self.stack: Stack = build(self.config, self._open_log)
         disturbance = Disturbance(wind, gust, force, torque, torque_gust)
         self.simulator = Simulator(

@@ -1,0 +1,172 @@
+"""Parameter files: QGroundControl's ``.params`` format, five columns between tabs, read strictly and written whole.
+
+A parameter is never lost in silence. A line that cannot be understood, a value that its declaration refuses, or a
+file of ours that is not all there is one sentence with file and line. Parameters that this vehicle does not have,
+because another controller flew when they were saved, are kept.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from flightstack.atomic_file import write_text_atomically
+from flightstack.params.errors import ConfigError
+from flightstack.params.spec import LARGEST_NAME, ParamSpec
+from flightstack.params.store import ParamStore
+
+INT32, REAL32 = 6, 9
+"""MAV_PARAM_TYPE of our parameters."""
+_INTEGER_TYPES, _FLOAT_TYPES = range(1, 9), (9, 10)
+_AUTOPILOT = 1  # component id
+_OURS, _END = "# Stack: flightstack", "# End"
+_LARGEST_FILE = 4_000_000
+
+
+class ParamLine(NamedTuple):
+    """One parameter of a file."""
+
+    name: str
+    value: float
+    is_integer: bool
+    line: int = 0
+
+
+def format_params(lines: Iterable[ParamLine], system_id: int = 1) -> str:
+    """Return the text of a parameter file, sorted by name."""
+    rows = [
+        f"{system_id}\t{_AUTOPILOT}\t{item.name}\t{item.value!r}\t{INT32 if item.is_integer else REAL32}"
+        for item in sorted(lines)
+    ]
+    head = [
+        f"# Onboard parameters for Vehicle {system_id}",
+        "#",
+        _OURS,
+        "# Only what differs from the defaults",
+        "#",
+        "# Vehicle-Id Component-Id Name Value Type",
+    ]
+    return "\n".join([*head, *rows, _END]) + "\n"
+
+
+def parse_params(text: str, file: object) -> list[ParamLine]:
+    """Read the text of a parameter file; raise ConfigError with ``file`` and line."""
+    lines: dict[str, ParamLine] = {}
+    rows = text.split("\n")
+    for number, row in enumerate(rows, 1):
+        if not row.strip() or row.startswith("#"):
+            continue
+        item = _parse_row(row.rstrip("\r"), file, number)
+        if item.name in lines:
+            problem = f"{item.name} stands in line {lines[item.name].line} already"
+            raise ConfigError(file, f"line {number}", problem)
+        lines[item.name] = item
+    comments = {row.strip() for row in rows if row.startswith("#")}
+    if _OURS in comments and _END not in comments:
+        raise ConfigError(file, "", f"is not all there: its last line should be {_END!r}")
+    return list(lines.values())
+
+
+def _parse_row(row: str, file: object, number: int) -> ParamLine:
+    def error(problem: str) -> ConfigError:
+        return ConfigError(file, f"line {number}", problem)
+
+    columns = row.split("\t")
+    if len(columns) != 5:
+        raise error(
+            f"has {len(columns)} columns between tabs, expected 5: vehicle, component, name, value, type"
+        )
+    vehicle, component, name, value, kind = columns
+    if not (vehicle.isdecimal() and int(vehicle) <= 255 and component.isdecimal()):
+        raise error(f"vehicle {vehicle[:20]!r} and component {component[:20]!r} must be numbers")
+    if int(component) != _AUTOPILOT:
+        raise error(f"{name} belongs to component {component}, not to the autopilot, {_AUTOPILOT}")
+    if not re.fullmatch(rf"[A-Za-z0-9_]{{1,{LARGEST_NAME}}}", name):
+        raise error(f"{name[:40]!r} is no name of a parameter")
+    if not kind.isdecimal() or int(kind) not in (*_INTEGER_TYPES, *_FLOAT_TYPES):
+        raise error(f"{name}: {kind[:20]!r} is no MAV_PARAM_TYPE of a number")
+    try:
+        number_read = float(value)
+    except ValueError:
+        number_read = math.nan
+    if not math.isfinite(number_read):
+        raise error(f"{name}: {value[:40]!r} is not a number")
+    is_integer = int(kind) in _INTEGER_TYPES
+    if is_integer and number_read != int(number_read):
+        raise error(f"{name}: {value[:40]!r} is not a whole number, as type {kind} demands")
+    return ParamLine(name, int(number_read) if is_integer else number_read, is_integer, number)
+
+
+def read_param_file(path: Path) -> list[ParamLine]:
+    """Read a parameter file, none if there is no such file; raise ConfigError."""
+    try:
+        if not path.exists():
+            return []
+        if path.stat().st_size > _LARGEST_FILE:
+            raise ConfigError(path, "", "is too large for a parameter file")
+        return parse_params(path.read_bytes().decode("utf-8"), path)
+    except OSError as error:
+        raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(path, "", "is not a text file") from error
+
+
+class LoadedParams(NamedTuple):
+    """What a parameter file held."""
+
+    lines: Mapping[str, ParamLine]
+    unknown: tuple[str, ...]
+    """Names that the vehicle does not have, kept for when it does."""
+
+    def warning(self, path: Path) -> str | None:
+        """Return a sentence about unknown names, or None."""
+        if not self.unknown:
+            return None
+        shown = ", ".join(self.unknown[:5]) + (" …" if len(self.unknown) > 5 else "")
+        return f"{path}: kept, but of no use to this vehicle and controller: {shown}"
+
+
+NOTHING_LOADED = LoadedParams({}, ())
+
+
+def load_into(store: ParamStore, path: Path) -> LoadedParams:
+    """Set the parameters of a file; raise ConfigError for one that is known and cannot be set."""
+    lines = {item.name: item for item in read_param_file(path)}
+    for item in lines.values():
+        spec = store.specs.get(item.name)
+        if spec is None:
+            continue
+        problem = _kind_problem(spec, item) or store.set(item.name, item.value)
+        if problem is not None:
+            raise ConfigError(path, f"line {item.line}", f"{item.name}: {problem}")
+    return LoadedParams(lines, tuple(name for name in lines if name not in store.specs))
+
+
+def _kind_problem(spec: ParamSpec, item: ParamLine) -> str | None:
+    if spec.is_integer == item.is_integer:
+        return None
+    return f"is {f'an integer, type {INT32}' if spec.is_integer else f'a real number, type {REAL32}'}, in the vehicle"
+
+
+def lines_to_save(store: ParamStore, loaded: LoadedParams) -> list[ParamLine]:
+    """Return what the file shall hold: all that differs from its default, and what is unknown here.
+
+    Of a parameter that is overridden for this run, the file keeps what it had.
+    """
+    kept = {name: loaded.lines[name] for name in loaded.unknown}
+    for name, spec in store.specs.items():
+        if store.is_overridden(name):
+            if name in loaded.lines:
+                kept[name] = loaded.lines[name]
+        elif not store.is_default(name):
+            kept[name] = ParamLine(name, store.value(name), spec.is_integer)
+    return list(kept.values())
+
+
+def save(store: ParamStore, loaded: LoadedParams, path: Path, system_id: int) -> None:
+    """Write the parameter file whole; raise OSError."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text_atomically(path, format_params(lines_to_save(store, loaded), system_id))

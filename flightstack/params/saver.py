@@ -1,0 +1,62 @@
+"""Keep the parameter file up to date without making the loops wait for the disk."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from flightstack.params.param_file import LoadedParams, save
+from flightstack.params.store import ParamStore
+
+
+class ParamSaver:
+    """Saves the parameters after every change, in a thread of its own; many changes at once become one file."""
+
+    def __init__(
+        self,
+        store: ParamStore,
+        loaded: LoadedParams,
+        path: Path,
+        system_id: int,
+        on_error: Callable[[OSError], None],
+    ) -> None:
+        """Watch ``store`` from now on. ``on_error`` is called, in the thread, when the file cannot be written."""
+        self._store = store
+        self._loaded = loaded
+        self._path = path
+        self._system_id = system_id
+        self._on_error = on_error
+        self._changed = threading.Event()
+        self._closing = False
+        self._thread: threading.Thread | None = None
+        store.subscribe(self._on_change)
+
+    def _on_change(self, _name: str, _value: float) -> None:
+        self._changed.set()
+        if self._thread is None and not self._closing:
+            self._thread = threading.Thread(target=self._run, name="parameters", daemon=True)
+            self._thread.start()
+
+    def _run(self) -> None:
+        while True:
+            self._changed.wait()
+            closing = self._closing  # before the changes are taken: none comes after it
+            self._changed.clear()
+            self._save()
+            if closing:
+                return
+
+    def _save(self) -> None:
+        try:
+            save(self._store, self._loaded, self._path, self._system_id)
+        except OSError as error:
+            self._on_error(error)
+
+    def close(self) -> None:
+        """Save what has changed, and end; a second call does nothing."""
+        self._closing = True
+        if self._thread is not None:
+            self._changed.set()
+            self._thread.join()
+            self._thread = None
