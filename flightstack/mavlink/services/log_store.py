@@ -1,0 +1,92 @@
+"""A vehicle's flight logs as its link services see them, wherever they are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import NamedTuple, Protocol
+
+from flightstack.mavlink.services.virtual_files import Entry, VirtualFile, clean_path
+
+
+class LogInfo(NamedTuple):
+    """One log."""
+
+    name: str
+    """File name, unique among the logs."""
+    size: int
+    """Bytes so far; the log of the flight under way still grows."""
+    time_utc_s: int
+    """When it was last written, in seconds since 1970; 0 if unknown."""
+
+    @property
+    def day(self) -> str:
+        """The day of ``time_utc_s``, as PX4 names the directories of its logs."""
+        return datetime.fromtimestamp(self.time_utc_s, UTC).strftime("%Y-%m-%d")
+
+
+class LogStore(Protocol):
+    """The logs of one vehicle."""
+
+    def logs(self) -> Sequence[LogInfo]:
+        """Return all logs, the oldest first."""
+        ...
+
+    def open(self, name: str) -> VirtualFile | None:
+        """Open a log; None if there is none of this name. Raise OSError when it cannot be read."""
+        ...
+
+    def erase(self) -> int:
+        """Erase all logs but the one that is being written; return how many were. Raise OSError."""
+        ...
+
+
+class NoLogs:
+    """The logs of a vehicle that keeps none."""
+
+    def logs(self) -> Sequence[LogInfo]:
+        """Return nothing."""
+        return ()
+
+    def open(self, name: str) -> VirtualFile | None:
+        """Return None."""
+        return None
+
+    def erase(self) -> int:
+        """Erase nothing."""
+        return 0
+
+
+class FlatLogs:
+    """Logs as one directory: what QGroundControl looks for at ``@MAV_LOG``."""
+
+    def __init__(self, store: LogStore) -> None:
+        self._store = store
+
+    def list(self, path: str) -> list[Entry] | None:
+        """Return the logs, in the order of their ids."""
+        return None if path else [Entry(log.name, log.size) for log in self._store.logs()]
+
+    def open(self, path: str) -> VirtualFile | None:
+        """Open a log by its name."""
+        return None if "/" in path else self._store.open(path)
+
+
+class DatedLogs:
+    """Logs in a directory for each day: as PX4 keeps them in ``/fs/microsd/log``."""
+
+    def __init__(self, store: LogStore) -> None:
+        self._store = store
+
+    def list(self, path: str) -> list[Entry] | None:
+        """Return the days, or the logs of a day."""
+        logs = self._store.logs()
+        if not path:
+            return [Entry(day, None) for day in sorted({log.day for log in logs})]
+        return [Entry(log.name, log.size) for log in logs if log.day == path] or None
+
+    def open(self, path: str) -> VirtualFile | None:
+        """Open ``day/name``."""
+        day, _, name = (clean_path(path) or "").partition("/")
+        is_there = any(log.day == day and log.name == name for log in self._store.logs())
+        return self._store.open(name) if is_there else None

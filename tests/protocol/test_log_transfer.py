@@ -1,0 +1,196 @@
+"""The log protocol: our client against our server, over good and bad links."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.log_client import LogClient, LogDone, LogEntry, LogFailed
+from flightstack.mavlink.services.log_server import LogServer
+from flightstack.transport.memory import LOSSLESS, Conditions
+from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station, content
+
+LOGS = {"first.ulg": content(90 * 30), "empty.ulg": b"", "big.ulg": content(200_000), "open.ulg": content(91)}
+
+
+class Vehicle:
+    """A server, and what it said."""
+
+    def __init__(self, logs: dict[str, bytes] | None = None) -> None:
+        self.store = MemoryLogs(LOGS if logs is None else logs)
+        self.is_armed = False
+        self.texts: list[tuple[int, str]] = []
+        self.server = LogServer(
+            VEHICLE, self.store, lambda: self.is_armed, lambda level, text: self.texts.append((level, text))
+        )
+
+    def tell(self, message: Message, now_s: float = 0.0, source: Address = GCS) -> None:
+        """Let a message of ``source`` arrive."""
+        message._header.srcSystem, message._header.srcComponent = source
+        self.server.receive(message, source, now_s)
+
+    def answers(self, polls: int = 50) -> list[Message]:
+        """Return what is sent in ``polls`` polls, one every hundredth of a second."""
+        return [message for n in range(polls) for _, message in self.server.poll(n * 0.01)]
+
+
+def entry_of(name: str) -> LogEntry:
+    number = list(LOGS).index(name)
+    return LogEntry(number, len(LOGS[name]), 1_700_000_000 + 86_400 * number)
+
+
+def fetch(entry: LogEntry, conditions: Conditions = LOSSLESS, seed: int = 0) -> tuple[object, float]:
+    client = LogClient(VEHICLE)
+    client.start_download(entry)
+    took_s = Ether(Vehicle().server, Station(client, conditions, seed)).run(lambda: client.result is not None)
+    return client.result, took_s
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_list_is_complete(seed: int) -> None:
+    client = LogClient(VEHICLE)
+    client.start_list()
+    Ether(Vehicle().server, Station(client, LOSSY, seed)).run(lambda: client.result is not None, 10.0)
+    assert client.result == LogDone(tuple(entry_of(name) for name in LOGS))
+
+
+def test_no_logs_are_a_list_too() -> None:
+    client = LogClient(VEHICLE)
+    client.start_list()
+    Ether(Vehicle({}).server, Station(client)).run(lambda: client.result is not None)
+    assert client.result == LogDone()
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_a_log_comes_whole(name: str) -> None:
+    result, took_s = fetch(entry_of(name))
+    assert result == LogDone(content=LOGS[name])
+    assert took_s < 0.6  # 2223 messages at 4000 per second
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_log_is_identical_over_a_link_that_loses_a_third(seed: int) -> None:
+    result, took_s = fetch(entry_of("big.ulg"), LOSSY, seed)
+    assert result == LogDone(content=LOGS["big.ulg"])
+    assert took_s < 20.0  # the worst of these seeds takes 8 s
+
+
+def test_a_vehicle_that_is_silent_is_given_up() -> None:
+    result, _ = fetch(entry_of("big.ulg"), Conditions(loss=1.0))
+    assert result == LogFailed("the vehicle (system 1) does not answer")
+
+
+def test_a_log_that_is_not_there_ends_at_once() -> None:
+    result, took_s = fetch(LogEntry(9, 1000, 0))
+    assert result == LogFailed("the vehicle cannot read the log, or it became shorter")
+    assert took_s < 0.1
+
+
+def test_clients_download_at_once() -> None:
+    clients = [LogClient(VEHICLE) for _ in range(6)]
+    stations = [Station(client, address=Address(200 + n, 190)) for n, client in enumerate(clients)]
+    for client in clients:
+        client.start_download(entry_of("big.ulg"))
+    ether = Ether(Vehicle().server, *stations)
+    ether.run(lambda: any(client.result is not None for client in clients))
+    assert min(client.progress[0] for client in clients) > 190_000
+    ether.run(lambda: all(client.result is not None for client in clients))
+    assert all(client.result == LogDone(content=LOGS["big.ulg"]) for client in clients)
+    assert ether.most_per_poll <= 16
+
+
+def test_entries_are_numbered_from_zero_as_in_px4() -> None:
+    vehicle = Vehicle()
+    vehicle.tell(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
+    entries = vehicle.answers()
+    assert [(e.id, e.num_logs, e.last_log_num) for e in entries] == [(n, 4, 3) for n in range(4)]
+
+
+def test_a_range_of_entries_is_brought_into_bounds() -> None:
+    vehicle = Vehicle()
+    vehicle.tell(mavlink.MAVLink_log_request_list_message(1, 1, 2, 2))
+    assert [entry.id for entry in vehicle.answers()] == [2]
+    vehicle.tell(mavlink.MAVLink_log_request_list_message(1, 1, 40, 50))
+    assert [entry.id for entry in vehicle.answers()] == [3]
+
+
+def test_a_log_that_begins_meanwhile_moves_no_number() -> None:
+    vehicle = Vehicle()
+    vehicle.tell(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
+    vehicle.answers()
+    vehicle.store.content = {"older.ulg": b"older", **vehicle.store.content}
+    vehicle.tell(mavlink.MAVLink_log_request_data_message(1, 1, 0, 0, 90))
+    assert bytes(vehicle.answers()[0].data) == LOGS["first.ulg"][:90]
+
+
+def test_who_asks_for_more_than_there_is_learns_where_a_log_of_whole_blocks_ends() -> None:
+    vehicle = Vehicle()
+    vehicle.tell(mavlink.MAVLink_log_request_data_message(1, 1, 0, 0, 0xFFFFFFFF))
+    blocks = vehicle.answers()
+    assert [block.count for block in blocks] == [90] * 30 + [0]
+    vehicle.tell(mavlink.MAVLink_log_request_data_message(1, 1, 0, 0, 2700))
+    assert [block.count for block in vehicle.answers()] == [90] * 30
+
+
+def test_small_requests_wait_for_each_other_and_a_large_one_begins_anew() -> None:
+    vehicle = Vehicle()
+    for offset in (180, 0, 90, 0):  # as MAVProxy fills gaps
+        vehicle.tell(mavlink.MAVLink_log_request_data_message(1, 1, 2, offset, 90))
+    assert [block.ofs for block in vehicle.answers(1)] == [180, 0, 90]
+    vehicle.tell(mavlink.MAVLink_log_request_data_message(1, 1, 2, 0, 200_000))
+    vehicle.tell(mavlink.MAVLink_log_request_data_message(1, 1, 2, 90_000, 1800))
+    assert [block.ofs for block in vehicle.answers()] == list(range(90_000, 91_800, 90))
+
+
+def test_end_stops_a_download() -> None:
+    vehicle = Vehicle()
+    vehicle.tell(mavlink.MAVLink_log_request_data_message(1, 1, 2, 0, 0xFFFFFFFF))
+    assert vehicle.answers(1)
+    vehicle.tell(mavlink.MAVLink_log_request_end_message(1, 1))
+    assert not vehicle.answers()
+    assert vehicle.server.next_deadline() is not None  # it is forgotten after a while
+
+
+def test_erasing_keeps_the_open_log_and_tells() -> None:
+    vehicle = Vehicle()
+    vehicle.tell(mavlink.MAVLink_log_erase_message(1, 1))
+    assert list(vehicle.store.content) == ["open.ulg"]
+    assert vehicle.texts == [(mavlink.MAV_SEVERITY_NOTICE, "3 logs erased")]
+
+
+def test_nothing_is_erased_while_armed() -> None:
+    vehicle = Vehicle()
+    vehicle.is_armed = True
+    vehicle.tell(mavlink.MAVLink_log_erase_message(1, 1))
+    assert len(vehicle.store.content) == 4
+    assert vehicle.texts == [(mavlink.MAV_SEVERITY_WARNING, "Logs not erased: the vehicle is armed")]
+
+
+def test_messages_for_others_are_ignored() -> None:
+    vehicle = Vehicle()
+    vehicle.tell(mavlink.MAVLink_log_erase_message(2, 1))
+    vehicle.tell(mavlink.MAVLink_log_request_list_message(1, 7, 0, 0xFFFF))
+    assert len(vehicle.store.content) == 4
+    assert not vehicle.answers()
+    assert vehicle.server.next_deadline() is None
+
+
+def test_a_silent_client_is_forgotten() -> None:
+    vehicle = Vehicle()
+    vehicle.tell(mavlink.MAVLink_log_request_data_message(1, 1, 2, 0, 90))
+    assert vehicle.answers(1)
+    assert not vehicle.server.poll(31.0)
+    assert vehicle.server.next_deadline() is None
+
+
+def test_the_client_takes_numbers_from_one_as_ardupilot_gives_them() -> None:
+    client = LogClient(VEHICLE)
+    client.start_list()
+    client.poll(0.0)
+    for number in (2, 1, 3):
+        message = mavlink.MAVLink_log_entry_message(number, 3, 3, 5, 100 * number)
+        message._header.srcSystem, message._header.srcComponent = VEHICLE
+        client.receive(message, 0.1)
+    assert client.result == LogDone(tuple(LogEntry(n, 100 * n, 5) for n in (1, 2, 3)))
