@@ -7,22 +7,29 @@ in a process, simulated time in tests. Telemetry counts simulated time too (``ma
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Hashable, Iterable, Iterator
 
 from flightstack.commands import VehicleContext
 from flightstack.ground.facts import AutopilotFacts
-from flightstack.ground.peer import GROUND, Peer, PeerAddress
+from flightstack.ground.peer import API, Peer, PeerAddress
+from flightstack.ground.router import Router
 from flightstack.ground.service import Service
 from flightstack.ground.services import make_services
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.frames import FrameReader
+from flightstack.mavlink.link import Link, Message, is_unknown
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
-from flightstack.mavlink.telemetry import MAKERS, heartbeat, status_texts
+from flightstack.mavlink.telemetry import MAKERS, VehicleFacts, heartbeat, messages, status_texts
 
 HEARTBEAT_S = 1.0
 PEER_FORGOTTEN_S = 30.0
-MAX_PEERS = 32
+MAX_PEERS = 64
+GIVES_WAY_S = 5.0
+"""A peer silent for so long gives way to a new one when all places are taken: five heartbeats are missing."""
+FORWARDED_A_POLL = 64
+MAX_TO_FORWARD = 4096
 
 
 class GroundHub:
@@ -40,19 +47,24 @@ class GroundHub:
             for kind in service.handles:
                 self._by_type.setdefault(kind, []).append(service)
         self._shown = (facts.armed, facts.mode)
+        self._router: Router[PeerAddress] = Router(self._own)
+        self._to_forward: deque[tuple[PeerAddress, bytes]] = deque(maxlen=MAX_TO_FORWARD)
+        self._forget_due_s = -math.inf
+        self._made: dict[int, tuple[Message, ...]] = {}
 
     # ------------------------------------------------------------------ peers
 
     def add_peer(self, address: PeerAddress, permanent: bool = False) -> Peer:
         """Begin to talk to ``address``; a permanent one gets heartbeats before it was ever heard."""
-        rates = GROUND_RATES_HZ if address.channel == GROUND else API_RATES_HZ
-        peer = Peer(Link(*self._own), Streams(rates), permanent)
+        rates = API_RATES_HZ if address.channel == API else GROUND_RATES_HZ
+        peer = Peer(Link(*self._own, keeps_unknown=True), Streams(rates), permanent)
         self._peers[address] = peer
         return peer
 
     def drop_peer(self, address: PeerAddress) -> None:
         """Forget a peer whose connection has ended."""
         self._peers.pop(address, None)
+        self._router.forget(address)
 
     def is_heard(self, address: PeerAddress) -> bool:
         """Tell whether a valid message of ``address`` has come, not too long ago."""
@@ -70,26 +82,46 @@ class GroundHub:
         return max((peer.heard_s for peer in self._peers.values()), default=-math.inf)
 
     def _forget_silent(self, now_s: float) -> None:
+        if now_s < self._forget_due_s:
+            return
+        self._forget_due_s = now_s + HEARTBEAT_S
         for address, peer in list(self._peers.items()):
             if now_s - peer.heard_s > PEER_FORGOTTEN_S:
                 if peer.permanent:
                     peer.heard_s = -math.inf
+                    self._router.forget(address)
                 else:
-                    del self._peers[address]
+                    self.drop_peer(address)
+
+    def _admit(self, address: PeerAddress, data: bytes, now_s: float) -> Peer | None:
+        """Make a peer of a stranger who sends a valid frame, if there is room: noise takes no place."""
+        if not any(frame.known for frame in FrameReader().feed(data)):
+            return None
+        if len(self._peers) >= MAX_PEERS:
+            passing = [(peer.heard_s, where) for where, peer in self._peers.items() if not peer.permanent]
+            silent_s, silent = min(passing, default=(math.inf, None))
+            if silent is None or now_s - silent_s < GIVES_WAY_S:
+                return None
+            self.drop_peer(silent)
+        return self.add_peer(address)
 
     # ------------------------------------------------------------------ receiving
 
     def receive(self, address: PeerAddress, data: bytes, now_s: float) -> None:
-        """Take a datagram; whatever it holds, nothing is raised."""
-        peer = self._peers.get(address)
+        """Take a datagram, or a piece of a stream; whatever it holds, nothing is raised."""
+        peer = self._peers.get(address) or self._admit(address, data, now_s)
         if peer is None:
-            if len(self._peers) >= MAX_PEERS:
-                return
-            peer = self.add_peer(address)
+            return
         for message in peer.link.decode(data):
-            peer.heard_s = now_s
-            for service in self._by_type.get(message.get_type(), ()):
-                service.receive(message, address, now_s)
+            if not is_unknown(message):
+                peer.heard_s = now_s
+            route = self._router.route(message, address, now_s)
+            if route.forward:
+                frame = bytes(message.get_msgbuf())
+                self._to_forward.extend((other, frame) for other in route.forward)
+            if route.local:
+                for service in self._by_type.get(message.get_type(), ()):
+                    service.receive(message, address, now_s)
 
     # ------------------------------------------------------------------ sending
 
@@ -99,10 +131,26 @@ class GroundHub:
         for service in self._services:
             self._collect(service.poll(now_s))
         self._spread_texts()
+        self._made.clear()
         for address, peer in list(self._peers.items()):
             for message in self._due(peer, changed, now_s):
-                yield address, peer.link.encode(message)
+                yield address, peer.link.encode_shared(message)
+        yield from self._forwarded()
         self._forget_silent(now_s)
+
+    def _forwarded(self) -> Iterator[tuple[PeerAddress, bytes]]:
+        """Pass on what peers sent each other, so much at a time."""
+        for _ in range(min(FORWARDED_A_POLL, len(self._to_forward))):
+            address, frame = self._to_forward.popleft()
+            if address in self._peers:
+                yield address, frame
+
+    def _make(self, message_id: int, facts: VehicleFacts) -> tuple[Message, ...]:
+        """Return a message of telemetry, made once in a poll for all peers."""
+        made = self._made.get(message_id)
+        if made is None:
+            made = self._made[message_id] = tuple(messages(message_id, facts))
+        return made
 
     def _collect(self, addressed: Iterable[tuple[Hashable | None, Message]]) -> None:
         for address, message in addressed:
@@ -114,12 +162,12 @@ class GroundHub:
     def _due(self, peer: Peer, changed: bool, now_s: float) -> Iterator[Message]:
         if (peer.heard or peer.permanent) and (changed or now_s >= peer.heartbeat_due_s):
             peer.heartbeat_due_s = now_s + HEARTBEAT_S
-            yield heartbeat(self._facts)
+            yield from self._make(mavlink.MAVLINK_MSG_ID_HEARTBEAT, self._facts)
         if peer.outbox:
             yield from peer.outbox
             peer.outbox.clear()
         if peer.heard:
-            yield from peer.streams.due(self._facts, now_s)
+            yield from peer.streams.due(self._facts, now_s, self._make)
 
     def _note_changes(self) -> bool:
         """Announce reached items; tell whether mode or arming changed."""

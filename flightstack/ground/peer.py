@@ -9,8 +9,8 @@ from typing import NamedTuple
 from flightstack.mavlink.link import Link, Message
 from flightstack.mavlink.streams import Streams
 
-GROUND = "ground"
-"""The channel of ground stations; any other gets the rates of an API client."""
+GROUND, API = "ground", "api"
+"""The channels of ground stations and of companions; any other gets the rates of a ground station."""
 
 
 class PeerAddress(NamedTuple):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Hashable
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message, is_unknown
@@ -25,33 +25,36 @@ ONE_LINK_ONLY = frozenset({mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_
 """Never passed on: a radio's report about its own link, and the secret key."""
 
 
-class Route(NamedTuple):
+Peer = TypeVar("Peer", bound=Hashable)
+
+
+class Route(NamedTuple, Generic[Peer]):
     """Where a message goes."""
 
     local: bool
     """Whether it may concern this vehicle: it is for its system, or for all."""
-    forward: tuple[Hashable, ...]
+    forward: tuple[Peer, ...]
     """Peers to pass it on to."""
 
 
-class Router:
+class Router(Generic[Peer]):
     """Learns who is where from what was heard, and decides where each message goes."""
 
     def __init__(self, own: Address) -> None:
         self._own = own
-        self._heard: dict[Hashable, OrderedDict[Address, None]] = {}
-        self._passed: OrderedDict[bytes, tuple[Hashable, float]] = OrderedDict()
+        self._heard: dict[Peer, OrderedDict[Address, None]] = {}
+        self._passed: OrderedDict[bytes, tuple[Peer, float]] = OrderedDict()
         self.repetitions = 0
         """Frames not passed on because another peer had brought them before: the network has a loop."""
 
-    def route(self, message: Message, peer: Hashable, now_s: float) -> Route:
+    def route(self, message: Message, peer: Peer, now_s: float) -> Route[Peer]:
         """Return where ``message`` of ``peer`` goes, and learn from it.
 
         The checksum of an unknown message cannot be verified, nor its target read: it is passed on to all if it
         comes from a peer that has sent a valid one, and nothing is learned from it.
         """
         if is_unknown(message):
-            to_all = self._others(peer) if peer in self._heard else ()
+            to_all: tuple[Peer, ...] = self._others(peer) if peer in self._heard else ()
             return Route(False, self._fresh(message, peer, to_all, now_s))
         source = sender(message)
         target = Address(getattr(message, "target_system", 0), getattr(message, "target_component", 0))
@@ -61,23 +64,23 @@ class Router:
         self._learn(peer, source)
         return Route(local, self._fresh(message, peer, self._places(target, peer), now_s))
 
-    def forget(self, peer: Hashable) -> None:
+    def forget(self, peer: Peer) -> None:
         """Forget a peer that is gone."""
         self._heard.pop(peer, None)
 
     # ------------------------------------------------------------------ who is where
 
-    def _learn(self, peer: Hashable, source: Address) -> None:
+    def _learn(self, peer: Peer, source: Address) -> None:
         addresses = self._heard.setdefault(peer, OrderedDict())
         if source not in addresses:
             addresses[source] = None
             if len(addresses) > MAX_ADDRESSES:
                 addresses.popitem(last=False)
 
-    def _others(self, peer: Hashable) -> tuple[Hashable, ...]:
+    def _others(self, peer: Peer) -> tuple[Peer, ...]:
         return tuple(other for other in self._heard if other != peer)
 
-    def _places(self, target: Address, peer: Hashable) -> tuple[Hashable, ...]:
+    def _places(self, target: Address, peer: Peer) -> tuple[Peer, ...]:
         """Return the peers, other than ``peer``, that ``target`` is to be found at."""
         if target.system == 0:
             return self._others(peer)
@@ -97,8 +100,8 @@ class Router:
     # ------------------------------------------------------------------ loops
 
     def _fresh(
-        self, message: Message, peer: Hashable, places: tuple[Hashable, ...], now_s: float
-    ) -> tuple[Hashable, ...]:
+        self, message: Message, peer: Peer, places: tuple[Peer, ...], now_s: float
+    ) -> tuple[Peer, ...]:
         """Return ``places``, or none when another peer has brought this very frame a moment ago."""
         if not places or message.get_msgId() in ONE_LINK_ONLY:
             return ()

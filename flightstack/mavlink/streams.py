@@ -7,7 +7,8 @@ time a client gets 50 attitudes a second, not 2 500. At speed 1, and over a memo
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeAlias
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Message
@@ -85,6 +86,9 @@ GROUPS: dict[int, tuple[int, ...]] = {
 """Messages of the groups of REQUEST_DATA_STREAM, as ArduPilot divides them."""
 
 
+Make: TypeAlias = Callable[[int, VehicleFacts], Iterable[Message]]
+
+
 class _Stream:
     """A message of a link, due at ``vehicle_s`` on the vehicle's clock and ``link_s`` on the link's."""
 
@@ -137,8 +141,8 @@ class Streams:
         for message_id in members:
             self.set_interval(message_id, interval_us)
 
-    def due(self, facts: VehicleFacts, link_now_s: float) -> Iterator[Message]:
-        """Yield the messages that are due by the vehicle's time and by the link's."""
+    def due(self, facts: VehicleFacts, link_now_s: float, make: Make = messages) -> Iterator[Message]:
+        """Yield the messages that are due by the vehicle's time and by the link's, made by ``make``."""
         now_s = facts.time_us * 1e-6
         if now_s < self._soonest_s:
             return
@@ -146,6 +150,6 @@ class Streams:
         for stream in self._streams.values():
             if now_s >= stream.vehicle_s and link_now_s >= stream.link_s:
                 stream.sent(now_s, link_now_s)
-                yield from messages(stream.message_id, facts)
+                yield from make(stream.message_id, facts)
             soonest_s = min(soonest_s, stream.vehicle_s)
         self._soonest_s = soonest_s
