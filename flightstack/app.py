@@ -18,6 +18,8 @@ from flightstack.config import StackConfig
 from flightstack.ground.peer import PeerAddress
 from flightstack.logging.flight_log import FlightLog
 from flightstack.modes import Mode
+from flightstack.params.identity import SYSTEM_ID
+from flightstack.params.saver import ParamSaver
 from flightstack.transport.processor import Follower
 from flightstack.transport.tcp import LinkClosedError, TcpClient
 from flightstack.transport.vehicle_ports import Place, PortsConfig, VehiclePorts
@@ -27,6 +29,8 @@ GROUND_POLL_NS = 500_000
 REPORT_S = 0.2
 SECOND_HELLO_S = 1.0
 """Silence after which a simulator is asked for the standard message."""
+SIMULATOR_NOTICE_S = 10.0
+"""Silence of a connected simulator after which the user is told; it is waited for longer: it may be compiling."""
 FIRST_CONTACT_S = 60.0
 """How long a process that must not outlive its ground station waits for the first word from it."""
 
@@ -60,6 +64,12 @@ class App:
         self._log_count = 0
         self.stack: Stack = build(config, self._open_log)
         self._ports = VehiclePorts(process.ports)
+        self._saver: ParamSaver | None = None
+        if config.params_file is not None:
+            system_id = int(self.stack.params.value(SYSTEM_ID))
+            self._saver = ParamSaver(
+                self.stack.params, self.stack.loaded_params, Path(config.params_file), system_id
+            )
         self._lockstep = config.lockstep
         self._stop_signal = 0
         for channel, peer in self._ports.first_peers:
@@ -115,6 +125,10 @@ class App:
     def _close(self, simulator: TcpClient | None, orderly: bool) -> None:
         """End the log and, if all is in order, say goodbye: who hears nothing counts us as lost."""
         self.stack.recorder.close()
+        if self._saver is not None:
+            self._saver.close()
+            if (problem := self._saver.take_error()) is not None:
+                print(f"flightstack: {problem}", file=sys.stderr, flush=True)
         if orderly:
             for (channel, host, port), data in self.stack.ground.farewell():
                 self._ports.send(channel, (host, port), data)
@@ -172,7 +186,7 @@ class App:
     def _wait_for_state(self, simulator: TcpClient) -> None:
         link, interval_us = self.stack.simulator, self.stack.rates.interval_us
         began_s = time.monotonic()
-        asked_again = False
+        asked_again = told = False
         while True:
             self._check_stop()
             self._serve_ground()
@@ -183,8 +197,22 @@ class App:
             if not asked_again and (silent or link.request_refused):
                 asked_again = True
                 simulator.send(link.second_hello(interval_us))
+            if not told and time.monotonic() - began_s > SIMULATOR_NOTICE_S:
+                told = True
+                self._tell_simulator_silent()
             self._check_simulator(began_s + self._process.simulator_timeout_s)
         self.stack.autopilot.has_state = True
+
+    def _tell_simulator_silent(self) -> None:
+        p = self._process
+        sentence = f"the simulator at {p.simulator_host}:{p.simulator_port} is connected but sends no state"
+        self.stack.autopilot.say(4, f"Waiting: {sentence}")
+        print(
+            f"flightstack: {sentence} for {SIMULATOR_NOTICE_S:g} s; it hangs, or compiles; waiting up to "
+            f"{p.simulator_timeout_s:g} s",
+            file=sys.stderr,
+            flush=True,
+        )
 
     def _hold_time(self, simulator: TcpClient) -> None:
         """Keep time at zero until the vehicle flies a mission; the ground links go on meanwhile."""
@@ -280,6 +308,8 @@ class App:
         if now_s >= self._next_report_s:
             self._next_report_s = now_s + REPORT_S
             self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
+            if self._saver is not None and (problem := self._saver.take_error()) is not None:
+                self.stack.autopilot.say(3, problem[0].upper() + problem[1:])
         ground, ports = self.stack.ground, self._ports
         for channel, peer, data in ports.receive(self._is_heard):
             ground.receive(PeerAddress(channel, *peer), data, now_s)

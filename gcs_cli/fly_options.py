@@ -43,8 +43,13 @@ class FlyOptions:
     vehicle: str = "paper_quad"
     instance: int = 0
     ideal_rotors: bool = False
+    params: Path | None = None
     timeout_s: float = 60.0
     limit_s: float = 3600.0
+    battery_start: float | None = None
+    battery_capacity: float | None = None
+    battery_drain: float | None = None
+    faults: tuple[str, ...] = ()
 
     @property
     def outer_rate_hz(self) -> float:
@@ -75,6 +80,8 @@ def checked_plan(options: FlyOptions) -> Plan:
     plan = load_plan(options.plan_path)
     load_vehicle(options.vehicle)
     open_gains(options.gains)
+    if options.params is not None and not options.params.is_file():
+        raise CliError(f"--params {options.params}: there is no such file", USAGE)
     rates(options.inner_hz, options.outer_rate_hz)
     rejection = check_mission(plan.items, plan.home or DEFAULT_HOME)
     if rejection is not None:
@@ -109,6 +116,13 @@ def _check_flags(options: FlyOptions) -> None:
     _number("--instance", options.instance, 0, MOST_INSTANCES - 1)
     _number("--timeout", options.timeout_s, 0.1, 86_400.0)
     _number("--limit", options.limit_s, 1.0, 1e6)
+    _number("--battery-start", _or(options.battery_start, 100.0), 0.0, 100.0)
+    _number("--battery-capacity", _or(options.battery_capacity, 1.0), 1.0, 1e6)
+    _number("--battery-drain", _or(options.battery_drain, 1.0), 0.0, 1e4)
+
+
+def _or(value: float | None, default: float) -> float:
+    return default if value is None else value
 
 
 def _number(flag: str, value: str | float, low: float, high: float) -> None:
@@ -161,6 +175,13 @@ def simulator_arguments(options: FlyOptions, home: GeoPoint) -> list[str]:
         arguments.append(f"--gust={options.gust}")
     if options.torque_gust is not None:
         arguments.append(f"--torque-gust={options.torque_gust}")
+    battery = {
+        "start": options.battery_start,
+        "capacity": options.battery_capacity,
+        "drain": options.battery_drain,
+    }
+    arguments += [f"--battery-{name}={value!r}" for name, value in battery.items() if value is not None]
+    arguments += [f"--fault={fault}" for fault in options.faults]  # the simulator knows what they may be
     return [*arguments, "--ideal-rotors"] if options.ideal_rotors else arguments
 
 
@@ -179,6 +200,7 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path) -> list[s
         f"--log={folder / LOG_NAME}",
         f"--home={_home(home)}",
         f"--exit-on-gcs-loss={GCS_LOSS_S:g}",
+        f"--params={options.params or 'none'}",
         "--wait-for-start",
     ]
     return [*arguments, "--ideal-rotors"] if options.ideal_rotors else arguments

@@ -37,6 +37,13 @@ class RunInfo:
     plant: str | None = None
     loops: str | None = None
     seed: int | None = None
+    wind: str | None = None
+    gust: float | None = None
+    torque_gust: float | None = None
+    battery_start: float | None = None
+    battery_capacity: float | None = None
+    battery_drain: float | None = None
+    faults: tuple[str, ...] = ()
     inner_hz: float | None = None
     outer_hz: float | None = None
     overruns: int | None = None
@@ -59,6 +66,7 @@ def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
         "outcome": run.outcome,
         "plan": run.plan,
         **{key: _finite(value) for key, value in settings.items()},
+        **_conditions(run),
         "sim_time_s": _rounded(flight.duration_s),
         "wall_time_s": _rounded(run.wall_time_s),
         "real_time_factor": _rounded(factor),
@@ -67,6 +75,20 @@ def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
         "max_tracking_error_m": _rounded(float(error_m.max())) if len(error_m) else None,
         "overruns": run.overruns if run.overruns is not None else flight.overruns,
         "log_sha256": file_sha256(run.log_path) if run.log_path and run.log_path.exists() else None,
+    }
+
+
+def _conditions(run: RunInfo) -> dict[str, Any]:
+    """What the simulator was asked to do to the vehicle, in the units of the flags; null where nothing was."""
+    wind = None if run.wind is None else [float(part) for part in run.wind.split(",")]
+    return {
+        "wind_m_s": wind,
+        "gust_m_s": run.gust,
+        "torque_gust_n_m": run.torque_gust,
+        "battery_start_percent": run.battery_start,
+        "battery_capacity_mah": run.battery_capacity,
+        "battery_drain": run.battery_drain,
+        "faults": list(run.faults),
     }
 
 

@@ -33,12 +33,26 @@ def fly(
     torque_gust: Annotated[
         float | None, typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
     ] = None,
+    battery_start: Annotated[
+        float | None, typer.Option(metavar="PERCENT", help="Charge at the start.  [default: 100]")
+    ] = None,
+    battery_capacity: Annotated[
+        float | None, typer.Option(metavar="MAH", help="Capacity.  [default: the vehicle's]")
+    ] = None,
+    battery_drain: Annotated[
+        float | None, typer.Option(metavar="FACTOR", help="Let the charge fall so many times as fast.")
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SPEC", help="As of sim-bridge, for example rotor:2:off@12.5; may be repeated."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Directory of the results.  [default: runs/<stamp>-<plan>]")
     ] = None,
     vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
     instance: Annotated[int, typer.Option(help="Shifts all ports, to fly beside another one.")] = 0,
     ideal_rotors: Annotated[bool, typer.Option("--ideal-rotors", help="No rotor lag, no limits.")] = False,
+    params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None,
     open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
     as_json: JsonOption = False,
     timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 60]")] = None,
@@ -55,7 +69,8 @@ def fly(
         raise CliError("fly starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
     options = FlyOptions(
         plan, controller, gains, plant, speed, inner_hz, outer_hz, seed, wind, gust, torque_gust, vehicle,
-        instance, ideal_rotors, 60.0 if settings.timeout_s is None else settings.timeout_s, limit,
+        instance, ideal_rotors, params, 60.0 if settings.timeout_s is None else settings.timeout_s, limit,
+        battery_start, battery_capacity, battery_drain, tuple(fault or ()),
     )  # fmt: skip
     items = checked_plan(options)
     console = FlyConsole(stderr=as_json, highlight=False)

@@ -82,6 +82,9 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
         ({"torque_gust": math.inf}, "--torque-gust inf: expected a number"),
         ({"inner_hz": float("nan")}, "--inner-hz nan: expected a number"),
         ({"seed": -1}, "--seed -1"),
+        ({"battery_start": 101.0}, "--battery-start 101.0: expected a number"),
+        ({"battery_capacity": 0.0}, "--battery-capacity 0.0: expected a number"),
+        ({"battery_drain": math.nan}, "--battery-drain nan: expected a number"),
         ({"instance": 100}, "--instance 100: expected a number from 0 to 99"),
         ({"limit_s": float("nan")}, "--limit nan"),
         ({"timeout_s": 0.0}, "--timeout 0.0"),
@@ -176,6 +179,15 @@ def test_the_children_are_told_everything() -> None:
         "--inner-hz=1000.0", "--outer-hz=250.0", "--sim-port=4562", "--sim-timeout=12",
         "--instance=2", "--gcs-port=14570", "--log=runs/x/flight.ulg",
         "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--wait-for-start", "--ideal-rotors",
+    ]  # fmt: skip
+
+
+def test_the_simulator_is_told_about_battery_and_faults() -> None:
+    faults = ("rotor:2:off@12.5", "battery:level=0.1@20")
+    options = FlyOptions(HOP, battery_start=40.0, battery_drain=3.5, faults=faults)
+    told = simulator_arguments(options, GeoPoint(47.1, -8.2, 3.5))
+    assert told[-4:] == [
+        "--battery-start=40.0", "--battery-drain=3.5", "--fault=rotor:2:off@12.5", "--fault=battery:level=0.1@20"
     ]  # fmt: skip
 
 

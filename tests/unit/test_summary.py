@@ -24,7 +24,8 @@ from tests.support.synthetic_flight import CORNERS_NED_M, HOME, INFO, PARAMETERS
 REQUIRED = {
     "outcome", "plan", "vehicle", "controller", "gains", "plant", "loops", "seed", "inner_hz", "outer_hz",
     "sim_time_s", "wall_time_s", "real_time_factor", "waypoints", "rms_tracking_error_m",
-    "max_tracking_error_m", "overruns", "log_sha256",
+    "max_tracking_error_m", "overruns", "log_sha256", "wind_m_s", "gust_m_s", "torque_gust_n_m",
+    "battery_start_percent", "battery_capacity_mah", "battery_drain", "faults",
 }  # fmt: skip
 
 
@@ -68,6 +69,15 @@ def test_attitude_is_that_of_the_quaternion(log_path: Path) -> None:
     expected = 0.12 * np.sin(2.0 * (flight.attitude.time_s - 1.05))
     assert np.abs(flight.attitude.values[:, 0] - expected).max() < 1e-6
     assert euler_from_quaternions(np.array([[math.cos(0.25), 0.0, 0.0, math.sin(0.25)]]))[0, 2] == 0.5
+
+
+def test_the_summary_names_the_conditions_of_the_flight() -> None:
+    run = RunInfo("completed", "x.plan", wind="3,-1", gust=0.5, battery_start=40.0, faults=("rotor:2:off@5",))
+    summary = summarise(Flight(), square_plan(), run)
+    assert (summary["wind_m_s"], summary["gust_m_s"], summary["torque_gust_n_m"]) == ([3.0, -1.0], 0.5, None)
+    assert (summary["battery_start_percent"], summary["battery_drain"]) == (40.0, None)
+    assert summary["faults"] == ["rotor:2:off@5"]
+    assert summarise(Flight(), square_plan(), RunInfo("completed", "x.plan"))["wind_m_s"] is None
 
 
 def test_the_summary_of_a_whole_flight(log_path: Path) -> None:
