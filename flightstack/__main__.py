@@ -28,7 +28,7 @@ def run(
     sim_port: Annotated[int | None, typer.Option(help="Port of the simulator [4560 + instance].")] = None,
     sim_timeout: Annotated[float, typer.Option(help="Longest wait for the simulator [s].")] = 30.0,
     instance: Annotated[
-        int, typer.Option(min=0, max=250, help="Number of this vehicle; shifts ports and id.")
+        int, typer.Option(min=0, max=249, help="Number of this vehicle; shifts ports and id.")
     ] = 0,
     gcs: Annotated[
         list[str] | None,
@@ -50,6 +50,12 @@ def run(
     param: Annotated[
         list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")
     ] = None,
+    params: Annotated[
+        str | None,
+        typer.Option(
+            help="Parameter file [runs/params-<instance>.params]; 'none' for none.", metavar="FILE|none"
+        ),
+    ] = None,
     home: Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of the local origin.")] = None,
     ideal_rotors: Annotated[
         bool, typer.Option(help="Rotors without lag and limits, as the paper assumes.")
@@ -69,7 +75,6 @@ def run(
     from flightstack.assembly import build
     from flightstack.clock import nearest_outer_hz
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
-    from flightstack.params.behaviour import Behaviour, with_assignments
     from flightstack.params.errors import ConfigError
     from flightstack.ports import described, ports_config, warning
     from flightstack.transport.udp import PortBusyError
@@ -81,7 +86,8 @@ def run(
         config = StackConfig(
             vehicle, controller, gains, loops, inner_hz, outer_rate, ideal_rotors, clock == "lockstep",
             DEFAULT_HOME if home is None else parse_home(home), instance + 1,
-            with_assignments(Behaviour(), param or []),
+            params_file=None if params == "none" else params or f"runs/params-{instance}.params",
+            params=tuple(param or []),
         )  # fmt: skip
         if check:
             vehicle_name = build(config, lambda: None).vehicle.name
@@ -102,6 +108,10 @@ def run(
     except (ConfigError, PortBusyError) as error:
         print(f"flightstack: {error}", file=sys.stderr)
         sys.exit(EXIT_USAGE)
+    if config.params_file is not None:
+        unknown = stack.stack.loaded_params.warning(Path(config.params_file))
+        if unknown is not None:
+            print(f"flightstack: {unknown}", file=sys.stderr, flush=True)
     print(
         f"flightstack: {stack.stack.vehicle.name}, {controller} ({gains}), {inner_hz:g}/{outer_rate:g} Hz, {clock}; "
         f"simulator {sim_host}:{process.simulator_port}, {described(process.ports)}",

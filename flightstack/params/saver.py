@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from pathlib import Path
 
 from flightstack.params.param_file import LoadedParams, save
@@ -13,20 +12,13 @@ from flightstack.params.store import ParamStore
 class ParamSaver:
     """Saves the parameters after every change, in a thread of its own; many changes at once become one file."""
 
-    def __init__(
-        self,
-        store: ParamStore,
-        loaded: LoadedParams,
-        path: Path,
-        system_id: int,
-        on_error: Callable[[OSError], None],
-    ) -> None:
-        """Watch ``store`` from now on. ``on_error`` is called, in the thread, when the file cannot be written."""
+    def __init__(self, store: ParamStore, loaded: LoadedParams, path: Path, system_id: int) -> None:
+        """Watch ``store`` from now on; ``loaded`` is what ``path`` held."""
         self._store = store
         self._loaded = loaded
         self._path = path
         self._system_id = system_id
-        self._on_error = on_error
+        self._error: OSError | None = None
         self._changed = threading.Event()
         self._closing = False
         self._thread: threading.Thread | None = None
@@ -51,7 +43,12 @@ class ParamSaver:
         try:
             save(self._store, self._loaded, self._path, self._system_id)
         except OSError as error:
-            self._on_error(error)
+            self._error = error
+
+    def take_error(self) -> str | None:
+        """Return the sentence why the file was not written, once for each time; None if it was."""
+        error, self._error = self._error, None
+        return None if error is None else f"parameters are not saved: {self._path}: {error.strerror or error}"
 
     def close(self) -> None:
         """Save what has changed, and end; a second call does nothing."""
