@@ -8,6 +8,8 @@ from typing import Generic, TypeVar
 
 MAX_WAITING_OCTETS = 65536
 """What one peer may have waiting; the largest datagram still fits."""
+LEAST_COST = 12
+"""What a piece counts at least, were it empty: the size of the smallest frame."""
 MAX_STRANGERS = 64
 """How many peers that nobody has heard a valid message from may wait at once."""
 
@@ -36,6 +38,7 @@ class FairQueue(Generic[Key]):
 
         ``is_known`` tells who may always join: strangers share a limited number of places.
         """
+        cost = max(len(data), LEAST_COST)
         pieces = self._waiting.get(key)
         if pieces is None:
             # counting all as strangers is cheap; who is known is asked only when it matters
@@ -44,24 +47,24 @@ class FairQueue(Generic[Key]):
                 return False
             pieces = self._waiting[key] = deque()
             self._octets[key] = 0
-        elif self._octets[key] + len(data) > self._max_octets:
+        elif self._octets[key] + cost > self._max_octets:
             self.dropped += 1
             return False
         pieces.append(data)
-        self._octets[key] += len(data)
+        self._octets[key] += cost
         return True
 
-    def take(self, most: int) -> Iterator[tuple[Key, bytes]]:
-        """Yield up to ``most`` pieces, with their peers, in turns."""
-        for _ in range(most):
-            if not self._waiting:
-                return
+    def take(self, octets: int) -> Iterator[tuple[Key, bytes]]:
+        """Yield pieces, with their peers, in turns: ``octets`` of them, and what the last piece has beyond."""
+        while self._waiting and octets > 0:
             key = next(iter(self._waiting))
             pieces = self._waiting.pop(key)
             data = pieces.popleft()
+            cost = max(len(data), LEAST_COST)
+            octets -= cost
             if pieces:
                 self._waiting[key] = pieces  # to the end of the line
-                self._octets[key] -= len(data)
+                self._octets[key] -= cost
             else:
                 del self._octets[key]
             yield key, data

@@ -50,8 +50,9 @@ def resolve(host: str) -> str:
 class UdpSocket:
     """Datagrams to and from any peer. What cannot be sent is counted: to lose one is normal in UDP."""
 
-    def __init__(self, host: str = "127.0.0.1", port: int = 0) -> None:
-        """Bind to ``host``:``port`` (0: any free one); raise PortBusyError."""
+    def __init__(self, host: str = "127.0.0.1", port: int = 0, largest: int = _LARGEST_DATAGRAM) -> None:
+        """Bind to ``host``:``port`` (0: any free one); raise PortBusyError. Longer datagrams are cut."""
+        self._largest = largest
         self._socket = _bound((host, port))
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
@@ -71,7 +72,7 @@ class UdpSocket:
         """Yield the datagrams that are here (bounded, so that a flood cannot hold the caller)."""
         for _ in range(_DATAGRAMS_A_CALL):
             try:
-                data, peer = self._socket.recvfrom(_LARGEST_DATAGRAM)
+                data, peer = self._socket.recvfrom(self._largest)
             except BlockingIOError:
                 return
             except OSError:  # a report about an earlier datagram, not about this one

@@ -1,0 +1,63 @@
+"""Turns among peers."""
+
+from __future__ import annotations
+
+from flightstack.transport.fair_queue import MAX_STRANGERS, MAX_WAITING_OCTETS, FairQueue
+
+
+def nobody(_: str) -> bool:
+    return False
+
+
+def test_a_peers_own_data_stays_in_order() -> None:
+    queue: FairQueue[str] = FairQueue()
+    for number in range(10):
+        queue.push("a", bytes([number]) * 20, nobody)
+    assert [data[0] for _, data in queue.take(1000)] == list(range(10))
+    assert len(queue) == 0
+
+
+def test_one_who_floods_delays_another_by_one_piece() -> None:
+    queue: FairQueue[str] = FairQueue()
+    for _ in range(1000):
+        queue.push("flood", bytes(60), nobody)
+    queue.push("station", b"hello", nobody)
+    assert [key for key, _ in queue.take(180)] == ["flood", "station", "flood", "flood"]
+
+
+def test_a_turn_ends_by_octets_and_never_without_a_piece() -> None:
+    queue: FairQueue[str] = FairQueue()
+    for key in "abc":
+        queue.push(key, bytes(2000), nobody)
+    assert [key for key, _ in queue.take(1)] == ["a"]
+    assert [key for key, _ in queue.take(2001)] == ["b", "c"]
+    assert list(queue.take(1000)) == []
+
+
+def test_empty_pieces_do_not_come_for_free() -> None:
+    queue: FairQueue[str] = FairQueue()
+    for _ in range(10_000):
+        queue.push("empty", b"", nobody)
+    assert queue.dropped > 4000
+    assert len(list(queue.take(4096))) < 400
+
+
+def test_what_waits_is_bounded_for_each_and_for_all_strangers() -> None:
+    queue: FairQueue[str] = FairQueue()
+    for _ in range(100):
+        queue.push("flood", bytes(2048), nobody)
+    assert queue.dropped == 100 - MAX_WAITING_OCTETS // 2048
+    for number in range(1000):
+        queue.push(f"stranger {number}", b"hello", nobody)
+    assert len(queue) == MAX_STRANGERS
+    assert not queue.push("one more", b"hello", nobody)
+    assert queue.push("station", b"hello", lambda key: key == "station")
+
+
+def test_who_is_forgotten_has_nothing_waiting() -> None:
+    queue: FairQueue[str] = FairQueue()
+    queue.push("a", b"hello", nobody)
+    assert "a" in queue
+    queue.forget("a")
+    queue.forget("never")
+    assert list(queue.take(1000)) == []

@@ -1,0 +1,213 @@
+"""The TCP server on real sockets: nothing waits, nothing grows, no frame is cut."""
+
+from __future__ import annotations
+
+import select
+import socket
+import struct
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.frames import FrameReader
+from flightstack.mavlink.link import Link
+from flightstack.transport.tcp_server import MAX_CLIENTS, MAX_UNSENT, STALLED_S, TcpServer
+from flightstack.transport.udp import Address, PortBusyError
+
+WAIT_MS = 10_000
+FRAME = Link(1, 1).encode(mavlink.MAVLink_statustext_message(6, b"x" * 50, 0, 0))
+
+
+class Server:
+    """A server on any free port, with a clock that the test moves."""
+
+    def __init__(self) -> None:
+        self.poller = select.poll()
+        self.now_s = 0.0
+        self.tcp = TcpServer("127.0.0.1", 0, self.poller, lambda: self.now_s)
+        self.clients: list[socket.socket] = []
+
+    def connect(self) -> socket.socket:
+        client = socket.create_connection(self.tcp.address, timeout=10.0)
+        self.clients.append(client)
+        return client
+
+    def step(self, wait_ms: int = 0) -> list[tuple[Address, bytes]]:
+        return list(self.tcp.receive([fileno for fileno, _ in self.poller.poll(wait_ms)]))
+
+    def until(self, done: Callable[[], bool]) -> list[tuple[Address, bytes]]:
+        """Step whenever a socket is ready, until ``done``; a socket that never becomes ready fails the test."""
+        received = []
+        while not done():
+            ready = self.poller.poll(WAIT_MS)
+            assert ready, "nothing arrived"
+            received += self.tcp.receive([fileno for fileno, _ in ready])
+        return received
+
+    def joined(self) -> tuple[socket.socket, Address]:
+        """Connect a client, and return it with its address."""
+        count = len(self.tcp)
+        client = self.connect()
+        self.until(lambda: len(self.tcp) > count)
+        return client, client.getsockname()
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    made = Server()
+    yield made
+    made.tcp.close()
+    for client in made.clients:
+        client.close()
+
+
+def test_clients_are_told_apart_and_answered(server: Server) -> None:
+    (one, first), (two, second) = server.joined(), server.joined()
+    assert server.tcp.opened() == [first, second]
+    one.sendall(b"of one")
+    two.sendall(b"of two")
+    got: dict[Address, bytes] = {}
+    while len(got) < 2:
+        got.update(server.step(WAIT_MS))
+    assert got == {first: b"of one", second: b"of two"}
+    server.tcp.send(second, b"to two")
+    server.tcp.send(first, b"to one")
+    server.tcp.flush()
+    assert (one.recv(99), two.recv(99)) == (b"to one", b"to two")
+
+
+def test_a_client_that_never_reads_neither_blocks_nor_fills_memory_nor_gets_half_a_frame(
+    server: Server,
+) -> None:
+    client, address = server.joined()
+    count = 0
+    while server.tcp.dropped < 1000:  # fills the kernel's buffers and ours
+        server.tcp.send(address, FRAME)
+        server.tcp.flush()
+        count += 1
+        assert len(server.tcp._clients[address].unsent) <= MAX_UNSENT
+    kept = count - server.tcp.dropped
+    client.settimeout(10.0)
+    reader, frames = FrameReader(), 0
+    while frames < kept:  # it wakes up: everything that was kept comes, whole
+        frames += len(reader.feed(client.recv(65536)))
+        server.tcp.flush()
+    assert frames == kept
+    assert reader.faults == 0
+    assert not reader.has_partial
+
+
+def test_a_client_that_takes_nothing_for_long_is_closed(server: Server) -> None:
+    _, lazy = server.joined()
+    reading, busy = server.joined()
+    while not server.tcp.dropped:
+        server.tcp.send(lazy, FRAME)
+        server.tcp.flush()
+    server.now_s = STALLED_S - 0.1
+    server.tcp.send(busy, FRAME)
+    server.tcp.flush()
+    assert server.tcp.closed() == []
+    server.now_s = STALLED_S + 0.1
+    server.tcp.flush()
+    assert server.tcp.closed() == [lazy]
+    assert not server.tcp.send(lazy, FRAME)
+    assert reading.recv(999) == FRAME
+
+
+def test_an_idle_client_is_not_taken_for_a_stalled_one(server: Server) -> None:
+    client, address = server.joined()
+    server.tcp.flush()
+    server.now_s = 1000.0
+    server.tcp.flush()
+    server.tcp.send(address, FRAME)
+    server.tcp.flush()
+    assert server.tcp.closed() == []
+    assert client.recv(999) == FRAME
+
+
+@pytest.mark.parametrize("abruptly", [False, True])
+def test_an_end_is_reported_once_also_with_a_reset(server: Server, abruptly: bool) -> None:
+    client, address = server.joined()
+    if abruptly:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    client.close()
+    server.until(lambda: len(server.tcp) == 0)
+    assert server.tcp.closed() == [address]
+    assert server.tcp.closed() == []
+    assert not server.tcp.send(address, FRAME)
+
+
+def test_who_closes_its_writing_half_only_is_gone(server: Server) -> None:
+    client, address = server.joined()
+    client.sendall(b"last words")
+    client.shutdown(socket.SHUT_WR)
+    received = server.until(lambda: len(server.tcp) == 0)
+    assert received == [(address, b"last words")]
+    assert server.tcp.closed() == [address]
+
+
+def test_a_thousand_connections_leave_nothing_behind(server: Server) -> None:
+    for number in range(1000):
+        client = server.connect()
+        if number % 3 == 0:
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        elif number % 3 == 1:
+            client.sendall(FRAME)
+        client.close()
+        server.clients.clear()
+        server.step()
+    count = [0, 0]
+
+    def all_ended() -> bool:
+        count[0] += len(server.tcp.opened())
+        count[1] += len(server.tcp.closed())
+        return count[0] == count[1] == 1000
+
+    # a connection that was reset before it was accepted may never have been there
+    while not all_ended() and server.poller.poll(1000):
+        server.step()
+    assert count[0] == count[1] >= 660
+    assert len(server.tcp) == len(server.tcp._by_fileno) == 0
+
+
+def test_when_all_places_are_taken_the_oldest_silent_client_gives_way(server: Server) -> None:
+    speaker, first = server.joined()
+    speaker.sendall(FRAME)
+    server.until(lambda: not server.tcp._clients[first].silent)
+    others = [server.joined()[1] for _ in range(MAX_CLIENTS - 1)]
+    latest = server.connect()
+    server.until(lambda: latest.getsockname() in server.tcp._clients)
+    assert server.tcp.closed() == [others[0]]
+    assert len(server.tcp) == MAX_CLIENTS
+    assert first in server.tcp._clients
+
+
+def test_when_all_clients_speak_a_new_one_is_turned_away(server: Server) -> None:
+    for _ in range(MAX_CLIENTS):
+        client, address = server.joined()
+        client.sendall(FRAME)
+        server.until(lambda address=address: not server.tcp._clients[address].silent)
+    late = server.connect()
+    server.step(WAIT_MS)
+    assert late.recv(10) == b""
+    assert len(server.tcp) == MAX_CLIENTS
+    assert server.tcp.closed() == []
+
+
+def test_what_is_not_wanted_now_stays_with_its_sender(server: Server) -> None:
+    client, address = server.joined()
+    client.sendall(FRAME)
+    ready = [fileno for fileno, _ in server.poller.poll(WAIT_MS)]
+    assert list(server.tcp.receive(ready, lambda _: False)) == []
+    assert list(server.tcp.receive(ready)) == [(address, FRAME)]
+
+
+def test_a_second_poller_sees_the_same_and_a_busy_port_is_named(server: Server) -> None:
+    client, _ = server.joined()
+    second = select.poll()
+    server.tcp.register(second)
+    client.sendall(FRAME)
+    assert second.poll(WAIT_MS)
+    with pytest.raises(PortBusyError, match=f"TCP port {server.tcp.address[1]} on 127.0.0.1 is in use"):
+        TcpServer("127.0.0.1", server.tcp.address[1], select.poll())
