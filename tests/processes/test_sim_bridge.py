@@ -193,7 +193,7 @@ def test_client_on_its_own_clock_gets_states_at_the_rate() -> None:
     rest = list(client.messages())  # until the other side closes
     client.socket.close()
     code, out, _ = bridge.end()
-    assert {message.get_type() for message in rest} <= {"FS_PLANT_STATE"}
+    assert {message.get_type() for message in rest} <= {"FS_PLANT_STATE", "BATTERY_STATUS"}
     assert code == 0
     assert "lateness mean" in out
 
@@ -255,6 +255,11 @@ def test_third_party_flies_by_hil_messages(bridge: SimBridge) -> None:
         (["--home", "91,0,0"], "--home latitude"),
         (["--vehicle", "none.toml"], "cannot be read"),
         (["fly"], "fly"),
+        (["--battery-start", "101"], "--battery-start: 101 is outside"),
+        (["--battery-capacity", "0"], "--battery-capacity: 0 is outside"),
+        (["--battery-drain", "-1"], "--battery-drain: -1 is outside"),
+        (["--fault", "rotor:9:off"], "--fault rotor:9:off: the vehicle has rotors 1 to 4"),
+        (["--fault", "state:freeze@5-4"], "it ends at 4 s, not after its begin at 5 s"),
     ],
 )
 def test_usage_errors(capsys: pytest.CaptureFixture[str], arguments: list[str], said: str) -> None:
@@ -263,6 +268,42 @@ def test_usage_errors(capsys: pytest.CaptureFixture[str], arguments: list[str], 
     assert main(arguments) == 2
     err = capsys.readouterr().err
     assert said in err
+    assert err.count("\n") == 1
+
+
+def test_battery_and_faults_act_as_asked_in_a_process() -> None:
+    bridge = SimBridge(
+        "--speed", "max", "--battery-start", "40", "--fault", "rotor:2:off@0.1", "--fault", "battery:level=0.2@0.2"
+    )  # fmt: skip
+    charges, speeds = {}, {}
+    with Client(bridge.port) as client:
+        client.request()
+        charge = None
+        for message in client.messages():
+            if message.get_type() == "BATTERY_STATUS":
+                charge = message.battery_remaining
+            elif message.get_type() == "FS_PLANT_STATE":
+                charges[message.time_us], speeds[message.time_us] = charge, message.rotor_speed_rad_s
+                if message.time_us == 300_000:
+                    break
+                client.answer(message.time_us)
+        client.heartbeat(mavlink.MAV_STATE_POWEROFF)
+    assert [charges[time_us] for time_us in (0, 198_000, 200_000)] == [40, 40, 20]
+    assert speeds[100_000][1] == pytest.approx(220.0, rel=1e-6)
+    assert speeds[300_000][1] < 1e-6
+    assert speeds[300_000][0] == pytest.approx(220.0, rel=1e-6)
+    assert bridge.end()[0] == 0
+
+
+def test_dropping_states_in_lockstep_ends_with_a_sentence() -> None:
+    bridge = SimBridge("--speed", "max", "--fault", "state:drop@5-6")
+    with Client(bridge.port) as client:
+        client.request()
+        next(m for m in client.messages() if m.get_type() == "FS_PLANT_STATE")
+        client.answer(0)
+        code, _, err = bridge.end()
+    assert code == 1
+    assert err.startswith("sim-bridge: state:drop needs a flight stack on its own clock (--clock realtime)")
     assert err.count("\n") == 1
 
 
