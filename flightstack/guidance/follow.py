@@ -42,6 +42,11 @@ def _or_zero(value: float) -> float:
 
 
 @compiled
+def _is_given(v: Vector3) -> bool:
+    return math.isfinite(v.x) and math.isfinite(v.y)
+
+
+@compiled
 def follow_horizontally(
     t: Trajectory,
     position: Vector3,
@@ -52,12 +57,12 @@ def follow_horizontally(
     dt_s: float,
 ) -> tuple[float, float, float, float, float, float]:
     """Return the reference's next x, y, vx, vy, ax, ay; NaN in a setpoint means "not given"."""
-    has_position = math.isfinite(position.x)
-    has_velocity, has_acceleration = math.isfinite(velocity.x), math.isfinite(acceleration.x)
+    has_position, has_velocity = _is_given(position), _is_given(velocity)
+    has_acceleration = _is_given(acceleration)
     limit = limits.acceleration_m_s2
     pole = POLE_RAD_S
-    wx, wy = _or_zero(velocity.x), _or_zero(velocity.y)
-    fx, fy = _or_zero(acceleration.x), _or_zero(acceleration.y)
+    wx, wy = (velocity.x, velocity.y) if has_velocity else (0.0, 0.0)
+    fx, fy = (acceleration.x, acceleration.y) if has_acceleration else (0.0, 0.0)
     if has_position:
         dx, dy = position.x - t.x, position.y - t.y
         if not (has_velocity or has_acceleration):
@@ -67,11 +72,11 @@ def follow_horizontally(
         distance = math.sqrt(dx * dx + dy * dy)
         scale = approach_speed(distance, speed_m_s, limit, pole / 3.0) / distance if distance > 1e-9 else 0.0
         wx, wy = wx + dx * scale, wy + dy * scale
-    elif has_acceleration and not has_velocity:  # at the top speed only what does not raise it is left
-        wx, wy = t.vx + fx / pole, t.vy + fy / pole
-        fx, fy = 0.0, 0.0
-    wx, wy = clipped(wx, wy, speed_m_s)
-    ax, ay = clipped(fx + pole * (wx - t.vx), fy + pole * (wy - t.vy), limit)
+    elif has_acceleration and not has_velocity:
+        wx, wy = t.vx, t.vy
+    # an acceleration is fed forward as a velocity that asks for it, which the top speed bounds too
+    wx, wy = clipped(wx + fx / pole, wy + fy / pole, speed_m_s)
+    ax, ay = clipped(pole * (wx - t.vx), pole * (wy - t.vy), limit)
     jx, jy = clipped(3.0 * pole * (ax - t.ax), 3.0 * pole * (ay - t.ay), limits.jerk_m_s3)
     ax, ay = t.ax + jx * dt_s, t.ay + jy * dt_s
     vx, vy = t.vx + ax * dt_s, t.vy + ay * dt_s
@@ -103,9 +108,9 @@ def follow_vertically(
         top = descent_m_s if dz > 0.0 else climb_m_s
         wanted += math.copysign(approach_speed(abs(dz), top, limit, pole / 3.0), dz)
     elif has_acceleration and not has_velocity:
-        wanted, feed = t.vz + feed / pole, 0.0
-    wanted = min(max(wanted, -climb_m_s), descent_m_s)
-    az = min(max(feed + pole * (wanted - t.vz), -limit), limit)
+        wanted = t.vz
+    wanted = min(max(wanted + feed / pole, -climb_m_s), descent_m_s)
+    az = min(max(pole * (wanted - t.vz), -limit), limit)
     jerk = min(max(3.0 * pole * (az - t.az), -limits.jerk_m_s3), limits.jerk_m_s3)
     az = t.az + jerk * dt_s
     vz = t.vz + az * dt_s

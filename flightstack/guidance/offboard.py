@@ -80,7 +80,7 @@ def point_step(
     z, vz, az = follow_vertically(
         t, p.z, v.z, a.z, params.climb_speed_m_s, params.descent_speed_m_s, limits, dt_s
     )
-    if not math.isfinite(p.x):
+    if not (math.isfinite(p.x) and math.isfinite(p.y)):
         x, y = leashed(x, here.x), leashed(y, here.y)
     if not math.isfinite(p.z):
         z = leashed(z, here.z)

@@ -1,0 +1,80 @@
+"""Messages that a companion or a pilot streams, and how to stream them to a ``World``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from tests.support.world import World
+
+NOTHING_GIVEN = 0b1101_1111_1111
+"""A type mask that ignores everything."""
+RATE_S = 0.02
+
+Triple = tuple[float, float, float]
+
+
+def local_point(
+    position: Triple | None = None,
+    velocity: Triple | None = None,
+    acceleration: Triple | None = None,
+    yaw: float | None = None,
+    yaw_rate: float | None = None,
+    frame: int = mavlink.MAV_FRAME_LOCAL_NED,
+    target: tuple[int, int] = (1, 1),
+) -> Message:
+    """SET_POSITION_TARGET_LOCAL_NED with what is given; NaN leaves out a single number."""
+    mask = NOTHING_GIVEN
+    for bits, given in (
+        (0x7, position),
+        (0x38, velocity),
+        (0x1C0, acceleration),
+        (1 << 10, yaw),
+        (1 << 11, yaw_rate),
+    ):
+        if given is not None:
+            mask &= ~bits
+    zero = (0.0, 0.0, 0.0)
+    numbers = (*(position or zero), *(velocity or zero), *(acceleration or zero), yaw or 0.0, yaw_rate or 0.0)
+    return mavlink.MAVLink_set_position_target_local_ned_message(0, *target, frame, mask, *numbers)
+
+
+def attitude(q: tuple[float, float, float, float], thrust: float) -> Message:
+    """SET_ATTITUDE_TARGET with an attitude."""
+    return mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 7, list(q), 0.0, 0.0, 0.0, thrust)
+
+
+def body_rates(rates: Triple, thrust: float) -> Message:
+    """SET_ATTITUDE_TARGET with body rates."""
+    return mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 128, [1.0, 0.0, 0.0, 0.0], *rates, thrust)
+
+
+def sticks(forward: float = 0.0, right: float = 0.0, up: float = 0.0, yaw: float = 0.0) -> Message:
+    """MANUAL_CONTROL with sticks from −1 to 1."""
+    x, y, r = (round(1000.0 * stick) for stick in (forward, right, yaw))
+    return mavlink.MAVLink_manual_control_message(1, x, y, round(500.0 + 500.0 * up), r, 0)
+
+
+def stream(world: World, message: Message | Callable[[float], Message], seconds: float) -> None:
+    """Send a message, or what a function of the time since the start makes, at 50 Hz."""
+    began_s = world.time_s
+    for _ in range(round(seconds / RATE_S)):
+        world.send(message(world.time_s - began_s) if callable(message) else message)
+        world.run(RATE_S)
+
+
+def select(world: World, main: int) -> int | None:
+    """Select PX4's main mode: 2 altitude, 3 position, 6 offboard."""
+    return world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, main, 0)
+
+
+def level(yaw_rad: float = 0.0) -> tuple[float, float, float, float]:
+    """Quaternion of a level vehicle."""
+    return math.cos(0.5 * yaw_rad), 0.0, 0.0, math.sin(0.5 * yaw_rad)
+
+
+def hover_thrust(world: World) -> float:
+    """Share of the largest thrust that carries the vehicle."""
+    return world.stack.vehicle.weight_n / world.stack.vehicle.max_thrust_n
