@@ -11,10 +11,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import one_process, real_time, report, round_trip, step_costs, three_processes
+from benchmarks import ground_load, one_process, real_time, report, round_trip, step_costs, three_processes
 from benchmarks.measure import OtherLoad
 
-SECTIONS = ("steps", "flights", "realtime", "start")
+SECTIONS = ("steps", "flights", "realtime", "load", "start")
 
 
 def _arguments() -> argparse.Namespace:
@@ -54,6 +54,11 @@ def main() -> int:
     if "realtime" in wanted:
         results["lateness"] = _measured(
             "lateness in real time", lambda: real_time.lateness(2.0 if quick else 10.0)
+        )
+    if "load" in wanted:
+        results["load"] = _measured(
+            "ground stations, noise and clients that never read",
+            lambda: ground_load.loads(2.0 if quick else 5.0, 1 if quick else 3),
         )
     if "start" in wanted:
         results["start"] = _measured(

@@ -28,11 +28,17 @@ def ground_port(instance: int) -> int:
     return 14550 + 10 * instance
 
 
+def tcp_port(instance: int) -> int:
+    """TCP port of the vehicle."""
+    return 5760 + 10 * instance
+
+
 def free_instance() -> int:
     """Return the first instance, from 60 on, all of whose ports are free."""
     for instance in range(_FIRST, _LAST + 1):
         udp = (ground_port(instance), 18570 + instance, 14580 + instance)
-        if _is_free(socket.SOCK_STREAM, simulator_port(instance)) and all(
+        tcp = (simulator_port(instance), tcp_port(instance))
+        if all(_is_free(socket.SOCK_STREAM, port) for port in tcp) and all(
             _is_free(socket.SOCK_DGRAM, port) for port in udp
         ):
             return instance

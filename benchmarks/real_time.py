@@ -65,9 +65,9 @@ def _flight_stack(seconds: float) -> list[float]:
         station.bind(("127.0.0.1", ground))
         station.settimeout(30.0)
         port = f"port={simulator_port(instance)}"
-        simulator = running.enter_context(_child("sim_bridge", f"--{port}", f"--instance={instance}"))
+        simulator = running.enter_context(child("sim_bridge", f"--{port}", f"--instance={instance}"))
         stack = running.enter_context(
-            _child(
+            child(
                 "benchmarks.timed_stack", str(file), "--clock=realtime", f"--sim-{port}",
                 f"--instance={instance}", f"--gcs-port={ground}", f"--log={folder}/flight.ulg",
             )
@@ -82,7 +82,8 @@ def _flight_stack(seconds: float) -> list[float]:
 
 
 @contextlib.contextmanager
-def _child(module: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+def child(module: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a module as a process that ends with the block."""
     quiet = subprocess.DEVNULL
     command = [sys.executable, "-m", module, *arguments]
     with subprocess.Popen(command, cwd=ROOT, stdout=quiet, stderr=quiet) as process:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from benchmarks.ground_load import Seen
 from benchmarks.measure import Figure, short
 from benchmarks.real_time import PERCENTILES
 from benchmarks.round_trip import WAYS
@@ -33,6 +34,8 @@ def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
         yield _round_trips(results["round_trips"]) + "\n"
     if "lateness" in results:
         yield _lateness(*results["lateness"]) + "\n"
+    if "load" in results:
+        yield _load(results["load"]) + "\n"
     if "start" in results:
         yield _start(results) + "\n"
 
@@ -86,6 +89,28 @@ def _lateness(figures: dict[str, list[float]], has_compiler: bool) -> str:
     rows = [(name, *(short(value) for value in values)) for name, values in figures.items()]
     text = table("LATENESS IN REAL TIME at 500 Hz, µs", head, rows)
     return text if has_compiler else text + "\n  (no C compiler here: the loop in C was left out)"
+
+
+def _load(results: dict[str, Seen]) -> str:
+    none = next(iter(results.values()))
+    rows: list[Row] = [
+        (
+            name,
+            short(seen.late_p50_us),
+            short(seen.late_p99_us),
+            short(seen.late_p99_us / none.late_p99_us, 2),
+            short(seen.tick_p50_us),
+            short(seen.tick_p99_us),
+            short(seen.tick_max_us),
+            f"{seen.overruns}",
+            f"{seen.missed}",
+            f"{seen.ticks}",
+            short(seen.frames_hz),
+        )
+        for name, seen in results.items()
+    ]
+    head = ("", "late p50", "p99", "× none", "turn p50", "p99", "max", "overruns", "missed", "of", "frames/s")
+    return table("GROUND LINKS in real time at 500 Hz, µs", head, rows)
 
 
 def _start(results: dict[str, Any]) -> str:
