@@ -38,7 +38,7 @@ CHECKS = {
 
 
 class GroundStation:
-    """A mission client on a link of its own."""
+    """Mission clients, one for each type of plan, on a link of their own."""
 
     def __init__(
         self,
@@ -46,10 +46,12 @@ class GroundStation:
         conditions: Conditions = LOSSLESS,
         seed: int = 0,
         system: int = 255,
-        mission_type: MissionType = MissionType.MISSION,
+        *,
+        mission_types: Sequence[MissionType] = (MissionType.MISSION,),
     ) -> None:
         self.name = name
-        self.client = MissionClient(VEHICLE, Address(system, 190), mission_type)
+        self.clients = {kind: MissionClient(VEHICLE, Address(system, 190), kind) for kind in mission_types}
+        self.client = self.clients[mission_types[0]]
         self.codec = Link(system, 190)
         self.vehicle_codec = Link(*VEHICLE)
         self.wire = LossyLink(conditions, seed)
@@ -74,16 +76,19 @@ class World:
                     self.server.receive(message, station.name, self.now_s)
             for data in station.wire.one.receive(self.now_s):
                 for message in station.codec.decode(data):
-                    station.client.receive(message, self.now_s)
-            for message in station.client.poll(self.now_s):
-                station.wire.one.send(station.codec.encode(message), self.now_s)
+                    for client in station.clients.values():
+                        client.receive(message, self.now_s)
+            for client in station.clients.values():
+                for message in client.poll(self.now_s):
+                    station.wire.one.send(station.codec.encode(message), self.now_s)
         for peer, message in self.server.poll(self.now_s):
             station = self.stations[str(peer)]
             station.wire.two.send(station.vehicle_codec.encode(message), self.now_s)
         self.events += self.server.events()
         deadlines = [self.server.next_deadline()]
         for station in self.stations.values():
-            deadlines += [station.client.next_deadline(), station.wire.next_arrival()]
+            deadlines += [client.next_deadline() for client in station.clients.values()]
+            deadlines.append(station.wire.next_arrival())
         due = [deadline for deadline in deadlines if deadline is not None]
         if due:
             self.now_s = max(self.now_s, min(due))

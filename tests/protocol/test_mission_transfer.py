@@ -269,7 +269,7 @@ def test_an_equal_mission_again_is_no_change() -> None:
 
 
 def test_types_that_are_not_stored_are_refused() -> None:
-    world = World(GroundStation("rally", mission_type=MissionType.RALLY))
+    world = World(GroundStation("rally", mission_types=[MissionType.RALLY]))
     result = world.upload("rally", mission(2))
     assert isinstance(result, Failed)
     assert result.result == MissionResult.UNSUPPORTED

@@ -14,12 +14,21 @@ from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionType
 
 _FORGET_AFTER_S = 30.0
+_RESTART_AFTER_S = 5.0
+"""Silence after which a client that asks for the count again is taken to begin anew."""
 _MAX_DOWNLOADS = 64  # a bound on memory, should clients never end theirs
 
 
 class _Download(NamedTuple):
     items: tuple[MissionItem, ...]
+    plan_id: int
+    served: int
+    """How many of the items were asked for, from the first on."""
     heard_s: float
+
+    @property
+    def is_half_done(self) -> bool:
+        return 0 < self.served < len(self.items)
 
 
 class Downloads:
@@ -28,10 +37,18 @@ class Downloads:
     def __init__(self) -> None:
         self._by_client: dict[tuple[Client, int], _Download] = {}
 
-    def begin(self, client: Client, kind: int, items: tuple[MissionItem, ...], now_s: float) -> int:
-        """Begin a download of ``items``, and return their count."""
-        self._keep(client, kind, items, now_s)
-        return len(items)
+    def begin(
+        self, client: Client, kind: int, items: tuple[MissionItem, ...], plan_id: int, now_s: float
+    ) -> tuple[int, int]:
+        """Begin a download of ``items``, and return their count and id.
+
+        A late copy of the request, in the middle of a download, goes on with the plan that is half across.
+        """
+        download = self._by_client.get((client, kind))
+        if download is None or not download.is_half_done or now_s - download.heard_s >= _RESTART_AFTER_S:
+            download = _Download(items, plan_id, 0, now_s)
+        self._keep(client, kind, download)
+        return len(download.items), download.plan_id
 
     def end(self, client: Client, kind: int) -> None:
         """Forget a download."""
@@ -55,7 +72,8 @@ class Downloads:
         download = self._by_client.get((client, kind))
         if download is not None and now_s - download.heard_s < _FORGET_AFTER_S:
             items = download.items
-            self._keep(client, kind, items, now_s)
+            served = max(download.served, min(request.seq + 1, len(items)))
+            self._keep(client, kind, download._replace(served=served, heard_s=now_s))
         if request.seq >= len(items):
             return None
         return message_from_item(
@@ -67,8 +85,8 @@ class Downloads:
             is_int=request.get_type() == "MISSION_REQUEST_INT",
         )
 
-    def _keep(self, client: Client, kind: int, items: tuple[MissionItem, ...], now_s: float) -> None:
+    def _keep(self, client: Client, kind: int, download: _Download) -> None:
         self._by_client.pop((client, kind), None)  # the order of the dictionary is that of the last request
-        self._by_client[client, kind] = _Download(items, now_s)
+        self._by_client[client, kind] = download
         if len(self._by_client) > _MAX_DOWNLOADS:
             del self._by_client[next(iter(self._by_client))]

@@ -178,8 +178,9 @@ class MissionServer:
 
     def _on_list(self, message: Message, client: Client, now_s: float) -> None:
         kind = message.mission_type
-        items, plan_id = self._store.items(kind), self._store.plan_id(kind)
-        count = self._downloads.begin(client, kind, items, now_s)
+        count, plan_id = self._downloads.begin(
+            client, kind, self._store.items(kind), self._store.plan_id(kind), now_s
+        )
         self._send(client, mavlink.MAVLink_mission_count_message(*client.address, count, kind, plan_id))
 
     def _on_request(self, message: Message, client: Client, now_s: float) -> None:

@@ -110,7 +110,7 @@ class Download(Operation):
         kind = message.get_type()
         if self.result is not None:
             return []
-        if kind == "MISSION_COUNT" and (not self.waits_for_item or message.count != self._count):
+        if kind == "MISSION_COUNT" and self._is_news(message):
             self._items, self._count = [], message.count
             self.plan_id = message.opaque_id
             self.waits_for_item = True
@@ -120,6 +120,11 @@ class Download(Operation):
         if kind == "MISSION_ACK" and message.type != MissionResult.ACCEPTED:
             self.refused(message.type, len(self._items) if self.waits_for_item else None)
         return []
+
+    def _is_news(self, message: Message) -> bool:
+        """Tell a count from a late copy: another plan than the one half across begins again."""
+        known = (self._count, self.plan_id)
+        return not self.waits_for_item or (message.count, message.opaque_id) != known
 
     def _on_item(self, message: Message) -> list[Message]:
         if message.seq == len(self._items):
