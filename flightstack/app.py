@@ -17,6 +17,8 @@ from flightstack.clock import DeadlineScheduler, ask_for_punctual_sleeps
 from flightstack.config import StackConfig
 from flightstack.ground.peer import PeerAddress
 from flightstack.logging.flight_log import FlightLog
+from flightstack.logging.log_library import LogLibrary, create_log_file
+from flightstack.mavlink.services.log_store import NO_LOGS
 from flightstack.modes import Mode
 from flightstack.params.identity import SYSTEM_ID
 from flightstack.params.saver import ParamSaver
@@ -62,7 +64,8 @@ class App:
     def __init__(self, config: StackConfig, process: ProcessConfig) -> None:
         self._process = process
         self._log_count = 0
-        self.stack: Stack = build(config, self._open_log)
+        logs = NO_LOGS if process.log is None else LogLibrary(process.log.parent)
+        self.stack: Stack = build(config, self._open_log, logs)
         self._ports = VehiclePorts(process.ports)
         self._saver: ParamSaver | None = None
         if config.params_file is not None:
@@ -156,7 +159,7 @@ class App:
             path = path.with_name(f"{path.stem}-{self._log_count}{path.suffix}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            return FlightLog(open(path, "wb", buffering=0), len(self.stack.vehicle.rotors))
+            return FlightLog(create_log_file(path), len(self.stack.vehicle.rotors))
         except OSError as error:
             self.stack.autopilot.say(3, f"No log: {path}: {error.strerror}")
             print(

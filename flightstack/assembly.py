@@ -25,6 +25,7 @@ from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.logging.flight_log import vehicle_info
 from flightstack.logging.recorder import FlightRecorder, OpenLog
+from flightstack.mavlink.services.log_store import NO_LOGS, LogStore
 from flightstack.mavlink.simulator_link import SimulatorLink
 from flightstack.mavlink.telemetry.facts import NoBattery
 from flightstack.modes import Mode
@@ -60,8 +61,11 @@ def vehicle_of(config: StackConfig) -> Vehicle:
     return vehicle.with_ideal_rotors() if config.ideal_rotors else vehicle
 
 
-def build(config: StackConfig, open_log: OpenLog) -> Stack:
-    """Build a stack; raise ConfigError for anything in the configuration that cannot fly."""
+def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> Stack:
+    """Build a stack, which shows ``logs`` to its ground stations.
+
+    Raise ConfigError for anything in the configuration that cannot fly.
+    """
     if config.loops not in LOOPS:
         raise ConfigError("--loops", config.loops, f"is not one of {', '.join(LOOPS)}")
     vehicle = vehicle_of(config)
@@ -104,7 +108,7 @@ def build(config: StackConfig, open_log: OpenLog) -> Stack:
     timing = LoopTiming(round(1e9 / pace.inner_hz))
     report = TimingReport(timing, pace, config.lockstep)
     facts = AutopilotFacts(autopilot, vehicle, system_id, report.message, NoBattery)
-    ground = GroundHub(VehicleContext(autopilot, params), facts, system_id)
+    ground = GroundHub(VehicleContext(autopilot, params, logs=logs), facts, system_id)
     return Stack(vehicle, pace, simulator, autopilot, ground, recorder, timing, report, params, loaded)
 
 

@@ -55,11 +55,12 @@ def options(
 
 
 def _register() -> None:
-    from gcs_cli.commands import actions, fly, mission, param, perf, status, watch  # noqa: PLC0415
+    from gcs_cli.commands import actions, fly, log, mission, param, perf, status, watch  # noqa: PLC0415
 
     app.command()(fly.fly)
     app.add_typer(mission.app, name="mission")
     app.add_typer(param.app, name="param")
+    app.add_typer(log.app, name="log")
     for action in actions.ACTIONS:
         app.command()(action)
     app.command()(status.status)

@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeAlias
 from flightstack.autopilot import Autopilot
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.services.command_server import Command
+from flightstack.mavlink.services.log_store import NO_LOGS, LogStore
 from flightstack.params.store import ParamStore
 
 ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
@@ -38,6 +39,7 @@ class VehicleContext:
     params: ParamStore
     shutdown_requested: bool = False
     reboot_requested: bool = False
+    logs: LogStore = NO_LOGS
 
 
 Handler: TypeAlias = Callable[[VehicleContext, Command], Answer]

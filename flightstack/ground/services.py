@@ -7,6 +7,7 @@ from collections.abc import Callable, Hashable
 from flightstack.commands import VehicleContext
 from flightstack.ground.command_service import CommandService
 from flightstack.ground.facts import AutopilotFacts
+from flightstack.ground.file_services import file_services
 from flightstack.ground.link_commands import LinkCommands
 from flightstack.ground.link_loss import LinkLossService
 from flightstack.ground.mission_service import MissionService
@@ -29,4 +30,5 @@ def make_services(
         *stream_services(own, vehicle.autopilot),
         LinkLossService(vehicle.autopilot),
         TimeService(lambda: facts.time_us),
+        *file_services(own, vehicle, None),
     ]

@@ -1,4 +1,4 @@
-"""The folder of flight logs: the only place that opens finished logs, and it opens nothing else.
+"""The folder of flight logs: the only place that opens log files, and it opens nothing else.
 
 A log is a regular file of this folder whose name ends in ``.ulg``. What leads out of the folder (a path, a symbolic
 link) is no log, whatever a ground station asks for.
@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import os
 import stat
-from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 from flightstack.mavlink.services.log_store import LogInfo
 
@@ -37,6 +38,15 @@ class LogFileReader:
         """Return up to ``count`` bytes from ``offset``; raise OSError."""
         return os.pread(self._descriptor, max(0, min(count, self._size - offset)), offset)
 
+    def is_being_written(self) -> bool:
+        """Tell whether somebody holds it open as ``create_log_file`` does."""
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            return error.errno == errno.EWOULDBLOCK
+        fcntl.flock(self._descriptor, fcntl.LOCK_UN)
+        return False
+
     def close(self) -> None:
         """Close the file; a second call does nothing."""
         if self._descriptor >= 0:
@@ -44,12 +54,22 @@ class LogFileReader:
             self._descriptor = -1
 
 
-class LogLibrary:
-    """The logs in ``folder``. ``is_open`` tells by its path whether a log is being written."""
+def create_log_file(path: Path) -> BinaryIO:
+    """Open a new log for writing, unbuffered; raise OSError.
 
-    def __init__(self, folder: Path, is_open: Callable[[Path], bool] = lambda path: False) -> None:
+    A lock that lasts until it is closed tells every process, this one too, that it is being written.
+    """
+    file = open(path, "wb", buffering=0)  # noqa: SIM115  # its owner closes it
+    with contextlib.suppress(OSError):  # some file systems know no locks
+        fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
+    return file
+
+
+class LogLibrary:
+    """The logs in ``folder``."""
+
+    def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._is_open = is_open
 
     def logs(self) -> list[LogInfo]:
         """Return all logs, the oldest first; none if the folder cannot be read."""
@@ -81,13 +101,15 @@ class LogLibrary:
         return LogFileReader(descriptor, status.st_size)
 
     def erase(self) -> int:
-        """Erase all logs but the one being written; return how many. Raise OSError at the first that stays."""
+        """Erase all logs but those being written; return how many. Raise OSError at the first that stays."""
         count = 0
         for log in self.logs():
-            path = self._folder / log.name
-            if not self._is_open(path):
-                path.unlink(missing_ok=True)
+            reader = self.open(log.name)
+            if reader is not None and not reader.is_being_written():
+                (self._folder / log.name).unlink(missing_ok=True)
                 count += 1
+            if reader is not None:
+                reader.close()
         return count
 
 

@@ -18,7 +18,7 @@ from flightstack.mavlink.services.ftp_messages import (
     mavlink_crc32,
     read_packet,
 )
-from flightstack.mavlink.services.ftp_server import FtpServer
+from flightstack.mavlink.services.ftp_server import MAX_CLIENTS, FtpServer
 from flightstack.mavlink.services.virtual_files import BytesFile, Entry, FileTree, fixed
 from tests.protocol.file_harness import GCS, VEHICLE, content
 
@@ -274,4 +274,4 @@ def test_a_flood_of_requests_is_bounded() -> None:
     for n in range(5000):
         dialogue.tell(Packet(n, 0, Opcode.LIST_DIRECTORY, 1, data=b"/"), Address(n % 250 + 1, 190))
     assert len(dialogue.answers()) == 256
-    assert len(dialogue.server._clients) == 32
+    assert len(dialogue.server._clients) == MAX_CLIENTS

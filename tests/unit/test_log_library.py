@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.logging.log_library import LogLibrary
+from flightstack.logging.log_library import LogLibrary, create_log_file
 from flightstack.mavlink.services.log_store import DatedLogs, FlatLogs, LogInfo
 from flightstack.mavlink.services.virtual_files import Entry
 
@@ -89,12 +89,16 @@ def test_nothing_but_logs_of_the_folder_is_opened(folder: Path, name: str) -> No
 
 
 def test_erasing_keeps_the_open_log_and_all_that_is_none(folder: Path) -> None:
-    library = LogLibrary(folder, lambda path: path == folder / "a.ulg")
-    assert library.erase() == 2
-    assert [log.name for log in library.logs()] == ["a.ulg"]
+    library = LogLibrary(folder)
+    with create_log_file(folder / "new.ulg") as log, create_log_file(folder / "a.ulg"):
+        log.write(b"in flight")
+        assert library.erase() == 2
+        assert {log.name for log in library.logs()} == {"a.ulg", "new.ulg"}
     assert (folder / "notes.txt").exists()
     assert (folder / "link.ulg").is_symlink()
     assert (folder.parent / "secret.ulg").read_bytes() == b"secret"
+    assert library.erase() == 2
+    assert library.logs() == []
 
 
 def test_logs_as_directories(folder: Path) -> None:

@@ -78,7 +78,7 @@ def component_metadata_message(boot_ms: int, file_crc: int, uri: str) -> Message
 
 
 def vehicle_files(
-    metadata: ComponentMetadata,
+    metadata: ComponentMetadata | None,
     parameter_pack: Callable[[str], bytes | None] | None,
     logs: LogStore,
 ) -> FileTree:
@@ -87,7 +87,7 @@ def vehicle_files(
     ``parameter_pack`` makes ``@PARAM/param.pck`` from the arguments after its "?"; None: there is none, and
     clients take the parameters one by one.
     """
-    files = dict(metadata.files)
+    files = {} if metadata is None else dict(metadata.files)
     if parameter_pack is not None:
         files[PARAMETER_PACK] = parameter_pack
     return FileTree(files, {LOGS_FLAT: FlatLogs(logs), LOGS_DATED: DatedLogs(logs)})

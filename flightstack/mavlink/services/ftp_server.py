@@ -35,7 +35,7 @@ from flightstack.mavlink.services.virtual_files import Entry, VirtualFile, Virtu
 
 SESSION_TIMEOUT_S = 10.0
 """Silence after which a client's files are closed, as in PX4."""
-MAX_CLIENTS = 32
+MAX_CLIENTS = 64
 MAX_ANSWERS = 256
 """Answers that may wait for the next poll; a client that floods us has to ask again."""
 

@@ -49,6 +49,8 @@ class LogFailed(NamedTuple):
 
     reason: str
     """One sentence."""
+    silent: bool = False
+    """Whether the vehicle did not answer."""
 
 
 class LogClient:
@@ -108,7 +110,9 @@ class LogClient:
         if self.result is None and self._retry_s is not None and now_s >= self._retry_s:
             self._progress_s = min(self._progress_s, now_s)
             if now_s - self._progress_s >= SILENCE_S:
-                self._end(LogFailed(f"the vehicle (system {self.vehicle.system}) does not answer"))
+                self._end(
+                    LogFailed(f"the vehicle (system {self.vehicle.system}) does not answer", silent=True)
+                )
             elif self._file is not None:
                 self._ask_for_data(self._file, now_s)
             else:

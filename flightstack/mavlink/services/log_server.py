@@ -21,7 +21,7 @@ from flightstack.mavlink.services.virtual_files import VirtualFile
 
 CLIENT_TIMEOUT_S = 30.0
 """Silence after which a client's list and open log are given up."""
-MAX_CLIENTS = 32
+MAX_CLIENTS = 64
 MAX_RANGES = 64
 SMALL_REQUEST = 10 * BLOCK
 """Requests up to this size fill gaps, and wait for each other; a larger one begins anew, as all are in PX4."""

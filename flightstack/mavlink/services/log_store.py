@@ -57,6 +57,9 @@ class NoLogs:
         return 0
 
 
+NO_LOGS = NoLogs()
+
+
 class FlatLogs:
     """Logs as one directory: what QGroundControl looks for at ``@MAV_LOG``."""
 

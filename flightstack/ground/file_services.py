@@ -1,0 +1,23 @@
+"""The services that show files: MAVLink FTP and the log protocol, joined to parameters and logs."""
+
+from __future__ import annotations
+
+from flightstack.commands import VehicleContext
+from flightstack.ground.service import Service
+from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.component_metadata import ComponentMetadata, vehicle_files
+from flightstack.mavlink.services.ftp_server import FtpServer
+from flightstack.mavlink.services.log_server import LogServer
+from flightstack.mavlink.services.param_pack import pack_file
+
+
+def file_services(
+    own: Address, vehicle: VehicleContext, metadata: ComponentMetadata | None
+) -> tuple[Service, Service]:
+    """Return the services of MAVLink FTP and of the log protocol; ``metadata`` None shows no metadata files."""
+    autopilot = vehicle.autopilot
+    files = vehicle_files(metadata, lambda arguments: pack_file(vehicle.params, arguments), vehicle.logs)
+    return (
+        FtpServer(own, files),
+        LogServer(own, vehicle.logs, lambda: autopilot.now.status.armed, autopilot.say),
+    )

@@ -1,0 +1,154 @@
+"""``gcs log list|download``."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gcs_cli.errors import FAILED, USAGE, CliError
+from gcs_cli.settings import ConnectOption, JsonOption, TimeoutOption, meet_vehicle
+
+if TYPE_CHECKING:
+    from flightstack.mavlink.services.log_client import LogEntry
+    from flightstack.mavlink.services.virtual_files import Entry
+    from gcs_cli.connection import Connection
+
+app = typer.Typer(help="The vehicle's flight logs.", no_args_is_help=True)
+
+_KILO = 1000.0
+
+
+@app.command("list")
+def list_logs(
+    context: typer.Context,
+    as_json: JsonOption = False,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+) -> None:
+    """List the logs, the oldest first."""
+    from gcs_cli import log_calls  # noqa: PLC0415
+
+    with meet_vehicle(context, connect, timeout) as connection:
+        logs = log_calls.fetch_list(connection)
+        files = log_calls.fetch_files(connection) if logs else ()
+    named = [(log, log_calls.file_of(log, logs, files)) for log in logs]
+    if as_json:
+        typer.echo(json.dumps([_facts(log, file) for log, file in named]))
+    elif not logs:
+        typer.echo("the vehicle has no logs")
+    else:
+        for log, file in named:
+            line = f"{log.log_id:5d}  {_time_text(log):<20}  {size_text(log.size):>9}"
+            typer.echo(f"{line}  {file.name}" if file is not None else line)
+
+
+@app.command()
+def download(
+    context: typer.Context,
+    log_id: Annotated[
+        str, typer.Argument(metavar="[ID|latest]", help="Which log.", show_default=False)
+    ] = "latest",
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The file to write; with --all, the folder.", show_default=False),
+    ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="All logs; those that are here already are left out.")
+    ] = False,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+) -> None:
+    """Fetch a log, or all of them."""
+    from gcs_cli import log_calls  # noqa: PLC0415
+
+    number = _number(log_id)
+    if everything and log_id != "latest":
+        raise CliError("give either a log or --all", USAGE)
+    with meet_vehicle(context, connect, timeout) as connection:
+        logs = log_calls.fetch_list(connection)
+        if not logs:
+            raise CliError("the vehicle has no logs")
+        files = log_calls.fetch_files(connection)
+        for log in logs if everything else [_chosen(logs, number)]:
+            file = log_calls.file_of(log, logs, files)
+            path = _path(log, file, output, everything)
+            if everything and path.exists() and path.stat().st_size == log.size:
+                typer.echo(f"{path} is here already")
+            else:
+                _fetch(connection, log, file, path, may_replace=output is not None and not everything)
+
+
+def _fetch(
+    connection: Connection, log: LogEntry, file: Entry | None, path: Path, *, may_replace: bool
+) -> None:
+    from flightstack.atomic_file import write_bytes_atomically  # noqa: PLC0415
+    from gcs_cli import log_calls  # noqa: PLC0415
+    from gcs_cli.transfer_bar import TransferBar  # noqa: PLC0415
+
+    if path.exists() and not may_replace:
+        raise CliError(f"{path} exists: name another file with --output", USAGE)
+    began_s = connection.now_s
+    with TransferBar(f"log {log.log_id}") as bar:
+        content = log_calls.fetch_log(connection, log, file, bar.show)
+    took_s = max(1e-3, connection.now_s - began_s)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes_atomically(path, content)
+    rate = size_text(len(content) / took_s)
+    typer.echo(f"log {log.log_id}: {size_text(len(content))} written to {path} ({rate}/s)")
+
+
+def _number(text: str) -> int | None:
+    """Return the number of a log; None for the latest. Raise CliError (usage)."""
+    if text == "latest":
+        return None
+    if not (text.isascii() and text.isdecimal() and len(text) <= 5):
+        raise CliError(f"{text}: expected the number of a log, or latest", USAGE)
+    return int(text)
+
+
+def _chosen(logs: tuple[LogEntry, ...], number: int | None) -> LogEntry:
+    if number is None:
+        return logs[-1]
+    for log in logs:
+        if log.log_id == number:
+            return log
+    first, last = logs[0].log_id, logs[-1].log_id
+    raise CliError(f"there is no log {number}: the vehicle has {first} to {last}", FAILED)
+
+
+def _path(log: LogEntry, file: Entry | None, output: Path | None, everything: bool) -> Path:
+    stamp = f"_{_moment(log):%Y%m%d-%H%M%S}" if log.time_utc_s else ""
+    name = f"log_{log.log_id}{stamp}.ulg" if file is None else file.name
+    if output is None:
+        return Path(name)
+    return output / name if everything or output.is_dir() else output
+
+
+def _facts(log: LogEntry, file: Entry | None) -> dict[str, object]:
+    return {
+        "id": log.log_id,
+        "size_bytes": log.size,
+        "time_utc": _moment(log).isoformat() if log.time_utc_s else None,
+        "name": None if file is None else file.name,
+    }
+
+
+def _moment(log: LogEntry) -> datetime:
+    return datetime.fromtimestamp(log.time_utc_s, UTC)
+
+
+def _time_text(log: LogEntry) -> str:
+    return f"{_moment(log):%Y-%m-%d %H:%M:%S}" if log.time_utc_s else "unknown time"
+
+
+def size_text(size: float) -> str:
+    """Show a number of bytes with three digits."""
+    for unit in ("B", "kB", "MB"):
+        if size < _KILO:
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.3g} {unit}"
+        size /= _KILO
+    return f"{size:.3g} GB"
