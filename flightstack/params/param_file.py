@@ -23,6 +23,7 @@ INT32, REAL32 = 6, 9
 _INTEGER_TYPES, _FLOAT_TYPES = range(1, 9), (9, 10)
 _AUTOPILOT = 1  # component id
 _OURS, _END = "# Stack: flightstack", "# End"
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _LARGEST_FILE = 4_000_000
 
 
@@ -74,6 +75,8 @@ def _parse_row(row: str, file: object, number: int) -> ParamLine:
     def error(problem: str) -> ConfigError:
         return ConfigError(file, f"line {number}", problem)
 
+    if not row.isascii():
+        raise error("holds characters that no parameter has")
     columns = row.split("\t")
     if len(columns) != 5:
         raise error(
@@ -88,10 +91,7 @@ def _parse_row(row: str, file: object, number: int) -> ParamLine:
         raise error(f"{name[:40]!r} is no name of a parameter")
     if not kind.isdecimal() or int(kind) not in (*_INTEGER_TYPES, *_FLOAT_TYPES):
         raise error(f"{name}: {kind[:20]!r} is no MAV_PARAM_TYPE of a number")
-    try:
-        number_read = float(value)
-    except ValueError:
-        number_read = math.nan
+    number_read = float(value) if _NUMBER.fullmatch(value) else math.nan
     if not math.isfinite(number_read):
         raise error(f"{name}: {value[:40]!r} is not a number")
     is_integer = int(kind) in _INTEGER_TYPES

@@ -1,0 +1,255 @@
+"""Parameter files: nothing is lost, whatever happens to the file; what cannot be read is one sentence."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flightstack import atomic_file
+from flightstack.assembly import build
+from flightstack.config import StackConfig
+from flightstack.params.errors import ConfigError
+from flightstack.params.param_file import (
+    NOTHING_LOADED,
+    ParamLine,
+    format_params,
+    lines_to_save,
+    load_into,
+    parse_params,
+    read_param_file,
+    save,
+)
+from flightstack.params.saver import ParamSaver
+from flightstack.params.spec import ParamSpec
+from flightstack.params.store import ParamStore
+from tests.support.world import PEER
+
+ROOT = Path(__file__).resolve().parents[2]
+SPECS = (
+    ParamSpec("FS_GAIN", 1.0 / 3.0, 0.0, 10.0, "", "Gain"),
+    ParamSpec("FS_MODE", 0, 0, 5, "", "Mode", True, choices=((0, "None"), (3, "Land"), (5, "End"))),
+    ParamSpec("FS_SPEED", 4.0, 0.1, 20.0, "m/s", "Speed"),
+)
+
+names = st.text("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_", min_size=1, max_size=16)
+values = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(2**31), 2**31 - 1)
+
+
+@given(st.dictionaries(names, values), st.integers(1, 250))
+def test_what_is_written_is_read(parameters: dict[str, float], system_id: int) -> None:
+    lines = [ParamLine(name, value, isinstance(value, int)) for name, value in parameters.items()]
+    read = parse_params(format_params(lines, system_id), "file")
+    assert {item.name: item.value for item in read} == parameters
+    assert all(isinstance(item.value, int) == item.is_integer for item in read)
+
+
+@given(st.dictionaries(names, values, min_size=1), st.data())
+def test_a_file_of_ours_that_is_cut_short_is_never_taken_for_whole(parameters, data) -> None:
+    lines = [ParamLine(name, value, isinstance(value, int)) for name, value in parameters.items()]
+    text = format_params(lines)
+    cut = data.draw(st.integers(text.index("# Stack: flightstack\n") + 21, len(text) - 2))
+    with pytest.raises(ConfigError):
+        parse_params(text[:cut], "file")
+
+
+@given(st.text(max_size=300) | st.text("#\t19FS_GAIN.-e\n", max_size=100))
+def test_any_text_is_read_or_refused_in_one_sentence(text: str) -> None:
+    said = ""
+    try:
+        read = parse_params(text, "file")
+    except ConfigError as error:
+        read, said = [], str(error)
+    assert "\n" not in said
+    assert all(1 <= len(item.name) <= 16 for item in read)
+
+
+BAD = {
+    "spaces for tabs": ("1 1 FS_SPEED 5 9", "has 1 columns between tabs, expected 5"),
+    "a column too many": ("1\t1\tFS_SPEED\t5\t9\t", "has 6 columns between tabs, expected 5"),
+    "half a line": ("1\t1\tFS_SPE", "has 3 columns between tabs, expected 5"),
+    "vehicle": ("x\t1\tFS_SPEED\t5\t9", "vehicle 'x' and component '1' must be numbers"),
+    "digits of another script": ("١\t1\tFS_SPEED\t5\t9", "holds characters that no parameter has"),
+    "other component": (
+        "1\t25\tFS_SPEED\t5\t9",
+        "FS_SPEED belongs to component 25, not to the autopilot, 1",
+    ),
+    "name": ("1\t1\tFS SPEED\t5\t9", "'FS SPEED' is no name of a parameter"),
+    "long name": ("1\t1\tA2345678901234567\t5\t9", "'A2345678901234567' is no name of a parameter"),
+    "value": ("1\t1\tFS_SPEED\tfast\t9", "FS_SPEED: 'fast' is not a number"),
+    "not finite": ("1\t1\tFS_SPEED\tnan\t9", "FS_SPEED: 'nan' is not a number"),
+    "underscore": ("1\t1\tFS_SPEED\t1_0\t9", "FS_SPEED: '1_0' is not a number"),
+    "huge": ("1\t1\tFS_MODE\t1e999\t6", "FS_MODE: '1e999' is not a number"),
+    "type": ("1\t1\tFS_SPEED\t5\t11", "FS_SPEED: '11' is no MAV_PARAM_TYPE of a number"),
+    "fraction": ("1\t1\tFS_MODE\t0.5\t6", "FS_MODE: '0.5' is not a whole number, as type 6 demands"),
+    "real for an integer": ("1\t1\tFS_MODE\t3\t9", "FS_MODE: is an integer, type 6, in the vehicle"),
+    "integer for a real": ("1\t1\tFS_SPEED\t3\t6", "FS_SPEED: is a real number, type 9, in the vehicle"),
+    "range": ("1\t1\tFS_SPEED\t50\t9", "FS_SPEED: 50 is outside 0.1 to 20 m/s"),
+    "no such choice": ("1\t1\tFS_MODE\t4\t6", "FS_MODE: 4 is not one of 0, 3, 5"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_line_that_cannot_be_is_a_sentence_with_file_and_line(tmp_path: Path, name: str) -> None:
+    row, sentence = BAD[name]
+    path = tmp_path / "my.params"
+    path.write_text(f"# a comment\n1\t1\tFS_GAIN\t2.5\t9\n\n{row}\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        load_into(ParamStore(SPECS), path)
+    assert str(error.value).startswith(f"{path}: line 4: ")
+    assert sentence in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_parameter_twice_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="line 2: FS_GAIN stands in line 1 already"):
+        parse_params("1\t1\tFS_GAIN\t2.5\t9\n1\t1\tFS_GAIN\t2.5\t9\n", "f")
+
+
+def test_no_file_is_no_parameters_and_anything_else_is_an_error(tmp_path: Path) -> None:
+    assert read_param_file(tmp_path / "none.params") == []
+    (tmp_path / "binary").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match="is not a text file"):
+        read_param_file(tmp_path / "binary")
+    with pytest.raises(ConfigError, match="cannot be read: Is a directory"):
+        read_param_file(tmp_path)
+
+
+def test_a_file_of_qgroundcontrol_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "qgc.params"
+    path.write_text(
+        "# Onboard parameters for Vehicle 3\r\n#\r\n# Stack: PX4 Pro\r\n# Vehicle-Id Component-Id Name Value Type\r\n"
+        "3\t1\tFS_GAIN\t0.349999994039535522\t9\r\n3\t1\tFS_MODE\t3\t6\r\n3\t1\tSYS_AUTOSTART\t4001\t6\r\n"
+    )
+    store = ParamStore(SPECS)
+    loaded = load_into(store, path)
+    assert store.values() == {"FS_GAIN": 0.35, "FS_MODE": 3, "FS_SPEED": 4.0}
+    assert loaded.unknown == ("SYS_AUTOSTART",)
+    assert (
+        loaded.warning(path) == f"{path}: kept, but of no use to this vehicle and controller: SYS_AUTOSTART"
+    )
+
+
+def test_only_what_differs_is_saved_with_what_is_unknown_and_without_overrides(tmp_path: Path) -> None:
+    path = tmp_path / "my.params"
+    path.write_text("1\t1\tLQR_Q\t2.5\t9\n1\t1\tFS_SPEED\t5.5\t9\n1\t1\tFS_GAIN\t2.0\t9\n")
+    store = ParamStore(SPECS)
+    loaded = load_into(store, path)
+    store.override("FS_SPEED", 9.0)
+    store.override("FS_MODE", 5)
+    store.reset(["FS_GAIN"])
+    save(store, loaded, path, 7)
+    assert [line for line in path.read_text().splitlines() if not line.startswith("#")] == [
+        "7\t1\tFS_SPEED\t5.5\t9",
+        "7\t1\tLQR_Q\t2.5\t9",
+    ]
+    store.set("FS_SPEED", 9.0)
+    assert {item.name for item in lines_to_save(store, loaded)} == {"FS_SPEED", "LQR_Q"}
+
+
+@pytest.mark.parametrize("failing", ["fsync", "replace"])
+def test_a_crash_while_writing_leaves_the_old_file(tmp_path: Path, monkeypatch, failing: str) -> None:
+    path = tmp_path / "my.params"
+    store = ParamStore(SPECS)
+    store.set("FS_SPEED", 5.0)
+    save(store, NOTHING_LOADED, path, 1)
+    before = path.read_bytes()
+
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    if failing == "fsync":
+        monkeypatch.setattr(atomic_file.os, "fsync", fail)
+    else:
+        monkeypatch.setattr(Path, "replace", fail)
+    store.set("FS_SPEED", 6.0)
+    with pytest.raises(OSError, match="No space"):
+        save(store, NOTHING_LOADED, path, 1)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_the_process_may_die_between_writing_and_renaming(tmp_path: Path) -> None:
+    """Killed for good, not by an exception: the temporary file stays, the old one is whole, the next start reads it."""
+    path = tmp_path / "my.params"
+    path.write_text("1\t1\tFS_SPEED\t5.0\t9\n")
+    script = (
+        "import os, pathlib\n"
+        "from flightstack.atomic_file import write_text_atomically\n"
+        "pathlib.Path.replace = lambda *_: os._exit(9)\n"
+        f"write_text_atomically(pathlib.Path({str(path)!r}), 'half')\n"
+    )
+    assert subprocess.run([sys.executable, "-c", script], cwd=ROOT, check=False).returncode == 9
+    assert len(list(tmp_path.iterdir())) == 2
+    store = ParamStore(SPECS)
+    load_into(store, path)
+    assert store.value("FS_SPEED") == 5.0
+    save(store, NOTHING_LOADED, path, 1)
+    assert read_param_file(path)[0].value == 5.0
+
+
+def test_the_saver_writes_changes_and_the_next_start_has_them(tmp_path: Path) -> None:
+    path = tmp_path / "new folder" / "my.params"
+    store = ParamStore(SPECS)
+    saver = ParamSaver(store, NOTHING_LOADED, path, 1)
+    saver.close()
+    assert not path.exists(), "nothing changed, nothing is written"
+    saver = ParamSaver(store, NOTHING_LOADED, path, 1)
+    for speed in range(1, 20):
+        store.set("FS_SPEED", float(speed))
+    store.set("FS_MODE", 3)
+    saver.close()
+    assert saver.take_error() is None
+    after = ParamStore(SPECS)
+    load_into(after, path)
+    assert after.values() == store.values()
+
+
+def test_a_disk_that_fails_is_reported_once(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    path = tmp_path / "file" / "my.params"
+    store = ParamStore(SPECS)
+    saver = ParamSaver(store, NOTHING_LOADED, path, 1)
+    store.set("FS_SPEED", 5.0)
+    saver.close()
+    assert saver.take_error() == f"parameters are not saved: {path}: File exists"
+    assert saver.take_error() is None
+
+
+# ---------------------------------------------------------------------- the vehicle
+
+
+def test_order_of_precedence(tmp_path: Path) -> None:
+    """Default, gains file, parameter file, --param."""
+    path = tmp_path / "my.params"
+    path.write_text("1\t1\tPOS_XY_P\t6.5\t9\n1\t1\tMPC_XY_CRUISE\t5.0\t9\n1\t1\tMAV_SYS_ID\t42\t6\n")
+    stack = build(StackConfig(params_file=str(path), params=("MPC_XY_CRUISE=3",)), lambda: None)
+    backend = stack.autopilot._backend
+    assert backend.get_parameter("POS_XY_P") == 6.5
+    assert backend.get_parameter("POS_XY_I") == 3.125  # tuned.toml
+    assert stack.autopilot.behaviour.cruise_speed_m_s == 3.0
+    assert stack.autopilot._navigator.params.cruise_speed_m_s == 3.0
+    assert stack.autopilot.behaviour.climb_speed_m_s == 2.5
+    stack.ground.add_peer(PEER, permanent=True)
+    frames = [data for _, data in stack.ground.poll(0.0)]
+    assert {frame[5] for frame in frames} == {42}, "the system id in MAVLink 2's header"
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "flightstack", "--check", *arguments]
+    return subprocess.run(command, cwd=ROOT, env=os.environ, capture_output=True, text=True, check=False)
+
+
+def test_the_process_refuses_a_damaged_file_in_one_sentence(tmp_path: Path) -> None:
+    path = tmp_path / "my.params"
+    path.write_text("1\t1\tMPC_XY_CRUISE\t50\t9\n")
+    done = run("--params", str(path))
+    assert done.returncode == 2
+    sentence = f"{path}: line 1: MPC_XY_CRUISE: 50 is outside 0.1 to 20 m/s"
+    assert done.stderr == f"flightstack: {sentence}\n"
+    assert run("--params", "none", "--param", "PID_ROLL_P=100").returncode == 0
