@@ -10,6 +10,7 @@ from fastcrc import crc16
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import MAGIC_V1, MAGIC_V2, Frame, FrameReader
+from flightstack.mavlink.signing import LinkSigning
 
 Message: TypeAlias = Any
 """A pymavlink message object."""
@@ -21,8 +22,18 @@ _crc16 = crc16.mcrf4xx
 class Link:
     """Encodes and decodes one link. Bytes that make no message are counted, never raised."""
 
-    def __init__(self, system_id: int, component_id: int, keeps_unknown: bool = False) -> None:
-        """``keeps_unknown``: let ``decode`` yield messages that the dialect lacks too, to be passed on."""
+    def __init__(
+        self,
+        system_id: int,
+        component_id: int,
+        keeps_unknown: bool = False,
+        signing: LinkSigning | None = None,
+    ) -> None:
+        """``keeps_unknown``: let ``decode`` yield messages that the dialect lacks too, to be passed on.
+
+        ``signing``: sign what is sent, and count as bad what is not signed as it should be.
+        """
+        self._signing = signing
         self._codec = mavlink.MAVLink(None, system_id, component_id)
         self._codec.robust_parsing = True
         self._reader = FrameReader()
@@ -36,7 +47,10 @@ class Link:
         frame: bytes = message.pack(self._codec)
         self._codec.seq = (self._codec.seq + 1) % 256
         self.sent += 1
-        return bytes(frame)
+        return self._outgoing(bytes(frame), message)
+
+    def _outgoing(self, frame: bytes, message: Message) -> bytes:
+        return frame if self._signing is None else self._signing.outgoing(frame, message.crc_extra)
 
     def encode_shared(self, message: Message) -> bytes:
         """Do as ``encode``, for a message that goes to several links and does not change between.
@@ -48,7 +62,7 @@ class Link:
         packed = (
             payload is not None and len(payload) == message.get_header().mlen
         )  # of a received one it is not
-        if payload is None or not packed or codec.signing.sign_outgoing:
+        if payload is None or not packed:
             return self.encode(message)
         number = message.get_msgId()  # ``id`` may be a field
         seq, system, component = codec.seq, codec.srcSystem, codec.srcComponent
@@ -59,7 +73,7 @@ class Link:
         crc: int = _crc16(b"%b%c" % (frame[1:], message.crc_extra))
         codec.seq = (seq + 1) % 256
         self.sent += 1
-        return frame + crc.to_bytes(2, "little")
+        return self._outgoing(frame + crc.to_bytes(2, "little"), message)
 
     @property
     def has_partial(self) -> bool:
@@ -86,11 +100,14 @@ class Link:
                     yield message
             else:
                 self.bad += 1
-                if self._keeps_unknown:
+                if self._keeps_unknown and (self._signing is None or self._signing.accepts(frame.data)):
                     yield _unknown(frame)
 
     def _message(self, frame: bytes) -> Message | None:
         """Decode one known frame; None when its checksum or signature is wrong."""
+        if self._signing is not None and not self._signing.accepts(frame):
+            self.bad += 1
+            return None
         try:
             message = self._codec.decode(bytearray(frame))
         except mavlink.MAVError:

@@ -1,0 +1,194 @@
+"""MAVLink 2 signing without I/O: who may speak, and proof that it is we who do.
+
+The specification: https://mavlink.io/en/guide/message_signing.html. One ``Signing`` serves all links of a process: a
+frame that was heard on one link is a replay on every other. pymavlink's own check notes the timestamp of a frame
+before it knows that the signature is right, so that a forged one silences a stream; this one does not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+from collections.abc import Callable
+from typing import NamedTuple
+
+from fastcrc import crc16
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2, MAGIC_V2, SIGNATURE_SIZE
+
+KEY_SIZE = 32
+NO_KEY = bytes(KEY_SIZE)
+"""The key that switches signing off."""
+TICKS_PER_S = 100_000
+EPOCH_UNIX_S = 1_420_070_400
+"""Timestamps count 10 µs from here: 2015-01-01."""
+LARGEST_TIMESTAMP = 2**48 - 1
+NEW_STREAM_TICKS = 60 * TICKS_PER_S
+"""A stream that was never heard may be so much behind our timestamp."""
+AHEAD_TICKS = 60 * TICKS_PER_S
+"""Timestamps are reserved for so long, so that no crash makes us use one twice."""
+MAX_STREAMS = 1024
+"""Only holders of the key open streams, but even they shall not fill the memory."""
+_ALWAYS_TAKEN = frozenset({int(mavlink.MAVLINK_MSG_ID_RADIO_STATUS)})
+"""Telemetry radios put them on the link, and have no key."""
+_SIGNED = int(mavlink.MAVLINK_IFLAG_SIGNED)
+_crc16 = crc16.mcrf4xx
+
+
+class Counts(NamedTuple):
+    """What happened to the frames that were received while there was a key."""
+
+    good: int = 0
+    unsigned_taken: int = 0
+    unsigned_refused: int = 0
+    bad_signature: int = 0
+    replayed: int = 0
+    too_old: int = 0
+
+    @property
+    def refused(self) -> int:
+        """All frames that were not taken."""
+        return self.unsigned_refused + self.bad_signature + self.replayed + self.too_old
+
+
+def timestamp_of(unix_s: float) -> int:
+    """Return the timestamp of a time since the Unix epoch; before 2015, 0."""
+    return min(LARGEST_TIMESTAMP, max(0, int((unix_s - EPOCH_UNIX_S) * TICKS_PER_S)))
+
+
+class Signing:
+    """The key, our timestamp, and the timestamps of all streams that were heard.
+
+    ``clock`` returns the time since the Unix epoch [s]. ``first`` is above every timestamp used before, and
+    ``reserve`` is called with a new one before any at or above the last reserved is used: it has to be on the
+    disk then. ``allow_unsigned``: take unsigned frames, but never wrongly signed ones.
+    """
+
+    def __init__(
+        self,
+        key: bytes,
+        clock: Callable[[], float],
+        first: int = 0,
+        reserve: Callable[[int], None] = lambda _limit: None,
+        allow_unsigned: bool = False,
+    ) -> None:
+        self.allow_unsigned = allow_unsigned
+        self.counts = Counts()
+        self._clock = clock
+        self._reserve = reserve
+        self._key = NO_KEY
+        self._timestamp = first
+        self._reserved = first
+        self._streams: dict[bytes, int] = {}
+        self.set_key(key)
+
+    @property
+    def is_on(self) -> bool:
+        """Whether there is a key: frames are signed and checked."""
+        return self._key != NO_KEY
+
+    @property
+    def timestamp(self) -> int:
+        """The latest timestamp that was used or heard."""
+        return self._timestamp
+
+    def set_key(self, key: bytes, initial_timestamp: int = 0) -> None:
+        """Use another key (32 octets; all zero: none) from now on; raise ValueError for another size."""
+        if len(key) != KEY_SIZE:
+            raise ValueError(f"a signing key has {KEY_SIZE} octets, not {len(key)}")
+        if key != self._key:
+            self._streams.clear()  # frames of the old key are worth nothing now
+        self._key = key
+        self._timestamp = max(self._timestamp, min(initial_timestamp, LARGEST_TIMESTAMP))
+
+    def next_timestamp(self) -> int:
+        """Return a timestamp that was never used before: the clock's, or one more than the last.
+
+        At the end of all timestamps, to which only a holder of the key can take us, the last one stays.
+        """
+        timestamp = min(max(self._timestamp + 1, timestamp_of(self._clock())), LARGEST_TIMESTAMP)
+        if timestamp >= self._reserved:
+            self._reserved = timestamp + AHEAD_TICKS
+            self._reserve(self._reserved)
+        self._timestamp = timestamp
+        return timestamp
+
+    def close(self) -> None:
+        """Give back what was reserved and not used, at an orderly end."""
+        if self._reserved > self._timestamp + 1:
+            self._reserved = self._timestamp + 1
+            self._reserve(self._reserved)
+
+    def sign(self, frame: bytes, crc_extra: int, link_id: int) -> bytes:
+        """Return an unsigned MAVLink 2 frame as a signed one."""
+        body = bytes((*frame[:2], frame[2] | _SIGNED)) + frame[3:-CHECKSUM_SIZE]
+        checksum: int = _crc16(body[1:] + bytes((crc_extra,)))
+        tail = (
+            checksum.to_bytes(2, "little") + bytes((link_id,)) + self.next_timestamp().to_bytes(6, "little")
+        )
+        return body + tail + self._signature(body + tail)
+
+    def accepts(self, frame: bytes, trusted: bool = False) -> bool:
+        """Tell whether a frame (whole, of either version) may be used, and count it.
+
+        ``trusted``: it came on a link that needs no signature.
+        """
+        if not self.is_on:
+            return True
+        if frame[0] == MAGIC_V2 and frame[2] & _SIGNED:
+            outcome = self._check(frame)
+        else:
+            taken = trusted or self.allow_unsigned or _message_id(frame) in _ALWAYS_TAKEN
+            outcome = "unsigned_taken" if taken else "unsigned_refused"
+        self.counts = self.counts._replace(**{outcome: getattr(self.counts, outcome) + 1})
+        return outcome in ("good", "unsigned_taken")
+
+    def _check(self, frame: bytes) -> str:
+        """Return what to count a signed frame as."""
+        if not hmac.compare_digest(self._signature(frame[:-6]), frame[-6:]):
+            return "bad_signature"
+        timestamp = int.from_bytes(frame[-12:-6], "little")
+        stream = frame[5:7] + frame[-SIGNATURE_SIZE : -SIGNATURE_SIZE + 1]  # system, component, link
+        last = self._streams.get(stream)
+        if last is not None and timestamp <= last:
+            return "replayed"
+        now = max(self._timestamp, timestamp_of(self._clock()))
+        if last is None and (timestamp + NEW_STREAM_TICKS < now or len(self._streams) >= MAX_STREAMS):
+            return "too_old"
+        self._streams[stream] = timestamp
+        self._timestamp = max(self._timestamp, timestamp)
+        return "good"
+
+    def _signature(self, octets: bytes) -> bytes:
+        return hashlib.sha256(self._key + octets).digest()[:6]
+
+
+class LinkSigning(NamedTuple):
+    """Signing on one link; ``link_id`` (0 to 255) tells it from our others."""
+
+    signing: Signing
+    link_id: int
+    trusted: bool = False
+    """Whether unsigned frames are taken on this link though they are not elsewhere."""
+
+    def outgoing(self, frame: bytes, crc_extra: int) -> bytes:
+        """Return what to send for an unsigned frame."""
+        return self.signing.sign(frame, crc_extra, self.link_id) if self.signing.is_on else frame
+
+    def accepts(self, frame: bytes) -> bool:
+        """Tell whether a received frame may be used, and count it."""
+        return self.signing.accepts(frame, self.trusted)
+
+
+def without_signature(frame: bytes, crc_extra: int) -> bytes:
+    """Return a frame without its signature, as it belongs into a log; an unsigned one stays as it is."""
+    if frame[0] != MAGIC_V2 or not frame[2] & _SIGNED:
+        return frame
+    body = bytes((*frame[:2], frame[2] & ~_SIGNED)) + frame[3 : HEADER_V2 + frame[1]]
+    checksum: int = _crc16(body[1:] + bytes((crc_extra,)))
+    return body + checksum.to_bytes(2, "little")
+
+
+def _message_id(frame: bytes) -> int:
+    return int.from_bytes(frame[7:10], "little") if frame[0] == MAGIC_V2 else frame[5]

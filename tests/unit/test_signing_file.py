@@ -1,0 +1,192 @@
+"""The signing key's files, and SETUP_SIGNING, which changes them."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Hashable
+from pathlib import Path
+
+import pytest
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.signing_setup import SigningSetup
+from flightstack.mavlink.signing import AHEAD_TICKS, NO_KEY, Signing
+from flightstack.params.errors import ConfigError
+from flightstack.signing_file import create_key, load_key, open_signing, replace_key
+
+KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))
+
+
+@pytest.fixture
+def key_file(tmp_path: Path) -> Path:
+    path = tmp_path / "vehicle.key"
+    path.write_text(KEY.hex() + "\n")
+    path.chmod(0o600)
+    return path
+
+
+def test_a_new_key_is_random_and_for_its_owner_alone(tmp_path: Path) -> None:
+    first, second = tmp_path / "keys" / "first.key", tmp_path / "second.key"
+    before = os.umask(0)
+    try:
+        keys = {create_key(first), create_key(second)}
+    finally:
+        os.umask(before)
+    assert len(keys) == 2
+    assert first.stat().st_mode & 0o777 == 0o600
+    assert {load_key(first), load_key(second)} == keys
+    with pytest.raises(ConfigError, match="File exists"):
+        create_key(first)
+
+
+@pytest.mark.parametrize("content", [KEY, KEY.hex().encode(), KEY.hex().upper().encode() + b"\r\n"])
+def test_a_key_is_raw_or_hexadecimal(key_file: Path, content: bytes) -> None:
+    key_file.write_bytes(content)
+    assert load_key(key_file) == KEY
+
+
+@pytest.mark.parametrize(
+    "content", [b"", KEY[:31], KEY + b"x", KEY.hex().encode()[:-1], b"\xff" * 64, b"z" * 64, b"0" * 9999]
+)
+def test_any_other_content_is_refused(key_file: Path, content: bytes) -> None:
+    key_file.write_bytes(content)
+    with pytest.raises(ConfigError, match="32 octets, or 64 hexadecimal digits"):
+        load_key(key_file)
+
+
+@pytest.mark.parametrize("mode", [0o640, 0o604, 0o620, 0o601, 0o666])
+def test_a_key_that_others_may_use_is_refused(key_file: Path, mode: int) -> None:
+    key_file.chmod(mode)
+    with pytest.raises(ConfigError, match=f"chmod 600 {key_file}"):
+        load_key(key_file)
+
+
+def test_a_missing_key_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"none.key: No such file"):
+        load_key(tmp_path / "none.key")
+
+
+def test_timestamps_go_on_after_a_crash_and_after_an_orderly_end(key_file: Path) -> None:
+    first = open_signing(key_file, "vehicle")
+    used = first.next_timestamp()
+    second = open_signing(key_file, "vehicle")  # the first one crashed
+    assert used < second.next_timestamp() <= used + AHEAD_TICKS + 100_000_000
+    second.close()
+    third = open_signing(key_file, "vehicle")
+    assert third.next_timestamp() > second.timestamp
+    timestamps = key_file.with_name("vehicle.key.vehicle.timestamp")
+    assert timestamps.stat().st_mode & 0o777 == 0o600
+    assert sorted(path.name for path in key_file.parent.iterdir()) == [key_file.name, timestamps.name]
+
+
+def test_two_processes_with_one_key_do_not_share_a_timestamp(key_file: Path) -> None:
+    vehicle, ground = open_signing(key_file, "vehicle"), open_signing(key_file, "gcs")
+    vehicle.next_timestamp()
+    ground.next_timestamp()
+    assert len(list(key_file.parent.iterdir())) == 3
+
+
+@pytest.mark.parametrize("content", [b"", b"x", b"-1", b"9" * 16, b"\xff"])
+def test_a_damaged_timestamp_file_is_not_passed_over(key_file: Path, content: bytes) -> None:
+    key_file.with_name("vehicle.key.vehicle.timestamp").write_bytes(content)
+    with pytest.raises(ConfigError, match=r"vehicle.key.vehicle.timestamp"):
+        open_signing(key_file, "vehicle")
+
+
+def test_a_disk_that_fails_in_flight_is_told_once(key_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    signing = open_signing(key_file, "vehicle")
+    (key_file.parent / "vehicle.key.vehicle.timestamp").unlink()
+    (key_file.parent / "vehicle.key.vehicle.timestamp").mkdir()  # no file can take its place
+    signing.next_timestamp()
+    signing.set_key(KEY, signing.timestamp + 2 * AHEAD_TICKS)
+    signing.next_timestamp()
+    assert capsys.readouterr().err.count("after a crash, wait a minute") == 1
+
+
+# ---------------------------------------------------------------------- SETUP_SIGNING
+
+
+class Setup:
+    """The service with a vehicle that is what the test says."""
+
+    def __init__(self, key_file: Path | None) -> None:
+        self.signing = None if key_file is None else open_signing(key_file, "vehicle")
+        self.key_file = key_file
+        self.armed = False
+        self.said: list[str] = []
+        self.service = SigningSetup(
+            Address(1, 1), self.signing, lambda: self.armed, self.is_secure, self.store, self.said.append
+        )
+
+    @staticmethod
+    def is_secure(peer: Hashable) -> bool:
+        return peer == "loopback"
+
+    def store(self, key: bytes) -> None:
+        assert self.key_file is not None
+        replace_key(self.key_file, key)
+
+    def send(
+        self, key: bytes, timestamp: int = 0, peer: str = "loopback", target: tuple[int, int] = (1, 1)
+    ) -> list[str]:
+        self.said.clear()
+        self.service.receive(mavlink.MAVLink_setup_signing_message(*target, list(key), timestamp), peer, 0.0)
+        assert self.service.poll(0.0) == []
+        assert self.service.next_deadline() is None
+        return self.said
+
+
+def test_a_new_key_is_used_and_kept(key_file: Path) -> None:
+    setup = Setup(key_file)
+    assert setup.send(OTHER_KEY, 5 * 10**13) == ["Signing is on: a new key is in use"]
+    assert setup.signing is not None
+    assert setup.signing.timestamp == 5 * 10**13
+    assert load_key(key_file) == OTHER_KEY
+    assert key_file.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_key_of_zeros_switches_signing_off_also_after_a_restart(key_file: Path) -> None:
+    setup = Setup(key_file)
+    assert setup.send(NO_KEY) == ["Signing is off"]
+    assert setup.signing is not None
+    assert not setup.signing.is_on
+    assert not open_signing(key_file, "vehicle").is_on
+    assert setup.send(OTHER_KEY) == ["Signing is on: a new key is in use"]
+
+
+def test_an_armed_vehicle_keeps_its_key(key_file: Path) -> None:
+    setup = Setup(key_file)
+    setup.armed = True
+    assert setup.send(OTHER_KEY) == ["Signing key refused: the vehicle is armed"]
+    assert load_key(key_file) == KEY
+
+
+def test_a_key_from_a_network_is_refused(key_file: Path) -> None:
+    setup = Setup(key_file)
+    assert setup.send(OTHER_KEY, peer="192.0.2.1") == ["Signing key refused: the link is not local"]
+    assert load_key(key_file) == KEY
+
+
+@pytest.mark.parametrize("target", [(0, 0), (0, 1), (2, 1), (1, 2)])
+def test_a_key_for_everyone_or_another_is_ignored(key_file: Path, target: tuple[int, int]) -> None:
+    setup = Setup(key_file)
+    assert setup.send(OTHER_KEY, target=target) == []
+    assert load_key(key_file) == KEY
+
+
+def test_a_key_that_cannot_be_kept_is_not_used(key_file: Path) -> None:
+    setup = Setup(key_file)
+    key_file.unlink()
+    key_file.mkdir()
+    (said,) = setup.send(OTHER_KEY)
+    assert said.startswith("Signing key refused: it cannot be kept: ")
+    assert setup.signing is not None
+    assert setup.signing.accepts(Signing(KEY, time.time).sign(b"\xfd" + bytes(11), 0, 0))
+
+
+def test_without_a_key_file_no_key_is_taken() -> None:
+    assert Setup(None).send(OTHER_KEY) == [
+        "Signing key refused: flightstack was started without --signing-key"
+    ]
