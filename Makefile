@@ -43,9 +43,11 @@ imports: $(READY)
 
 generated: $(READY)
 	$(BIN)/python tools/generate_dialect.py --check
+	$(BIN)/python tools/generate_params.py --check
 
 generate: $(READY) ## Regenerate files made from others
 	$(BIN)/python tools/generate_dialect.py
+	$(BIN)/python tools/generate_params.py
 
 bench: $(READY) ## Print speeds beside their floors
 	@$(BIN)/python -m benchmarks

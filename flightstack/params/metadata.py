@@ -1,0 +1,55 @@
+"""What ground stations need to show parameters: the file of MAVLink's component metadata, type PARAMETER.
+
+The form: https://mavlink.io/en/services/component_metadata.html, parameter.schema.json, version 3.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import Any
+
+from flightstack.params.spec import ParamSpec
+
+VERSION = 3
+INTEGER, REAL = "Int32", "Float"
+
+
+def parameter_metadata(specs: Iterable[ParamSpec]) -> dict[str, Any]:
+    """Return the content of the file, sorted by name."""
+    entries = [_entry(spec) for spec in sorted(specs, key=lambda spec: spec.name)]
+    return {"version": VERSION, "parameters": entries}
+
+
+def parameters_json(specs: Iterable[ParamSpec]) -> str:
+    """Return the text of the file; the same declarations give the same text."""
+    return json.dumps(parameter_metadata(specs), separators=(",", ":"), allow_nan=False)
+
+
+def _entry(spec: ParamSpec) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "name": spec.name,
+        "type": INTEGER if spec.is_integer else REAL,
+        "default": spec.number(spec.default),
+        "min": spec.number(spec.low),
+        "max": spec.number(spec.high),
+        "units": spec.unit,
+        "shortDesc": spec.help,
+        "longDesc": long_description(spec),
+        "decimalPlaces": 0 if spec.is_integer else spec.decimals,
+        "group": spec.group,
+        "category": "Standard",
+    }
+    if spec.choices:
+        entry["values"] = [{"value": value, "description": meaning} for value, meaning in spec.choices]
+    if spec.reboot_required:
+        entry["rebootRequired"] = True
+    return entry
+
+
+def long_description(spec: ParamSpec) -> str:
+    """Return the line of help as a sentence, and when a change takes effect."""
+    when = (
+        "Takes effect at the next start." if spec.reboot_required else "Takes effect at once, in flight too."
+    )
+    return f"{spec.help}. {when}"
