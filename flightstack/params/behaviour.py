@@ -89,21 +89,24 @@ class Behaviour:
     return_min_distance_m: float = _param(
         "RTL_MIN_DIST", 10, 0.5, 100, "m", "Nearer to home a return does not climb"
     )
-    return_type: float = _param(
-        "RTL_TYPE", 0, 0, 1, "", "Return to the nearest of 0 home and rally points, 1 rally points, else home"
-    )
-    fence_action: float = _param(
-        "GF_ACTION", 2, 0, 5, "", "Geofence breach: 0 none, 1 warning, 2 hold, 3 return, 4 terminate, 5 land"
-    )
+    return_type: int = _param(
+        "RTL_TYPE", 0, 0, 1, "", "Where a return goes",
+        choices=((0, "To the nearest of home and rally points"), (1, "To the nearest rally point, else home")),
+    )  # fmt: skip
+    fence_action: int = _param(
+        "GF_ACTION", 2, 0, 5, "", "Geofence breach",
+        choices=((0, "None"), (1, "Warning"), (2, "Hold"), (3, "Return"), (4, "Terminate"), (5, "Land")),
+    )  # fmt: skip
     fence_max_distance_m: float = _param(
         "GF_MAX_HOR_DIST", 0, 0, 10000, "m", "Geofence: farthest horizontal distance from home; 0 no limit"
     )
     fence_max_altitude_m: float = _param(
         "GF_MAX_VER_DIST", 0, 0, 10000, "m", "Geofence: greatest altitude above home; 0 no limit"
     )
-    fence_predicts: float = _param(
-        "GF_PREDICT", 0, 0, 1, "", "Geofence: 1 to act where the vehicle could no longer stop inside"
-    )
+    fence_predicts: int = _param(
+        "GF_PREDICT", 0, 0, 1, "", "When the geofence acts",
+        choices=((0, "At a breach"), (1, "Where the vehicle could no longer stop inside")),
+    )  # fmt: skip
     first_waypoint_distance_m: float = _param(
         "MIS_DIST_1WP", 10000, -1, 100000, "m", "Farthest first waypoint from home; -1 for no limit"
     )
