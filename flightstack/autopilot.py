@@ -8,7 +8,7 @@ import numpy as np
 
 from flightstack.commander.arming_checks import arming_refusals
 from flightstack.commander.conditions import LinkFacts, StateSource
-from flightstack.commander.failsafe import Action, Decision
+from flightstack.commander.failsafe import Action, Decision, Failsafe
 from flightstack.commander.supervisor import Supervisor
 from flightstack.commander.transitions import Event, Facts, Need, Outcome, Status, transition
 from flightstack.contract import FloatArray, LoopRow, LoopStatus
@@ -18,12 +18,13 @@ from flightstack.guidance.mission import NAV_DELAY, TAKEOFF
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.guidance.plan_table import plan_table
+from flightstack.guidance.safe_places import SafePlaces, plan_limits
 from flightstack.guidance.setpoints import OffboardSetpoint, Sticks
 from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.modes import Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
-from flightstack.plan import MissionItem, Rejection, check_mission
+from flightstack.plan import MissionItem, Rejection
 from flightstack.plan.check import Limits
 from flightstack.snapshot import CRITICAL, EMERGENCY, INFO, NOTICE, WARNING, Recorder, Snapshot, Text
 
@@ -68,6 +69,7 @@ class Autopilot:
         self.home = home
         self.supervisor = Supervisor(vehicle, behaviour, outer_hz, state, source)
         self.items: tuple[MissionItem, ...] = ()
+        self.places = SafePlaces(home)
         self._divisor = divisor
         self._backend = backend
         self._recorder = recorder
@@ -152,6 +154,8 @@ class Autopilot:
             return
         if decision != acted:
             self._recorder.status(time_us, now.status, failsafe=True)
+        if Failsafe.POSITION_ERROR in supervisor.failsafes:
+            self._navigator.take_up(self._state)
         for event in FAILSAFE_EVENTS.get(decision.action, ()):
             if self._apply(event) is None:
                 break
@@ -282,6 +286,10 @@ class Autopilot:
             if altitude > self.limits.max_altitude_m:
                 return f"takeoff altitude {altitude:g} m is above {self.limits.max_altitude_m:g} m"
             self._takeoff_altitude_m = altitude
+        if event is Event.SELECT_MISSION:
+            way_out = self.places.way_out(self.items)
+            if way_out is not None:
+                return way_out
         self._adopt(before, outcome.status, event)
         return None
 
@@ -320,6 +328,10 @@ class Autopilot:
         if starting:
             self._backend.reset(self._state)
             self._navigator.rest_at(self._state)
+        if status.mode is Mode.RETURN and entering:
+            north_m, east_m = float(self._state[0]), float(self._state[1])
+            place = self.places.return_place(north_m, east_m, self.behaviour.return_type)
+            self._navigator.return_to(place.north_m, place.east_m, -place.altitude_m)
         if starting or (flying and entering):
             self._navigator.enter(status.mode, self._takeoff_altitude_m)
         self._flying = flying
@@ -371,12 +383,11 @@ class Autopilot:
     @property
     def limits(self) -> Limits:
         """Limits of a mission."""
-        b = self.behaviour
-        return Limits(max_first_distance_m=b.first_waypoint_distance_m, max_distance_m=b.waypoint_distance_m)
+        return plan_limits(self.behaviour)
 
     def check_mission(self, items: Sequence[MissionItem]) -> Rejection | None:
         """Tell why the vehicle would refuse a mission, or None."""
-        return check_mission(items, self.home, self.limits)
+        return self.places.check_mission(items, self.limits)
 
     def set_mission(self, items: Sequence[MissionItem]) -> None:
         """Take a mission that was checked; one that is being flown begins anew with its first item."""
@@ -385,6 +396,23 @@ class Autopilot:
         self._mission_changed()
         if not self.items and self.now.status.mode is Mode.MISSION:
             self.happen(Event.SELECT_HOLD)
+
+    def check_fence(self, items: Sequence[MissionItem]) -> Rejection | None:
+        """Tell why the vehicle would refuse a geofence, or None: in flight, one that it would break at once."""
+        acts_in_air = not self.now.landed and self.behaviour.fence_action > 0.0
+        return self.places.check_fence(items, (self._state[0], self._state[1]) if acts_in_air else None)
+
+    def set_fence(self, items: Sequence[MissionItem]) -> None:
+        """Take a geofence that was checked; no items remove it."""
+        self.supervisor.set_fence(self.places.set_fence(items))
+
+    def check_rally(self, items: Sequence[MissionItem]) -> Rejection | None:
+        """Tell why the vehicle would refuse a list of rally points, or None."""
+        return self.places.check_rally(items, self.limits)
+
+    def set_rally(self, items: Sequence[MissionItem]) -> None:
+        """Take rally points that were checked, for the next return; no items remove them."""
+        self.places.set_rally(items)
 
     def set_current_item(self, seq: int) -> str | None:
         """Make ``seq`` the current item; return why not, or None."""

@@ -115,7 +115,7 @@ class AutopilotFacts:
     @property
     def plan_ids(self) -> PlanIds:
         """Identifiers of the stored plans."""
-        return PlanIds()
+        return PlanIds(*self._autopilot.places.ids)
 
     @property
     def battery(self) -> BatteryView:
@@ -125,7 +125,7 @@ class AutopilotFacts:
     @property
     def fence_breached(self) -> bool:
         """Whether the vehicle is outside its fence."""
-        return False
+        return bool(self._autopilot.supervisor.fence.flags)
 
     @property
     def has_state(self) -> bool:

@@ -15,7 +15,7 @@ from flightstack.mavlink.services.mission_store import (
     MissionRefused,
     MissionReplaced,
 )
-from flightstack.plan import MissionType
+from flightstack.plan import PLAN_NAMES, MissionType
 from flightstack.snapshot import NOTICE, WARNING
 
 
@@ -26,7 +26,19 @@ class MissionService:
 
     def __init__(self, own: Address, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
-        self._server = MissionServer(own, {MissionType.MISSION: autopilot.check_mission})
+        self._server = MissionServer(
+            own,
+            {
+                MissionType.MISSION: autopilot.check_mission,
+                MissionType.FENCE: autopilot.check_fence,
+                MissionType.RALLY: autopilot.check_rally,
+            },
+        )
+        self._setters = {
+            MissionType.MISSION: autopilot.set_mission,
+            MissionType.FENCE: autopilot.set_fence,
+            MissionType.RALLY: autopilot.set_rally,
+        }
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a message of the mission protocol."""
@@ -48,13 +60,21 @@ class MissionService:
         autopilot = self._autopilot
         for event in self._server.events():
             if isinstance(event, MissionReplaced):
-                autopilot.set_mission(event.items)
-                autopilot.say(NOTICE, f"Mission of {len(event.items)} items loaded")
+                self._setters[event.mission_type](event.items)
+                autopilot.say(NOTICE, f"{_name(event.mission_type)} of {len(event.items)} items loaded")
             elif isinstance(event, MissionCleared):
-                autopilot.set_mission(())
+                self._setters[event.mission_type](())
             elif isinstance(event, CurrentRequested):
                 refusal = autopilot.set_current_item(event.seq)
                 if refusal is not None:
                     autopilot.say(WARNING, f"Mission item: {refusal}")
             elif isinstance(event, MissionRefused):
-                autopilot.say(WARNING, f"Mission refused: {event.reason}")
+                autopilot.say(WARNING, f"{_name(event.mission_type)} refused: {event.reason}")
+        mission, fence, rally = (self._server.plan_id(kind) for kind in self._setters)
+        autopilot.places.ids = (mission, fence, rally)
+
+
+def _name(kind: MissionType) -> str:
+    """Return "Mission", "Geofence" or "List of rally points"."""
+    name = PLAN_NAMES[kind]
+    return name[0].upper() + name[1:]

@@ -1,0 +1,78 @@
+"""Where the vehicle may fly and where it returns to: geofence, home and rally points. No I/O, no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.guidance.fence import NO_FENCE, Fence
+from flightstack.guidance.rally import HOME, ReturnPlace, choose, rally_points
+from flightstack.params.behaviour import Behaviour
+from flightstack.plan import (
+    DEFAULT_LIMITS,
+    Limits,
+    MissionItem,
+    Rejection,
+    check_fence,
+    check_mission,
+    check_rally,
+)
+from flightstack.plan.legs import leg_rejection
+
+
+def plan_limits(b: Behaviour) -> Limits:
+    """Return what a plan may ask for; without GF_MAX_VER_DIST, the altitude that missions always had."""
+    return Limits(
+        max_first_distance_m=b.first_waypoint_distance_m,
+        max_distance_m=b.waypoint_distance_m,
+        max_altitude_m=b.fence_max_altitude_m or DEFAULT_LIMITS.max_altitude_m,
+        max_home_distance_m=b.fence_max_distance_m,
+    )
+
+
+class SafePlaces:
+    """The geofence and the rally points in force, and the checks of plans against them."""
+
+    def __init__(self, origin: GeoPoint) -> None:
+        """Measure in metres from ``origin``, the origin of the local frame."""
+        self._origin = origin
+        self._frame = LocalFrame(origin)
+        self.fence: Fence = NO_FENCE
+        self.home: ReturnPlace = HOME
+        """Where home is; it may be set elsewhere than at the origin."""
+        self.points: tuple[ReturnPlace, ...] = ()
+        self.ids: tuple[int, int, int] = (0, 0, 0)
+        """Opaque ids of mission, geofence and rally points; the owner of the stores keeps them."""
+
+    def check_mission(self, items: Sequence[MissionItem], limits: Limits) -> Rejection | None:
+        """Return why a mission is refused: by itself, by the limits or by the geofence."""
+        return check_mission(items, self._origin, limits, self.fence.shape)
+
+    def check_fence(
+        self, items: Sequence[MissionItem], vehicle_ne_m: tuple[float, float] | None
+    ) -> Rejection | None:
+        """Return why a geofence is refused; ``vehicle_ne_m`` is where a flying vehicle is."""
+        return check_fence(items, self._origin, vehicle_ne_m)
+
+    def check_rally(self, items: Sequence[MissionItem], limits: Limits) -> Rejection | None:
+        """Return why a list of rally points is refused."""
+        return check_rally(items, self._origin, limits, self.fence.shape)
+
+    def set_fence(self, items: Sequence[MissionItem]) -> Fence:
+        """Take a geofence that was checked, and return it."""
+        self.fence = Fence.from_items(items, self._frame) if items else NO_FENCE
+        return self.fence
+
+    def set_rally(self, items: Sequence[MissionItem]) -> None:
+        """Take rally points that were checked."""
+        self.points = rally_points(items, self._frame)
+
+    def way_out(self, items: Sequence[MissionItem]) -> str | None:
+        """Return where a stored mission leaves the geofence: one may have been loaded after it."""
+        rejection = leg_rejection(items, self._origin, self.fence.shape)
+        return None if rejection is None else rejection.reason
+
+    def return_place(self, north_m: float, east_m: float, return_type: float) -> ReturnPlace:
+        """Return where a return from here goes (RTL_TYPE); a rally point outside the geofence is none."""
+        inside = [point for point in self.points if self.fence.shape.allows(point.north_m, point.east_m)]
+        return choose((north_m, east_m), self.home, inside, return_type)
