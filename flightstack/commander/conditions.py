@@ -1,11 +1,9 @@
-"""What the supervisor is told by others: links, battery, the state's age, the geofence. Types only."""
+"""What the supervisor is told by others: links, battery, the state's age. Types only."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Protocol
-
-from flightstack.contract import FloatArray
 
 
 @dataclass
@@ -58,16 +56,4 @@ class StateSource(Protocol):
 
     def freshness(self, now_us: int) -> Freshness:
         """Tell how old the state is at vehicle time ``now_us``."""
-        ...
-
-
-class FenceWatch(Protocol):
-    """The geofence; ``guidance.fence.FenceMonitor`` is one."""
-
-    def step(self, state: FloatArray) -> int:
-        """Return the kinds of breach at ``state`` (13,) as bits; 0 inside."""
-        ...
-
-    def text(self, flags: int) -> str:
-        """Return what the bits mean, as the end of a sentence; empty for none."""
         ...

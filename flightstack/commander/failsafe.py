@@ -169,6 +169,7 @@ RULE_OF: Mapping[Failsafe, Rule] = {rule.failsafe: rule for rule in RULES}
 PRIORITY: Mapping[Failsafe, int] = {rule.failsafe: -index for index, rule in enumerate(RULES)}
 
 DOES_ALREADY: Mapping[Phase, Action] = {
+    Phase.MANUAL: Action.ALTITUDE,
     Phase.HOLD: Action.HOLD,
     Phase.RETURN: Action.RETURN,
     Phase.LAND: Action.LAND,

@@ -7,7 +7,7 @@ a mode overrides what is active; whatever begins after that acts again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from flightstack.commander.failsafe import (
@@ -107,7 +107,8 @@ def failsafe_step(
         if not (escalates and failsafe is decision.cause):
             said.append(Announcement(WARNING, RULE_OF[failsafe].begins))
     if escalates:
-        said.append(_announce(decision, entries, situation, behaviour))
+        waited_s = (time_us - entries[decision.cause].since_us) * 1e-6 if decision.cause else 0.0
+        said.append(_announce(decision, begun, waited_s, behaviour))
     return Step(Memory(entries, decision), tuple(said))
 
 
@@ -128,14 +129,16 @@ def _waits(failsafe: Failsafe, elapsed_s: float, phase: Phase, behaviour: Behavi
 
 
 def _announce(
-    decision: Decision, entries: Mapping[Failsafe, Entry], situation: Situation, behaviour: Behaviour
+    decision: Decision, begun: Sequence[Failsafe], waited_s: float, behaviour: Behaviour
 ) -> Announcement:
+    """Tell what a failsafe does: with its beginning, or later when it acts after a wait."""
     assert decision.cause is not None
+    begins, verb = RULE_OF[decision.cause].begins, VERB[decision.action]
     later = action_of(decision.cause, behaviour)
-    text = f"{RULE_OF[decision.cause].begins}: {VERB[decision.action]}"
-    elapsed_s = (situation.time_us - entries[decision.cause].since_us) * 1e-6
     if decision.action is Action.HOLD and later in (Action.RETURN, Action.LAND):
-        text += f", {VERB[later]} in {behaviour.failsafe_delay_s - elapsed_s:.0f} s"
+        verb += f", {VERB[later]} in {behaviour.failsafe_delay_s - waited_s:.0f} s"
+    first = decision.cause in begun
+    text = f"{begins}: {verb}" if first else f"Failsafe: {verb} ({begins[0].lower()}{begins[1:]})"
     return Announcement(EMERGENCY if decision.action >= Action.BLIND else CRITICAL, text)
 
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from flightstack.commander.arming_checks import ArmingFacts
-from flightstack.commander.conditions import FenceWatch, LinkFacts, StateSource
+from flightstack.commander.conditions import LinkFacts, StateSource
 from flightstack.commander.detectors import (
     BEYOND_ATTITUDE,
     BEYOND_POSITION,
@@ -33,6 +33,7 @@ from flightstack.commander.failsafe_step import (
 )
 from flightstack.commander.transitions import Status
 from flightstack.contract import SETPOINT_SIZE, FloatArray
+from flightstack.guidance.fence import NO_FENCE, Fence, FenceMonitor
 from flightstack.modes import Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
@@ -57,7 +58,8 @@ class Supervisor:
     ) -> None:
         """Watch ``state`` (13,), which ``source`` writes in place."""
         self.links = LinkFacts()
-        self.fence: FenceWatch | None = None
+        self.fence = FenceMonitor()
+        self._areas = NO_FENCE
         self.position_is_controlled = False
         """Whether the setpoint's place is flown to: not on the ground, nor while a stream gives attitudes."""
         self.battery_level = 0
@@ -75,6 +77,9 @@ class Supervisor:
         """Compile the detectors, or load them from the cache."""
         detect(self._state, self._nowhere, row, self._detector, self._params, self._dt_s)
         self.armed()
+        probe = FenceMonitor()
+        probe.configure(NO_FENCE, max_altitude_m=1.0)
+        probe.step(self._state)
 
     # ------------------------------------------------------------------ what is
 
@@ -98,7 +103,7 @@ class Supervisor:
         self._watch_battery()
         finite = bool(np.isfinite(self._state).all())
         qx, qy = float(self._state[7]), float(self._state[8])
-        breach = "" if self.fence is None or not finite else self.fence.text(self.fence.step(self._state))
+        breach = self.fence.text(self.fence.step(self._state))
         return ArmingFacts(
             mode=mode,
             state_is_valid=finite and has_state,
@@ -118,6 +123,19 @@ class Supervisor:
         """Take new parameters, from the next outer tick on."""
         self._behaviour = behaviour
         self._params = detector_params(behaviour, self._vehicle, self._dt_s)
+        self._configure_fence()
+
+    def set_fence(self, fence: Fence) -> None:
+        """Take the areas of a geofence that was checked; ``NO_FENCE`` for none."""
+        self._areas = fence
+        self._configure_fence()
+
+    def _configure_fence(self) -> None:
+        b = self._behaviour
+        brakes = (b.acceleration_m_s2, b.vertical_acceleration_m_s2) if b.fence_predicts else None
+        self.fence.configure(
+            self._areas, b.fence_max_distance_m, b.fence_max_altitude_m, decelerations_m_s2=brakes
+        )
 
     def armed(self) -> None:
         """Forget what the detectors saw before: a flight begins."""
@@ -154,18 +172,23 @@ class Supervisor:
         return said
 
     def _conditions(self, found: int, mode: Mode) -> frozenset[Failsafe]:
-        """Return what is wrong now."""
-        breached = self.fence is not None and self.fence.step(self._state) != 0
+        """Return what is wrong now.
+
+        A stream that was lost in its mode stays lost until it is back, in whichever mode that ended.
+        """
+        breached = self.fence.step(self._state) != 0
         quiet = not (found & ~MOVING or self._stale or self.battery_level or breached or self.links.gcs_lost)
-        if quiet and mode not in STREAM_MODES:
+        if quiet and mode not in STREAM_MODES and not self._memory.entries:
             return NO_CONDITION
-        links = self.links
+        links, entries = self.links, self._memory.entries
+        flies_offboard = mode is Mode.OFFBOARD or Failsafe.OFFBOARD_LOST in entries
+        flies_sticks = mode in (Mode.POSITION, Mode.ALTITUDE) or Failsafe.MANUAL_LOST in entries
         conditions = {
             Failsafe.STATE_STALE: self._stale,
             Failsafe.FENCE: breached,
             Failsafe.GCS_LOST: links.gcs_lost,
-            Failsafe.OFFBOARD_LOST: links.offboard_lost and mode is Mode.OFFBOARD,
-            Failsafe.MANUAL_LOST: links.manual_lost and mode in (Mode.POSITION, Mode.ALTITUDE),
+            Failsafe.OFFBOARD_LOST: links.offboard_lost and flies_offboard,
+            Failsafe.MANUAL_LOST: links.manual_lost and flies_sticks,
         }
         present = {failsafe for failsafe, holds in conditions.items() if holds}
         present.update(failsafe for bit, failsafe in FAULTS if found & bit)

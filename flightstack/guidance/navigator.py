@@ -189,6 +189,11 @@ class Navigator:
         self._land[:] = (1.0, 0.0, state[2])
         store_position_setpoint(self.setpoint, setpoint_of(Trajectory(*self._trajectory.tolist())))
 
+    def take_up(self, state: FloatArray) -> None:
+        """Put the reference where the vehicle is, moving as it does: it could not follow the old one."""
+        self._trajectory[:6] = state[:6]
+        self._trajectory[6:9] = 0.0
+
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
         """Aim for ``mode`` from where the reference is now."""
         t, aim, p = self._trajectory, self._aim, self.params

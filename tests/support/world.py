@@ -33,6 +33,7 @@ from flightstack.mavlink.services.mission_client import Done, Failed, MissionCli
 from flightstack.modes import Mode
 from flightstack.plan import MissionItem, load_plan
 from sim_bridge.disturbance import Disturbance
+from sim_bridge.faults import parse_fault
 from sim_bridge.plant import PlantOptions
 from sim_bridge.simulator import Simulator
 
@@ -41,6 +42,7 @@ PEER = PeerAddress(GROUND, "memory", 0)
 GCS = Address(255, 190)
 HELD_STEP_S = 0.001
 SERVICE_LIMIT_S = 30.0
+STREAM_STEP_S = 0.05
 
 
 class TookTooLongError(AssertionError):
@@ -92,6 +94,13 @@ class World:
         self.counts: dict[str, int] = {}
         self.texts: list[str] = []
         self.reached: list[int] = []
+        self.sends_heartbeats = True
+        self.loses_states = False
+        """Ticks go on without states, as they do in real time when a simulator hangs."""
+        self._missed_us = 0
+        self.streams: dict[str, Callable[[], Message]] = {}
+        """Makers of messages that are sent twenty times a second: offboard setpoints, sticks."""
+        self._stream_due_s = -math.inf
         self._next_log_us = 0
         self._ticks = 0
         self.stack.simulator.receive(memoryview(self.simulator.outgoing()))
@@ -144,7 +153,7 @@ class World:
     def tick(self) -> None:
         """One exchange: state to the stack, actuators back, all as bytes."""
         stack = self.stack
-        commands = stack.autopilot.tick(stack.simulator.time_us)
+        commands = stack.autopilot.tick(stack.simulator.time_us + self._missed_us)
         assert self._actuators.open(stack.simulator.answer(commands, self.armed))
         self._ticks += 1
         if self._ticks % stack.rates.divisor == 0:
@@ -154,7 +163,10 @@ class World:
                 stack.recorder.timing(time_us, **stack.report.log_fields(time_us // stack.rates.interval_us))
             self.exchange_with_ground()
         self.simulator.apply(self._actuators)
-        assert stack.simulator.receive(memoryview(self.simulator.outgoing()))
+        if self.loses_states:
+            self._missed_us += stack.rates.interval_us
+        else:
+            assert stack.simulator.receive(memoryview(self.simulator.outgoing()))
 
     def run(self, seconds: float) -> None:
         """Let simulated time pass."""
@@ -181,14 +193,22 @@ class World:
         """Carry what both sides have to say, once."""
         now_s = self._link_now_s()
         ground = self.stack.ground
-        if now_s >= self._heartbeat_due_s:
+        if self.sends_heartbeats and now_s >= self._heartbeat_due_s:
             self._heartbeat_due_s = now_s + 1.0
             self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        if self.streams and now_s >= self._stream_due_s:
+            self._stream_due_s = now_s + STREAM_STEP_S
+            for make in self.streams.values():
+                self.send(make())
         for message in (*self._missions.poll(now_s), *self._commands.poll(now_s)):
             self.send(message)
         for _, data in list(ground.poll(now_s)):
             for message in self._link.decode(data):
                 self._take(message, now_s)
+
+    def inject(self, fault: str) -> None:
+        """Begin a fault of the simulator, written as ``sim-bridge --fault`` takes it."""
+        self.simulator.inject(parse_fault(fault, len(self.stack.vehicle.rotors)))
 
     def send(self, message: Message) -> None:
         """Send a message of the ground station's."""
