@@ -60,6 +60,7 @@ class Supervisor:
         self.links = LinkFacts()
         self.fence = FenceMonitor()
         self._areas = NO_FENCE
+        self._home_ned_m = (0.0, 0.0, 0.0)
         self.position_is_controlled = False
         """Whether the setpoint's place is flown to: not on the ground, nor while a stream gives attitudes."""
         self.battery_level = 0
@@ -130,11 +131,16 @@ class Supervisor:
         self._areas = fence
         self._configure_fence()
 
+    def set_home(self, home_ned_m: tuple[float, float, float]) -> None:
+        """Measure the fence's distance and altitude from another home."""
+        self._home_ned_m = home_ned_m
+        self._configure_fence()
+
     def _configure_fence(self) -> None:
         b = self._behaviour
         brakes = (b.acceleration_m_s2, b.vertical_acceleration_m_s2) if b.fence_predicts else None
         self.fence.configure(
-            self._areas, b.fence_max_distance_m, b.fence_max_altitude_m, decelerations_m_s2=brakes
+            self._areas, b.fence_max_distance_m, b.fence_max_altitude_m, self._home_ned_m, brakes
         )
 
     def armed(self) -> None:
