@@ -56,7 +56,7 @@ def undeclared(controller: str, fields: Sequence[str]) -> tuple[Tunable, ...]:
     prefix = _plain(controller)[:4].strip("_") or "CTRL"
     tunables: dict[str, Tunable] = {}
     for field in fields:
-        name = _free(f"{prefix}_{_plain(field)}"[:LARGEST_NAME], tunables)
+        name = _free(f"{prefix}_{_plain(field) or 'P'}"[:LARGEST_NAME], tunables)
         text = f"{field} of the controller {controller}"
         tunables[name] = Tunable(field, name, -UNDECLARED_LIMIT, UNDECLARED_LIMIT, "", text, 6)
     return tuple(tunables.values())

@@ -18,9 +18,12 @@ from scipy.linalg import solve_continuous_are
 
 from flightstack.assembly import build
 from flightstack.config import StackConfig
-from flightstack.control.controller_loading import controller_names, load_controller
+from flightstack.contract import LoopRow
+from flightstack.control.attitude_pid import CONTROLLER as PID
+from flightstack.control.controller_loading import _form_problem, controller_names, load_controller
 from flightstack.params.errors import ConfigError
 from flightstack.params.gains_file import BUILT_IN
+from flightstack.params.tunable import Tunable, undeclared
 from tests.support.world import World
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -141,6 +144,82 @@ def test_an_edit_is_noticed(site: Path) -> None:
     assert alone.key == key
     for name in ("laws.lqr", "laws"):
         sys.modules.pop(name, None)
+
+
+# ---------------------------------------------------------------------- its parameters
+
+
+def test_without_a_declaration_every_field_is_a_parameter(installed: Path) -> None:
+    world = World(controller="lqr", params=["LQR_ANGLE_ROLL=250"])
+    params = world.stack.params
+    assert [name for name in params.specs if name.startswith("LQR_")] == [
+        "LQR_ANGLE_PITCH", "LQR_ANGLE_ROLL", "LQR_ANGLE_YAW", "LQR_IX_KG_M2", "LQR_IY_KG_M2", "LQR_IZ_KG_M2",
+        "LQR_RATE_PITCH", "LQR_RATE_ROLL", "LQR_RATE_YAW",
+    ]  # fmt: skip
+    spec = params.specs["LQR_ANGLE_ROLL"]
+    assert (spec.default, spec.low, spec.high, spec.group) == (
+        pytest.approx(200.0), -1e6, 1e6, "Attitude Controller lqr",
+    )  # fmt: skip
+    assert world.stack.autopilot._backend.get_parameter("LQR_ANGLE_ROLL") == 250.0
+    world.arm()
+    world.takeoff(2.0)
+    world.run(1.0)
+    before = world.stack.autopilot.now.row.copy()
+    params.set("LQR_IX_KG_M2", 0.0)
+    world.tick()
+    assert before[LoopRow.WRENCH][1] != 0.0
+    assert world.stack.autopilot.now.row[LoopRow.WRENCH][1] == 0.0, "no inertia, no torque, in the next tick"
+
+
+def test_a_declaration_chooses_names_and_ranges(site: Path) -> None:
+    text = MODULE.replace("Params, (0.0,), read_params)", "Params, (0.0,), read_params, TUNABLES)").replace(
+        "CONTROLLER =",
+        'TUNABLES = (Tunable("angle_roll", "LQR_Q", 0.0, 500.0, "1/s^2", "Stiffness"),)\n\nCONTROLLER =',
+    )
+    install(site)
+    (site / "lqr_controller.py").write_text("from flightstack.params.tunable import Tunable\n" + text.replace(
+        "from __future__ import annotations\n", ""))  # fmt: skip
+    importlib.invalidate_caches()
+    stack = build(StackConfig(controller="lqr"), lambda: None)
+    assert [name for name in stack.params.specs if name.startswith("LQR_")] == ["LQR_Q"]
+    assert stack.params.set("LQR_Q", 501.0) == "501 is outside 0 to 500 1/s^2"
+
+
+def test_names_made_of_fields_fit_and_differ() -> None:
+    fields = ("rate_feedforward_x", "rate_feedforward_y", "q", "Ω", "kp.1")
+    names = [tunable.name for tunable in undeclared("my-very-own", fields)]
+    assert names == ["MY_V_RATE_FEEDFO", "MY_V_RATE_FEED_2", "MY_V_Q", "MY_V_P", "MY_V_KP_1"]
+
+
+BAD_DECLARATIONS = {
+    "no declaration": ([3], "must declare its parameters as a tuple of Tunable"),
+    "small letters": (
+        (Tunable("unused", "lqr_q", 0, 1, "", "Q"),),
+        "needs another name (A to Z, 0 to 9 and _, at most 16) for its parameter 'lqr_q'",
+    ),
+    "no such field": ((Tunable("q", "LQR_Q", 0, 1, "", "Q"),), "has no field 'q' for its parameter 'LQR_Q'"),
+    "no such memory": (
+        (Tunable("kp_roll", "LQR_Q", 0, 1, "", "Q", integrates="x"),),
+        "remembers no 'x' for its parameter 'LQR_Q'",
+    ),
+    "no range": ((Tunable("kp_roll", "LQR_Q", 1, 1, "", "Q"),), "has no range for its parameter 'LQR_Q'"),
+    "twice": ((Tunable("kp_roll", "LQR_Q", 0, 1, "", "Q"),) * 2, "declares a parameter twice"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_DECLARATIONS)
+def test_a_declaration_that_cannot_be(name: str) -> None:
+    tunables, sentence = BAD_DECLARATIONS[name]
+    assert _form_problem("pid", PID._replace(tunables=tunables)) == sentence
+
+
+def test_a_name_that_the_vehicle_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken = PID._replace(tunables=(Tunable("kp_roll", "MPC_XY_CRUISE", 0, 1e5, "", "Gain"),))
+    monkeypatch.setattr("flightstack.assembly.load_controller", lambda _: taken)
+    with pytest.raises(
+        ConfigError, match="declares the parameter MPC_XY_CRUISE, which the vehicle has already"
+    ):
+        build(StackConfig(), lambda: None)
 
 
 # ---------------------------------------------------------------------- as a process
