@@ -1,0 +1,257 @@
+"""Guided flight: go to a place, at a speed, pause and go on; and flight by sticks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from flightstack.config import DEFAULT_HOME
+from flightstack.contract import Vector3
+from flightstack.geodesy import LocalFrame
+from flightstack.mavlink.dialect import mavlink
+from flightstack.modes import Mode
+from tests.support.streams import select, sticks, stream
+from tests.support.world import World
+
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED_FRAME = 0, 1, 2, 9
+NAN = math.nan
+ALTITUDE, POSITION = 2, 3
+CHANGE_MODE = 1.0
+
+
+@pytest.fixture
+def hovering() -> World:
+    world = World()
+    world.arm()
+    world.takeoff(5.0)
+    world.until(lambda: world.mode is Mode.HOLD)
+    world.run(4.0)
+    return world
+
+
+def go_to(
+    world: World,
+    north: float = NAN,
+    east: float = NAN,
+    altitude: float = NAN,
+    yaw: float = NAN,
+    speed: float = -1.0,
+    flags: float = CHANGE_MODE,
+) -> int | None:
+    """DO_REPOSITION as a COMMAND_LONG: altitude above sea level from one above home."""
+    place = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, 0.0))
+    latitude, longitude = place.latitude_deg, place.longitude_deg
+    altitude += DEFAULT_HOME.altitude_m
+    return world.command(mavlink.MAV_CMD_DO_REPOSITION, speed, flags, 0.0, yaw, latitude, longitude, altitude)
+
+
+def heading(world: World) -> float:
+    q = world.simulator.frame.state[6:10]
+    return 2.0 * math.atan2(q[3], q[0])
+
+
+def fastest(world: World, seconds: float) -> np.ndarray:
+    """Fly on; return the largest horizontal, upward and downward speed."""
+    top = np.zeros(3)
+    for _ in range(round(seconds / 0.1)):
+        world.run(0.1)
+        north, east, down = world.velocity
+        top = np.maximum(top, (math.hypot(north, east), -down, down))
+    return top
+
+
+def test_goto_flies_to_the_place_looking_there(hovering: World) -> None:
+    assert go_to(hovering, 12.0, 9.0, 8.0) == ACCEPTED
+    hovering.run(14.0)
+    # a position in single precision is 0.4 m of latitude and longitude in a COMMAND_LONG
+    assert np.linalg.norm(hovering.position - (12.0, 9.0, -8.0)) < 0.6
+    assert heading(hovering) == pytest.approx(math.atan2(9.0, 12.0), abs=0.05)
+    assert hovering.mode is Mode.HOLD
+
+
+def test_goto_in_degrees_above_home_is_exact_and_takes_its_heading_in_radians(hovering: World) -> None:
+    place = LocalFrame(DEFAULT_HOME).to_geo(Vector3(10.0, -6.0, 0.0))
+    x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
+    command = mavlink.MAV_CMD_DO_REPOSITION
+    hovering.send(mavlink.MAVLink_command_int_message(1, 1, 6, command, 0, 0, 2.0, 1, 0, 1.5, x, y, 7.0))
+    top = fastest(hovering, 15.0)
+    assert hovering.received["COMMAND_ACK"].result == ACCEPTED
+    assert np.linalg.norm(hovering.position - (10.0, -6.0, -7.0)) < 0.02  # a unit of 1e-7 degrees is 0.011 m
+    assert heading(hovering) == pytest.approx(1.5, abs=0.01)
+    assert top[0] == pytest.approx(2.0, rel=0.02)
+
+
+def test_what_a_goto_leaves_open_stays(hovering: World) -> None:
+    assert go_to(hovering, altitude=9.0) == ACCEPTED
+    hovering.run(8.0)
+    assert hovering.position == pytest.approx([0.0, 0.0, -9.0], abs=0.02)
+    go_to(hovering, 8.0, 0.0, yaw=0.5)
+    hovering.run(10.0)
+    assert hovering.altitude == pytest.approx(9.0, abs=0.02)
+    assert heading(hovering) == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_goto_of_nothing_is_a_pause(hovering: World) -> None:
+    hovering.upload("square.plan")
+    hovering.resume_mission()
+    hovering.until(lambda: float(np.linalg.norm(hovering.velocity)) > 2.0)
+    assert go_to(hovering) == ACCEPTED
+    assert hovering.mode is Mode.HOLD
+    hovering.run(5.0)
+    assert np.linalg.norm(hovering.velocity) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("place", "result", "reason"),
+    [
+        ({"north": 5.0, "east": 0.0, "altitude": 1e4}, DENIED, "is above"),
+        ({"north": 5e4, "east": 0.0}, DENIED, "km away"),
+        ({"north": 5.0, "east": 0.0, "altitude": math.inf}, DENIED, "not a number"),
+        ({"north": 5.0, "east": 0.0, "yaw": math.inf}, DENIED, "not a number"),
+        ({"north": 2e7, "east": 0.0}, DENIED, "not on earth"),
+    ],
+)
+def test_a_goto_that_cannot_be_is_refused(
+    hovering: World, place: dict[str, float], result: int, reason: str
+) -> None:
+    assert go_to(hovering, **place) == result
+    hovering.run(0.02)
+    assert any(reason in text for text in hovering.texts), hovering.texts
+
+
+def test_a_goto_needs_the_air_a_known_frame_and_a_mode() -> None:
+    world = World()
+    assert go_to(world, 5.0, 5.0, 5.0) == REJECTED
+    world.run(0.02)
+    assert any("on the ground" in text for text in world.texts), world.texts
+    command = mavlink.MAV_CMD_DO_REPOSITION
+    world.send(mavlink.MAVLink_command_int_message(1, 1, 1, command, 0, 0, -1.0, 1, 0, NAN, 0, 0, 7.0))
+    world.run(0.02)
+    assert world.received["COMMAND_ACK"].result == UNSUPPORTED_FRAME
+    world.upload("square.plan")
+    world.start_mission()
+    world.until(lambda: not world.landed)
+    assert go_to(world, 5.0, 5.0, 5.0, flags=0.0) == REJECTED
+    assert world.mode is Mode.MISSION
+
+
+def test_speeds_change_in_flight_and_come_back(hovering: World) -> None:
+    change = mavlink.MAV_CMD_DO_CHANGE_SPEED
+    assert hovering.command(change, 1, 2.0, -1) == ACCEPTED
+    assert hovering.command(change, 2, 1.0, -1) == ACCEPTED
+    assert hovering.command(change, 3, 0.6, -1) == ACCEPTED
+    go_to(hovering, 15.0, 0.0, 10.0)
+    top = fastest(hovering, 12.0)
+    assert top[:2] == pytest.approx([2.0, 1.0], rel=0.02)
+    hovering.command(change, 1, -2.0, -1)
+    go_to(hovering, -15.0, 0.0, 6.0)
+    top = fastest(hovering, 14.0)
+    assert top[0] == pytest.approx(4.0, rel=0.03)  # MPC_XY_CRUISE
+    assert top[2] == pytest.approx(0.6, rel=0.02)
+    for which, speed in ((1, 0.0), (1, NAN), (7, 3.0), (NAN, 3.0), (1, -5.0)):
+        assert hovering.command(change, which, speed, -1) == DENIED
+    assert hovering.command(change, 1, -1.0, -1) == ACCEPTED
+
+
+def test_a_mission_flies_at_a_changed_speed_pauses_and_goes_on(hovering: World) -> None:
+    hovering.upload("square.plan")
+    hovering.resume_mission()
+    hovering.until(lambda: 1 in hovering.reached)
+    assert hovering.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 1.0, -1) == ACCEPTED
+    hovering.run(3.0)
+    assert np.linalg.norm(hovering.velocity[:2]) == pytest.approx(1.0, rel=0.05)
+    assert hovering.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0) == ACCEPTED
+    assert hovering.mode is Mode.HOLD
+    assert hovering.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 1) == ACCEPTED
+    assert hovering.mode is Mode.MISSION
+    assert hovering.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 2) == DENIED
+    hovering.until_disarmed()
+    assert hovering.reached == [0, 1, 2, 3, 4, 5]
+
+
+def test_a_takeoff_above_home_by_its_frame() -> None:
+    world = World()
+    world.arm()
+    command = mavlink.MAV_CMD_NAV_TAKEOFF
+    world.send(mavlink.MAVLink_command_int_message(1, 1, 3, command, 0, 0, 0, 0, 0, NAN, 0, 0, 6.0))
+    world.until(lambda: world.mode is Mode.TAKEOFF, 1.0)
+    world.until(lambda: world.mode is Mode.HOLD)
+    world.run(4.0)
+    assert world.altitude == pytest.approx(6.0, abs=0.02)
+
+
+# ---------------------------------------------------------------------- sticks
+
+
+def test_sticks_need_a_stream() -> None:
+    world = World()
+    for mode in (POSITION, ALTITUDE):
+        assert select(world, mode) == REJECTED
+    world.run(0.02)
+    assert any("no manual control" in text for text in world.texts), world.texts
+
+
+def test_a_whole_flight_by_sticks() -> None:
+    world = World(params=["MPC_VEL_MANUAL=3"])
+    stream(world, sticks(up=-1.0), 0.2)
+    assert select(world, POSITION) == ACCEPTED
+    assert world.arm() == ACCEPTED
+    stream(world, sticks(), 2.0)
+    assert world.landed  # a centred throttle does not take off
+    stream(world, sticks(up=1.0), 4.0)
+    assert not world.landed
+    stream(world, sticks(forward=1.0), 5.0)
+    assert world.velocity == pytest.approx([3.0, 0.0, 0.0], abs=0.02)
+    stream(world, sticks(yaw=0.5), 3.0)
+    stream(world, sticks(), 4.0)
+    place = world.position
+    stream(world, sticks(), 4.0)
+    assert np.linalg.norm(world.position - place) < 0.01
+    for _ in range(2000):
+        if not world.armed:
+            break
+        stream(world, sticks(up=-1.0), 0.02)
+    assert not world.armed
+    assert abs(world.altitude) < 0.01
+    assert np.linalg.norm(world.position[:2] - place[:2]) < 0.02
+
+
+def test_position_mode_holds_its_place_in_wind() -> None:
+    world = World(wind=(4.0, 2.0, 0.0))
+    world.arm()
+    world.takeoff(5.0)
+    world.until(lambda: world.mode is Mode.HOLD)
+    world.run(5.0)
+    stream(world, sticks(), 0.1)
+    assert select(world, POSITION) == ACCEPTED
+    place = world.position
+    stream(world, sticks(), 10.0)
+    assert np.linalg.norm(world.position - place) < 0.05
+
+
+def test_altitude_mode_tilts_and_keeps_its_height(hovering: World) -> None:
+    stream(hovering, sticks(), 0.1)
+    assert select(hovering, ALTITUDE) == ACCEPTED
+    height = hovering.altitude
+    stream(hovering, sticks(right=0.6), 1.5)
+    q = hovering.simulator.frame.state[6:10]
+    roll = math.atan2(2.0 * (q[0] * q[1] + q[2] * q[3]), 1.0 - 2.0 * (q[1] ** 2 + q[2] ** 2))
+    # past the dead zone, 0.5 of 0.9 of 35 degrees
+    assert math.degrees(roll) == pytest.approx(35.0 * 0.5 / 0.9, abs=1.0)
+    assert hovering.altitude == pytest.approx(height, abs=0.05)
+    stream(hovering, sticks(), 0.5)
+    drifting = hovering.velocity[1]
+    assert drifting > 2.0  # level again, and nothing brakes it but the air
+    assert hovering.hold() == ACCEPTED
+    hovering.run(6.0)
+    assert np.linalg.norm(hovering.velocity) < 0.02
+
+
+def test_the_last_of_two_pilots_wins(hovering: World) -> None:
+    stream(hovering, sticks(), 0.1)
+    select(hovering, POSITION)
+    stream(hovering, sticks(forward=1.0), 2.0)
+    stream(hovering, sticks(forward=-1.0), 6.0)
+    assert hovering.velocity[0] < -3.0
