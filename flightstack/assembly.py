@@ -27,12 +27,10 @@ from flightstack.logging.flight_log import vehicle_info
 from flightstack.logging.recorder import FlightRecorder, OpenLog
 from flightstack.mavlink.services.log_store import NO_LOGS, LogStore
 from flightstack.mavlink.simulator_link import SimulatorLink
-from flightstack.mavlink.telemetry.facts import NoBattery
-from flightstack.modes import Mode
 from flightstack.parameters import behaviour_of, connect_parameters, load_parameters
 from flightstack.params.errors import ConfigError
 from flightstack.params.gains_file import open_gains
-from flightstack.params.identity import SYSTEM_ID
+from flightstack.params.identity import AUTOPILOT, GENERIC, SYSTEM_ID
 from flightstack.params.param_file import LoadedParams
 from flightstack.params.store import ParamStore
 from flightstack.params.vehicle import Vehicle, load_vehicle
@@ -102,20 +100,22 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
         recorder,
         simulator.state,
         simulator.rotor_speed_rad_s,
+        simulator,
     )
     warm_up(backend, Navigator(guidance_params(behaviour, vehicle.weight_n), pace.outer_hz), simulator)
+    autopilot.supervisor.warm_up(np.zeros(LoopRow.SIZE))
     connect_parameters(params, autopilot, backend, recorder)
     timing = LoopTiming(round(1e9 / pace.inner_hz))
     report = TimingReport(timing, pace, config.lockstep)
-    facts = AutopilotFacts(autopilot, vehicle, system_id, report.message, NoBattery)
-    ground = GroundHub(VehicleContext(autopilot, params, logs=logs), facts, system_id)
+    generic = params.value(AUTOPILOT) == GENERIC
+    facts = AutopilotFacts(autopilot, vehicle, system_id, generic, report.message, lambda: simulator.battery)
+    ground = GroundHub(VehicleContext(autopilot, params, generic, logs=logs), facts, system_id)
     return Stack(vehicle, pace, simulator, autopilot, ground, recorder, timing, report, params, loaded)
 
 
 def warm_up(backend: ControlBackend, navigator: Navigator, simulator: SimulatorLink) -> None:
     """Compile every kernel now, or load it from the cache: the first tick must not take a second."""
     row = np.zeros(LoopRow.SIZE)
-    navigator.rest_at(simulator.state)
-    navigator.step(Mode.HOLD, simulator.state, backend.attitude_target)
+    navigator.warm_up(simulator.state, backend.attitude_target)
     backend.step(simulator.state, navigator.setpoint, simulator.rotor_speed_rad_s, True, row)
     backend.reset(simulator.state)

@@ -66,7 +66,6 @@ class Autopilot:
         """Use ``state`` (13,) and ``rotor_speed_rad_s`` (8,), which ``source`` writes in place."""
         self._vehicle = vehicle
         self._behaviour = behaviour
-        self.home = home
         self.supervisor = Supervisor(vehicle, behaviour, outer_hz, state, source)
         self.items: tuple[MissionItem, ...] = ()
         self.places = SafePlaces(home)
@@ -166,6 +165,10 @@ class Autopilot:
             self.now.landed = landed
             self._landed_us = time_us
             self._has_flown = True
+            if landed:
+                self.now.landing_us = time_us
+            else:
+                self.now.takeoff_us = self.now.takeoff_us or time_us
             self._recorder.landed(time_us, landed)
             self.say(INFO, "Landing detected" if landed else "Takeoff detected")
             self._choose_loops()
@@ -285,7 +288,7 @@ class Autopilot:
                 return f"takeoff altitude {altitude:g} m is too low"
             if altitude > self.limits.max_altitude_m:
                 return f"takeoff altitude {altitude:g} m is above {self.limits.max_altitude_m:g} m"
-            self._takeoff_altitude_m = altitude
+            self._takeoff_altitude_m = altitude + self.places.home.altitude_m
         if event is Event.SELECT_MISSION:
             way_out = self.places.way_out(self.items)
             if way_out is not None:
@@ -296,7 +299,8 @@ class Autopilot:
     def _adopt(self, before: Status, after: Status, event: Event) -> None:
         self.now.status = after
         if after.armed and not before.armed:
-            self._armed_us = self.now.time_us
+            self._armed_us = self.now.armed_us = self.now.time_us
+            self.now.takeoff_us = self.now.landing_us = 0
             self.supervisor.armed()
             self._has_flown = False
             self.now.landed = True
@@ -385,6 +389,23 @@ class Autopilot:
         """Limits of a mission."""
         return plan_limits(self.behaviour)
 
+    @property
+    def home(self) -> GeoPoint:
+        """Where a return goes, and from where relative altitudes count."""
+        return self.places.home_point
+
+    def set_home(self, point: GeoPoint) -> str | None:
+        """Move home; return why not, or None. A mission's relative altitudes follow, and the fence's limits."""
+        refusal = self.places.set_home(point)
+        if refusal is None:
+            home = self.places.home
+            self._navigator.change_plan(*self._plan_table())
+            self.supervisor.set_home((home.north_m, home.east_m, -home.altitude_m))
+        return refusal
+
+    def _plan_table(self) -> tuple[FloatArray, FloatArray]:
+        return plan_table(self.items, self.places.frame, self.home.altitude_m)
+
     def check_mission(self, items: Sequence[MissionItem]) -> Rejection | None:
         """Tell why the vehicle would refuse a mission, or None."""
         return self.places.check_mission(items, self.limits)
@@ -392,7 +413,7 @@ class Autopilot:
     def set_mission(self, items: Sequence[MissionItem]) -> None:
         """Take a mission that was checked; one that is being flown begins anew with its first item."""
         self.items = tuple(items)
-        self._navigator.set_plan(*plan_table(self.items, self.home))
+        self._navigator.set_plan(*self._plan_table())
         self._mission_changed()
         if not self.items and self.now.status.mode is Mode.MISSION:
             self.happen(Event.SELECT_HOLD)

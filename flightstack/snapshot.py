@@ -61,6 +61,10 @@ class Snapshot:
     progress: MissionProgress = NO_PROGRESS
     mission_count: int = 0
     mission_complete: bool = False
+    armed_us: int = 0
+    """When the present flight was armed, took off and landed; 0 for what has not been since arming."""
+    takeoff_us: int = 0
+    landing_us: int = 0
     reached: list[int] = field(default_factory=list)
     """Mission items reached that telemetry has yet to announce."""
     texts: list[Text] = field(default_factory=list)

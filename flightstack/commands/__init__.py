@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flightstack.commands import arming, guided, mission, modes, system
+from flightstack.commands import arming, guided, mission, modes, parameters, system
 from flightstack.commands.context import UNSUPPORTED, Answer, Handler, VehicleContext
 from flightstack.mavlink.services.command_server import Command
 
@@ -13,6 +13,7 @@ HANDLERS: dict[int, Handler] = {
     **modes.HANDLERS,
     **guided.HANDLERS,
     **mission.HANDLERS,
+    **parameters.HANDLERS,
     **system.HANDLERS,
 }
 

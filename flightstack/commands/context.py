@@ -37,6 +37,8 @@ class VehicleContext:
 
     autopilot: Autopilot
     params: ParamStore
+    is_generic: bool = False
+    """Whether the vehicle calls itself a generic autopilot (FS_AUTOPILOT), as it was when it started."""
     shutdown_requested: bool = False
     reboot_requested: bool = False
     logs: LogStore = NO_LOGS

@@ -14,7 +14,7 @@ from flightstack.commands.context import (
     VehicleContext,
     answer_to,
 )
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.services.command_server import Command
 from flightstack.modes import Mode
@@ -39,8 +39,11 @@ def above_home_m(vehicle: VehicleContext, command: Command) -> float:
 
 
 def take_off(vehicle: VehicleContext, command: Command) -> Answer:
-    """NAV_TAKEOFF: parameter 7 is the altitude; NaN means MIS_TAKEOFF_ALT. The place is where the vehicle stands."""
-    altitude_m = above_home_m(vehicle, command)
+    """NAV_TAKEOFF: parameter 7 is the altitude; NaN means MIS_TAKEOFF_ALT. The place is where the vehicle stands.
+
+    A generic autopilot's is above home, as clients that do not know PX4 mean it.
+    """
+    altitude_m = command.params[6] if vehicle.is_generic else above_home_m(vehicle, command)
     if math.isinf(altitude_m):
         return Answer(DENIED, "the takeoff altitude is not a number")
     wanted = None if math.isnan(altitude_m) else altitude_m
@@ -70,7 +73,7 @@ def reposition(vehicle: VehicleContext, command: Command) -> Answer:
     if refusal is not None:
         return Answer(DENIED, refusal)
     home = autopilot.home
-    place = LocalFrame(home).to_ned(GeoPoint(latitude, longitude, home.altitude_m + altitude_m))
+    place = autopilot.places.frame.to_ned(GeoPoint(latitude, longitude, home.altitude_m + altitude_m))
     refusal = _too_far(vehicle, place.x, place.y, altitude_m)
     if refusal is not None:
         return Answer(DENIED, refusal)
@@ -91,14 +94,22 @@ def _not_a_place(latitude: float, longitude: float, altitude_m: float, yaw_rad: 
 
 
 def _too_far(vehicle: VehicleContext, north_m: float, east_m: float, altitude_m: float) -> str | None:
-    """Tell why the vehicle does not go to a place: a mission's limits hold for it too."""
-    limits, state = vehicle.autopilot.limits, vehicle.autopilot.now.state
+    """Tell why the vehicle does not go to a place: the limits of a mission and the geofence hold for it too."""
+    autopilot = vehicle.autopilot
+    limits, (x, y, z) = autopilot.limits, autopilot.now.state[:3].tolist()
     if 0.0 < limits.max_altitude_m < altitude_m:
         return f"altitude {altitude_m:.6g} m is above {limits.max_altitude_m:g} m"
-    away_m = math.hypot(north_m - float(state[0]), east_m - float(state[1]))
+    away_m = math.hypot(north_m - x, east_m - y)
     if 0.0 < limits.max_distance_m < away_m:
         return f"the place is {away_m / 1e3:.1f} km away, farther than MIS_DIST_WPS allows"
-    return None
+    if autopilot.behaviour.fence_action == 0:
+        return None
+    if math.isnan(north_m):
+        north_m, east_m = x, y
+    if math.isnan(altitude_m):
+        altitude_m = -z - autopilot.places.home.altitude_m
+    refusal = autopilot.supervisor.fence.refusal(north_m, east_m, altitude_m)
+    return None if refusal is None else f"the place {refusal}"
 
 
 def change_speed(vehicle: VehicleContext, command: Command) -> Answer:

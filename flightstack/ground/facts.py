@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from flightstack.autopilot import Autopilot
-from flightstack.commander.transitions import Event, transition
+from flightstack.commander.failsafe import Action
 from flightstack.contract import FloatArray
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.telemetry.facts import BatteryView, FlightTimes, PlanIds
@@ -23,6 +23,7 @@ class AutopilotFacts:
         autopilot: Autopilot,
         vehicle: Vehicle,
         system_id: int,
+        is_generic: bool,
         loop_timing: Callable[[], Message],
         battery: Callable[[], BatteryView],
     ) -> None:
@@ -32,8 +33,8 @@ class AutopilotFacts:
         self.system_id = system_id
         self.rotors = len(vehicle.rotors)
         self.max_thrust_n = vehicle.weight_n * 2.0 if vehicle.ideal_rotors else vehicle.max_thrust_n
-        self.is_generic = False
-        self.frame = LocalFrame(autopilot.home)
+        self.is_generic = is_generic
+        self.frame = autopilot.places.frame
         self.top_speed_rad_s = [min(rotor.max_speed_rad_s, 1e6) for rotor in vehicle.rotors]
         self._battery = battery
         self.state: FloatArray = self._now.state
@@ -104,13 +105,21 @@ class AutopilotFacts:
 
     @property
     def system_status(self) -> int:
-        """MAV_STATE: active when armed, else standing by."""
+        """MAV_STATE: critical while a failsafe acts, emergency when it is about to end the flight."""
+        if self.mode is Mode.TERMINATION:
+            return int(mavlink.MAV_STATE_FLIGHT_TERMINATION)
+        action = self._autopilot.supervisor.decision.action
+        if self.armed and action >= Action.LAND:
+            return int(mavlink.MAV_STATE_EMERGENCY)
+        if self.armed and action > Action.WARN:
+            return int(mavlink.MAV_STATE_CRITICAL)
         return int(mavlink.MAV_STATE_ACTIVE if self.armed else mavlink.MAV_STATE_STANDBY)
 
     @property
     def flight(self) -> FlightTimes:
         """When the present flight began."""
-        return FlightTimes()
+        now = self._now
+        return FlightTimes(now.armed_us, now.takeoff_us, now.landing_us)
 
     @property
     def plan_ids(self) -> PlanIds:
@@ -135,4 +144,4 @@ class AutopilotFacts:
     @property
     def can_arm(self) -> bool:
         """Whether an arm command would be accepted."""
-        return self.armed or transition(self._now.status, self._autopilot.facts, Event.ARM).refusal is None
+        return self.armed or not self._autopilot.arming_refusals()

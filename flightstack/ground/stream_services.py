@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from flightstack.autopilot import Autopilot
 from flightstack.contract import Vector3
-from flightstack.geodesy import LocalFrame
 from flightstack.ground.service import Service
 from flightstack.guidance.setpoints import OffboardSetpoint
 from flightstack.mavlink.services.addressing import Address
@@ -21,7 +20,7 @@ class OffboardInbox:
 
     def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
-        self._frame = LocalFrame(autopilot.home)
+        self._frame = autopilot.places.frame
 
     def here(self) -> Here:
         """Tell where the vehicle is now."""

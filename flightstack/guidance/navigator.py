@@ -170,6 +170,11 @@ class Navigator:
         self._jumps = np.ascontiguousarray(jumps)
         self.restart_plan()
 
+    def change_plan(self, plan: FloatArray, jumps: FloatArray) -> None:
+        """Take the same plan with other numbers in it; the mission goes on where it is, its jumps as counted."""
+        self._plan = np.ascontiguousarray(plan)
+        self._jumps = np.ascontiguousarray(jumps)
+
     def restart_plan(self) -> None:
         """Make the first item the current one and restore the repeats of the jumps."""
         self._jumps_left = self._jumps.copy()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from flightstack.geodesy import GeoPoint, LocalFrame
@@ -30,13 +31,17 @@ def plan_limits(b: Behaviour) -> Limits:
     )
 
 
+FARTHEST_HOME_M = 100_000.0
+"""Beyond this a home is a mistake: the local frame is flat."""
+
+
 class SafePlaces:
     """The geofence and the rally points in force, and the checks of plans against them."""
 
     def __init__(self, origin: GeoPoint) -> None:
         """Measure in metres from ``origin``, the origin of the local frame."""
-        self._origin = origin
-        self._frame = LocalFrame(origin)
+        self.frame = LocalFrame(origin)
+        self.home_point = origin
         self.fence: Fence = NO_FENCE
         self.home: ReturnPlace = HOME
         """Where home is; it may be set elsewhere than at the origin."""
@@ -44,9 +49,26 @@ class SafePlaces:
         self.ids: tuple[int, int, int] = (0, 0, 0)
         """Opaque ids of mission, geofence and rally points; the owner of the stores keeps them."""
 
+    @property
+    def _origin(self) -> GeoPoint:
+        return self.frame.origin
+
+    def set_home(self, point: GeoPoint) -> str | None:
+        """Move home; return why not, or None."""
+        if not all(math.isfinite(number) for number in point):
+            return "home has no such position"
+        if abs(point.latitude_deg) > 90.0 or abs(point.longitude_deg) > 180.0:
+            return "home is not a place on earth"
+        local = self.frame.to_ned(point)
+        if math.hypot(local.x, local.y) > FARTHEST_HOME_M or abs(local.z) > FARTHEST_HOME_M:
+            return f"home is more than {FARTHEST_HOME_M / 1e3:g} km from where the vehicle started"
+        self.home_point = point
+        self.home = ReturnPlace(local.x, local.y, -local.z)
+        return None
+
     def check_mission(self, items: Sequence[MissionItem], limits: Limits) -> Rejection | None:
         """Return why a mission is refused: by itself, by the limits or by the geofence."""
-        return check_mission(items, self._origin, limits, self.fence.shape)
+        return check_mission(items, self.home_point, limits, self.fence.shape)
 
     def check_fence(
         self, items: Sequence[MissionItem], vehicle_ne_m: tuple[float, float] | None
@@ -56,16 +78,16 @@ class SafePlaces:
 
     def check_rally(self, items: Sequence[MissionItem], limits: Limits) -> Rejection | None:
         """Return why a list of rally points is refused."""
-        return check_rally(items, self._origin, limits, self.fence.shape)
+        return check_rally(items, self.home_point, limits, self.fence.shape)
 
     def set_fence(self, items: Sequence[MissionItem]) -> Fence:
         """Take a geofence that was checked, and return it."""
-        self.fence = Fence.from_items(items, self._frame) if items else NO_FENCE
+        self.fence = Fence.from_items(items, self.frame) if items else NO_FENCE
         return self.fence
 
     def set_rally(self, items: Sequence[MissionItem]) -> None:
         """Take rally points that were checked."""
-        self.points = rally_points(items, self._frame)
+        self.points = rally_points(items, self.frame)
 
     def way_out(self, items: Sequence[MissionItem]) -> str | None:
         """Return where a stored mission leaves the geofence: one may have been loaded after it."""
