@@ -44,6 +44,15 @@ def run(
     listen: Annotated[
         str, typer.Option(help="Address of this machine to listen on for MAVLink; 0.0.0.0 for all.")
     ] = "127.0.0.1",
+    signing_key: Annotated[
+        Path | None,
+        typer.Option(
+            help="Sign MAVLink with the key in this file (made if missing); refuse what is unsigned."
+        ),
+    ] = None,
+    allow_unsigned: Annotated[
+        bool, typer.Option("--allow-unsigned", help="With --signing-key: take unsigned messages as well.")
+    ] = False,
     log: Annotated[
         str | None, typer.Option(help="Log file [runs/<stamp>-flight.ulg]; 'none' for no log.")
     ] = None,
@@ -82,6 +91,8 @@ def run(
     try:
         if clock not in ("lockstep", "realtime"):
             raise ConfigError("--clock", clock, "is not one of lockstep, realtime")
+        if allow_unsigned and signing_key is None:
+            raise ConfigError("--allow-unsigned", "", "is for --signing-key: without a key all is unsigned")
         outer_rate = nearest_outer_hz(inner_hz) if outer_hz is None else outer_hz
         config = StackConfig(
             vehicle, controller, gains, loops, inner_hz, outer_rate, ideal_rotors, clock == "lockstep",
@@ -103,6 +114,8 @@ def run(
             None if log == "none" else path,
             wait_for_start,
             exit_on_gcs_loss,
+            signing_key,
+            allow_unsigned,
         )
         stack = App(config, process)
     except (ConfigError, PortBusyError) as error:
@@ -117,7 +130,7 @@ def run(
         f"simulator {sim_host}:{process.simulator_port}, {described(process.ports)}",
         flush=True,
     )
-    if (caution := warning(process.ports)) is not None:
+    if (caution := warning(process.ports, signed=signing_key is not None and not allow_unsigned)) is not None:
         print(f"flightstack: {caution}", file=sys.stderr, flush=True)
     sys.exit(stack.run())
 

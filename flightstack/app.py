@@ -19,9 +19,11 @@ from flightstack.ground.peer import PeerAddress
 from flightstack.logging.flight_log import FlightLog
 from flightstack.logging.log_library import LogLibrary, create_log_file
 from flightstack.mavlink.services.log_store import NO_LOGS
+from flightstack.mavlink.signing import Signing
 from flightstack.modes import Mode
 from flightstack.params.identity import SYSTEM_ID
 from flightstack.params.saver import ParamSaver
+from flightstack.signing_file import create_key, open_signing, replace_key
 from flightstack.transport.processor import Follower
 from flightstack.transport.tcp import LinkClosedError, TcpClient
 from flightstack.transport.vehicle_ports import Place, PortsConfig, VehiclePorts
@@ -48,6 +50,9 @@ class ProcessConfig:
     log: Path | None
     wait_for_start: bool
     exit_on_ground_loss_s: float | None
+    signing_key: Path | None = None
+    """File of the key that signs MAVLink; None: nothing is signed."""
+    allow_unsigned: bool = False
 
 
 class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops
@@ -66,6 +71,7 @@ class App:
         self._log_count = 0
         logs = NO_LOGS if process.log is None else LogLibrary(process.log.parent)
         self.stack: Stack = build(config, self._open_log, logs)
+        self._signing = self._open_signing()
         self._ports = VehiclePorts(process.ports)
         self._saver: ParamSaver | None = None
         if config.params_file is not None:
@@ -82,6 +88,19 @@ class App:
         self._next_log_us = 0
         self._next_ground_ns = 0
         self._follower: Follower | None = None
+
+    def _open_signing(self) -> Signing | None:
+        """Sign the ground links if there is to be a key; raise ConfigError."""
+        path = self._process.signing_key
+        if path is None:
+            return None
+        if not path.exists():
+            create_key(path)
+            print(f"flightstack: a new signing key is in {path}", flush=True)
+        role = f"vehicle-{self._process.ports.instance}"
+        signing = open_signing(path, role, self._process.allow_unsigned)
+        self.stack.ground.use_signing(signing, lambda key: replace_key(path, key))
+        return signing
 
     # ------------------------------------------------------------------ life
 
@@ -136,6 +155,8 @@ class App:
             for (channel, host, port), data in self.stack.ground.farewell():
                 self._ports.send(channel, (host, port), data)
             self._ports.flush()
+        if self._signing is not None:
+            self._signing.close()
         if simulator is not None:
             if orderly:
                 with contextlib.suppress(LinkClosedError):

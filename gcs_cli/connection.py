@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from flightstack.mavlink.signing import LinkSigning
 from flightstack.transport.udp import PortBusyError, UdpSocket, resolve
 from gcs_cli.calls import Answer, Call
 from gcs_cli.endpoint import VEHICLE_CONNECTION, Endpoint
@@ -16,19 +17,28 @@ _LONGEST_WAIT_S = 0.25
 
 
 class Connection:
-    """Runs a ``Session`` over UDP. Raises CliError when the port is busy."""
+    """Runs a ``Session`` over UDP. Raises CliError when the port is busy.
 
-    def __init__(self, endpoint: Endpoint, record: Callable[[bytes], None] | None = None) -> None:
+    ``signing``: sign what is sent, and take what is signed with the same key.
+    """
+
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        record: Callable[[bytes], None] | None = None,
+        signing: LinkSigning | None = None,
+    ) -> None:
         self.endpoint = endpoint
+        self._signing = signing
         try:
             if endpoint.listens:
                 self._socket = UdpSocket(endpoint.host, endpoint.port)
-                self.session = Session(record=record)
+                self.session = Session(record=record, signing=signing)
             else:
                 host = resolve(endpoint.host)
                 # the loopback interface reaches nobody else, so that nobody else reaches us
                 self._socket = UdpSocket("127.0.0.1" if host.startswith("127.") else "0.0.0.0")
-                self.session = Session((host, endpoint.port), record)
+                self.session = Session((host, endpoint.port), record, signing)
         except PortBusyError as error:
             raise CliError(
                 f"{error}: end the other ground station, or use --connect {VEHICLE_CONNECTION}", USAGE
@@ -64,6 +74,11 @@ class Connection:
     def meet(self, timeout_s: float) -> None:
         """Wait for the vehicle's heartbeat; raise CliError (no answer)."""
         if not self.wait_for(lambda: self.session.view.identity is not None, timeout_s):
+            if self._signing is not None and self._signing.signing.counts.refused:
+                raise CliError(
+                    f"the vehicle at {self.endpoint} does not sign with this key: check --signing-key on both sides",
+                    NO_ANSWER,
+                )
             way = "sent to" if self.endpoint.listens else "answered at"
             raise CliError(
                 f"no vehicle {way} {self.endpoint} within {timeout_s:g} s: start `sim-bridge` and "
@@ -95,6 +110,8 @@ class Connection:
         """Say goodbye and close the socket."""
         self._send(self.session.farewell())
         self._socket.close()
+        if self._signing is not None:
+            self._signing.signing.close()
 
     def __enter__(self) -> Connection:
         return self

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.signing import LinkSigning, without_signature
 from flightstack.transport.udp import Address
 from gcs_cli.vehicle_view import update
 from gcs_cli.view_types import VehicleView
@@ -35,15 +36,21 @@ class Session:
     """The ground station's side of a link.
 
     The first peer from which an autopilot's heartbeat comes is the vehicle; datagrams of others are dropped
-    unless that one has fallen silent. ``record`` gets every frame, sent and received.
+    unless that one has fallen silent. ``record`` gets every frame, sent and received, without its signature.
     """
 
-    def __init__(self, peer: Address | None = None, record: Callable[[bytes], None] | None = None) -> None:
+    def __init__(
+        self,
+        peer: Address | None = None,
+        record: Callable[[bytes], None] | None = None,
+        signing: LinkSigning | None = None,
+    ) -> None:
         self.view = VehicleView()
         self.peer = peer
         self.bad = 0
         self._links: dict[Address, Link] = {}
-        self._out = Link(SYSTEM_ID, COMPONENT_ID)
+        self._signing = signing
+        self._out = Link(SYSTEM_ID, COMPONENT_ID, signing=signing)
         self.record = record
         self._service: Service | None = None
         self._heartbeat_due_s = 0.0
@@ -65,7 +72,7 @@ class Session:
             return
         if len(self._links) > _MOST_PEERS:
             self._links.clear()
-        link = self._links.setdefault(peer, Link(SYSTEM_ID, COMPONENT_ID))
+        link = self._links.setdefault(peer, Link(SYSTEM_ID, COMPONENT_ID, signing=self._signing))
         bad_before = link.bad
         for message in link.decode(data):
             if heard or self._is_vehicle(message, peer, now_s):
@@ -88,7 +95,7 @@ class Session:
 
     def _take(self, message: Message, now_s: float) -> None:
         if self.record is not None:
-            self.record(bytes(message.get_msgbuf()))
+            self.record(without_signature(bytes(message.get_msgbuf()), message.crc_extra))
         self.view = update(self.view, message, now_s)
         if self._service is not None and not self._is_other_system(message):
             self._service.receive(message, now_s)
@@ -119,7 +126,7 @@ class Session:
     def _encode(self, message: Message) -> bytes:
         frame = self._out.encode(message)
         if self.record is not None:
-            self.record(frame)
+            self.record(without_signature(frame, message.crc_extra))
         return frame
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
@@ -34,6 +35,17 @@ TimeoutOption = Annotated[
         show_default=False,
     ),
 ]
+SigningKeyOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--signing-key",
+        metavar="FILE",
+        envvar="GCS_SIGNING_KEY",
+        help="Sign with the key in this file, and hear only what is signed with it.",
+        show_default=False,
+        show_envvar=True,
+    ),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
@@ -42,11 +54,14 @@ class Settings(NamedTuple):
 
     connect: str | None = None
     timeout_s: float | None = None
+    signing_key: Path | None = None
 
     def merged(self, connect: str | None, timeout_s: float | None) -> Settings:
         """Return these with those given after the command, which win."""
         return Settings(
-            self.connect if connect is None else connect, self.timeout_s if timeout_s is None else timeout_s
+            self.connect if connect is None else connect,
+            self.timeout_s if timeout_s is None else timeout_s,
+            self.signing_key,
         )
 
     @property
@@ -72,10 +87,11 @@ def settings_of(context: typer.Context) -> Settings:
 def meet_vehicle(context: typer.Context, connect: str | None, timeout_s: float | None) -> Connection:
     """Open the link and wait for the vehicle; raise CliError."""
     from gcs_cli.connection import Connection  # noqa: PLC0415
+    from gcs_cli.signing import open_signing  # noqa: PLC0415
 
     settings = settings_of(context).merged(connect, timeout_s)
     patience_s = settings.patience_s
-    connection = Connection(settings.endpoint)
+    connection = Connection(settings.endpoint, signing=open_signing(settings.signing_key))
     try:
         connection.meet(patience_s)
     except BaseException:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 
 from flightstack.commands import VehicleContext
 from flightstack.ground.facts import AutopilotFacts
@@ -16,10 +16,12 @@ from flightstack.ground.peer import API, Peer, PeerAddress
 from flightstack.ground.router import Router
 from flightstack.ground.service import Service
 from flightstack.ground.services import make_services
+from flightstack.ground.signed_links import NEVER_FORWARDED, link_signing, signing_setup
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import FrameReader
 from flightstack.mavlink.link import Link, Message, is_unknown
 from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.signing import Signing
 from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
 from flightstack.mavlink.telemetry import MAKERS, VehicleFacts, heartbeat, messages, status_texts
 
@@ -47,17 +49,29 @@ class GroundHub:
             for kind in service.handles:
                 self._by_type.setdefault(kind, []).append(service)
         self._shown = (facts.armed, facts.mode)
+        self._signing: Signing | None = None
         self._router: Router[PeerAddress] = Router(self._own)
         self._to_forward: deque[tuple[PeerAddress, bytes]] = deque(maxlen=MAX_TO_FORWARD)
         self._forget_due_s = -math.inf
         self._made: dict[int, tuple[Message, ...]] = {}
+
+    def use_signing(self, signing: Signing, store: Callable[[bytes], None]) -> None:
+        """Sign what is sent to peers that are added from now on, and check what they send.
+
+        A new key that a ground station of this machine sends is kept by ``store``, which may raise OSError.
+        """
+        self._signing = signing
+        setup = signing_setup(self._own, self._autopilot, signing, store)
+        for kind in setup.handles:
+            self._by_type[kind] = [setup]
 
     # ------------------------------------------------------------------ peers
 
     def add_peer(self, address: PeerAddress, permanent: bool = False) -> Peer:
         """Begin to talk to ``address``; a permanent one gets heartbeats before it was ever heard."""
         rates = API_RATES_HZ if address.channel == API else GROUND_RATES_HZ
-        peer = Peer(Link(*self._own, keeps_unknown=True), Streams(rates), permanent)
+        link = Link(*self._own, keeps_unknown=True, signing=link_signing(self._signing, address))
+        peer = Peer(link, Streams(rates), permanent)
         self._peers[address] = peer
         return peer
 
@@ -116,7 +130,7 @@ class GroundHub:
             if not is_unknown(message):
                 peer.heard_s = now_s
             route = self._router.route(message, address, now_s)
-            if route.forward:
+            if route.forward and message.get_type() not in NEVER_FORWARDED:
                 frame = bytes(message.get_msgbuf())
                 self._to_forward.extend((other, frame) for other in route.forward)
             if route.local:

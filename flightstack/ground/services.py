@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
+from flightstack import __version__
 from flightstack.commands import VehicleContext
 from flightstack.ground.command_service import CommandService
 from flightstack.ground.facts import AutopilotFacts
@@ -15,14 +16,25 @@ from flightstack.ground.peer import Peer
 from flightstack.ground.service import Service
 from flightstack.ground.stream_services import stream_services
 from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.component_metadata import ComponentMetadata
+from flightstack.mavlink.services.log_stream import LogStream
+from flightstack.mavlink.services.param_server import ParamServer
 from flightstack.mavlink.services.timesync import TimeService
+from flightstack.params.metadata import parameters_json
+from flightstack.snapshot import WARNING
+
+VENDOR = "flightstack"
 
 
 def make_services(
     own: Address, vehicle: VehicleContext, facts: AutopilotFacts, peer_at: Callable[[Hashable], Peer]
 ) -> list[Service]:
     """Return every service, in the order in which their messages are sent; ``peer_at`` finds a known peer."""
-    link_commands = LinkCommands(own, facts, peer_at)
+    metadata = ComponentMetadata(
+        parameters_json(vehicle.params.specs.values()), VENDOR, facts.model, __version__
+    )
+    log_stream = LogStream(own, lambda: vehicle.open_log_tail())
+    link_commands = LinkCommands(own, facts, peer_at, log_stream, metadata)
     return [
         MissionService(own, vehicle.autopilot),
         CommandService(own, vehicle, peer_at, link_commands.answer),
@@ -30,5 +42,7 @@ def make_services(
         *stream_services(own, vehicle.autopilot),
         LinkLossService(vehicle.autopilot),
         TimeService(lambda: facts.time_us),
-        *file_services(own, vehicle, None),
+        ParamServer(own, vehicle.params, lambda text: vehicle.autopilot.say(WARNING, text)),
+        *file_services(own, vehicle, metadata),
+        log_stream,
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import lzma
+import time
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from rich.console import Console
 
 from flightstack.mavlink.services.param_client import ParamTiming
 from flightstack.mavlink.services.param_values import Parameter
+from flightstack.mavlink.signing import timestamp_of
 from flightstack.params.errors import ConfigError
 from gcs_cli.param_file import load_parameters, render_parameters
 from gcs_cli.param_info import ParamInfo, number_text, parse_metadata
@@ -342,3 +344,57 @@ def test_bytes_that_are_no_metadata_are_none(data: bytes) -> None:
 
 def test_a_small_file_that_grows_without_end_is_cut() -> None:
     assert parse_metadata(lzma.compress(b" " * 40_000_000 + b'{"parameters": [{"name": "A"}]}')) == {}
+
+
+# ---------------------------------------------------------------------- signed links
+
+KEY = bytes(range(32))
+
+
+@pytest.fixture
+def key_file(tmp_path: Path) -> Path:
+    path = tmp_path / "gcs.key"
+    path.write_text(KEY.hex())
+    path.chmod(0o600)
+    return path
+
+
+def signed_vehicle(key: bytes) -> ParamVehicle:
+    """A vehicle whose pymavlink signs, and takes signed messages only."""
+    vehicle = ParamVehicle()
+    signing = vehicle.codec.signing
+    signing.secret_key, signing.sign_outgoing = key, True
+    signing.timestamp = timestamp_of(time.time())
+    return vehicle
+
+
+def told_signed(vehicle: ParamVehicle, key_file: Path, *arguments: object) -> Ended:
+    with serve(vehicle) as socket:
+        link = f"udpout:127.0.0.1:{socket.address[1]}"
+        return gcs("--connect", link, "--timeout", "1", "--signing-key", key_file, *arguments)
+
+
+def test_a_signed_vehicle_is_commanded_with_its_key(key_file: Path) -> None:
+    vehicle = signed_vehicle(KEY)
+    for value in ("5", "6"):  # the second run goes on with its timestamps
+        result = told_signed(vehicle, key_file, "param", "set", "MPC_XY_CRUISE", value)
+        assert (result.stderr, result.returncode) == ("", 0)
+    assert vehicle.values["MPC_XY_CRUISE"] == 6.0
+    assert vehicle.codec.signing.goodsig_count > 0
+    assert vehicle.codec.signing.badsig_count == 0
+
+
+@pytest.mark.parametrize("vehicle", [signed_vehicle(KEY[::-1]), ParamVehicle()], ids=["another", "none"])
+def test_a_vehicle_with_another_key_or_none_is_not_heard(key_file: Path, vehicle: ParamVehicle) -> None:
+    vehicle.codec.signing.allow_unsigned_callback = lambda *_: True  # it talks to anybody
+    result = told_signed(vehicle, key_file, "arm")
+    assert result.returncode == 3
+    assert "does not sign with this key" in result.stderr
+    assert not vehicle.armed
+
+
+def test_a_key_that_others_may_read_is_a_usage_error(key_file: Path) -> None:
+    key_file.chmod(0o644)
+    result = gcs("--signing-key", key_file, "arm")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert f"chmod 600 {key_file}" in result.stderr

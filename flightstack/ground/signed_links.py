@@ -1,0 +1,43 @@
+"""How the vehicle's ground links are signed, and who may change the key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+
+from flightstack.autopilot import Autopilot
+from flightstack.ground.peer import API, GROUND, PeerAddress
+from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.signing_setup import SigningSetup
+from flightstack.mavlink.signing import LinkSigning, Signing
+from flightstack.snapshot import NOTICE
+from flightstack.transport.vehicle_ports import is_loopback
+
+NEVER_FORWARDED = frozenset({"SETUP_SIGNING"})
+"""A key that came over a safe link must not go out on another."""
+_LINK_IDS = {GROUND: 0, API: 1}
+_OTHER_LINK_ID = 2
+
+
+def link_signing(signing: Signing | None, address: PeerAddress) -> LinkSigning | None:
+    """Return how to sign the link to ``address``; each channel has a link id of its own."""
+    if signing is None:
+        return None
+    return LinkSigning(signing, _LINK_IDS.get(address.channel, _OTHER_LINK_ID))
+
+
+def signing_setup(
+    own: Address, autopilot: Autopilot, signing: Signing, store: Callable[[bytes], None]
+) -> SigningSetup:
+    """Return the service that takes new keys, from this machine and while disarmed."""
+    return SigningSetup(
+        own,
+        signing,
+        lambda: autopilot.now.status.armed,
+        _is_on_this_machine,
+        store,
+        lambda text: autopilot.say(NOTICE, text),
+    )
+
+
+def _is_on_this_machine(peer: Hashable) -> bool:
+    return isinstance(peer, PeerAddress) and is_loopback(peer.host)

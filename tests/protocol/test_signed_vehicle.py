@@ -1,0 +1,162 @@
+"""The whole vehicle with signed links, and parameters over them: raw pymavlink is the ground station."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import pytest
+from pymavlink.dialects.v20 import common
+
+from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.mavlink.signing import NO_KEY, Signing, timestamp_of
+from tests.support.world import World
+
+KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))
+HERE, ELSEWHERE = "127.0.0.1", "192.0.2.7"
+NOW_S = 1.75e9
+REQUEST_LIST = common.MAVLink_param_request_list_message(1, 1)
+
+
+class Station:
+    """A ground station at ``host``; it signs if it has a key."""
+
+    def __init__(
+        self, vehicle: SignedVehicle, key: bytes | None, host: str = HERE, system: int = 255
+    ) -> None:
+        self.hub, self.address = vehicle.world.stack.ground, PeerAddress(GROUND, host, 5000 + system)
+        self.codec = common.MAVLink(None, system, 190)
+        self.codec.robust_parsing = True
+        self.now_s = 0.0
+        if key is not None:
+            self.codec.signing.secret_key, self.codec.signing.sign_outgoing = key, True
+            self.codec.signing.timestamp = timestamp_of(NOW_S)
+
+    def frame(self, message: Any) -> bytes:
+        self.codec.seq = (self.codec.seq + 1) % 256
+        return bytes(message.pack(self.codec))
+
+    def ask(self, *messages: Any) -> list[Any]:
+        """Send messages and return what comes back to this station within a second."""
+        return self.send(*(self.frame(message) for message in messages))
+
+    def send(self, *frames: bytes) -> list[Any]:
+        for frame in frames:
+            self.hub.receive(self.address, frame, self.now_s)
+        answers: list[Any] = []
+        for _ in range(100):
+            self.now_s += 0.01
+            for address, data in list(self.hub.poll(self.now_s)):
+                if address == self.address:
+                    answers += self.codec.parse_buffer(bytearray(data)) or ()
+        return answers
+
+
+def of_type(messages: list[Any], kind: str) -> list[Any]:
+    return [message for message in messages if message.get_type() == kind]
+
+
+class SignedVehicle(NamedTuple):
+    world: World
+    signing: Signing
+    stored: list[bytes]
+    """Keys that were kept for the next start."""
+
+
+@pytest.fixture(scope="module")
+def shared() -> World:
+    return World()
+
+
+@pytest.fixture
+def vehicle(shared: World) -> SignedVehicle:
+    """The vehicle on the ground, with a key and no peers."""
+    for address in list(shared.stack.ground._peers):
+        shared.stack.ground.drop_peer(address)
+    signed = SignedVehicle(shared, Signing(KEY, lambda: NOW_S), [])
+    shared.stack.ground.use_signing(signed.signing, signed.stored.append)
+    return signed
+
+
+def test_the_parameter_list_comes_signed_to_who_signs(vehicle: SignedVehicle) -> None:
+    values = of_type(Station(vehicle, KEY).ask(REQUEST_LIST), "PARAM_VALUE")
+    store = vehicle.world.stack.params
+    assert [value.param_id for value in values] == ["_HASH_CHECK", *store.specs]
+    assert all(value._signed for value in values)
+    assert {value.get_link_id() for value in values} == {0}
+
+
+@pytest.mark.parametrize("key", [None, OTHER_KEY])
+def test_who_does_not_sign_with_the_key_is_not_heard(vehicle: SignedVehicle, key: bytes | None) -> None:
+    station = Station(vehicle, key)
+    assert station.ask(REQUEST_LIST) == []
+    set_frame = station.frame(common.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 9.0, 9))
+    station.send(set_frame)
+    assert vehicle.world.stack.params.value("MIS_TAKEOFF_ALT") != 9.0
+
+
+def test_a_heard_command_cannot_be_sent_again_from_another_port(vehicle: SignedVehicle) -> None:
+    station = Station(vehicle, KEY)
+    first, second = (
+        station.frame(common.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", value, 9))
+        for value in (9.0, 8.0)
+    )
+    station.send(first, second)
+    Station(vehicle, KEY, system=77).send(first)  # another address: another link
+    assert vehicle.world.stack.params.value("MIS_TAKEOFF_ALT") == 8.0
+    vehicle.world.stack.params.reset()
+
+
+def test_a_key_from_this_machine_is_taken_and_kept(vehicle: SignedVehicle) -> None:
+    station = Station(vehicle, KEY)
+    message = common.MAVLink_setup_signing_message(1, 1, list(OTHER_KEY), timestamp_of(NOW_S))
+    station.codec.signing.allow_unsigned_callback = lambda *_: True  # it has yet to take the new key itself
+    texts = [text.text for text in of_type(station.ask(message), "STATUSTEXT")]
+    assert texts == ["Signing is on: a new key is in use"]
+    assert vehicle.stored == [OTHER_KEY]
+    assert of_type(Station(vehicle, KEY, system=78).ask(REQUEST_LIST), "PARAM_VALUE") == []
+    assert of_type(Station(vehicle, OTHER_KEY, system=79).ask(REQUEST_LIST), "PARAM_VALUE") != []
+
+
+def test_a_key_from_a_network_is_refused(vehicle: SignedVehicle) -> None:
+    message = common.MAVLink_setup_signing_message(1, 1, list(NO_KEY), 0)
+    texts = [text.text for text in of_type(Station(vehicle, KEY, ELSEWHERE).ask(message), "STATUSTEXT")]
+    assert texts == ["Signing key refused: the link is not local"]
+    assert vehicle.signing.is_on
+
+
+def test_a_key_for_another_vehicle_is_not_passed_on(vehicle: SignedVehicle) -> None:
+    other = Station(vehicle, KEY, system=2)
+    other.ask(common.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+    station = Station(vehicle, KEY)
+    frames: list[bytes] = []
+    for message in (
+        common.MAVLink_setup_signing_message(2, 190, list(OTHER_KEY), 0),
+        common.MAVLink_param_request_list_message(2, 190),
+    ):
+        station.hub.receive(station.address, station.frame(message), 3.0)
+        frames += [bytes(data) for address, data in station.hub.poll(3.0) if address == other.address]
+    numbers = [int.from_bytes(frame[7:10], "little") for frame in frames]
+    assert REQUEST_LIST.id in numbers
+    assert common.MAVLINK_MSG_ID_SETUP_SIGNING not in numbers
+
+
+def test_a_refused_parameter_is_explained_in_a_text(vehicle: SignedVehicle) -> None:
+    answers = Station(vehicle, KEY).ask(common.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 1e9, 9))
+    assert [error.error for error in of_type(answers, "PARAM_ERROR")] == [2]
+    said = "".join(text.text for text in of_type(answers, "STATUSTEXT"))
+    assert said == "Parameter MIS_TAKEOFF_ALT refused: 1e+09 is outside 0.2 to 100 m"
+
+
+def test_all_parameters_are_reset_by_command_but_not_while_armed(vehicle: SignedVehicle) -> None:
+    assert vehicle.world.stack.params.set("MIS_TAKEOFF_ALT", 9.0) is None
+    reset = common.MAVLink_command_long_message(1, 1, 245, 0, 2.0, 0, 0, 0, 0, 0, 0)
+    status = vehicle.world.stack.autopilot.now.status
+    vehicle.world.stack.autopilot.now.status = status._replace(armed=True)
+    try:
+        station = Station(vehicle, KEY)
+        assert [ack.result for ack in of_type(station.ask(reset), "COMMAND_ACK")] == [2]  # DENIED
+        assert vehicle.world.stack.params.value("MIS_TAKEOFF_ALT") == 9.0
+    finally:
+        vehicle.world.stack.autopilot.now.status = status
+    assert [ack.result for ack in of_type(station.ask(reset), "COMMAND_ACK")] == [0]
+    assert vehicle.world.stack.params.is_default("MIS_TAKEOFF_ALT")
