@@ -1,0 +1,277 @@
+"""What notices a fault: limits, times, hysteresis; and links on two clocks."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from flightstack.commander.arming_checks import ArmingFacts, arming_refusals
+from flightstack.commander.detectors import (
+    BATTERY_HYSTERESIS,
+    BEYOND_ATTITUDE,
+    BEYOND_POSITION,
+    DETECTOR_MEMORY_SIZE,
+    MOVING,
+    NOT_FINITE,
+    ROTOR_FAULT,
+    battery_level,
+    detect,
+    detector_params,
+)
+from flightstack.commander.link_watch import LinkWatch
+from flightstack.commander.transitions import TERMINATED, Need
+from flightstack.contract import LoopRow, LoopStatus
+from flightstack.modes import Mode
+from flightstack.params.behaviour import Behaviour, with_assignments
+from flightstack.params.vehicle import load_vehicle
+
+DT_S = 0.01
+VEHICLE = load_vehicle("x_quad")
+
+
+class Bench:
+    """One vehicle's detectors, at 100 Hz."""
+
+    def __init__(self, *assignments: str) -> None:
+        behaviour = with_assignments(Behaviour(), list(assignments))
+        self.params = detector_params(behaviour, VEHICLE, DT_S)
+        self.memory = np.zeros(DETECTOR_MEMORY_SIZE)
+        self.state = np.array([0.0] * 6 + [1.0] + [0.0] * 6)
+        self.setpoint = np.zeros(11)
+        self.row = np.zeros(LoopRow.SIZE)
+        self.row[LoopRow.REFERENCE_ATTITUDE] = 1.0, 0.0, 0.0, 0.0
+        self.row[LoopRow.ROTOR_COMMAND] = self.row[LoopRow.ROTOR_SPEED] = 300.0
+
+    def attitude(self, roll_deg: float, pitch_deg: float = 0.0, yaw_deg: float = 0.0) -> None:
+        x, y, z, w = Rotation.from_euler("ZYX", [yaw_deg, pitch_deg, roll_deg], degrees=True).as_quat()
+        self.state[6:10] = w, x, y, z
+
+    def run(self, seconds: float) -> int:
+        found = 0
+        for _ in range(round(seconds / DT_S)):
+            found = detect(self.state, self.setpoint, self.row, self.memory, self.params, DT_S)
+        return found
+
+
+def test_a_quiet_flight_triggers_nothing() -> None:
+    assert Bench().run(60.0) == 0
+
+
+@pytest.mark.parametrize(
+    ("roll", "pitch", "beyond"),
+    [(59, 0, False), (61, 0, True), (-61, 0, True), (0, 61, True), (0, -59, False), (180, 0, True)],
+)
+def test_roll_and_pitch_have_limits_and_times(roll: float, pitch: float, beyond: bool) -> None:
+    bench = Bench("FS_ATT_ERR=0")
+    bench.attitude(roll, pitch, yaw_deg=77.0)
+    assert not bench.run(0.29) & BEYOND_ATTITUDE
+    assert bool(bench.run(0.01) & BEYOND_ATTITUDE) is beyond
+
+
+def test_limits_leave_room_for_the_largest_tilt() -> None:
+    bench = Bench("FS_ATT_ERR=0", "MPC_TILTMAX_AIR=70")
+    bench.attitude(80.0)
+    assert not bench.run(2.0) & BEYOND_ATTITUDE
+    bench.attitude(86.0)
+    assert bench.run(0.3) & BEYOND_ATTITUDE
+
+
+def test_a_limit_of_zero_is_off() -> None:
+    bench = Bench("FD_FAIL_R=0", "FD_FAIL_P=0", "FS_ATT_ERR=0", "FS_POS_ERR=0", "FD_ACT_EN=0")
+    bench.attitude(150.0, 80.0)
+    bench.state[0] = 1e6
+    bench.row[LoopRow.ROTOR_SPEED] = 10.0
+    assert bench.run(10.0) == 0
+
+
+@given(
+    st.floats(-1.4, 1.4),
+    st.floats(-1.4, 1.4),
+    st.floats(-3.1, 3.1),
+    st.floats(-1.4, 1.4),
+    st.floats(-1.4, 1.4),
+)
+def test_tilt_error_is_the_angle_between_the_thrust_axes(
+    roll: float, pitch: float, yaw: float, other_roll: float, other_pitch: float
+) -> None:
+    """Compared with SciPy's rotations; yaw does not count."""
+    one = Rotation.from_euler("ZYX", [yaw, pitch, roll])
+    other = Rotation.from_euler("ZYX", [0.3, other_pitch, other_roll])
+    axes = one.as_matrix()[:, 2], other.as_matrix()[:, 2]
+    angle = math.acos(max(-1.0, min(1.0, float(np.dot(*axes)))))
+    if abs(angle - math.radians(30.0)) < 1e-6:
+        return
+    bench = Bench("FD_FAIL_R=0", "FD_FAIL_P=0", "FS_ATT_ERR_T=0.02")
+    x, y, z, w = one.as_quat()
+    bench.state[6:10] = w, x, y, z
+    x, y, z, w = other.as_quat()
+    bench.row[LoopRow.REFERENCE_ATTITUDE] = w, x, y, z
+    assert bool(bench.run(0.05) & BEYOND_ATTITUDE) is (angle > math.radians(30.0))
+
+
+def test_position_error_has_a_limit_a_time_and_a_release() -> None:
+    bench = Bench()
+    bench.state[:3] = 6.0, 8.1, 0.0
+    assert not bench.run(0.99) & BEYOND_POSITION
+    assert bench.run(0.01) & BEYOND_POSITION
+    bench.state[:3] = 6.0, 7.9, 0.0
+    assert bench.run(0.99) & BEYOND_POSITION
+    assert not bench.run(0.02) & BEYOND_POSITION
+
+
+def test_a_moment_beyond_the_limit_begins_the_time_anew() -> None:
+    bench = Bench()
+    for _ in range(5):
+        bench.state[0] = 11.0
+        assert not bench.run(0.9) & BEYOND_POSITION
+        bench.state[0] = 9.0
+        bench.run(0.01)
+
+
+@pytest.mark.parametrize(
+    ("speed", "fault"), [(300.0, False), (215.0, False), (205.0, True), (0.0, True), (395.0, True)]
+)
+def test_a_rotor_must_follow_its_command(speed: float, fault: bool) -> None:
+    bench = Bench()
+    bench.run(1.0)
+    bench.row[LoopRow.ROTOR_SPEED.start + 2] = speed
+    assert not bench.run(0.09) & ROTOR_FAULT
+    assert bool(bench.run(0.01) & ROTOR_FAULT) is fault
+
+
+def test_a_rotor_is_given_its_lag() -> None:
+    """A step of the command, followed as the vehicle's rotors do, is no fault."""
+    bench = Bench()
+    bench.row[LoopRow.ROTOR_SPEED] = bench.row[LoopRow.ROTOR_COMMAND] = 0.0
+    bench.run(1.0)
+    bench.row[LoopRow.ROTOR_COMMAND] = 600.0
+    lag_s = max(rotor.lag_s for rotor in VEHICLE.rotors)
+    for _ in range(200):
+        speeds = bench.row[LoopRow.ROTOR_SPEED]
+        speeds += (600.0 - speeds) * (1.0 - math.exp(-DT_S / lag_s))
+        assert not bench.run(DT_S) & ROTOR_FAULT
+
+
+def test_speeds_that_nobody_measures_are_no_fault() -> None:
+    bench = Bench()
+    bench.row[LoopRow.ROTOR_SPEED] = 0.0
+    assert not bench.run(5.0) & ROTOR_FAULT
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("index", range(13))
+def test_a_number_that_is_none_is_found_at_once(value: float, index: int) -> None:
+    bench = Bench()
+    bench.state[index] = value
+    assert bench.run(DT_S) == NOT_FINITE
+
+
+def test_an_output_that_is_none_is_found() -> None:
+    bench = Bench()
+    bench.row[LoopRow.STATUS] = LoopStatus.OUTPUT_NOT_FINITE
+    assert bench.run(DT_S) & NOT_FINITE
+
+
+def test_moving_is_any_speed_or_rate() -> None:
+    for index in (3, 4, 5, 10, 11, 12):
+        bench = Bench()
+        bench.state[index] = -1e-5
+        assert bench.run(DT_S) == MOVING
+
+
+@given(st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=72, max_size=72))
+def test_no_number_breaks_the_detectors(values: list[float]) -> None:
+    bench = Bench()
+    bench.state[:], bench.setpoint[:], bench.row[:47] = values[:13], values[13:24], values[24:71]
+    bench.run(0.1)
+    assert set(bench.memory[5:10]) <= {0.0, 1.0}
+
+
+# ---------------------------------------------------------------------- battery
+
+THRESHOLDS = (0.15, 0.07, 0.05)
+
+
+@pytest.mark.parametrize(
+    ("remaining", "level"),
+    [(1.0, 0), (0.151, 0), (0.15, 1), (0.071, 1), (0.07, 2), (0.05, 3), (0.0, 3), (math.nan, 0)],
+)
+def test_battery_levels(remaining: float, level: int) -> None:
+    assert battery_level(0, remaining, THRESHOLDS) == level
+
+
+def test_a_level_is_left_only_well_above_its_threshold() -> None:
+    assert battery_level(1, 0.15 + BATTERY_HYSTERESIS - 0.001, THRESHOLDS) == 1
+    assert battery_level(1, 0.15 + BATTERY_HYSTERESIS + 0.001, THRESHOLDS) == 0
+    assert battery_level(3, 0.06, THRESHOLDS) == 3
+    assert battery_level(3, 0.075, THRESHOLDS) == 2
+    assert battery_level(3, 0.5, THRESHOLDS) == 0
+
+
+# ---------------------------------------------------------------------- links
+
+
+def test_a_link_is_lost_when_it_is_silent_on_both_clocks() -> None:
+    watch = LinkWatch()
+    watch.heard(100.0, 5_000_000)
+    assert not watch.lost(111.0, 6_000_000, 10.0)  # simulated time hardly moves
+    assert not watch.lost(100.5, 55_000_000, 10.0)  # a hundred times real time
+    assert watch.lost(110.1, 15_100_000, 10.0)
+    watch.heard(110.2, 15_200_000)
+    assert not watch.lost(110.3, 15_300_000, 10.0)
+
+
+def test_who_never_spoke_is_silent_but_not_lost() -> None:
+    watch = LinkWatch()
+    assert watch.silent(1e9, 10**15, 10.0)
+    assert not watch.lost(1e9, 10**15, 10.0)
+
+
+# ---------------------------------------------------------------------- arming
+
+READY = ArmingFacts(
+    mode=Mode.HOLD, state_is_valid=True, state_is_fresh=True, upright=True, gcs_lost=False, manual_fresh=False,
+    offboard_fresh=False, fence_breach="", battery_level=0, battery_remaining=math.nan,
+)  # fmt: skip
+
+
+def test_a_vehicle_that_is_ready_arms() -> None:
+    assert arming_refusals(READY, Behaviour()) == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "params", "reason"),
+    [
+        ({"state_is_valid": False, "upright": False}, [], Need.STATE.value),
+        ({"state_is_fresh": False}, [], "the state is frozen or missing"),
+        ({"upright": False}, [], Need.UPRIGHT.value),
+        ({"battery_level": 1, "battery_remaining": 0.12}, [], "the battery is low: 12% left"),
+        ({}, ["BAT_LOW_THR=0.12", "BAT_CRIT_THR=0.2"], "BAT_EMERGEN_THR, BAT_CRIT_THR and BAT_LOW_THR"),
+        ({"fence_breach": "is outside the geofence"}, [], "the vehicle is outside the geofence"),
+        ({"gcs_lost": True}, ["NAV_DLL_ACT=1"], "the ground station is lost"),
+        ({"mode": Mode.POSITION}, [], Need.MANUAL_STREAM.value),
+        ({"mode": Mode.ALTITUDE}, [], Need.MANUAL_STREAM.value),
+        ({"mode": Mode.OFFBOARD}, [], Need.OFFBOARD_STREAM.value),
+        ({"mode": Mode.TERMINATION}, [], TERMINATED),
+    ],
+)
+def test_each_reason_has_its_sentence(change: dict[str, object], params: list[str], reason: str) -> None:
+    facts = READY._replace(**change)
+    (sentence,) = arming_refusals(facts, with_assignments(Behaviour(), params))
+    assert sentence.startswith(reason)
+
+
+def test_all_reasons_are_given_at_once() -> None:
+    facts = READY._replace(upright=False, battery_level=2, battery_remaining=0.06, gcs_lost=True)
+    assert len(arming_refusals(facts, Behaviour().updated("NAV_DLL_ACT", 2))) == 3
+
+
+def test_what_is_switched_off_does_not_keep_the_vehicle_on_the_ground() -> None:
+    facts = READY._replace(gcs_lost=True, fence_breach="is outside the geofence")
+    off = with_assignments(Behaviour(), ["NAV_DLL_ACT=0", "GF_ACTION=0"])
+    assert arming_refusals(facts, off) == ()

@@ -1,0 +1,152 @@
+"""Failsafes over time: beginning, waiting, acting, overriding, ending, and what is said."""
+
+from __future__ import annotations
+
+from flightstack.commander.failsafe import Action, Failsafe, Phase
+from flightstack.commander.failsafe_step import (
+    CRITICAL,
+    EMERGENCY,
+    IDLE,
+    NOTICE,
+    WARNING,
+    Announcement,
+    Memory,
+    Situation,
+    active,
+    failsafe_step,
+    override,
+)
+from flightstack.params.behaviour import Behaviour, with_assignments
+
+
+class Flight:
+    """Steps failsafes at 10 Hz."""
+
+    def __init__(self, *assignments: str, phase: Phase = Phase.MISSION) -> None:
+        self.behaviour = with_assignments(Behaviour(), list(assignments))
+        self.phase = phase
+        self.memory: Memory = IDLE
+        self.time_us = 0
+        self.said: list[Announcement] = []
+
+    def run(self, seconds: float, *conditions: Failsafe) -> Action:
+        for _ in range(round(seconds * 10)):
+            situation = Situation(self.time_us, self.phase, sticks_are_live=True)
+            self.memory, said = failsafe_step(self.memory, frozenset(conditions), situation, self.behaviour)
+            self.said += said
+            self.time_us += 100_000
+        return self.memory.decision.action
+
+
+def test_a_return_waits_in_hold_and_both_are_said_once() -> None:
+    flight = Flight("NAV_DLL_ACT=2")
+    assert flight.run(0.1, Failsafe.GCS_LOST) is Action.HOLD
+    flight.phase = Phase.HOLD
+    assert flight.run(4.8, Failsafe.GCS_LOST) is Action.WARN  # it holds already
+    assert flight.run(0.2, Failsafe.GCS_LOST) is Action.RETURN
+    flight.phase = Phase.RETURN
+    assert flight.run(5.0, Failsafe.GCS_LOST) is Action.WARN
+    assert flight.said == [
+        (CRITICAL, "Ground station lost: holding, returning in 5 s"),
+        (CRITICAL, "Failsafe: returning (ground station lost)"),
+    ]
+
+
+def test_a_condition_that_ends_in_the_wait_is_over() -> None:
+    flight = Flight("NAV_DLL_ACT=2")
+    flight.run(2.0, Failsafe.GCS_LOST)
+    assert flight.run(9.0) is Action.NONE
+    assert flight.said[-1] == (NOTICE, "Ground station is back")
+    assert active(flight.memory) == ()
+    assert flight.run(1.0, Failsafe.GCS_LOST) is Action.HOLD  # the wait begins anew
+
+
+def test_who_returns_or_lands_is_not_made_to_wait() -> None:
+    flight = Flight("COM_LOW_BAT_ACT=3", phase=Phase.RETURN)
+    assert flight.run(0.1, Failsafe.BATTERY_EMERGENCY) is Action.LAND
+
+
+def test_without_delay_a_failsafe_acts_at_once() -> None:
+    flight = Flight("NAV_DLL_ACT=3", "COM_FAIL_ACT_T=0")
+    assert flight.run(0.1, Failsafe.GCS_LOST) is Action.LAND
+    assert flight.said == [(CRITICAL, "Ground station lost: landing")]
+
+
+def test_a_second_failsafe_escalates_and_names_itself() -> None:
+    flight = Flight("COM_LOW_BAT_ACT=3", "COM_FAIL_ACT_T=0")
+    assert flight.run(1.0, Failsafe.BATTERY_LOW) is Action.WARN
+    assert flight.run(1.0, Failsafe.BATTERY_LOW, Failsafe.BATTERY_CRITICAL) is Action.RETURN
+    flight.phase = Phase.RETURN
+    everything = (Failsafe.BATTERY_LOW, Failsafe.BATTERY_CRITICAL, Failsafe.BATTERY_EMERGENCY)
+    assert flight.run(0.1, *everything) is Action.LAND
+    assert flight.said == [
+        (WARNING, "Battery level is low"),
+        (CRITICAL, "Battery level is critical: returning"),
+        (CRITICAL, "Battery level is dangerously low: landing"),
+    ]
+    assert active(flight.memory) == everything[::-1]
+
+
+def test_a_user_overrides_what_is_active_but_not_what_comes_after() -> None:
+    flight = Flight("NAV_DLL_ACT=2", "COM_LOW_BAT_ACT=3", "COM_FAIL_ACT_T=0")
+    assert flight.run(0.1, Failsafe.GCS_LOST) is Action.RETURN
+    flight.memory = override(flight.memory)  # the user selects the mission again
+    assert flight.run(20.0, Failsafe.GCS_LOST) is Action.NONE
+    assert active(flight.memory) == (Failsafe.GCS_LOST,)
+    assert flight.run(0.1, Failsafe.GCS_LOST, Failsafe.BATTERY_CRITICAL) is Action.RETURN
+
+
+def test_after_an_override_the_same_failsafe_acts_when_it_begins_again() -> None:
+    flight = Flight("NAV_DLL_ACT=2", "COM_FAIL_ACT_T=0")
+    flight.run(1.0, Failsafe.GCS_LOST)
+    flight.memory = override(flight.memory)
+    flight.run(1.0)
+    assert flight.run(0.1, Failsafe.GCS_LOST) is Action.RETURN
+
+
+def test_without_a_state_the_rotors_hold_and_then_stop() -> None:
+    flight = Flight("FS_BLIND_T=2")
+    assert flight.run(2.0, Failsafe.STATE_STALE) is Action.BLIND
+    assert flight.run(0.1, Failsafe.STATE_STALE) is Action.TERMINATE
+    assert flight.said == [
+        (EMERGENCY, "State is frozen or missing: rotors hold their speeds"),
+        (EMERGENCY, "Failsafe: flight terminated (state is frozen or missing)"),
+    ]
+
+
+def test_a_state_that_comes_back_ends_the_blindness() -> None:
+    flight = Flight("FS_BLIND_T=2")
+    flight.run(1.5, Failsafe.NOT_FINITE)
+    assert flight.run(5.0) is Action.NONE
+    assert flight.said[-1] == (NOTICE, "State and controller output are finite again")
+
+
+def test_rotors_may_hold_for_ever() -> None:
+    assert Flight("FS_BLIND_T=-1").run(100.0, Failsafe.NOT_FINITE) is Action.BLIND
+
+
+def test_an_action_that_is_switched_off_says_nothing() -> None:
+    flight = Flight("GF_ACTION=0")
+    assert flight.run(1.0, Failsafe.FENCE) is Action.NONE
+    assert flight.said == []
+
+
+def test_a_link_without_action_is_told_of_all_the_same() -> None:
+    flight = Flight("NAV_DLL_ACT=0")
+    assert flight.run(1.0, Failsafe.GCS_LOST) is Action.WARN
+    assert flight.said == [(WARNING, "Ground station lost")]
+
+
+def test_disarming_forgets() -> None:
+    flight = Flight("NAV_DLL_ACT=2")
+    flight.run(1.0, Failsafe.GCS_LOST)
+    flight.phase = Phase.DISARMED
+    assert flight.run(1.0, Failsafe.GCS_LOST) is Action.NONE
+    assert flight.memory == IDLE
+
+
+def test_parameters_count_at_once() -> None:
+    flight = Flight("NAV_DLL_ACT=0", "COM_FAIL_ACT_T=0")
+    flight.run(1.0, Failsafe.GCS_LOST)
+    flight.behaviour = flight.behaviour.updated("NAV_DLL_ACT", 3)
+    assert flight.run(0.1, Failsafe.GCS_LOST) is Action.LAND
