@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
 
 from flightstack.autopilot import Autopilot
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.services.command_server import Command
 from flightstack.mavlink.services.log_store import NO_LOGS, LogStore
+from flightstack.mavlink.services.log_stream import LogTail
 from flightstack.params.store import ParamStore
 
 ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
@@ -42,6 +43,8 @@ class VehicleContext:
     shutdown_requested: bool = False
     reboot_requested: bool = False
     logs: LogStore = NO_LOGS
+    open_log_tail: Callable[[], LogTail | None] = field(default=lambda: None)
+    """Opens the log that is being written, to stream it; None while there is none."""
 
 
 Handler: TypeAlias = Callable[[VehicleContext, Command], Answer]

@@ -182,6 +182,26 @@ def test_a_takeoff_above_home_by_its_frame() -> None:
     assert world.altitude == pytest.approx(6.0, abs=0.02)
 
 
+def test_a_generic_autopilot_takes_off_to_an_altitude_above_home() -> None:
+    world = World(params=["FS_AUTOPILOT=1"])
+    world.arm()
+    assert world.command(mavlink.MAV_CMD_NAV_TAKEOFF, *[NAN] * 6, 6.0) == ACCEPTED
+    world.until(lambda: world.mode is Mode.HOLD)
+    assert world.altitude == pytest.approx(6.0, abs=0.4)
+
+
+def test_a_goto_out_of_the_geofence_is_refused() -> None:
+    world = World(params=["GF_MAX_HOR_DIST=20", "GF_MAX_VER_DIST=15"])
+    world.arm()
+    world.takeoff(5.0)
+    world.until(lambda: world.mode is Mode.HOLD)
+    assert go_to(world, 30.0, 0.0) == DENIED
+    world.run(0.02)
+    assert any("the place is more than 20 m from home" in text for text in world.texts), world.texts
+    assert go_to(world, altitude=16.0) == DENIED
+    assert go_to(world, 15.0, 0.0, 12.0) == ACCEPTED
+
+
 # ---------------------------------------------------------------------- sticks
 
 
