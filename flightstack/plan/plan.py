@@ -14,8 +14,8 @@ from flightstack.plan.item import MissionItem
 class Plan:
     """Mission items in flying order and the planned home.
 
-    ``document`` is the JSON document that the plan was read from (never changed). Geofence, rally points and
-    every key that we do not know live there, and are written back. ``comments`` are those of a waypoint file,
+    ``document`` is the JSON document that the plan was read from (never changed). Every key that we do not
+    know lives there, and is written back. ``comments`` are those of a waypoint file,
     each with the number of the line of values before which it stands.
     """
 
@@ -23,10 +23,16 @@ class Plan:
     home: GeoPoint | None = None
     document: Mapping[str, Any] = field(default_factory=dict, repr=False)
     comments: tuple[tuple[int, str], ...] = ()
+    fence: tuple[MissionItem, ...] = ()
+    """The geofence, as items."""
+    rally: tuple[MissionItem, ...] = ()
+    """The rally points, as items."""
 
     @property
     def has_fence_or_rally(self) -> bool:
-        """Tell whether the document holds geofence or rally points."""
+        """Tell whether there are geofence or rally points, be it of a version that we cannot read."""
+        if self.fence or self.rally:
+            return True
         fence, rally = self.document.get("geoFence"), self.document.get("rallyPoints")
         lists = [
             part.get(key)

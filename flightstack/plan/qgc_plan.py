@@ -16,6 +16,7 @@ from flightstack.params.errors import ConfigError
 from flightstack.plan import values
 from flightstack.plan.item import MissionItem
 from flightstack.plan.plan import Plan
+from flightstack.plan.qgc_areas import fence_items, rally_items
 from flightstack.plan.vocabulary import GLOBAL_FRAMES, Command
 
 
@@ -44,7 +45,8 @@ def plan_of_document(document: Mapping[str, Any], file: object) -> Plan:
         _append(entries, listed_item, file)
     values.check_count(file, len(entries))
     home = _home(mission.get("plannedHomePosition"), file)
-    return Plan(_with_jump_targets(entries, file), home, document)
+    items = _with_jump_targets(entries, file)
+    return Plan(items, home, document, fence=fence_items(document, file), rally=rally_items(document, file))
 
 
 def _document(text: str, file: object) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import Any
 from flightstack.geodesy import GeoPoint
 from flightstack.plan.item import MissionItem, float_coordinate
 from flightstack.plan.plan import Plan
+from flightstack.plan.qgc_areas import fence_document, rally_document
 from flightstack.plan.qgc_plan import plan_of_document
 from flightstack.plan.vocabulary import Command
 
@@ -27,6 +28,10 @@ def plan_to_json(plan: Plan) -> str:
         ]
     if source.home is None or source.home != plan.home:
         mission["plannedHomePosition"] = [_number(value) for value in plan.home or _derived_home(plan)]
+    if source.fence != plan.fence:
+        document["geoFence"] = fence_document(plan.fence, document.get("geoFence") or {})
+    if source.rally != plan.rally:
+        document["rallyPoints"] = rally_document(plan.rally, plan.home, document.get("rallyPoints") or {})
     return json.dumps(document, indent=4) + "\n"
 
 

@@ -120,7 +120,11 @@ def test_every_supported_command_is_in_the_mission_that_says_so() -> None:
 def document(*listed: dict[str, Any]) -> dict[str, Any]:
     return {
         "fileType": "Plan",
-        "geoFence": {"circles": [{"circle": {"radius": 50}}], "polygons": [], "version": 2},
+        "geoFence": {
+            "circles": [{"circle": {"center": [47.0, 8.0], "radius": 50}, "inclusion": True, "version": 1}],
+            "polygons": [],
+            "version": 2,
+        },
         "groundStation": "QGroundControl",
         "mission": {
             "cruiseSpeed": 15,
