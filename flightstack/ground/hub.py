@@ -140,15 +140,21 @@ class GroundHub:
     # ------------------------------------------------------------------ sending
 
     def poll(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
-        """Yield (address, bytes) of all that is to be sent now."""
+        """Yield (address, bytes) of all that is to be sent now.
+
+        Who has little time may take a part of it, and the rest later, before the next call; ``receive`` may be
+        called in between.
+        """
         changed = self._note_changes()
         for service in self._services:
             self._collect(service.poll(now_s))
         self._spread_texts()
         self._made.clear()
         for address, peer in list(self._peers.items()):
-            for message in self._due(peer, changed, now_s):
-                yield address, peer.link.encode_shared(message)
+            if self._peers.get(address) is peer:  # it may have gone while its turn had not come
+                frames = [peer.link.encode_shared(message) for message in self._due(peer, changed, now_s)]
+                for frame in frames:
+                    yield address, frame
         yield from self._forwarded()
         self._forget_silent(now_s)
 

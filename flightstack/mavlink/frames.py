@@ -88,12 +88,17 @@ def frame_size(buffer: bytes, start: int) -> int | None:
 
 
 def checked(data: bytes) -> Frame | None:
-    """Return the frame that ``data`` is, or None when its checksum is wrong."""
+    """Return the frame that ``data`` is, or None when its checksum is wrong.
+
+    Unknown messages are frames in version 2 only, where two octets of the header have to fit.
+    """
     if data[0] == MAGIC_V1:
         message_id, end = data[5], len(data) - CHECKSUM_SIZE
     else:
         message_id, end = int.from_bytes(data[7:10], "little"), HEADER_V2 + data[1]
     kind = mavlink.mavlink_map.get(message_id)
+    if data[0] == MAGIC_V1 and (kind is None or data[1] > kind.unpacker.size):
+        return None  # one in 256 octets of noise begins such a frame: only a checksum may speak for it
     if kind is None:
         return Frame(data, message_id, known=False)
     if _crc16(data[1:end] + bytes((kind.crc_extra,))) != data[end] | data[end + 1] << 8:
