@@ -8,6 +8,7 @@ import select
 import signal
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -30,6 +31,8 @@ from flightstack.transport.vehicle_ports import Place, PortsConfig, VehiclePorts
 
 EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
 GROUND_POLL_NS = 500_000
+GROUND_SLICE_NS = 400_000
+"""In real time, sending to ground stations takes so much of a tick at most; what is left waits for the next."""
 REPORT_S = 0.2
 SECOND_HELLO_S = 1.0
 """Silence after which a simulator is asked for the standard message."""
@@ -88,6 +91,8 @@ class App:
         self._next_log_us = 0
         self._next_ground_ns = 0
         self._follower: Follower | None = None
+        self._sending: Iterator[tuple[PeerAddress, bytes]] | None = None
+        self._slice_ns: int | None = None
 
     def _open_signing(self) -> Signing | None:
         """Sign the ground links if there is to be a key; raise ConfigError."""
@@ -293,6 +298,7 @@ class App:
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
         ask_for_punctual_sleeps()
         scheduler = DeadlineScheduler(timing)
+        self._slice_ns = GROUND_SLICE_NS
         interval_us, tick, time_us = self.stack.rates.interval_us, 0, 0
         heard_s = time.monotonic()
         while True:
@@ -308,6 +314,8 @@ class App:
             if tick % self.stack.rates.divisor == 0:
                 self._between_ticks()
                 self._check_simulator(heard_s + self._process.simulator_timeout_s)
+            elif self._sending is not None:
+                self._send()
 
     def _between_ticks(self) -> None:
         """Do what is due between two ticks: ground links, timing report, reasons to stop."""
@@ -341,9 +349,22 @@ class App:
             ground.add_peer(PeerAddress(channel, *peer), permanent=True)
         for channel, peer in ports.closed():
             ground.drop_peer(PeerAddress(channel, *peer))
-        for (channel, host, port), data in ground.poll(now_s):
-            ports.send(channel, (host, port), data)
-        ports.flush()
+        if self._sending is None:
+            self._sending = ground.poll(now_s)
+        self._send()
+
+    def _send(self) -> None:
+        """Send what is due, as far as the time goes that a tick leaves for it."""
+        assert self._sending is not None
+        clock_ns, send = time.monotonic_ns, self._ports.send
+        end_ns = math.inf if self._slice_ns is None else clock_ns() + self._slice_ns
+        for (channel, host, port), data in self._sending:
+            send(channel, (host, port), data)
+            if clock_ns() >= end_ns:
+                break
+        else:
+            self._sending = None
+        self._ports.flush()
 
     def _is_heard(self, place: Place) -> bool:
         channel, peer = place
