@@ -18,13 +18,16 @@ from flightstack.clock import DeadlineScheduler, ask_for_punctual_sleeps
 from flightstack.config import StackConfig
 from flightstack.ground.peer import PeerAddress
 from flightstack.logging.flight_log import FlightLog
-from flightstack.logging.log_library import LogLibrary, create_log_file
+from flightstack.logging.log_files import LogFiles
+from flightstack.logging.log_library import LogLibrary
+from flightstack.logging.log_tail import FileTail
 from flightstack.mavlink.services.log_store import NO_LOGS
 from flightstack.mavlink.signing import Signing
 from flightstack.modes import Mode
 from flightstack.params.identity import SYSTEM_ID
 from flightstack.params.saver import ParamSaver
 from flightstack.signing_file import create_key, open_signing, replace_key
+from flightstack.snapshot import ERROR
 from flightstack.transport.processor import Follower
 from flightstack.transport.tcp import LinkClosedError, TcpClient
 from flightstack.transport.vehicle_ports import Place, PortsConfig, VehiclePorts
@@ -71,9 +74,10 @@ class App:
 
     def __init__(self, config: StackConfig, process: ProcessConfig) -> None:
         self._process = process
-        self._log_count = 0
+        self._log_files = LogFiles(process.log)
         logs = NO_LOGS if process.log is None else LogLibrary(process.log.parent)
         self.stack: Stack = build(config, self._open_log, logs)
+        self.stack.ground.vehicle.open_log_tail = self._open_tail
         self._signing = self._open_signing()
         self._ports = VehiclePorts(process.ports)
         self._saver: ParamSaver | None = None
@@ -177,21 +181,18 @@ class App:
             )
 
     def _open_log(self) -> FlightLog | None:
-        path = self._process.log
-        if path is None:
-            return None
-        self._log_count += 1
-        if self._log_count > 1:
-            path = path.with_name(f"{path.stem}-{self._log_count}{path.suffix}")
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            return FlightLog(create_log_file(path), len(self.stack.vehicle.rotors))
+            return self._log_files.open(len(self.stack.vehicle.rotors))
         except OSError as error:
-            self.stack.autopilot.say(3, f"No log: {path}: {error.strerror}")
+            path = self._log_files.current
+            self.stack.autopilot.say(ERROR, f"No log: {path}: {error.strerror}")
             print(
                 f"flightstack: no log can be written to {path}: {error.strerror}", file=sys.stderr, flush=True
             )
             return None
+
+    def _open_tail(self) -> FileTail | None:
+        return self._log_files.tail(lambda: self.stack.recorder.is_logging)
 
     # ------------------------------------------------------------------ start
 

@@ -33,6 +33,7 @@ class AutopilotFacts:
         self.system_id = system_id
         self.rotors = len(vehicle.rotors)
         self.max_thrust_n = vehicle.weight_n * 2.0 if vehicle.ideal_rotors else vehicle.max_thrust_n
+        self.model = vehicle.name
         self.is_generic = is_generic
         self.frame = autopilot.places.frame
         self.top_speed_rad_s = [min(rotor.max_speed_rad_s, 1e6) for rotor in vehicle.rotors]

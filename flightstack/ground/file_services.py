@@ -12,9 +12,9 @@ from flightstack.mavlink.services.param_pack import pack_file
 
 
 def file_services(
-    own: Address, vehicle: VehicleContext, metadata: ComponentMetadata | None
+    own: Address, vehicle: VehicleContext, metadata: ComponentMetadata
 ) -> tuple[Service, Service]:
-    """Return the services of MAVLink FTP and of the log protocol; ``metadata`` None shows no metadata files."""
+    """Return the services of MAVLink FTP and of the log protocol."""
     autopilot = vehicle.autopilot
     files = vehicle_files(metadata, lambda arguments: pack_file(vehicle.params, arguments), vehicle.logs)
     return (

@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable
 
-from flightstack.commands.context import ACCEPTED, DENIED, Answer
+from flightstack.commands.context import ACCEPTED, DENIED, REJECTED, UNSUPPORTED, Answer
 from flightstack.ground.facts import AutopilotFacts
 from flightstack.ground.peer import Peer
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address, is_for
 from flightstack.mavlink.services.command_server import Command
+from flightstack.mavlink.services.component_metadata import ComponentMetadata
+from flightstack.mavlink.services.log_stream import LogStream
 from flightstack.mavlink.telemetry import is_available, messages
+from flightstack.mavlink.telemetry.fields import boot_ms
 
 LINK_COMMANDS = frozenset(
     {
@@ -21,6 +24,8 @@ LINK_COMMANDS = frozenset(
         mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
         mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
         mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,
+        mavlink.MAV_CMD_LOGGING_START,
+        mavlink.MAV_CMD_LOGGING_STOP,
     }
 )
 FORERUNNERS: dict[int, int] = {
@@ -28,6 +33,8 @@ FORERUNNERS: dict[int, int] = {
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION,
 }
 """Commands from before REQUEST_MESSAGE, and what they ask for."""
+ULOG = 0.0
+"""Format of LOGGING_START."""
 HIGHEST_MESSAGE_ID = 0xFFFFFF
 
 
@@ -41,8 +48,17 @@ class LinkCommands:
 
     handles = frozenset({"REQUEST_DATA_STREAM"})
 
-    def __init__(self, own: Address, facts: AutopilotFacts, peer_at: Callable[[Hashable], Peer]) -> None:
+    def __init__(
+        self,
+        own: Address,
+        facts: AutopilotFacts,
+        peer_at: Callable[[Hashable], Peer],
+        log_stream: LogStream,
+        metadata: ComponentMetadata,
+    ) -> None:
         self._own = own
+        self._log_stream = log_stream
+        self._metadata = metadata
         self._facts = facts
         self._peer_at = peer_at
 
@@ -54,6 +70,8 @@ class LinkCommands:
             return Answer(ACCEPTED) if done else Answer(DENIED, "no such message or interval")
         if command.command == mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
             return self._send_interval(peer, number)
+        if command.command in (mavlink.MAV_CMD_LOGGING_START, mavlink.MAV_CMD_LOGGING_STOP):
+            return self._stream_log(command)
         if command.command in FORERUNNERS:
             return self._send_message(peer, FORERUNNERS[command.command], 0.0)
         return self._send_message(peer, number, argument)
@@ -61,10 +79,23 @@ class LinkCommands:
     def _send_message(self, peer: Peer, number: int, argument: float) -> Answer:
         if number == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._send_interval(peer, _message_id(argument))
+        if number == mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA:
+            peer.outbox.append(self._metadata.message(boot_ms(self._facts)))
+            return Answer(ACCEPTED)
         if not is_available(number):
             return Answer(DENIED, f"message {number} is not available")
         peer.outbox.extend(messages(number, self._facts, argument))
         return Answer(ACCEPTED)
+
+    def _stream_log(self, command: Command) -> Answer:
+        """LOGGING_START streams the present or the next flight's log (format 0, ULog); LOGGING_STOP ends it."""
+        if command.command == mavlink.MAV_CMD_LOGGING_STOP:
+            self._log_stream.stop()
+            return Answer(ACCEPTED)
+        if command.params[0] != ULOG:
+            return Answer(UNSUPPORTED)
+        refusal = self._log_stream.start(command.peer, command.source)
+        return Answer(ACCEPTED) if refusal is None else Answer(REJECTED, refusal)
 
     def _send_interval(self, peer: Peer, about: int) -> Answer:
         if not 0 <= about <= 0xFFFF:

@@ -33,7 +33,7 @@ def make_services(
     metadata = ComponentMetadata(
         parameters_json(vehicle.params.specs.values()), VENDOR, facts.model, __version__
     )
-    log_stream = LogStream(own, lambda: vehicle.open_log_tail())
+    log_stream = LogStream(own, lambda: vehicle.open_log_tail())  # noqa: PLW0108  # the process sets it later
     link_commands = LinkCommands(own, facts, peer_at, log_stream, metadata)
     return [
         MissionService(own, vehicle.autopilot),

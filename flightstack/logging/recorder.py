@@ -39,6 +39,11 @@ class FlightRecorder:
         self._missions = 0
         self.error: OSError | None = None
 
+    @property
+    def is_logging(self) -> bool:
+        """Whether a log is being written."""
+        return self._log is not None
+
     def inner_row(self, time_us: int) -> FloatArray:
         """Return the row that the inner loop fills in this tick."""
         return self._scratch if self._log is None else self._log.inner.append(time_us)
@@ -54,8 +59,8 @@ class FlightRecorder:
         row[OUTER.setpoint : OUTER.target_attitude] = setpoint
         row[OUTER.target_attitude :] = attitude_target
 
-    def status(self, time_us: int, status: Status) -> None:
-        """Record mode and arming; arming begins a log, disarming ends it."""
+    def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
+        """Record mode and arming, and whether a failsafe acts; arming begins a log, disarming ends it."""
         if status.armed and self._log is None:
             self._begin(time_us)
         if self._log is None:
@@ -66,6 +71,7 @@ class FlightRecorder:
             nav_state_timestamp=time_us,
             arming_state=ARMING_STATE_ARMED if status.armed else ARMING_STATE_DISARMED,
             nav_state=NAVIGATION_STATE[status.mode],
+            failsafe=int(failsafe),
             pre_flight_checks_pass=1,
         )
         if not status.armed:

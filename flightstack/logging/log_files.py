@@ -1,0 +1,42 @@
+"""The files of one process's flight logs: named one after the other, and readable while they are written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from flightstack.logging.flight_log import FlightLog
+from flightstack.logging.log_library import create_log_file
+from flightstack.logging.log_tail import FileTail
+
+
+class LogFiles:
+    """Opens ``first`` for the first flight, and for the next ones files with a number behind its name."""
+
+    def __init__(self, first: Path | None) -> None:
+        self._first = first
+        self._count = 0
+        self.current: Path | None = None
+        """The newest log, finished or not."""
+
+    def open(self, rotors: int) -> FlightLog | None:
+        """Begin the next log; None if there are to be none. Raise OSError."""
+        path = self._first
+        if path is None:
+            return None
+        self._count += 1
+        if self._count > 1:
+            path = path.with_name(f"{path.stem}-{self._count}{path.suffix}")
+        self.current = path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return FlightLog(create_log_file(path), rotors)
+
+    def tail(self, is_logging: Callable[[], bool]) -> FileTail | None:
+        """Return the log that is being written, to be read along; None while there is none."""
+        path = self.current
+        if path is None or not is_logging():
+            return None
+        try:
+            return FileTail(path, lambda: is_logging() and self.current == path)
+        except OSError:
+            return None
