@@ -11,6 +11,7 @@ import pytest
 from pyulog import ULog
 
 from flightstack.contract import LoopRow
+from flightstack.mavlink.dialect import mavlink
 from flightstack.modes import Mode
 from tests.support.world import World, item
 
@@ -66,6 +67,19 @@ def test_a_gain_acts_on_the_next_tick(controller: str, gain: str) -> None:
     )
     changed.run(3.0)
     assert changed.velocity[0] == pytest.approx(4.0, abs=0.3)
+
+
+def test_a_ground_station_changes_a_gain_in_flight_and_is_told() -> None:
+    world = cruising()
+    world.send(mavlink.MAVLink_param_set_message(1, 1, b"POS_XY_P", 6.1, mavlink.MAV_PARAM_TYPE_REAL32))
+    world.run(0.1)
+    assert world.stack.autopilot._backend.get_parameter("POS_XY_P") == 6.1
+    assert world.received["PARAM_VALUE"].param_id == "POS_XY_P"
+    assert world.received["PARAM_VALUE"].param_value == pytest.approx(6.1)
+    world.send(mavlink.MAVLink_param_set_message(1, 1, b"POS_XY_P", math.nan, mavlink.MAV_PARAM_TYPE_REAL32))
+    world.run(0.1)
+    assert world.stack.params.value("POS_XY_P") == 6.1
+    assert any("POS_XY_P" in text for text in world.texts)
 
 
 def test_an_integral_gain_changes_without_a_bump() -> None:
