@@ -10,14 +10,19 @@ from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.command_client import CommandClient, CommandResult
 from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
-from flightstack.plan import MissionItem, MissionResult
+from flightstack.plan import MissionItem, MissionResult, MissionType
 from gcs_cli.session import COMPONENT_ID, SYSTEM_ID, Session
 
 TEXT_WAIT_S = 0.3
 """How long to wait for the text that explains a refusal: it comes right after the answer."""
 
 _WARNING = 4  # MAV_SEVERITY_WARNING; lower is worse
-_PREFIXES = ("Command refused: ", "Mission refused: ")
+_PREFIXES = (
+    "Command refused: ",
+    "Mission refused: ",
+    "Geofence refused: ",
+    "List of rally points refused: ",
+)
 
 
 class Answer(NamedTuple):
@@ -29,7 +34,9 @@ class Answer(NamedTuple):
     silent: bool = False
     """Whether the vehicle did not answer at all."""
     items: tuple[MissionItem, ...] = ()
-    """The mission, of a download."""
+    """The plan, of a download."""
+    result: int = MissionResult.ACCEPTED
+    """The MAV_MISSION_RESULT of a transfer."""
 
 
 class Call:
@@ -61,12 +68,13 @@ class Call:
         )
         if silent:
             return Answer(False, result.reason, silent=True)
+        code = result.result if isinstance(result, Failed) else MissionResult.ACCEPTED
         text = self._explanation()
         if text:
-            return Answer(False, text)
+            return Answer(False, text, result=code)
         if self._text_due_s is None:
             self._text_due_s = now_s + TEXT_WAIT_S
-        return Answer(False, result.reason) if now_s >= self._text_due_s else None
+        return Answer(False, result.reason, result=code) if now_s >= self._text_due_s else None
 
     def _explanation(self) -> str:
         texts = [
@@ -87,29 +95,29 @@ def command(session: Session, number: int, params: Sequence[float], now_s: float
     return Call(session, client)
 
 
-def upload(session: Session, items: Sequence[MissionItem]) -> Call:
-    """Begin to upload a mission; without items it is cleared."""
-    client = _mission_client(session)
+def upload(session: Session, items: Sequence[MissionItem], kind: MissionType = MissionType.MISSION) -> Call:
+    """Begin to upload a mission, geofence or rally points; without items they are cleared."""
+    client = _mission_client(session, kind)
     client.start_upload(items)
     return Call(session, client)
 
 
-def download(session: Session) -> Call:
-    """Begin to download the mission."""
-    client = _mission_client(session)
+def download(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
+    """Begin to download the mission, geofence or rally points."""
+    client = _mission_client(session, kind)
     client.start_download()
     return Call(session, client)
 
 
-def clear(session: Session) -> Call:
-    """Begin to clear the mission."""
-    client = _mission_client(session)
+def clear(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
+    """Begin to clear the mission, geofence, rally points or all."""
+    client = _mission_client(session, kind)
     client.start_clear()
     return Call(session, client)
 
 
-def _mission_client(session: Session) -> MissionClient:
-    return MissionClient(_vehicle(session), Address(SYSTEM_ID, COMPONENT_ID))
+def _mission_client(session: Session, kind: MissionType) -> MissionClient:
+    return MissionClient(_vehicle(session), Address(SYSTEM_ID, COMPONENT_ID), kind)
 
 
 def _vehicle(session: Session) -> Address:
@@ -126,6 +134,7 @@ FORCE_DISARM: Command = (int(mavlink.MAV_CMD_COMPONENT_ARM_DISARM), (0.0, 21196.
 LAND: Command = (int(mavlink.MAV_CMD_NAV_LAND), (0.0, 0.0, 0.0, NAN, NAN, NAN, NAN))
 RETURN: Command = (int(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH), ())
 START_MISSION: Command = (int(mavlink.MAV_CMD_MISSION_START), ())
+REBOOT: Command = (int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), (1.0,))
 SHUT_DOWN: Command = (int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), (2.0,))
 _REQUEST = int(mavlink.MAV_CMD_REQUEST_MESSAGE)
 REQUEST_MISSION_CURRENT: Command = (_REQUEST, (float(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT),))
@@ -136,6 +145,24 @@ REQUEST_SYS_STATUS: Command = (_REQUEST, (float(mavlink.MAVLINK_MSG_ID_SYS_STATU
 def takeoff_command(altitude_amsl_m: float = NAN) -> Command:
     """Return the command to take off to an altitude above sea level; NaN: as high as the vehicle likes."""
     return int(mavlink.MAV_CMD_NAV_TAKEOFF), (0.0, 0.0, 0.0, NAN, NAN, NAN, altitude_amsl_m)
+
+
+def goto_command(latitude_deg: float, longitude_deg: float, altitude_amsl_m: float = NAN) -> Command:
+    """Return the command to hold at another place; an altitude that is NaN stays as it is."""
+    change_mode = float(mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+    params = (-1.0, change_mode, 0.0, NAN, latitude_deg, longitude_deg, altitude_amsl_m)
+    return int(mavlink.MAV_CMD_DO_REPOSITION), params
+
+
+def speed_command(speed_m_s: float) -> Command:
+    """Return the command to fly at another ground speed."""
+    return int(mavlink.MAV_CMD_DO_CHANGE_SPEED), (1.0, speed_m_s, -1.0)
+
+
+def home_command(place: tuple[float, float, float] | None) -> Command:
+    """Return the command to move home to latitude, longitude, altitude above the sea; None: here."""
+    number = int(mavlink.MAV_CMD_DO_SET_HOME)
+    return (number, (1.0,)) if place is None else (number, (0.0, 0.0, 0.0, NAN, *place))
 
 
 def mode_command(main: int, sub: int) -> Command:

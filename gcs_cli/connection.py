@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 
 from flightstack.mavlink.signing import LinkSigning
+from flightstack.plan import MissionResult
 from flightstack.transport.udp import PortBusyError, UdpSocket, resolve
 from gcs_cli.calls import Answer, Call
 from gcs_cli.endpoint import VEHICLE_CONNECTION, Endpoint
@@ -86,8 +87,11 @@ class Connection:
                 NO_ANSWER,
             )
 
-    def complete(self, call: Call, name: str) -> Answer:
-        """Run a request to its end; raise CliError when the vehicle refuses ``name`` or does not answer."""
+    def complete(self, call: Call, name: str, *, may_lack: bool = False) -> Answer:
+        """Run a request to its end; raise CliError when the vehicle refuses ``name`` or does not answer.
+
+        With ``may_lack``, a vehicle that knows no such type of plan has an empty one.
+        """
         session = self.session
         while (answer := call.answer(self.now_s)) is None:
             if session.view.powered_off or session.view.lost(self.now_s):
@@ -95,6 +99,8 @@ class Connection:
                     f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}"
                 )
             self.step(self.now_s + _LONGEST_WAIT_S)
+        if may_lack and answer.result == MissionResult.UNSUPPORTED:
+            return Answer(True)
         if not answer.accepted:
             refused = f"{name}: {answer.reason}" if answer.silent else f"{name} refused: {answer.reason}"
             raise CliError(refused, NO_ANSWER if answer.silent else FAILED)

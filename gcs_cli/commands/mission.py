@@ -1,35 +1,83 @@
-"""``gcs mission upload|download|clear|start``."""
+"""``gcs mission upload|download|check|clear|start``."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
 from gcs_cli.settings import ConnectOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
-    from flightstack.plan import MissionItem
+    from flightstack.plan import MissionItem, MissionType, Plan
 
 app = typer.Typer(help="The vehicle's mission.", no_args_is_help=True)
+
+
+class Part(StrEnum):
+    """What ``--type`` may be."""
+
+    MISSION = "mission"
+    FENCE = "fence"
+    RALLY = "rally"
+    ALL = "all"
+
+
+FileArgument = Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)]
 
 
 @app.command()
 def upload(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)],
+    file: FileArgument,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
 ) -> None:
-    """Replace the vehicle's mission by that of a file."""
+    """Replace the vehicle's mission, geofence and rally points by those of a file.
+
+    What the file does not hold stays as it is on the vehicle.
+    """
     from flightstack.plan import load_plan  # noqa: PLC0415
     from gcs_cli import calls  # noqa: PLC0415
 
-    items = load_plan(file).items
+    plan = load_plan(file)
+    parts = [part for part in plan_parts(plan) if part.items or part.kind == 0]
+    done: list[str] = []
     with meet_vehicle(context, connect, timeout) as connection:
-        connection.complete(calls.upload(connection.session, items), f"upload of {file}")
-    typer.echo(f"mission of {len(items)} items uploaded")
+        for part in parts:
+            name = f"upload of the {part.name} of {file}" if len(parts) > 1 else f"upload of {file}"
+            if done:
+                name = f"{' and '.join(done)} uploaded, but {name}"
+            connection.complete(calls.upload(connection.session, part.items, part.kind), name)
+            done.append(part.name)
+    for part in parts:
+        typer.echo(f"{part.name} of {len(part.items)} items uploaded")
+
+
+@app.command()
+def check(file: FileArgument) -> None:
+    """Check a file as the vehicle does, without one: mission, geofence and rally points."""
+    from flightstack.geodesy import GeoPoint  # noqa: PLC0415
+    from flightstack.plan import check_fence, check_mission, check_rally, fence_shape, load_plan  # noqa: PLC0415
+    from gcs_cli.errors import FAILED, CliError  # noqa: PLC0415
+
+    plan = load_plan(file)
+    first = next((item.position_deg for item in plan.items if item.position_deg is not None), (0.0, 0.0))
+    home = plan.home or GeoPoint(*first, 0.0)
+    fence = fence_shape(plan.fence, home)
+    checks = {
+        "geofence": check_fence(plan.fence, home),
+        "mission": check_mission(plan.items, home, fence=fence) if plan.items else None,
+        "list of rally points": check_rally(plan.rally, home, fence=fence),
+    }
+    for name, rejection in checks.items():
+        if rejection is not None:
+            raise CliError(f"{file}: {name}: {rejection.reason}", FAILED)
+    for part in plan_parts(plan):
+        typer.echo(f"{part.name} of {len(part.items)} items: good")
 
 
 @app.command()
@@ -41,34 +89,55 @@ def download(
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
 ) -> None:
-    """Fetch the vehicle's mission."""
+    """Fetch the vehicle's mission, geofence and rally points."""
     from flightstack.geodesy import GeoPoint  # noqa: PLC0415
-    from flightstack.plan import Plan, save_plan  # noqa: PLC0415
+    from flightstack.plan import MissionType, Plan, save_plan  # noqa: PLC0415
     from gcs_cli import calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout) as connection:
         session = connection.session
-        items = connection.complete(calls.download(session), "download").items
+        items, fence, rally = (
+            connection.complete(
+                calls.download(session, kind), "download", may_lack=kind != MissionType.MISSION
+            ).items
+            for kind in (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)
+        )
         if file is not None:
             # so that the file says where home is; a vehicle that does not tell leaves it open
             connection.wait_for(lambda: session.view.home is not None, 3.0)
         home = session.view.home
-    if file is None:
-        for seq, item in enumerate(items):
-            typer.echo(item_line(seq, item))
-    else:
-        save_plan(file, Plan(items, None if home is None else GeoPoint(*home[:3])))
-    typer.echo(f"mission of {len(items)} items downloaded" + (f" to {file}" if file else ""))
+    plan = Plan(items, None if home is None else GeoPoint(*home[:3]), fence=fence, rally=rally)
+    if file is not None:
+        save_plan(file, plan)
+    for part in plan_parts(plan):
+        if file is None:
+            for seq, item in enumerate(part.items):
+                typer.echo(item_line(seq, item))
+        if part.items or part.kind == MissionType.MISSION:
+            typer.echo(f"{part.name} of {len(part.items)} items downloaded" + (f" to {file}" if file else ""))
 
 
 @app.command()
-def clear(context: typer.Context, connect: ConnectOption = None, timeout: TimeoutOption = None) -> None:
-    """Remove the vehicle's mission."""
+def clear(
+    context: typer.Context,
+    part: Annotated[Part, typer.Option("--type", help="What to remove.")] = Part.MISSION,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+) -> None:
+    """Remove the vehicle's mission, geofence or rally points."""
+    from flightstack.plan import MissionType  # noqa: PLC0415
     from gcs_cli import calls  # noqa: PLC0415
 
+    kind = MissionType[part.name]
+    name = {
+        Part.FENCE: "geofence",
+        Part.RALLY: "rally points",
+        Part.ALL: "mission, geofence and rally points",
+    }
+    said = name.get(part, "mission")
     with meet_vehicle(context, connect, timeout) as connection:
-        connection.complete(calls.clear(connection.session), "clearing the mission")
-    typer.echo("mission cleared")
+        connection.complete(calls.clear(connection.session, kind), f"clearing the {said}")
+    typer.echo(f"{said} cleared")
 
 
 @app.command()
@@ -80,6 +149,22 @@ def start(context: typer.Context, connect: ConnectOption = None, timeout: Timeou
     with meet_vehicle(context, connect, timeout) as connection:
         order(connection, calls.START_MISSION, "mission start")
     typer.echo("mission started")
+
+
+class PlanPart(NamedTuple):
+    """One of the three plans in a file or on a vehicle."""
+
+    kind: MissionType
+    name: str
+    items: Sequence[MissionItem]
+
+
+def plan_parts(plan: Plan) -> list[PlanPart]:
+    """Return mission, geofence and rally points, in the order in which ground stations send them."""
+    from flightstack.plan import PLAN_NAMES  # noqa: PLC0415
+
+    items = (plan.items, plan.fence, plan.rally)
+    return [PlanPart(kind, name, part) for (kind, name), part in zip(PLAN_NAMES.items(), items, strict=True)]
 
 
 def item_line(seq: int, item: MissionItem) -> str:

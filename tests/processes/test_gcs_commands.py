@@ -95,6 +95,51 @@ def test_a_mission_goes_up_and_comes_down_the_same(tmp_path: Path) -> None:
     assert vehicle.items == []
 
 
+def test_a_plan_goes_up_and_comes_down_with_its_geofence_and_rally_points(tmp_path: Path) -> None:
+    from flightstack.plan import load_plan  # noqa: PLC0415
+
+    vehicle, copy = FakeVehicle(), tmp_path / "copy.plan"
+    result = told(vehicle, "mission", "upload", MISSIONS / "fenced_square.plan")
+    assert result.stdout.splitlines() == [
+        "mission of 6 items uploaded",
+        "geofence of 5 items uploaded",
+        "list of rally points of 1 items uploaded",
+    ]
+    assert [len(vehicle.plans[kind]) for kind in (0, 1, 2)] == [6, 5, 1]
+    assert told(vehicle, "mission", "download", copy).returncode == 0
+    before, after = load_plan(MISSIONS / "fenced_square.plan"), load_plan(copy)
+    assert (after.items, after.fence, after.rally) == (before.items, before.fence, before.rally)
+    assert told(vehicle, "mission", "clear", "--type", "fence").stdout == "geofence cleared\n"
+    assert [len(vehicle.plans[kind]) for kind in (0, 1, 2)] == [6, 0, 1]
+    told(vehicle, "mission", "clear", "--type", "all")
+    assert not any(vehicle.plans.values())
+
+
+def test_a_refused_geofence_is_told_from_the_mission_that_went_before() -> None:
+    vehicle = FakeVehicle(refused_type=1)
+    result = told(vehicle, "mission", "upload", MISSIONS / "fenced_square.plan")
+    assert result.returncode == 1
+    assert "mission uploaded, but upload of the geofence of" in result.stderr
+    assert [len(vehicle.plans[kind]) for kind in (0, 1, 2)] == [6, 0, 0]
+
+
+def test_a_vehicle_without_geofence_is_downloaded_from() -> None:
+    vehicle = FakeVehicle(unknown_types=(1, 2))
+    result = told(vehicle, "mission", "download")
+    assert (result.returncode, result.stdout) == (0, "mission of 0 items downloaded\n")
+
+
+def test_files_are_checked_as_the_vehicle_checks_them(tmp_path: Path) -> None:
+    good = gcs("mission", "check", MISSIONS / "fenced_square.plan")
+    assert (good.returncode, good.stdout.splitlines()[1]) == (0, "geofence of 5 items: good")
+    bad = tmp_path / "bad.plan"
+    text = (MISSIONS / "fenced_square.plan").read_text()
+    bad.write_text(text.replace('"radius": 4.0', '"radius": 15.0'))
+    result = gcs("mission", "check", bad)
+    assert result.returncode == 1
+    assert "mission: item 1 (NAV_WAYPOINT)" in result.stderr
+
+
 def test_a_refused_mission_names_the_item() -> None:
     vehicle = FakeVehicle(mission_result=3, mission_refusal="Mission refused: item 2 is not supported")
     result = told(vehicle, "mission", "upload", MISSIONS / "hop.plan")

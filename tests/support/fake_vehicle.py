@@ -19,6 +19,8 @@ ARM, START, SHUT_DOWN, REQUEST, RETURN = 400, 300, 246, 512, 20
 HOLD, MISSION, RTL = (4 << 16 | sub << 24 for sub in (3, 4, 5))
 ACCEPTED, REJECTED, UNSUPPORTED = 0, 1, 3
 STEP_S = 0.05
+EVERY_TYPE = 255
+DENIED = 14
 
 
 @dataclass
@@ -34,6 +36,10 @@ class FakeVehicle:
     """Names of messages that never arrive."""
     mission_result: int = ACCEPTED
     mission_refusal: str = ""
+    refused_type: int | None = None
+    """MAV_MISSION_TYPE whose uploads are refused."""
+    unknown_types: tuple[int, ...] = ()
+    """MAV_MISSION_TYPEs that it does not know."""
     healthy_after_s: float = 0.0
     stop_at_item: int | None = None
     """Item at which it does ``at_stop``: "disarm", "silence", "power off" or "hover"."""
@@ -44,7 +50,8 @@ class FakeVehicle:
     def __post_init__(self) -> None:
         self.codec = mavlink.MAVLink(None, self.system_id, 1)
         self.codec.robust_parsing = True
-        self.items: list[Any] = []
+        self.plans: dict[int, list[Any]] = {0: [], 1: [], 2: []}
+        self._type = 0
         self.commands: list[tuple[int, tuple[float, ...]]] = []
         self.heard: list[str] = []
         self.armed = self.silent = self.powered_off = self.complete = False
@@ -108,6 +115,7 @@ class FakeVehicle:
         self._ack(REQUEST, ACCEPTED if number in makers else UNSUPPORTED)
 
     def _on_mission_count(self, message: Any) -> None:
+        self._type = message.mission_type
         self._uploading, self._expected = [], message.count
         self._ask_next_item()
 
@@ -119,25 +127,36 @@ class FakeVehicle:
     def _ask_next_item(self) -> None:
         seq = len(self._uploading)
         if seq < self._expected:
-            self._out.append(mavlink.MAVLink_mission_request_int_message(255, 190, seq))
+            self._out.append(mavlink.MAVLink_mission_request_int_message(255, 190, seq, self._type))
             return
-        self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, self.mission_result))
-        if self.mission_result == ACCEPTED:
-            self.items = self._uploading
+        result = DENIED if self._type == self.refused_type else self.mission_result
+        self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, result, self._type))
+        if result == ACCEPTED:
+            self.plans[self._type] = self._uploading
         elif self.mission_refusal:
             self._say(self.mission_refusal)
 
-    def _on_mission_request_list(self, _message: Any) -> None:
-        self._out.append(mavlink.MAVLink_mission_count_message(255, 190, len(self.items)))
+    def _on_mission_request_list(self, message: Any) -> None:
+        kind = message.mission_type
+        if kind in self.unknown_types:
+            self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, UNSUPPORTED, kind))
+            return
+        self._out.append(mavlink.MAVLink_mission_count_message(255, 190, len(self.plans[kind]), kind))
 
     def _on_mission_request_int(self, message: Any) -> None:
-        item = self.items[message.seq]
+        item = self.plans[message.mission_type][message.seq]
         item.target_system, item.target_component = 255, 190
         self._out.append(item)
 
-    def _on_mission_clear_all(self, _message: Any) -> None:
-        self.items = []
-        self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, ACCEPTED))
+    def _on_mission_clear_all(self, message: Any) -> None:
+        for kind in (0, 1, 2) if message.mission_type == EVERY_TYPE else (message.mission_type,):
+            self.plans[kind] = []
+        self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, ACCEPTED, message.mission_type))
+
+    @property
+    def items(self) -> list[Any]:
+        """The mission."""
+        return self.plans[0]
 
     # -- sending
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -193,7 +194,7 @@ def test_changed_items_are_written_new_and_the_others_kept(tmp_path: Path) -> No
     source = document(simple(jump_id=7), simple(jump_id=8), simple_jump(8, jump_id=9))
     plan = load_plan(write(tmp_path / "a.plan", source))
     changed = MissionItem(Command.NAV_LAND, Frame.GLOBAL_RELATIVE_ALT, 0.0, 0.0, 0.0, NAN, UNSET_E7, UNSET_E7)
-    new = Plan((plan.items[0], changed, *plan.items[2:]), GeoPoint(1.0, 2.0, 3.0), plan.document)
+    new = replace(plan, items=(plan.items[0], changed, *plan.items[2:]), home=GeoPoint(1.0, 2.0, 3.0))
     save_plan(tmp_path / "b.plan", new)
     again = load_plan(tmp_path / "b.plan")
     assert (again.items, again.home) == (new.items, new.home)
