@@ -167,3 +167,32 @@ def test_setpoints_that_make_no_sense_are_refused_once() -> None:
     refused = [text for text in world.texts if "Setpoint refused" in text]
     assert refused == ["Setpoint refused: the position has only one of its horizontal parts"]
     assert np.linalg.norm(world.position - before) < 0.02
+
+
+def test_nothing_that_is_streamed_breaks_the_flight() -> None:
+    """Random masks, frames and numbers, NaN, infinite and huge ones among them, 50 times a second."""
+    # without the rotor check: such setpoints drive the rotors from limit to limit
+    world = in_offboard(params=["MPC_XY_VEL_MAX=6", "FD_ACT_EN=0"])
+    random = np.random.default_rng(3)
+    odd = (math.nan, math.inf, -math.inf, 3e38, -3e38, 0.0)
+    held_on, steepest, fastest = 0, 0.0, 0.0
+    hover = local_point((0.0, 0.0, -15.0))
+    for step in range(1500):
+        numbers = [
+            float(random.choice(odd)) if random.random() < 0.1 else float(x) for x in random.normal(0, 8, 11)
+        ]
+        frame, mask = int(random.choice((1, 7, 8, 9, 12))), int(random.integers(0, 4096))
+        world.send(mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, frame, mask, *numbers))
+        if step % 25 == 0 or world.altitude < 8.0:  # well above the ground
+            world.send(hover)
+        world.run(0.02)
+        held_on += world.mode is Mode.OFFBOARD
+        q = world.simulator.frame.state[6:10]
+        steepest = max(steepest, math.acos(1.0 - 2.0 * float(q[1] ** 2 + q[2] ** 2)))
+        fastest = max(fastest, float(np.linalg.norm(world.velocity[:2])))
+    assert held_on == 1500, world.texts
+    assert fastest < 6.6  # 10 % above what the reference may do
+    assert steepest < math.radians(47.0)  # MPC_TILTMAX_AIR and what the attitude loop overshoots
+    assert world.hold() == ACCEPTED
+    world.run(8.0)
+    assert np.linalg.norm(world.velocity) < 0.02

@@ -219,3 +219,32 @@ def test_row_shows_what_the_rotors_make() -> None:
     made = PAPER.effectiveness() @ (speeds * np.abs(speeds))
     assert row[LoopRow.WRENCH_ACHIEVED] == pytest.approx(made, abs=1e-12)
     assert mixer_for(PAPER).high == pytest.approx([303.4359550870504**2] * 4)
+
+
+def test_an_attitude_given_from_outside_is_flown_in_a_straight_line_over_an_outer_period() -> None:
+    """As the outer loop's own targets are; the outer loop rests, and takes over from there without a jump."""
+    loops = make()
+    flight = Flight(loops, at_rest(), setpoint())
+    flight.tick(5)
+    integral = loops._position_memory.copy()
+    pitch = 0.2
+    target = np.array([math.cos(0.5 * pitch), 0.0, math.sin(0.5 * pitch), 0.0, 0.7 * PAPER.weight_n])
+    references, thrusts = [], []
+    for period in range(40):
+        loops.set_attitude_target(target)
+        for _ in range(5):
+            row = np.zeros(LoopRow.SIZE)
+            loops.step(flight.state, flight.wish, SPEEDS, False, row)
+            references.append(row[LoopRow.REFERENCE_ATTITUDE][2])
+            thrusts.append(row[LoopRow.WRENCH][0])
+        assert period or loops._fraction == pytest.approx(1.0)
+    assert thrusts == pytest.approx([0.7 * PAPER.weight_n] * 200)
+    assert references[-1] == pytest.approx(math.sin(0.5 * pitch), rel=1e-3)
+    steps = np.diff(references)
+    assert steps.min() >= -1e-9  # it comes from one side
+    assert np.abs(np.diff(steps)).max() < 1e-3
+    assert loops._position_memory.tolist() == integral.tolist()
+    before = loops.attitude_target.copy()
+    row = np.zeros(LoopRow.SIZE)
+    loops.step(flight.state, flight.wish, SPEEDS, True, row)
+    assert loops._last_target.tolist() == before.tolist()  # the way back begins here
