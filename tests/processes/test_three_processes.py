@@ -7,76 +7,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from queue import Empty, Queue
 
 import pytest
 from pyulog import ULog
 
 from tests.support.free_instance import free_instance
+from tests.support.process import BOUND_S, Process
 from tests.support.world import World
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
-BOUND_S = 60.0
-MOST_LINES = 200
-
-
-class Process:
-    """A process of ours whose output is read as it comes."""
-
-    def __init__(self, module: str, *arguments: str) -> None:
-        self.name = module
-        self._popen = subprocess.Popen(
-            [sys.executable, "-u", "-m", module, *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL,
-            text=True,
-        )
-        self._fresh: Queue[str | None] = Queue()
-        self.lines: list[str] = []
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self) -> None:
-        assert self._popen.stdout is not None
-        with self._popen.stdout as output:
-            for line in output:
-                self.lines.append(line.rstrip())
-                self._fresh.put(line)
-        self._fresh.put(None)
-
-    def wait_for(self, text: str) -> None:
-        for _ in range(MOST_LINES):
-            try:
-                line = self._fresh.get(timeout=BOUND_S)
-            except Empty:
-                line = None
-            assert line is not None, f"{self.name} never said {text!r}: {self.output}"
-            if text in line:
-                return
-        raise AssertionError(f"{self.name} did not say {text!r} in {MOST_LINES} lines: {self.output}")
-
-    def end(self) -> int:
-        code = self._popen.wait(BOUND_S)
-        self._reader.join(BOUND_S)
-        return code
-
-    def kill(self) -> None:
-        self._popen.kill()
-        self.end()
-
-    def interrupt(self) -> None:
-        self._popen.send_signal(signal.SIGINT)
-
-    @property
-    def output(self) -> str:
-        return "\n".join(self.lines)
 
 
 Start = Callable[..., Process]

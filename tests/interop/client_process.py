@@ -1,0 +1,36 @@
+"""The process in which a client's library runs: it connects, then runs stories by name, one a line of input.
+
+It is started by :class:`tests.interop.client.Client`; a library that hangs or dies then cannot take the tests along.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import json
+import sys
+import traceback
+
+from tests.interop.drone import Drone
+
+CONNECTED, PASSED, FAILED = "connected", "passed", "failed"
+
+
+async def serve(url: str) -> None:
+    drone = await Drone.connect(url)
+    print(CONNECTED, flush=True)
+    loop = asyncio.get_running_loop()
+    while line := await loop.run_in_executor(None, sys.stdin.readline):
+        module, function, arguments = json.loads(line)
+        try:
+            await getattr(importlib.import_module(module), function).story(drone, **arguments)
+        except Exception:
+            traceback.print_exc()
+            print(FAILED, flush=True)
+        else:
+            print(PASSED, flush=True)
+    drone.mavsdk.destroy()
+
+
+if __name__ == "__main__":
+    asyncio.run(serve(sys.argv[1]))

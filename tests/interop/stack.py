@@ -1,0 +1,50 @@
+"""Simulator and flight stack as real processes, for clients that we did not write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.support.free_instance import free_instance
+from tests.support.process import Process
+
+HOST = "127.0.0.1"
+
+
+class RealVehicle:
+    """``sim-bridge`` and ``flightstack`` at an instance of their own, at a speed against real time."""
+
+    def __init__(self, directory: Path, speed: float, *options: str) -> None:
+        """Start both; ``directory`` takes logs and parameters, ``options`` go to ``flightstack``."""
+        self.speed = speed
+        self.instance = free_instance()
+        self.api_port = 14540 + self.instance
+        self.gcs_port = 14550 + 10 * self.instance
+        self.tcp_port = 5760 + 10 * self.instance
+        self.log = directory / "flight.ulg"
+        number = ("--instance", str(self.instance))
+        self.simulator = Process("sim_bridge", *number, "--speed", str(speed))
+        self.stack = Process(
+            "flightstack", *number, "--gcs-port", str(self.gcs_port), "--log", str(self.log),
+            "--params", str(directory / "vehicle.params"), *options,
+        )  # fmt: skip
+        try:
+            self.stack.wait_for("flightstack: paper_quad")
+        except AssertionError:
+            self.kill()
+            raise
+
+    def stop(self) -> None:
+        """End both as Ctrl-C does, and expect that they end in order."""
+        self.stack.interrupt()
+        codes = self.stack.end(), self.simulator.end()
+        assert codes == (0, 0), self.output
+
+    def kill(self) -> None:
+        """End both, whatever they do."""
+        self.stack.kill()
+        self.simulator.kill()
+
+    @property
+    def output(self) -> str:
+        """What both processes said."""
+        return f"--- flightstack\n{self.stack.output}\n--- sim-bridge\n{self.simulator.output}"

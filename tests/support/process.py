@@ -1,0 +1,82 @@
+"""A process of ours whose output is read as it comes.
+
+Waits are for events (a line of output, the end of the process); their bounds only keep a broken run from hanging.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+from queue import Empty, Queue
+
+BOUND_S = 60.0
+MOST_LINES = 200
+
+
+class Process:
+    """A Python module that runs as a process; standard error is read together with standard output."""
+
+    def __init__(self, module: str, *arguments: str, listens: bool = False) -> None:
+        """Start it; with ``listens`` it gets the lines of :meth:`tell`, else no input."""
+        self.name = module
+        self._popen = subprocess.Popen(
+            [sys.executable, "-u", "-m", module, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.PIPE if listens else subprocess.DEVNULL,
+            text=True,
+        )
+        self._fresh: Queue[str | None] = Queue()
+        self.lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._popen.stdout is not None
+        with self._popen.stdout as output:
+            for line in output:
+                self.lines.append(line.rstrip())
+                self._fresh.put(line)
+        self._fresh.put(None)
+
+    def next_line(self) -> str | None:
+        """Return the next line of output, or None: the process ended, or was silent too long."""
+        try:
+            return self._fresh.get(timeout=BOUND_S)
+        except Empty:
+            return None
+
+    def wait_for(self, text: str) -> None:
+        for _ in range(MOST_LINES):
+            line = self.next_line()
+            assert line is not None, f"{self.name} never said {text!r}: {self.output}"
+            if text in line:
+                return
+        raise AssertionError(f"{self.name} did not say {text!r} in {MOST_LINES} lines: {self.output}")
+
+    def tell(self, line: str) -> None:
+        """Write a line to the process's standard input."""
+        assert self._popen.stdin is not None
+        self._popen.stdin.write(line + "\n")
+        self._popen.stdin.flush()
+
+    def end(self) -> int:
+        """Close its input, wait for its end and return its exit code."""
+        if self._popen.stdin is not None:
+            self._popen.stdin.close()
+        code = self._popen.wait(BOUND_S)
+        self._reader.join(BOUND_S)
+        return code
+
+    def kill(self) -> None:
+        self._popen.kill()
+        self.end()
+
+    def interrupt(self) -> None:
+        self._popen.send_signal(signal.SIGINT)
+
+    @property
+    def output(self) -> str:
+        return "\n".join(self.lines)
