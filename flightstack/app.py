@@ -26,8 +26,9 @@ from flightstack.mavlink.signing import Signing
 from flightstack.modes import Mode
 from flightstack.params.identity import SYSTEM_ID
 from flightstack.params.saver import ParamSaver
+from flightstack.reboot import carry_over, config_after
 from flightstack.signing_file import create_key, open_signing, replace_key
-from flightstack.snapshot import ERROR
+from flightstack.snapshot import ERROR, NOTICE
 from flightstack.transport.processor import Follower
 from flightstack.transport.tcp import LinkClosedError, TcpClient
 from flightstack.transport.vehicle_ports import Place, PortsConfig, VehiclePorts
@@ -69,23 +70,21 @@ class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops
         self.code = code
 
 
+class RebootRequestedError(Exception):
+    """A ground station wants the vehicle to start anew."""
+
+
 class App:
     """Runs one flight stack until it is told to stop or loses someone it needs."""
 
     def __init__(self, config: StackConfig, process: ProcessConfig) -> None:
         self._process = process
         self._log_files = LogFiles(process.log)
-        logs = NO_LOGS if process.log is None else LogLibrary(process.log.parent)
-        self.stack: Stack = build(config, self._open_log, logs)
-        self.stack.ground.vehicle.open_log_tail = self._open_tail
-        self._signing = self._open_signing()
-        self._ports = VehiclePorts(process.ports)
+        self._config = config
         self._saver: ParamSaver | None = None
-        if config.params_file is not None:
-            system_id = int(self.stack.params.value(SYSTEM_ID))
-            self._saver = ParamSaver(
-                self.stack.params, self.stack.loaded_params, Path(config.params_file), system_id
-            )
+        self._signing: Signing | None = None
+        self.stack: Stack = self._build(config)
+        self._ports = VehiclePorts(process.ports)
         self._lockstep = config.lockstep
         self._stop_signal = 0
         for channel, peer in self._ports.first_peers:
@@ -98,7 +97,18 @@ class App:
         self._sending: Iterator[tuple[PeerAddress, bytes]] | None = None
         self._slice_ns: int | None = None
 
-    def _open_signing(self) -> Signing | None:
+    def _build(self, config: StackConfig) -> Stack:
+        """Build a stack and join it to the files of this process; raise ConfigError."""
+        log = self._process.log
+        stack = build(config, self._open_log, NO_LOGS if log is None else LogLibrary(log.parent))
+        stack.ground.vehicle.open_log_tail = self._open_tail
+        self._signing = self._open_signing(stack)
+        if config.params_file is not None:
+            system_id = int(stack.params.value(SYSTEM_ID))
+            self._saver = ParamSaver(stack.params, stack.loaded_params, Path(config.params_file), system_id)
+        return stack
+
+    def _open_signing(self, stack: Stack) -> Signing | None:
         """Sign the ground links if there is to be a key; raise ConfigError."""
         path = self._process.signing_key
         if path is None:
@@ -108,7 +118,7 @@ class App:
             print(f"flightstack: a new signing key is in {path}", flush=True)
         role = f"vehicle-{self._process.ports.instance}"
         signing = open_signing(path, role, self._process.allow_unsigned)
-        self.stack.ground.use_signing(signing, lambda key: replace_key(path, key))
+        stack.ground.use_signing(signing, lambda key: replace_key(path, key))
         return signing
 
     # ------------------------------------------------------------------ life
@@ -123,12 +133,7 @@ class App:
             simulator = self._connect()
             simulator.send(self.stack.simulator.hello(self.stack.rates.interval_us))
             self._wait_for_state(simulator)
-            if self._process.wait_for_start:
-                self._hold_time(simulator)
-            if self._lockstep:
-                self._run_lockstep(simulator)
-            else:
-                self._run_real_time(simulator)
+            self._fly(simulator)
         except Ended as ended:
             if str(ended):
                 print(f"flightstack: {ended}", file=sys.stderr, flush=True)
@@ -138,6 +143,38 @@ class App:
         finally:
             self._close(simulator, orderly=code == EXIT_OK)
         return code
+
+    def _fly(self, simulator: TcpClient) -> None:
+        """Run the loops until the process ends; a reboot begins anew."""
+        holds_time = self._process.wait_for_start
+        while True:
+            try:
+                if holds_time:
+                    self._hold_time(simulator)
+                holds_time = False
+                if self._lockstep:
+                    self._run_lockstep(simulator)
+                else:
+                    self._run_real_time(simulator)
+            except RebootRequestedError:
+                self._reboot()
+                if not holds_time:  # the last state was answered: the next one comes by itself
+                    self._wait_for_state(simulator)
+
+    def _reboot(self) -> None:
+        old = self.stack
+        old.recorder.close()
+        for (channel, host, port), data in old.ground.poll(time.monotonic()):  # the command's answer
+            self._ports.send(channel, (host, port), data)
+        if self._saver is not None:
+            self._saver.close()
+        if self._signing is not None:
+            self._signing.close()
+        self._sending = None
+        self.stack = self._build(config_after(old, self._config))
+        carry_over(old, self.stack)
+        self.stack.autopilot.say(NOTICE, "Rebooted")
+        print("flightstack: rebooted", file=sys.stderr, flush=True)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._stop_signal = number
@@ -376,6 +413,8 @@ class App:
     def _check_stop(self) -> None:
         if self._stop_signal:
             raise Ended(EXIT_OK, "stopped")
+        if self.stack.ground.vehicle.reboot_requested:
+            raise RebootRequestedError
         if self.stack.ground.vehicle.shutdown_requested:
             raise Ended(EXIT_OK, "shut down by the ground station")
         limit_s = self._process.exit_on_ground_loss_s

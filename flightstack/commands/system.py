@@ -1,4 +1,4 @@
-"""Commands to the vehicle as a system: home, parameters, its end."""
+"""Commands to the vehicle as a system: home, termination, its end."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from flightstack.mavlink.services.command_server import Command
 from flightstack.snapshot import NOTICE
 
 DO_NOTHING, REBOOT, SHUT_DOWN = 0.0, 1.0, 2.0
-WRITE, RESETS = 1.0, (2.0, 3.0, 4.0)
 RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
 
@@ -68,23 +67,8 @@ def set_home(vehicle: VehicleContext, command: Command) -> Answer:
     return Answer(ACCEPTED)
 
 
-def store_parameters(vehicle: VehicleContext, command: Command) -> Answer:
-    """PREFLIGHT_STORAGE: parameter 1 is 1 to save, 2, 3 or 4 to reset; every change is saved at once anyway."""
-    wanted = command.params[0]
-    if wanted in (DO_NOTHING, WRITE):
-        return Answer(ACCEPTED)
-    if wanted not in RESETS:
-        return Answer(UNSUPPORTED)
-    if vehicle.autopilot.now.status.armed:
-        return Answer(DENIED, "the vehicle is armed")
-    vehicle.params.reset()
-    vehicle.autopilot.say(NOTICE, "Parameters have their defaults again")
-    return Answer(ACCEPTED)
-
-
 HANDLERS: dict[int, Handler] = {
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: reboot_or_shut_down,
     mavlink.MAV_CMD_DO_FLIGHTTERMINATION: terminate_flight,
     mavlink.MAV_CMD_DO_SET_HOME: set_home,
-    mavlink.MAV_CMD_PREFLIGHT_STORAGE: store_parameters,
 }

@@ -12,6 +12,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 
 from flightstack.commands import VehicleContext
 from flightstack.ground.facts import AutopilotFacts
+from flightstack.ground.mission_service import MissionService
 from flightstack.ground.peer import API, Peer, PeerAddress
 from flightstack.ground.router import Router
 from flightstack.ground.service import Service
@@ -74,6 +75,16 @@ class GroundHub:
         peer = Peer(link, Streams(rates), permanent)
         self._peers[address] = peer
         return peer
+
+    def addresses(self) -> list[tuple[PeerAddress, bool]]:
+        """Return every peer's address, and whether it is permanent."""
+        return [(address, peer.permanent) for address, peer in self._peers.items()]
+
+    def adopt_plans(self, other: GroundHub) -> None:
+        """Take the plans that another hub's vehicle holds; before a reboot it was this one's."""
+        for service in self._services:
+            if isinstance(service, MissionService):
+                service.adopt(*(s for s in other._services if isinstance(s, MissionService)))
 
     def drop_peer(self, address: PeerAddress) -> None:
         """Forget a peer whose connection has ended."""

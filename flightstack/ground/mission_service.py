@@ -40,6 +40,14 @@ class MissionService:
             MissionType.RALLY: autopilot.set_rally,
         }
 
+    def adopt(self, other: MissionService) -> None:
+        """Take the other's plans, the geofence first: the others were checked against it."""
+        for kind in (MissionType.FENCE, MissionType.MISSION, MissionType.RALLY):
+            items = other._server.items(kind)
+            if items:
+                self._server.restore(kind, items)
+        self._take_events()
+
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a message of the mission protocol."""
         self._server.receive(message, peer, now_s)

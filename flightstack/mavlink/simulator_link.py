@@ -95,6 +95,14 @@ class SimulatorLink:
         self.request_refused = False
         self.peer_said_goodbye = False
 
+    def resume(self, other: SimulatorLink) -> None:
+        """Go on where another link of the same connection was, after a reboot."""
+        self.state[:] = other.state
+        self.rotor_speed_rad_s[:] = other.rotor_speed_rad_s
+        self.time_us, self._state_us, self._arrived_us = other.time_us, other._state_us, other.time_us
+        self._changed_us = other.time_us
+        self.battery, self.has_state, self._speaks_hil = other.battery, other.has_state, other._speaks_hil
+
     def hello(self, interval_us: int) -> bytes:
         """Return the bytes to send after connecting: who we are, and our own state message every so often."""
         return self.heartbeat(False) + self._request(FS_PLANT_STATE_ID, interval_us)

@@ -1,4 +1,4 @@
-"""``gcs arm``, ``disarm``, ``takeoff``, ``land``, ``rtl``, ``hold`` and ``mode``: one command, one line."""
+"""``gcs arm``, ``takeoff``, ``goto``, ``mode`` and their like: one command, one line."""
 
 from __future__ import annotations
 
@@ -117,4 +117,71 @@ def mode(
     typer.echo(f"mode {name.lower()}")
 
 
-ACTIONS: tuple[Callable[..., None], ...] = (arm, disarm, takeoff, land, rtl, hold, mode)
+def goto(
+    context: typer.Context,
+    latitude: Annotated[float, typer.Argument(help="Degrees.")],
+    longitude: Annotated[float, typer.Argument(help="Degrees.")],
+    alt: Annotated[float | None, typer.Option("--alt", metavar="METRES", help="Altitude above home.")] = None,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+) -> None:
+    """Fly to a place and hold there; put -- before negative degrees."""
+    from gcs_cli import calls  # noqa: PLC0415
+
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        raise CliError(f"goto {latitude:g} {longitude:g}: not a place on earth", USAGE)
+    with meet_vehicle(context, connect, timeout) as connection:
+        altitude_amsl_m = calls.NAN if alt is None else alt + _home_altitude_m(connection)
+        order(connection, calls.goto_command(latitude, longitude, altitude_amsl_m), "goto")
+    typer.echo(f"flying to {latitude:.7f} {longitude:.7f}" + ("" if alt is None else f" at {alt:g} m"))
+
+
+def speed(
+    context: typer.Context,
+    metres_per_second: Annotated[float, typer.Argument(help="Ground speed [m/s]; -2 for the usual one.")],
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+) -> None:
+    """Fly at another speed until disarmed."""
+    from gcs_cli import calls  # noqa: PLC0415
+
+    with meet_vehicle(context, connect, timeout) as connection:
+        order(connection, calls.speed_command(metres_per_second), "speed")
+    typer.echo(
+        "flying at the usual speed" if metres_per_second < 0.0 else f"flying at {metres_per_second:g} m/s"
+    )
+
+
+def sethome(
+    context: typer.Context,
+    place: Annotated[
+        list[float] | None, typer.Argument(help="Latitude, longitude, altitude above the sea [here].")
+    ] = None,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+) -> None:
+    """Move home, where a return goes and from where altitudes count; put -- before negative degrees."""
+    from gcs_cli import calls  # noqa: PLC0415
+
+    if place and len(place) != 3:
+        raise CliError("sethome: give latitude, longitude and altitude, or nothing for here", USAGE)
+    target = (place[0], place[1], place[2]) if place else None
+    with meet_vehicle(context, connect, timeout) as connection:
+        order(connection, calls.home_command(target), "sethome")
+    typer.echo(
+        "home is here" if target is None else f"home is {target[0]:.7f} {target[1]:.7f} {target[2]:g} m"
+    )
+
+
+def reboot(context: typer.Context, connect: ConnectOption = None, timeout: TimeoutOption = None) -> None:
+    """Reboot the vehicle, which must stand on the ground."""
+    from gcs_cli import calls  # noqa: PLC0415
+
+    with meet_vehicle(context, connect, timeout) as connection:
+        order(connection, calls.REBOOT, "reboot")
+    typer.echo("rebooting")
+
+
+ACTIONS: tuple[Callable[..., None], ...] = (
+    arm, disarm, takeoff, land, rtl, hold, goto, speed, sethome, mode, reboot,
+)  # fmt: skip

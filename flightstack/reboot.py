@@ -1,0 +1,27 @@
+"""A reboot of the vehicle in its process: everything begins anew, but nothing that was given to it is lost. No I/O."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flightstack.assembly import Stack
+from flightstack.config import StackConfig
+
+
+def config_after(stack: Stack, config: StackConfig) -> StackConfig:
+    """Return the configuration to boot with: without a parameter file, the values of now are handed on."""
+    if config.params_file is not None:
+        return config
+    changed = [name for name in stack.params.specs if not stack.params.is_default(name)]
+    return replace(config, params=tuple(f"{name}={stack.params.value(name)!r}" for name in changed))
+
+
+def carry_over(old: Stack, new: Stack) -> None:
+    """Give the new stack what is not the process's to forget: peers, plans, home, and the newest state."""
+    for address, permanent in old.ground.addresses():
+        new.ground.add_peer(address, permanent)
+    new.autopilot.set_home(old.autopilot.home)
+    new.ground.adopt_plans(old.ground)
+    new.simulator.resume(old.simulator)
+    new.autopilot.has_state = old.autopilot.has_state
+    new.autopilot.now.time_us = old.autopilot.now.time_us
