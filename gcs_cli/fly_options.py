@@ -43,13 +43,13 @@ class FlyOptions:
     vehicle: str = "paper_quad"
     instance: int = 0
     ideal_rotors: bool = False
-    params: Path | None = None
     timeout_s: float = 60.0
     limit_s: float = 3600.0
     battery_start: float | None = None
     battery_capacity: float | None = None
     battery_drain: float | None = None
     faults: tuple[str, ...] = ()
+    params: Path | None = None
 
     @property
     def outer_rate_hz(self) -> float:

@@ -69,8 +69,8 @@ def fly(
         raise CliError("fly starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
     options = FlyOptions(
         plan, controller, gains, plant, speed, inner_hz, outer_hz, seed, wind, gust, torque_gust, vehicle,
-        instance, ideal_rotors, params, 60.0 if settings.timeout_s is None else settings.timeout_s, limit,
-        battery_start, battery_capacity, battery_drain, tuple(fault or ()),
+        instance, ideal_rotors, 60.0 if settings.timeout_s is None else settings.timeout_s, limit,
+        battery_start, battery_capacity, battery_drain, tuple(fault or ()), params,
     )  # fmt: skip
     items = checked_plan(options)
     console = FlyConsole(stderr=as_json, highlight=False)

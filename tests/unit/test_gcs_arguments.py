@@ -178,8 +178,21 @@ def test_the_children_are_told_everything() -> None:
         "--vehicle=x_quad", "--controller=backstepping", "--gains=paper",
         "--inner-hz=1000.0", "--outer-hz=250.0", "--sim-port=4562", "--sim-timeout=12",
         "--instance=2", "--gcs-port=14570", "--log=runs/x/flight.ulg",
-        "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--wait-for-start", "--ideal-rotors",
+        "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--params=none",
+        "--wait-for-start", "--ideal-rotors",
     ]  # fmt: skip
+
+
+def test_a_parameter_file_is_passed_on_and_must_be_there(tmp_path: Path) -> None:
+    path = tmp_path / "my.params"
+    with pytest.raises(CliError, match=f"--params {path}: there is no such file") as error:
+        checked_plan(FlyOptions(HOP, params=path))
+    assert error.value.exit_code == USAGE
+    path.write_text("")
+    checked_plan(FlyOptions(HOP, params=path))
+    assert f"--params={path}" in stack_arguments(
+        FlyOptions(HOP, params=path), GeoPoint(0.0, 0.0, 0.0), tmp_path
+    )
 
 
 def test_the_simulator_is_told_about_battery_and_faults() -> None:
