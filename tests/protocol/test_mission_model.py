@@ -157,6 +157,6 @@ class Transfers(RuleBasedStateMachine):
 
 
 Transfers.TestCase.settings = settings(
-    derandomize=True, deadline=None, max_examples=120, stateful_step_count=40
+    derandomize=True, deadline=None, max_examples=200, stateful_step_count=40
 )
 TestTransfers = Transfers.TestCase

@@ -149,6 +149,7 @@ class Server:
         assert answers[-1].type == MissionResult.ACCEPTED
 
 
+CLEAR = mavlink.MAVLink_mission_clear_all_message(*VEHICLE, 0)
 LIST = mavlink.MAVLink_mission_request_list_message(*VEHICLE, 0)
 
 
@@ -172,6 +173,20 @@ def test_a_late_copy_of_the_request_for_the_count_does_not_change_the_plan_half_
     server.put(old, OTHER)
     (late,) = server.tell(LIST, now_s=6.0)  # silent for five seconds: begins anew
     assert late.opaque_id == mission_id(old)
+
+
+def test_a_repeated_acknowledgement_has_the_id_of_the_plan_that_was_accepted() -> None:
+    """Else a client whose acknowledgement got lost would take another client's plan for its own."""
+    first, second = mission(2, mark=1), mission(2, mark=2)
+    server = Server()
+    server.put(first)
+    for change in (lambda: server.put(second, OTHER), lambda: server.tell(CLEAR, OTHER)):
+        server.put(first)
+        last = message_from_item(first[1], 1, VEHICLE, 0)
+        assert server.tell(last)[0].opaque_id == mission_id(first)
+        change()
+        (again,) = server.tell(last)
+        assert (again.type, again.opaque_id) == (MissionResult.ACCEPTED, mission_id(first))
 
 
 def test_a_download_begins_again_when_the_plan_turns_out_to_be_another() -> None:

@@ -40,7 +40,7 @@ class MissionServer:
         self._timing = timing
         self._store = PlanStore(checks)
         self._uploads: dict[int, Upload] = {}
-        self._ended: dict[int, tuple[Client, int, MissionResult]] = {}
+        self._ended: dict[int, tuple[Client, int, Message]] = {}
         self._downloads = Downloads()
         self._outbox: list[tuple[Hashable, Message]] = []
         self._events: list[MissionEvent] = []
@@ -132,7 +132,7 @@ class MissionServer:
             # The last item again: our MISSION_ACK got lost.
             ended = self._ended.get(kind)
             if ended is not None and ended[:2] == (client, message.seq):
-                self._ack(client, ended[2], kind)
+                self._send(client, ended[2])
         elif upload.accept(message, now_s) and upload.is_complete:
             self._complete(upload)
 
@@ -151,8 +151,9 @@ class MissionServer:
     def _end(self, upload: Upload, result: MissionResult) -> None:
         kind = upload.mission_type
         del self._uploads[kind]
-        self._ended[kind] = (upload.client, upload.count - 1, result)
-        self._ack(upload.client, result, kind)
+        ack = self._ack(upload.client, result, kind)
+        # as it was, should it be needed again: the plan in force, and its id, may be another client's by then
+        self._ended[kind] = (upload.client, upload.count - 1, ack)
 
     def _forget_upload(self, kind: int) -> None:
         self._uploads.pop(kind, None)
@@ -223,9 +224,11 @@ class MissionServer:
     def _refused(self, result: MissionResult, seq: int | None, reason: str, kind: int) -> None:
         self._events.append(MissionRefused(result, seq, reason, MissionType(kind)))
 
-    def _ack(self, client: Client, result: MissionResult, kind: int) -> None:
+    def _ack(self, client: Client, result: MissionResult, kind: int) -> Message:
         plan_id = self._store.plan_id(kind) if result == MissionResult.ACCEPTED else 0
-        self._send(client, ack_message(client.address, result, kind, plan_id))
+        ack = ack_message(client.address, result, kind, plan_id)
+        self._send(client, ack)
+        return ack
 
     def _send(self, client: Client, message: Message) -> None:
         self._outbox.append((client.peer, message))
