@@ -35,7 +35,7 @@ from flightstack.transport.vehicle_ports import Place, PortsConfig, VehiclePorts
 
 EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
 GROUND_POLL_NS = 500_000
-GROUND_SLICE_NS = 400_000
+GROUND_SHARE = 0.4
 """In real time, sending to ground stations takes so much of a tick at most; what is left waits for the next."""
 REPORT_S = 0.2
 SECOND_HELLO_S = 1.0
@@ -336,7 +336,7 @@ class App:
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
         ask_for_punctual_sleeps()
         scheduler = DeadlineScheduler(timing)
-        self._slice_ns = GROUND_SLICE_NS
+        self._slice_ns = round(GROUND_SHARE * timing.period_ns)
         interval_us, tick, time_us = self.stack.rates.interval_us, 0, 0
         heard_s = time.monotonic()
         while True:
