@@ -66,7 +66,7 @@ class Autopilot:
         """Use ``state`` (13,) and ``rotor_speed_rad_s`` (8,), which ``source`` writes in place."""
         self._vehicle = vehicle
         self._behaviour = behaviour
-        self.supervisor = Supervisor(vehicle, behaviour, outer_hz, state, source)
+        self.supervisor = Supervisor(vehicle, behaviour, outer_hz, divisor, state, source)
         self.items: tuple[MissionItem, ...] = ()
         self.places = SafePlaces(home)
         self._divisor = divisor
@@ -85,6 +85,7 @@ class Autopilot:
         self._takeoff_altitude_m = behaviour.takeoff_altitude_m
         self.has_state = False  # set once a state has arrived
         idle_row = np.zeros(LoopRow.SIZE)
+        self._good_row = idle_row.copy()
         self.now = Snapshot(state, self._navigator.setpoint, backend.attitude_target, idle_row)
 
     # ------------------------------------------------------------------ the tick
@@ -102,14 +103,18 @@ class Autopilot:
         row = self._recorder.inner_row(time_us)
         if not self._flying:
             self._backend.idle(state, self._rotor_speed, now.status.armed, row)
+            self.supervisor.follow_rotors(row)
         elif self.supervisor.holds_rotors:
-            row[:] = now.row
+            row[:] = self._good_row
             row[LoopRow.STATUS] = LoopStatus.INPUT_STALE
         else:
             aims = outer_due and not self._navigator.flies_attitude(now.status.mode)
             self._backend.step(state, now.setpoint, self._rotor_speed, aims, row)
+            self.supervisor.follow_rotors(row)
         now.row = row
         if outer_due:
+            if self.supervisor.state_is_new:  # what the loops make of a frozen state is nothing to hold
+                self._good_row[:] = row
             self._recorder.outer(time_us, state, now.setpoint, now.attitude_target)
         commands: FloatArray = row[LoopRow.ROTOR_COMMAND]
         return commands
@@ -232,6 +237,11 @@ class Autopilot:
     def links(self) -> LinkFacts:
         """What is known of the ground links; each service writes its own field."""
         return self.supervisor.links
+
+    @property
+    def failsafes(self) -> tuple[Failsafe, ...]:
+        """Active failsafes in order of priority."""
+        return self.supervisor.failsafes
 
     @property
     def facts(self) -> Facts:

@@ -19,18 +19,20 @@ from flightstack.params.vehicle import Vehicle
 RELEASE_S = 1.0
 NOT_FINITE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT, MOVING = 1, 2, 4, 8, 16
 """Bits of what ``detect`` returns."""
-MOVING_ABOVE = 1e-6
-"""Speed [m/s] or rate [rad/s] that must change the state within a tick: its last digit is a billion times smaller."""
+MOVING_ABOVE = 1e-9
+"""Speed [m/s] or rate [rad/s] that must change the state in twentieths of a second: its last digit is smaller yet."""
 BATTERY_HYSTERESIS = 0.02
 TILT_MARGIN_DEG = 15
-LAG_MARGIN_S = 0.01
-"""On top of a rotor's lag: the way of command and measurement."""
+ROTOR_MEAN_S = 0.03
+"""Rotors are compared by means over about this time: loops that shake them are no fault of theirs."""
 
 ROLL, PITCH, TILT_ERROR, POSITION, ROTORS = range(5)
 TIMERS = 5
-M_TRIGGERED, M_EXPECTED = TIMERS, 2 * TIMERS
-DETECTOR_MEMORY_SIZE = 2 * TIMERS + MAX_ROTORS
-P_LIMIT, P_TIME, P_BLEND, P_ROTORS, P_SLOW = 0, TIMERS, 2 * TIMERS, 2 * TIMERS + 1, 2 * TIMERS + 2
+M_TRIGGERED = TIMERS
+DETECTOR_MEMORY_SIZE = 2 * TIMERS
+P_LIMIT, P_TIME, P_ROTORS, P_SLOW = 0, TIMERS, 2 * TIMERS, 2 * TIMERS + 1
+R_EXPECTED, R_MEAN, R_ERROR = 0, MAX_ROTORS, 2 * MAX_ROTORS
+ROTOR_MEMORY_SIZE = 3 * MAX_ROTORS
 
 _REFERENCE_AT = LoopRow.REFERENCE_ATTITUDE.start
 _COMMAND_AT = LoopRow.ROTOR_COMMAND.start
@@ -39,12 +41,11 @@ _STATUS_AT = LoopRow.STATUS
 _BAD_OUTPUT = LoopStatus.OUTPUT_NOT_FINITE
 
 
-def detector_params(behaviour: Behaviour, vehicle: Vehicle, dt_s: float) -> FloatArray:
-    """Return the numbers that ``detect`` takes, shape (13,); a limit of 0 is off.
+def detector_params(behaviour: Behaviour, vehicle: Vehicle) -> FloatArray:
+    """Return the numbers that ``detect`` takes, shape (12,); a limit of 0 is off.
 
     Limits and times are in the order roll, pitch, tilt error [rad], position error [m], rotor speed [share]. Then
-    come how much of a rotor's lag passes in ``dt_s``, the number of rotors, and the speed below which errors count
-    as shares of that speed.
+    come the number of rotors, and the speed below which errors count as shares of that speed.
     """
     b = behaviour
     least_deg = b.max_tilt_deg + TILT_MARGIN_DEG
@@ -56,10 +57,31 @@ def detector_params(behaviour: Behaviour, vehicle: Vehicle, dt_s: float) -> Floa
         b.rotor_error if b.rotor_check else 0.0,
     )
     times = (b.max_roll_s, b.max_pitch_s, b.max_tilt_error_s, b.max_position_error_s, b.rotor_error_ms * 1e-3)
-    lag_s = max(rotor.lag_s for rotor in vehicle.rotors) + LAG_MARGIN_S
     slow_rad_s = 0.1 * min(1e4, *(rotor.max_speed_rad_s for rotor in vehicle.rotors))
-    rest = (1.0 - math.exp(-dt_s / lag_s), len(vehicle.rotors), slow_rad_s)
-    return np.array([*limits, *times, *rest], dtype=np.float64)
+    return np.array([*limits, *times, len(vehicle.rotors), slow_rad_s], dtype=np.float64)
+
+
+def rotor_params(vehicle: Vehicle, dt_s: float) -> FloatArray:
+    """Return the numbers that ``follow_rotors`` takes: for each rotor the share of its lag that passes in ``dt_s``,
+    and at the end that of the mean's time.
+    """
+    shares = [1.0 - math.exp(-dt_s / r.lag_s) if r.lag_s > 0.0 else 1.0 for r in vehicle.rotors]
+    return np.array([*shares, 1.0 - math.exp(-dt_s / ROTOR_MEAN_S)], dtype=np.float64)
+
+
+@compiled
+def follow_rotors(row: FloatArray, memory: FloatArray, params: FloatArray) -> None:
+    """Compare each rotor's measured speed with what its commands lead to; once per inner tick.
+
+    ``row`` (48,) holds speeds from before its commands. ``memory`` (24,) keeps, for each rotor, the speed that the
+    commands lead to (first-order lag, exact for commands that are held), its mean, and the mean of the error.
+    """
+    last = len(params) - 1
+    for i in range(last):
+        expected = memory[R_EXPECTED + i]
+        memory[R_MEAN + i] += (expected - memory[R_MEAN + i]) * params[last]
+        memory[R_ERROR + i] += (row[_SPEED_AT + i] - expected - memory[R_ERROR + i]) * params[last]
+        memory[R_EXPECTED + i] = expected + (row[_COMMAND_AT + i] - expected) * params[i]
 
 
 @compiled
@@ -81,20 +103,15 @@ def _watch(memory: FloatArray, index: int, beyond: bool, time_s: float, dt_s: fl
 
 
 @compiled
-def _rotor_error(row: FloatArray, memory: FloatArray, params: FloatArray) -> float:
-    """Return the largest share by which a measured speed differs from what its command leads to.
+def _rotor_error(row: FloatArray, rotors: FloatArray, params: FloatArray) -> float:
+    """Return the largest mean error of a rotor's speed as share of the mean speed that was expected.
 
-    The expectation follows the command with the rotor's lag. A simulator that measures no speeds sends zeros:
-    then nothing is known, and the error is 0.
+    A simulator that measures no speeds sends zeros: then nothing is known, and the error is 0.
     """
     worst, measured = 0.0, False
     for i in range(int(params[P_ROTORS])):
-        expected = memory[M_EXPECTED + i]
-        expected += (row[_COMMAND_AT + i] - expected) * params[P_BLEND]
-        memory[M_EXPECTED + i] = expected
-        speed = row[_SPEED_AT + i]
-        measured = measured or speed != 0.0
-        worst = max(worst, abs(speed - expected) / max(abs(expected), params[P_SLOW]))
+        measured = measured or row[_SPEED_AT + i] != 0.0
+        worst = max(worst, abs(rotors[R_ERROR + i]) / max(abs(rotors[R_MEAN + i]), params[P_SLOW]))
     return worst if measured else 0.0
 
 
@@ -103,6 +120,7 @@ def detect(
     state: FloatArray,
     setpoint: FloatArray,
     row: FloatArray,
+    rotors: FloatArray,
     memory: FloatArray,
     params: FloatArray,
     dt_s: float,
@@ -110,8 +128,8 @@ def detect(
     """Advance all detectors by one outer tick; return the bits of what is wrong, and ``MOVING``.
 
     ``state`` (13,), ``setpoint`` (11,) and ``row`` (48,), the newest row of the inner loop, as in ``contract``;
-    ``memory`` (18,) is updated, ``params`` come from ``detector_params``. A state that is not finite leaves the
-    other detectors as they are.
+    ``rotors`` (24,) is the memory of ``follow_rotors``; ``memory`` (10,) is updated; ``params`` come from
+    ``detector_params``. A state that is not finite leaves the other detectors as they are.
     """
     status = int(row[_STATUS_AT])
     for value in state:
@@ -140,7 +158,7 @@ def detect(
     tilt_error = math.acos(min(1.0, max(-1.0, cosine)))
     p = now.position_ned_m
     distance = math.sqrt((p.x - setpoint[0]) ** 2 + (p.y - setpoint[1]) ** 2 + (p.z - setpoint[2]) ** 2)
-    errors = (abs(roll), abs(pitch), tilt_error, distance, _rotor_error(row, memory, params))
+    errors = (abs(roll), abs(pitch), tilt_error, distance, _rotor_error(row, rotors, params))
     bits = (BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT)
     for index in range(TIMERS):
         limit = params[P_LIMIT + index]

@@ -18,9 +18,12 @@ from flightstack.commander.detectors import (
     MOVING,
     NOT_FINITE,
     ROTOR_FAULT,
+    ROTOR_MEMORY_SIZE,
     battery_level,
     detect,
     detector_params,
+    follow_rotors,
+    rotor_params,
 )
 from flightstack.commander.failsafe import Decision, Failsafe, phase_of
 from flightstack.commander.failsafe_step import (
@@ -47,6 +50,8 @@ FAULTS = (
     (BEYOND_POSITION, Failsafe.POSITION_ERROR),
     (ROTOR_FAULT, Failsafe.ROTOR),
 )
+HOLD_AFTER_US = 50_000
+"""Age of a state from which on the loops rest: fed with what does not change, they would go to their limits."""
 NO_CONDITION: frozenset[Failsafe] = frozenset()
 
 
@@ -54,9 +59,15 @@ class Supervisor:
     """Holds what the detectors and failsafes remember."""
 
     def __init__(
-        self, vehicle: Vehicle, behaviour: Behaviour, outer_hz: float, state: FloatArray, source: StateSource
+        self,
+        vehicle: Vehicle,
+        behaviour: Behaviour,
+        outer_hz: float,
+        divisor: int,
+        state: FloatArray,
+        source: StateSource,
     ) -> None:
-        """Watch ``state`` (13,), which ``source`` writes in place."""
+        """Watch ``state`` (13,), which ``source`` writes in place; ``divisor`` inner ticks make an outer one."""
         self.links = LinkFacts()
         self.fence = FenceMonitor()
         self._areas = NO_FENCE
@@ -70,13 +81,21 @@ class Supervisor:
         self._dt_s = 1.0 / outer_hz
         self.set_behaviour(behaviour)
         self._detector = np.zeros(DETECTOR_MEMORY_SIZE)
+        self._rotor_params = rotor_params(vehicle, self._dt_s / divisor)
+        self._rotors = np.zeros(ROTOR_MEMORY_SIZE)
         self._nowhere = np.zeros(SETPOINT_SIZE)
         self._memory = IDLE
+        self._found = 0
         self._stale = False
+        self.holds_rotors = False
+        """Whether the state must not be flown by: it is frozen or missing."""
+        self.state_is_new = True
+        """Whether the state has changed since the outer tick before."""
 
     def warm_up(self, row: FloatArray) -> None:
         """Compile the detectors, or load them from the cache."""
-        detect(self._state, self._nowhere, row, self._detector, self._params, self._dt_s)
+        detect(self._state, self._nowhere, row, self._rotors, self._detector, self._params, self._dt_s)
+        self.follow_rotors(row)
         self.armed()
         probe = FenceMonitor()
         probe.configure(NO_FENCE, max_altitude_m=1.0)
@@ -93,11 +112,6 @@ class Supervisor:
     def decision(self) -> Decision:
         """What the failsafes ask for, and the cause."""
         return self._memory.decision
-
-    @property
-    def holds_rotors(self) -> bool:
-        """Whether the state must not be flown by: it is frozen or missing."""
-        return self._stale
 
     def arming_facts(self, mode: Mode, has_state: bool) -> ArmingFacts:
         """Return what the arming checks look at."""
@@ -123,7 +137,7 @@ class Supervisor:
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Take new parameters, from the next outer tick on."""
         self._behaviour = behaviour
-        self._params = detector_params(behaviour, self._vehicle, self._dt_s)
+        self._params = detector_params(behaviour, self._vehicle)
         self._configure_fence()
 
     def set_fence(self, fence: Fence) -> None:
@@ -146,6 +160,12 @@ class Supervisor:
     def armed(self) -> None:
         """Forget what the detectors saw before: a flight begins."""
         self._detector[:] = 0.0
+        self._rotors[:] = 0.0
+        self._found = 0
+
+    def follow_rotors(self, row: FloatArray) -> None:
+        """Take the newest row of the inner loop, shape (48,), once per inner tick."""
+        follow_rotors(row, self._rotors, self._rotor_params)
 
     def override(self) -> None:
         """A user has selected a mode: what is active now acts no more."""
@@ -159,17 +179,18 @@ class Supervisor:
         ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop.
         """
         self._watch_battery()
-        found = 0
-        if status.armed:
-            if not self.position_is_controlled:
-                self._nowhere[:3] = self._state[:3]
-                setpoint = self._nowhere
-            found = detect(self._state, setpoint, row, self._detector, self._params, self._dt_s)
-        self._stale = self._is_stale(time_us, status.armed and not landed and bool(found & MOVING))
+        self._watch_state(time_us, in_air=status.armed and not landed)
         if not status.armed:
             self._memory = IDLE
             return ()
-        conditions = self._conditions(found, status.mode)
+        if not self.holds_rotors:
+            if not self.position_is_controlled:
+                self._nowhere[:3] = self._state[:3]
+                setpoint = self._nowhere
+            self._found = detect(
+                self._state, setpoint, row, self._rotors, self._detector, self._params, self._dt_s
+            )
+        conditions = self._conditions(self._found, status.mode)
         if not conditions and not self._memory.entries:
             return ()
         phase = phase_of(status.armed, landed, status.mode)
@@ -200,14 +221,17 @@ class Supervisor:
         present.update(failsafe for bit, failsafe in FAULTS if found & bit)
         return frozenset(present.union(BATTERY_FAILSAFES[: self.battery_level]))
 
-    def _is_stale(self, time_us: int, must_change: bool) -> bool:
-        """Tell whether the state is too old, or does not change although its own speeds say that it must.
+    def _watch_state(self, time_us: int, in_air: bool) -> None:
+        """Find out whether the state is too old, or does not change although its own speeds say that it must.
 
         At rest on the ground, and in the calm at the end of a long hover, it may stay the same to the last bit.
         """
         fresh = self._source.freshness(time_us)
+        old_us = max(fresh.age_us, fresh.frozen_us) if in_air and self._found & MOVING else fresh.age_us
         limit_us = self._behaviour.stale_s * 1e6
-        return fresh.age_us >= limit_us or (must_change and fresh.frozen_us >= limit_us)
+        self.state_is_new = not (fresh.age_us or fresh.frozen_us)
+        self.holds_rotors = old_us >= min(limit_us, HOLD_AFTER_US)
+        self._stale = old_us >= limit_us
 
     def _watch_battery(self) -> None:
         battery, b = self._source.battery, self._behaviour

@@ -198,7 +198,10 @@ class SimulatorLink:
             if content != self._seen:
                 self._seen = content
                 self._changed_us = now_us
-        return Freshness(now_us - self._arrived_us, now_us - self._changed_us)
+        frozen_us = (
+            0 if self._speaks_hil else now_us - self._changed_us
+        )  # its coarse numbers may well stay the same
+        return Freshness(now_us - self._arrived_us, frozen_us)
 
     def _take_battery(self, m: Message) -> None:
         """Take BATTERY_STATUS of the first battery; −1 and unused cells mean unknown."""
