@@ -204,6 +204,15 @@ def test_a_client_may_open_four_files_and_silent_ones_give_way() -> None:
     assert dialogue.ask(Opcode.OPEN_FILE_RO, b"small", sequence=5).session == 0
 
 
+def test_a_session_number_that_the_client_chose_is_kept() -> None:
+    """MAVProxy counts its sessions itself, and takes no answer with another number for its own."""
+    dialogue = Dialogue()
+    sessions = [dialogue.ask(Opcode.OPEN_FILE_RO, b"big", session=240, sequence=n).session for n in range(2)]
+    assert sessions == [240, 0]
+    read = dialogue.ask(Opcode.READ_FILE, session=240, size=8)
+    assert (read.opcode, read.session, read.size) == (Opcode.ACK, 240, 8)
+
+
 def test_a_file_read_to_its_end_gives_way_to_the_next() -> None:
     """The message that ends a session gets lost: MAVSDK would read the old file from session 0."""
     dialogue = Dialogue()

@@ -204,7 +204,7 @@ class FtpServer:
     def _open(self, client: FtpSessions, request: Packet, now_s: float) -> _Result:
         file = self._opened(request)
         try:
-            number = client.open(file, now_s)
+            number = client.open(file, request.session, now_s)
         except FtpRefusal:
             file.close()
             raise

@@ -95,8 +95,10 @@ class FtpSessions:
     last: tuple[Packet, Packet] | None = None
     """The last request that changed something, and its answer, for when that gets lost."""
 
-    def open(self, file: VirtualFile, now_s: float) -> int:
+    def open(self, file: VirtualFile, wanted: int, now_s: float) -> int:
         """Return the session number of ``file``; raise FtpRefusal when too many are open.
+
+        It is the number of the request when that is free, as in ArduPilot: MAVProxy drops answers with another.
 
         A session whose end was sent, or which is silent, is closed: the message that ends it gets lost, and
         clients that ignore the number in the answer (MAVSDK) would go on to read the old file.
@@ -105,11 +107,12 @@ class FtpSessions:
             is_silent = session.burst is None and now_s - session.heard_s >= ABANDONED_S
             if session.is_done or is_silent:
                 self.close(number)
-        free = next((n for n in range(MAX_SESSIONS) if n not in self.sessions), None)
-        if free is None:
+        if len(self.sessions) >= MAX_SESSIONS:
             raise FtpRefusal(FtpError.NO_SESSIONS_AVAILABLE)
-        self.sessions[free] = Session(file, now_s)
-        return free
+        taken = wanted in self.sessions
+        number = next(n for n in range(MAX_SESSIONS) if n not in self.sessions) if taken else wanted
+        self.sessions[number] = Session(file, now_s)
+        return number
 
     def session(self, number: int, now_s: float) -> Session:
         """Return an open session, which counts as heard; raise FtpRefusal."""
