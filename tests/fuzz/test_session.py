@@ -1,0 +1,145 @@
+"""The ground station's session, its view of the vehicle and its clients, against whatever arrives."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+
+import pytest
+from rich.console import Console
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link
+from flightstack.mavlink.services.addressing import Address
+from flightstack.mavlink.services.command_client import CommandClient
+from flightstack.mavlink.services.ftp_client import FtpClient
+from flightstack.mavlink.services.log_client import LogClient, LogEntry
+from flightstack.mavlink.services.mission_client import MissionClient
+from flightstack.mavlink.services.param_client import ParamClient
+from gcs_cli.session import Service, Session
+from gcs_cli.watch_lines import state_line, text_line
+from gcs_cli.watch_render import render
+from tests.fuzz.inputs import KINDS, Inputs
+from tests.fuzz.measure import calls, held
+from tests.support.world import item
+
+MESSAGES = 1_000
+STEP_S = 0.02
+VEHICLE, OWN = Address(1, 1), Address(255, 190)
+HERE = ("192.0.2.1", 18570)
+MOST_HELD = 400_000
+HEARTBEAT = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)
+LONG = [b"\xfd" * 65_000, b"\xfe" * 65_000, b"\xfe\x00" * 30_000, b"\xfd\xff\x00" * 20_000]
+
+
+def show(session: Session, now_s: float) -> None:
+    """Draw and write the view, at all three sizes."""
+    for width, height in ((40, 10), (90, 30), (200, 60)):
+        console = Console(file=io.StringIO(), width=width, height=height)
+        console.print(render(session.view, now_s, width, height))
+    state_line(session.view, now_s)
+    for text in session.view.texts:
+        text_line(text)
+
+
+def upload() -> Service:
+    client = MissionClient(VEHICLE, OWN)
+    client.start_upload([item(22, z=8.0), item(16, 10.0, 5.0, 8.0), item(21, 10.0, 5.0)])
+    return client
+
+
+def download() -> Service:
+    client = MissionClient(VEHICLE, OWN)
+    client.start_download()
+    return client
+
+
+def command() -> Service:
+    client = CommandClient(VEHICLE, OWN)
+    client.send(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,), 0.0)
+    return client
+
+
+def parameter_list() -> Service:
+    client = ParamClient(VEHICLE, OWN)
+    client.start_list()
+    return client
+
+
+def parameter_set() -> Service:
+    client = ParamClient(VEHICLE, OWN)
+    client.start_set("MPC_XY_CRUISE", 3.0)
+    return client
+
+
+def file() -> Service:
+    client = FtpClient(VEHICLE, OWN)
+    client.start_download("@PARAM/param.pck")
+    return client
+
+
+def directory() -> Service:
+    client = FtpClient(VEHICLE, OWN)
+    client.start_list("/")
+    return client
+
+
+def log_list() -> Service:
+    client = LogClient(VEHICLE)
+    client.start_list()
+    return client
+
+
+def log() -> Service:
+    client = LogClient(VEHICLE)
+    client.start_download(LogEntry(1, 100_000, 0))
+    return client
+
+
+SERVICES = [upload, download, command, parameter_list, parameter_set, file, directory, log_list, log]
+
+
+@pytest.mark.parametrize("make", SERVICES)
+def test_every_client_lives_with_a_mad_vehicle_and_comes_to_an_end(make: Callable[[], Service]) -> None:
+    """The vehicle says anything, then falls silent: the operation under way ends, well or not."""
+    session, vehicle, record = Session(), Link(1, 1), [0]
+
+    def note(frame: bytes) -> None:
+        record[0] += len(frame)
+
+    session.record = note
+    session.receive(vehicle.encode(HEARTBEAT), HERE, 0.0)
+    service = make()
+    session.use(service)
+    inputs = Inputs(81 + SERVICES.index(make), targets=(0, 255, 255), sources=(1, 1, 1, 2))
+    now_s = 0.0
+    for number in range(MESSAGES):
+        now_s += STEP_S if number % 10 == 0 else 0.0
+        for piece in inputs.pieces(inputs.datagram()):
+            session.receive(piece, (HERE[0], HERE[1] + (number % 50) * (number % 7 == 0)), now_s)
+        assert len(session.poll(now_s)) < 200
+        if number % 250 == 0:
+            show(session, now_s)
+    assert record[0] > 0
+    assert held(session) < MOST_HELD
+    while getattr(service, "result", None) is None and now_s < 600.0:
+        now_s += 0.5
+        session.poll(now_s)
+    assert getattr(service, "result", None) is not None
+
+
+def test_a_real_vehicle_is_found_after_anything() -> None:
+    """Strangers that claim to be vehicles fall silent at last; the next heartbeat decides."""
+    session, inputs = Session(), Inputs(101)
+    for number in range(MESSAGES):
+        session.receive(inputs.datagram(), (HERE[0], number % 300), number * 0.001)
+    assert len(inputs.drawn) > len(KINDS) // 2
+    session.receive(Link(42, 1).encode(HEARTBEAT), HERE, 1_000.0)
+    assert (session.target, session.peer) == ((42, 1), HERE)
+
+
+@pytest.mark.parametrize("data", LONG, ids=["v2", "v1", "short v1", "long v2"])
+def test_the_work_is_bounded_by_the_size_of_what_arrives(data: bytes) -> None:
+    session = Session()
+    assert calls(lambda: session.receive(data, HERE, 0.0)) < 20 * len(data)
+    assert session.view.identity is None
