@@ -38,11 +38,11 @@ def start() -> Iterator[Start]:
         process.kill()
 
 
-def fly(out: Path, *options: str) -> tuple[dict[str, object], bytes]:
+def fly(out: Path, instance: int, *options: str) -> tuple[dict[str, object], bytes]:
     run = subprocess.run(
         [
             sys.executable, "-m", "gcs_cli", "fly", str(MISSIONS / "hop.plan"), "--json", "--out", str(out),
-            "--instance", str(free_instance()), *options,
+            "--instance", str(instance), *options,
         ],
         capture_output=True, text=True, timeout=4 * BOUND_S, check=False,
     )  # fmt: skip
@@ -54,14 +54,15 @@ def fly(out: Path, *options: str) -> tuple[dict[str, object], bytes]:
 
 
 def test_the_same_flight_gives_the_same_log_at_any_speed_and_in_one_process(tmp_path: Path) -> None:
-    logs = []
+    logs, instance = [], free_instance()
     gusts = ("--gust", "1", "--torque-gust", "0.1", "--seed", "7")
     for speed in ("max", "10", "1"):
-        summary, log = fly(tmp_path / speed, "--speed", speed, "--vehicle", "x_quad", *gusts)
+        summary, log = fly(tmp_path / speed, instance, "--speed", speed, "--vehicle", "x_quad", *gusts)
         assert summary["outcome"] == "completed"
         logs.append(log)
     assert logs[0] == logs[1] == logs[2]
-    world = World(vehicle="x_quad", gust=1.0, torque_gust=0.1, seed=7)
+    system_id = instance + 1  # a parameter, and so in the log
+    world = World(vehicle="x_quad", gust=1.0, torque_gust=0.1, seed=7, system_id=system_id)
     world.upload("hop.plan")
     world.start_mission()
     world.until_disarmed()
