@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from flightstack.commander.arming_checks import arming_refusals
 from flightstack.commander.conditions import LinkFacts, StateSource
 from flightstack.commander.failsafe import Action, Decision, Failsafe
-from flightstack.commander.supervisor import Supervisor
+from flightstack.commander.ground_watch import GroundWatch
+from flightstack.commander.supervisor import EVENTS_OF_ACTION, Supervisor
 from flightstack.commander.transitions import Event, Facts, Need, Outcome, Status, transition
 from flightstack.contract import FloatArray, LoopRow, LoopStatus
 from flightstack.control.backend import ControlBackend
 from flightstack.geodesy import GeoPoint
-from flightstack.guidance.mission import NAV_DELAY, TAKEOFF
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
-from flightstack.guidance.plan_table import plan_table
-from flightstack.guidance.safe_places import SafePlaces, plan_limits
 from flightstack.guidance.setpoints import OffboardSetpoint, Sticks
 from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.modes import Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
-from flightstack.plan import MissionItem, Rejection
-from flightstack.plan.check import Limits
+from flightstack.plan_keeper import PlanKeeper
 from flightstack.snapshot import CRITICAL, EMERGENCY, INFO, NOTICE, WARNING, Recorder, Snapshot, Text
 
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
@@ -33,21 +28,10 @@ AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
 STREAM_MODES = (Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
 """Modes in which a stream from the ground says where to fly, and whether to leave the ground."""
 
-FAILSAFE_EVENTS: dict[Action, tuple[Event, ...]] = {
-    Action.POSITION: (Event.SELECT_POSITION, Event.SELECT_HOLD, Event.SELECT_LAND),
-    Action.ALTITUDE: (Event.SELECT_ALTITUDE, Event.SELECT_HOLD, Event.SELECT_LAND),
-    Action.HOLD: (Event.SELECT_HOLD, Event.SELECT_LAND),
-    Action.RETURN: (Event.SELECT_RETURN, Event.SELECT_LAND),
-    Action.LAND: (Event.SELECT_LAND,),
-    Action.DISARM: (Event.FORCE_DISARM,),
-    Action.TERMINATE: (Event.TERMINATE,),
-}
-"""What a failsafe's action means to the commander: the first event that is not refused."""
-
 USERS_CHOICES = frozenset(event for event in Event if event.name.startswith("SELECT_"))
 
 
-class Autopilot:
+class Autopilot(PlanKeeper):
     """Ties commander, guidance and control loops together."""
 
     def __init__(
@@ -64,24 +48,20 @@ class Autopilot:
         source: StateSource,
     ) -> None:
         """Use ``state`` (13,) and ``rotor_speed_rad_s`` (8,), which ``source`` writes in place."""
+        super().__init__(home)
         self._vehicle = vehicle
         self._behaviour = behaviour
         self.supervisor = Supervisor(vehicle, behaviour, outer_hz, divisor, state, source)
-        self.items: tuple[MissionItem, ...] = ()
-        self.places = SafePlaces(home)
         self._divisor = divisor
         self._backend = backend
         self._recorder = recorder
-        self._weight_n = vehicle.weight_n
         self._navigator = Navigator(guidance_params(behaviour, vehicle.weight_n), outer_hz)
         self._max_thrust_n = 2.0 * vehicle.weight_n if vehicle.ideal_rotors else vehicle.max_thrust_n
         self._state = state
         self._rotor_speed = rotor_speed_rad_s
         self._tick = 0
         self._flying = False
-        self._armed_us = 0
-        self._landed_us = 0
-        self._has_flown = False
+        self._ground = GroundWatch()
         self._takeoff_altitude_m = behaviour.takeoff_altitude_m
         self.has_state = False  # set once a state has arrived
         idle_row = np.zeros(LoopRow.SIZE)
@@ -160,7 +140,7 @@ class Autopilot:
             self._recorder.status(time_us, now.status, failsafe=True)
         if Failsafe.POSITION_ERROR in supervisor.failsafes:
             self._navigator.take_up(self._state)
-        for event in FAILSAFE_EVENTS.get(decision.action, ()):
+        for event in EVENTS_OF_ACTION.get(decision.action, ()):
             if self._apply(event) is None:
                 break
 
@@ -168,8 +148,7 @@ class Autopilot:
         landed = self._navigator.landed
         if landed != self.now.landed:
             self.now.landed = landed
-            self._landed_us = time_us
-            self._has_flown = True
+            self._ground.changed(time_us)
             if landed:
                 self.now.landing_us = time_us
             else:
@@ -179,22 +158,13 @@ class Autopilot:
             self._choose_loops()
         if not landed:
             return
-        b = self.behaviour
-        if self._has_flown:
-            if self._waited(time_us, self._landed_us, b.disarm_after_landing_s) and not self._is_taking_off():
-                self._apply(Event.LANDED_LONG_ENOUGH)
-        elif self._waited(time_us, self._armed_us, b.disarm_without_takeoff_s):
+        mode = self.now.status.mode  # after a landing, only who goes on flying stays armed
+        is_taking_off = mode in AIRBORNE_MODES or (mode in STREAM_MODES and self._flying)
+        event = self._ground.event(time_us, is_taking_off, self._behaviour)
+        if event is Event.NO_TAKEOFF:
             self.say(WARNING, "Disarmed: no takeoff")
-            self._apply(Event.NO_TAKEOFF)
-
-    def _is_taking_off(self) -> bool:
-        """After a landing, only a mission that goes on flying keeps the vehicle armed."""
-        mode = self.now.status.mode
-        return mode in AIRBORNE_MODES or (mode in STREAM_MODES and self._flying)
-
-    @staticmethod
-    def _waited(time_us: int, since_us: int, wait_s: float) -> bool:
-        return wait_s >= 0.0 and (time_us - since_us) * 1e-6 >= wait_s
+        if event is not None:
+            self._apply(event)
 
     def _watch_mission(self, time_us: int) -> None:
         progress = self._navigator.progress
@@ -224,14 +194,8 @@ class Autopilot:
 
     @property
     def behaviour(self) -> Behaviour:
-        """The parameters of guidance and commander; a new set takes effect with the next outer tick."""
+        """The parameters of guidance and commander."""
         return self._behaviour
-
-    @behaviour.setter
-    def behaviour(self, behaviour: Behaviour) -> None:
-        self._behaviour = behaviour
-        self._navigator.set_params(guidance_params(behaviour, self._vehicle.weight_n))
-        self.supervisor.set_behaviour(behaviour)
 
     @property
     def links(self) -> LinkFacts:
@@ -261,12 +225,6 @@ class Autopilot:
         """Return every reason for which the vehicle would not arm now; empty when it would."""
         known = self.supervisor.arming_facts(self.now.status.mode, self.has_state)
         return arming_refusals(known, self._behaviour)
-
-    def _mission_begins_with_takeoff(self) -> bool:
-        for item in self.items:
-            if item.command < NAV_DELAY:  # the first item that moves the vehicle
-                return item.command == TAKEOFF
-        return False
 
     def happen(self, event: Event, takeoff_altitude_m: float | None = None) -> str | None:
         """Apply what a user asks for; return why it was refused, or None.
@@ -309,10 +267,10 @@ class Autopilot:
     def _adopt(self, before: Status, after: Status, event: Event) -> None:
         self.now.status = after
         if after.armed and not before.armed:
-            self._armed_us = self.now.armed_us = self.now.time_us
+            self.now.armed_us = self.now.time_us
             self.now.takeoff_us = self.now.landing_us = 0
             self.supervisor.armed()
-            self._has_flown = False
+            self._ground.armed(self.now.time_us)
             self.now.landed = True
         if before.armed and not after.armed:  # the log ends with disarming: its last words come first
             in_air = not self.now.landed
@@ -349,6 +307,10 @@ class Autopilot:
         if starting or (flying and entering):
             self._navigator.enter(status.mode, self._takeoff_altitude_m)
         self._flying = flying
+
+    def _mission_is_gone(self) -> None:
+        if self.now.status.mode is Mode.MISSION:
+            self.happen(Event.SELECT_HOLD)
 
     def _rises(self) -> bool:
         """Tell whether the mode makes a standing vehicle leave the ground."""
@@ -389,81 +351,9 @@ class Autopilot:
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Fly by other parameters, from the next outer tick on."""
-        self.behaviour = behaviour
-        self._navigator.set_params(guidance_params(behaviour, self._weight_n))
-
-    # ------------------------------------------------------------------ mission
-
-    @property
-    def limits(self) -> Limits:
-        """Limits of a mission."""
-        return plan_limits(self.behaviour)
-
-    @property
-    def home(self) -> GeoPoint:
-        """Where a return goes, and from where relative altitudes count."""
-        return self.places.home_point
-
-    def set_home(self, point: GeoPoint) -> str | None:
-        """Move home; return why not, or None. A mission's relative altitudes follow, and the fence's limits."""
-        refusal = self.places.set_home(point)
-        if refusal is None:
-            home = self.places.home
-            self._navigator.change_plan(*self._plan_table())
-            self.supervisor.set_home((home.north_m, home.east_m, -home.altitude_m))
-        return refusal
-
-    def _plan_table(self) -> tuple[FloatArray, FloatArray]:
-        return plan_table(self.items, self.places.frame, self.home.altitude_m)
-
-    def check_mission(self, items: Sequence[MissionItem]) -> Rejection | None:
-        """Tell why the vehicle would refuse a mission, or None."""
-        return self.places.check_mission(items, self.limits)
-
-    def set_mission(self, items: Sequence[MissionItem]) -> None:
-        """Take a mission that was checked; one that is being flown begins anew with its first item."""
-        self.items = tuple(items)
-        self._navigator.set_plan(*self._plan_table())
-        self._mission_changed()
-        if not self.items and self.now.status.mode is Mode.MISSION:
-            self.happen(Event.SELECT_HOLD)
-
-    def check_fence(self, items: Sequence[MissionItem]) -> Rejection | None:
-        """Tell why the vehicle would refuse a geofence, or None: in flight, one that it would break at once."""
-        acts_in_air = not self.now.landed and self.behaviour.fence_action > 0.0
-        return self.places.check_fence(items, (self._state[0], self._state[1]) if acts_in_air else None)
-
-    def set_fence(self, items: Sequence[MissionItem]) -> None:
-        """Take a geofence that was checked; no items remove it."""
-        self.supervisor.set_fence(self.places.set_fence(items))
-
-    def check_rally(self, items: Sequence[MissionItem]) -> Rejection | None:
-        """Tell why the vehicle would refuse a list of rally points, or None."""
-        return self.places.check_rally(items, self.limits)
-
-    def set_rally(self, items: Sequence[MissionItem]) -> None:
-        """Take rally points that were checked, for the next return; no items remove them."""
-        self.places.set_rally(items)
-
-    def set_current_item(self, seq: int) -> str | None:
-        """Make ``seq`` the current item; return why not, or None."""
-        if not 0 <= seq < len(self.items):
-            return f"there is no mission item {seq}"
-        self._navigator.set_current(seq)
-        self._mission_changed()
-        return None
-
-    def restart_mission(self) -> None:
-        """Begin the mission anew: its first item is the current one, jumps count from zero."""
-        self._navigator.restart_plan()
-        self._mission_changed()
-
-    def _mission_changed(self) -> None:
-        now = self.now
-        now.progress = self._navigator.progress
-        now.mission_count = len(self.items)
-        now.mission_complete = False
-        self._recorder.mission(now.time_us, now.progress, len(self.items))
+        self._behaviour = behaviour
+        self._navigator.set_params(guidance_params(behaviour, self._vehicle.weight_n))
+        self.supervisor.set_behaviour(behaviour)
 
     # ------------------------------------------------------------------ texts
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from flightstack.commander.arming_checks import ArmingFacts
-from flightstack.commander.conditions import LinkFacts, StateSource
+from flightstack.commander.conditions import BatteryReading, LinkFacts, StateSource
 from flightstack.commander.detectors import (
     BEYOND_ATTITUDE,
     BEYOND_POSITION,
@@ -25,7 +25,7 @@ from flightstack.commander.detectors import (
     follow_rotors,
     rotor_params,
 )
-from flightstack.commander.failsafe import Decision, Failsafe, phase_of
+from flightstack.commander.failsafe import Action, Decision, Failsafe, phase_of
 from flightstack.commander.failsafe_step import (
     IDLE,
     Announcement,
@@ -34,7 +34,7 @@ from flightstack.commander.failsafe_step import (
     failsafe_step,
     override,
 )
-from flightstack.commander.transitions import Status
+from flightstack.commander.transitions import Event, Status
 from flightstack.contract import SETPOINT_SIZE, FloatArray
 from flightstack.guidance.fence import NO_FENCE, Fence, FenceMonitor
 from flightstack.modes import Mode
@@ -52,6 +52,16 @@ FAULTS = (
 )
 HOLD_AFTER_US = 50_000
 """Age of a state from which on the loops rest: fed with what does not change, they would go to their limits."""
+EVENTS_OF_ACTION: dict[Action, tuple[Event, ...]] = {
+    Action.POSITION: (Event.SELECT_POSITION, Event.SELECT_HOLD, Event.SELECT_LAND),
+    Action.ALTITUDE: (Event.SELECT_ALTITUDE, Event.SELECT_HOLD, Event.SELECT_LAND),
+    Action.HOLD: (Event.SELECT_HOLD, Event.SELECT_LAND),
+    Action.RETURN: (Event.SELECT_RETURN, Event.SELECT_LAND),
+    Action.LAND: (Event.SELECT_LAND,),
+    Action.DISARM: (Event.FORCE_DISARM,),
+    Action.TERMINATE: (Event.TERMINATE,),
+}
+"""What a failsafe's action means to the commander: the first event that is not refused."""
 NO_CONDITION: frozenset[Failsafe] = frozenset()
 
 
@@ -75,6 +85,7 @@ class Supervisor:
         self.position_is_controlled = False
         """Whether the setpoint's place is flown to: not on the ground, nor while a stream gives attitudes."""
         self.battery_level = 0
+        self._reading: BatteryReading | None = None
         self._vehicle = vehicle
         self._source = source
         self._state = state
@@ -138,6 +149,7 @@ class Supervisor:
         """Take new parameters, from the next outer tick on."""
         self._behaviour = behaviour
         self._params = detector_params(behaviour, self._vehicle)
+        self._reading = None
         self._configure_fence()
 
     def set_fence(self, fence: Fence) -> None:
@@ -235,6 +247,9 @@ class Supervisor:
 
     def _watch_battery(self) -> None:
         battery, b = self._source.battery, self._behaviour
+        if battery is self._reading:  # most of the time: it is read ten times a second
+            return
+        self._reading = battery
         remaining = battery.remaining if battery.valid else math.nan
         thresholds = (b.battery_low, b.battery_critical, b.battery_emergency)
         self.battery_level = battery_level(self.battery_level, remaining, thresholds)
