@@ -141,9 +141,7 @@ class Inputs:
             head = bytes((len(payload), *source, kind.number))
             return b"\xfe" + head + payload + _checksum(head + payload, kind)
         signed = 0.8 < style < 0.85
-        head = bytes((len(payload), signed, 0, *source)) + kind.number.to_bytes(3, "little")
-        tail = draw.randbytes(13) if signed else b""
-        return b"\xfd" + head + payload + _checksum(head + payload, kind) + tail
+        return sealed(kind, payload, source, draw.randbytes(13) if signed else b"")
 
     # ------------------------------------------------------------------ what is no frame
 
@@ -207,6 +205,12 @@ class Inputs:
             if style > 0.96 and len(out) > 1:
                 out[-1], out[-2] = out[-2], out[-1]
         return out
+
+
+def sealed(kind: Kind, payload: bytes, source: tuple[int, int, int], signature: bytes = b"") -> bytes:
+    """Return the MAVLink 2 frame with a right checksum; ``source``: sequence number, system and component."""
+    head = bytes((len(payload), bool(signature), 0, *source)) + kind.number.to_bytes(3, "little")
+    return b"\xfd" + head + payload + _checksum(head + payload, kind) + signature
 
 
 def _checksum(body: bytes, kind: Kind) -> bytes:
