@@ -27,6 +27,8 @@ from flightstack.mavlink.services.mission_upload import Client, Upload
 from flightstack.plan.rejection import Rejection
 from flightstack.plan.vocabulary import PLAN_NAMES, MissionResult, MissionType
 
+_MAX_ENDED = 32  # a bound on memory: uploads whose acknowledgement can be repeated
+
 
 class MissionServer:
     """Keeps one plan of each type in ``checks``, and lets clients upload, download and clear it."""
@@ -40,7 +42,7 @@ class MissionServer:
         self._timing = timing
         self._store = PlanStore(checks)
         self._uploads: dict[int, Upload] = {}
-        self._ended: dict[int, tuple[Client, int, Message]] = {}
+        self._ended: dict[tuple[int, Client], tuple[int, Message]] = {}
         self._downloads = Downloads()
         self._outbox: list[tuple[Hashable, Message]] = []
         self._events: list[MissionEvent] = []
@@ -114,7 +116,9 @@ class MissionServer:
         kind, count = message.mission_type, message.count
         if self._is_busy_for(client, [kind], kind):
             return
-        self._forget_upload(kind)  # the same client begins again: nothing of its first try may mix in
+        # the same client begins again: nothing of its first try may mix in
+        self._uploads.pop(kind, None)
+        self._ended.pop((kind, client), None)
         reason = self._store.too_long(kind, count)
         if reason is not None:
             self._ack(client, MissionResult.NO_SPACE, kind)
@@ -130,9 +134,9 @@ class MissionServer:
         upload = self._uploads.get(kind)
         if upload is None or upload.client != client:
             # The last item again: our MISSION_ACK got lost.
-            ended = self._ended.get(kind)
-            if ended is not None and ended[:2] == (client, message.seq):
-                self._send(client, ended[2])
+            last_seq, ack = self._ended.get((kind, client), (None, None))
+            if ack is not None and last_seq == message.seq:
+                self._send(client, ack)
         elif upload.accept(message, now_s) and upload.is_complete:
             self._complete(upload)
 
@@ -153,11 +157,10 @@ class MissionServer:
         del self._uploads[kind]
         ack = self._ack(upload.client, result, kind)
         # as it was, should it be needed again: the plan in force, and its id, may be another client's by then
-        self._ended[kind] = (upload.client, upload.count - 1, ack)
-
-    def _forget_upload(self, kind: int) -> None:
-        self._uploads.pop(kind, None)
-        self._ended.pop(kind, None)
+        self._ended.pop((kind, upload.client), None)  # the order of the dictionary is that of the ends
+        self._ended[kind, upload.client] = (upload.count - 1, ack)
+        if len(self._ended) > _MAX_ENDED:
+            del self._ended[next(iter(self._ended))]
 
     def _is_busy_for(self, client: Client, kinds: Iterable[int], asked: int) -> bool:
         """Deny ``client`` while another one uploads; the upload goes on unharmed."""
