@@ -133,6 +133,11 @@ class AutopilotFacts:
         return self._battery()
 
     @property
+    def fence_acts(self) -> bool:
+        """Whether a breach of the fence has a consequence."""
+        return self._autopilot.behaviour.fence_action != 0
+
+    @property
     def fence_breached(self) -> bool:
         """Whether the vehicle is outside its fence."""
         return bool(self._autopilot.supervisor.fence.flags)

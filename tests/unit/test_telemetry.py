@@ -39,7 +39,7 @@ def facts(**changes: object) -> SimpleNamespace:
         "home": HOME, "frame": LocalFrame(HOME),
         "armed": True, "mode": Mode.MISSION, "landed": False, "climbing": False, "descending": False,
         "is_generic": False, "system_status": 4, "top_speed_rad_s": [600.0] * 4, "battery": NoBattery(),
-        "flight": FlightTimes(), "plan_ids": PlanIds(), "fence_breached": False,
+        "flight": FlightTimes(), "plan_ids": PlanIds(), "fence_breached": False, "fence_acts": True,
         "mission_current": 2, "mission_count": 5, "mission_state": 3, "can_arm": True, "has_state": True,
         "loop_timing": lambda: FsLoopTiming(1, 2, 0, 0, 500.0, 100.0, 30.0, *[1.0] * 6, 0),
     }  # fmt: skip
@@ -203,6 +203,12 @@ def test_a_breached_fence_is_ill() -> None:
     assert not ill.onboard_control_sensors_health & fence
     assert ill.onboard_control_sensors_enabled & fence
     assert on_the_wire(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, fence_breached=True).breach_status == 1
+
+
+def test_a_fence_without_action_is_not_enabled() -> None:
+    idle = on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, fence_acts=False)
+    assert not idle.onboard_control_sensors_enabled & mavlink.MAV_SYS_STATUS_GEOFENCE
+    assert idle.onboard_control_sensors_present & mavlink.MAV_SYS_STATUS_GEOFENCE
 
 
 def test_every_mode_is_listed_and_named_once() -> None:

@@ -155,6 +155,11 @@ class VehicleFacts(Protocol):
         ...
 
     @property
+    def fence_acts(self) -> bool:
+        """Whether a breach of the fence has a consequence."""
+        ...
+
+    @property
     def fence_breached(self) -> bool:
         """Whether the vehicle is outside its fence."""
         ...

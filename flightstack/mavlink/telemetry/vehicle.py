@@ -83,8 +83,9 @@ def sys_status(f: VehicleFacts) -> Message:
     if f.battery.valid:
         present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
         healthy |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    enabled = present if f.fence_acts else present & ~mavlink.MAV_SYS_STATUS_GEOFENCE
     return mavlink.MAVLink_sys_status_message(
-        present, present, healthy, 0, *_battery_fields(f), 0, 0, 0, 0, 0, 0
+        present, enabled, healthy, 0, *_battery_fields(f), 0, 0, 0, 0, 0, 0
     )
 
 
