@@ -24,6 +24,7 @@ LINK_COMMANDS = frozenset(
         mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
         mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
         mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,
+        mavlink.MAV_CMD_GET_HOME_POSITION,
         mavlink.MAV_CMD_LOGGING_START,
         mavlink.MAV_CMD_LOGGING_STOP,
     }
@@ -31,6 +32,7 @@ LINK_COMMANDS = frozenset(
 FORERUNNERS: dict[int, int] = {
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION,
+    mavlink.MAV_CMD_GET_HOME_POSITION: mavlink.MAVLINK_MSG_ID_HOME_POSITION,
 }
 """Commands from before REQUEST_MESSAGE, and what they ask for."""
 ULOG = 0.0
