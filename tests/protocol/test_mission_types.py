@@ -157,22 +157,34 @@ def request(seq: int) -> Message:
     return mavlink.MAVLink_mission_request_int_message(*VEHICLE, seq, 0)
 
 
-def test_a_late_copy_of_the_request_for_the_count_does_not_change_the_plan_half_way() -> None:
-    old, new = mission(3, mark=1), mission(3, mark=2)
+def test_a_late_copy_of_the_request_for_the_count_never_mixes_two_plans() -> None:
+    old, new = mission(4, mark=1), mission(4, mark=2)
     server = Server()
     server.put(old)
     (count,) = server.tell(LIST)
+    assert count.opaque_id == mission_id(old)
     server.tell(request(0))
+    (again,) = server.tell(LIST)  # of the same plan: it goes on
+    assert again.opaque_id == mission_id(old)
+    assert server.tell(request(1))[0].param1 == 1.0
     server.put(new, OTHER)
-    (again,) = server.tell(LIST, now_s=1.0)
-    assert again.opaque_id == count.opaque_id == mission_id(old)
-    assert [server.tell(request(seq), now_s=1.0)[0].param1 for seq in (1, 2)] == [1.0, 1.0]
-    (fresh,) = server.tell(LIST, now_s=1.0)  # all are across: a new download
-    assert fresh.opaque_id == mission_id(new)
-    server.tell(request(0), now_s=1.0)
-    server.put(old, OTHER)
-    (late,) = server.tell(LIST, now_s=6.0)  # silent for five seconds: begins anew
-    assert late.opaque_id == mission_id(old)
+    assert server.tell(request(1))[0].param1 == 1.0  # still the plan that it asked for
+    (other,) = server.tell(LIST)
+    assert other.opaque_id == mission_id(new)
+    for seq in (2, 3):  # the client has not heard of it: no item of the new plan
+        (told,) = server.tell(request(seq))
+        assert (told.get_type(), told.opaque_id) == ("MISSION_COUNT", mission_id(new))
+    assert [server.tell(request(seq))[0].param1 for seq in range(4)] == [2.0] * 4
+
+
+def test_a_new_download_after_one_that_was_given_up_brings_the_plan_in_force() -> None:
+    server = Server()
+    server.put(mission(3, mark=1))
+    server.tell(LIST)
+    server.tell(request(0))  # its end, MISSION_ACK, gets lost
+    server.put(mission(3, mark=2), OTHER)
+    assert server.tell(LIST, now_s=1.0)[0].opaque_id == mission_id(mission(3, mark=2))
+    assert [server.tell(request(seq), now_s=1.0)[0].param1 for seq in range(3)] == [2.0] * 3
 
 
 def test_a_repeated_acknowledgement_has_the_id_of_the_plan_that_was_accepted() -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.mission_messages import message_from_item
 from flightstack.mavlink.services.mission_upload import Client
@@ -14,8 +15,6 @@ from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionType
 
 _FORGET_AFTER_S = 30.0
-_RESTART_AFTER_S = 5.0
-"""Silence after which a client that asks for the count again is taken to begin anew."""
 _MAX_DOWNLOADS = 64  # a bound on memory, should clients never end theirs
 
 
@@ -25,6 +24,8 @@ class _Download(NamedTuple):
     served: int
     """How many of the items were asked for, from the first on."""
     heard_s: float
+    is_switched: bool = False
+    """Whether it took the place of one of another plan that was half across."""
 
     @property
     def is_half_done(self) -> bool:
@@ -42,13 +43,16 @@ class Downloads:
     ) -> tuple[int, int]:
         """Begin a download of ``items``, and return their count and id.
 
-        A late copy of the request, in the middle of a download, goes on with the plan that is half across.
+        In the middle of a download this is a new one, or a late copy of the request: nobody can tell. If the
+        plan has changed meanwhile, ``answer`` holds back the rest of it until the client has begun anew.
         """
-        download = self._by_client.get((client, kind))
-        if download is None or not download.is_half_done or now_s - download.heard_s >= _RESTART_AFTER_S:
-            download = _Download(items, plan_id, 0, now_s)
-        self._keep(client, kind, download)
-        return len(download.items), download.plan_id
+        before = self._by_client.get((client, kind))
+        is_half_done = before is not None and before.is_half_done and now_s - before.heard_s < _FORGET_AFTER_S
+        if before is not None and is_half_done and before.plan_id == plan_id:
+            self._keep(client, kind, before._replace(heard_s=now_s))
+        else:
+            self._keep(client, kind, _Download(items, plan_id, 0, now_s, is_half_done))
+        return len(items), plan_id
 
     def end(self, client: Client, kind: int) -> None:
         """Forget a download."""
@@ -64,6 +68,8 @@ class Downloads:
     ) -> Message | None:
         """Return the item asked for, or None if there is none of that number.
 
+        A client that goes on where it was in a plan that has been replaced gets the count again, with another id.
+
         Without a download under way it is the stored mission's. A client that asks with the deprecated
         MISSION_REQUEST gets a MISSION_ITEM, as from PX4: those that still ask so know no other.
         """
@@ -72,6 +78,10 @@ class Downloads:
         download = self._by_client.get((client, kind))
         if download is not None and now_s - download.heard_s < _FORGET_AFTER_S:
             items = download.items
+            if download.is_switched and request.seq > download.served:
+                return mavlink.MAVLink_mission_count_message(
+                    *client.address, len(items), kind, download.plan_id
+                )
             served = max(download.served, min(request.seq + 1, len(items)))
             self._keep(client, kind, download._replace(served=served, heard_s=now_s))
         if request.seq >= len(items):
