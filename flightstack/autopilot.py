@@ -216,7 +216,7 @@ class Autopilot(PlanKeeper):
             upright=known.upright,
             landed=self.now.landed,
             has_mission=bool(self.items),
-            mission_begins_with_takeoff=self._mission_begins_with_takeoff(),
+            mission_takes_off=self._mission_takes_off(),
             manual_fresh=known.manual_fresh,
             offboard_fresh=known.offboard_fresh,
         )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from flightstack.commander.supervisor import Supervisor
 from flightstack.contract import FloatArray
 from flightstack.geodesy import GeoPoint
-from flightstack.guidance.mission import NAV_DELAY, TAKEOFF
+from flightstack.guidance.mission import LAND, NAV_DELAY, RETURN_TO_LAUNCH
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.plan_table import plan_table
 from flightstack.guidance.safe_places import SafePlaces, plan_limits
@@ -106,8 +106,9 @@ class PlanKeeper:
         now.mission_complete = False
         self._recorder.mission(now.time_us, now.progress, len(self.items))
 
-    def _mission_begins_with_takeoff(self) -> bool:
+    def _mission_takes_off(self) -> bool:
+        """Tell whether the mission leaves the ground: by a takeoff, or on the way to its first position."""
         for item in self.items:
             if item.command < NAV_DELAY:  # the first item that moves the vehicle
-                return item.command == TAKEOFF
+                return item.command not in (LAND, RETURN_TO_LAUNCH)
         return False

@@ -87,8 +87,8 @@ def checked_plan(options: FlyOptions) -> Plan:
     if rejection is not None:
         raise CliError(f"{options.plan_path}: {rejection.reason}", USAGE)
     moving = (item.command for item in plan.items if item.command in POSITION_COMMANDS | {_RETURN})
-    if next(moving, None) != Command.NAV_TAKEOFF:
-        problem = "the mission must begin with a takeoff, since the vehicle stands on the ground"
+    if next(moving, None) in (Command.NAV_LAND, _RETURN):
+        problem = "the mission begins with a landing or a return, and the vehicle stands on the ground"
         raise CliError(f"{options.plan_path}: {problem}", USAGE)
     return plan
 

@@ -41,7 +41,7 @@ class Facts(NamedTuple):
     upright: bool
     landed: bool
     has_mission: bool
-    mission_begins_with_takeoff: bool
+    mission_takes_off: bool
     manual_fresh: bool
     offboard_fresh: bool
 
@@ -62,7 +62,7 @@ class Need(Enum):
     IN_AIR = "the vehicle is on the ground"
     ARMED = "the vehicle is disarmed"
     MISSION = "no mission is loaded"
-    TAKEOFF_ITEM = "the vehicle is on the ground and the mission does not begin with a takeoff"
+    TAKES_OFF = "the vehicle is on the ground and the mission begins with a landing or a return"
     MANUAL_STREAM = "no manual control is received"
     OFFBOARD_STREAM = "no offboard setpoints are received"
 
@@ -76,7 +76,7 @@ def is_met(need: Need, status: Status, facts: Facts) -> bool:
         Need.IN_AIR: status.armed and not facts.landed,
         Need.ARMED: status.armed,
         Need.MISSION: facts.has_mission,
-        Need.TAKEOFF_ITEM: not facts.landed or facts.mission_begins_with_takeoff,
+        Need.TAKES_OFF: not facts.landed or facts.mission_takes_off,
         Need.MANUAL_STREAM: facts.manual_fresh,
         Need.OFFBOARD_STREAM: facts.offboard_fresh,
     }[need]
@@ -102,7 +102,7 @@ RULES = (
     Rule(Event.FORCE_DISARM, FLYABLE, (), False, Mode.HOLD),
     Rule(Event.TERMINATE, tuple(Mode), (), False, Mode.TERMINATION),
     Rule(Event.SELECT_TAKEOFF, FLYABLE, (Need.STATE, Need.ON_GROUND), None, Mode.TAKEOFF),
-    Rule(Event.SELECT_MISSION, FLYABLE, (Need.STATE, Need.MISSION, Need.TAKEOFF_ITEM), None, Mode.MISSION),
+    Rule(Event.SELECT_MISSION, FLYABLE, (Need.STATE, Need.MISSION, Need.TAKES_OFF), None, Mode.MISSION),
     Rule(Event.SELECT_HOLD, FLYABLE, (Need.STATE,), None, Mode.HOLD),
     Rule(Event.SELECT_RETURN, FLYABLE, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.RETURN),
     Rule(Event.SELECT_LAND, FLYABLE, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.LAND),

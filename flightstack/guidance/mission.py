@@ -32,13 +32,15 @@ DO_CHANGE_SPEED = 178
 # progress: the current item and its phase, the last item reached (−1: none), and the goal in force
 M_CURRENT, M_PHASE, M_TIMER, M_REACHED, M_FINISHED, M_WANTS_RETURN = range(6)
 M_X, M_Y, M_Z, M_YAW, M_YAW_IS_SET, M_YAW_IS_COUNTED, M_YAW_RATE, M_SPEED = range(6, 14)
+# where a vehicle on the ground rises to before it sets out for an item that is no takeoff
+M_RISE_X, M_RISE_Y, M_RISE_Z = range(14, 17)
 # items reached since the start, the newest ``LOG_SIZE`` of them: several may be reached in one tick
-M_LOG_COUNT, M_LOG = 14, 15
+M_LOG_COUNT, M_LOG = 17, 18
 LOG_SIZE = 64
 MISSION_MEMORY_SIZE = M_LOG + LOG_SIZE
 
-BEGIN, TRAVEL, STAY = 0.0, 1.0, 2.0
-"""Phases of an item: about to begin; on the way; there (waiting out its time, or descending)."""
+BEGIN, TRAVEL, STAY, RISE = 0.0, 1.0, 2.0, 3.0
+"""Phases of an item: about to begin; on the way; there (waiting out its time, or descending); leaving the ground."""
 
 
 @compiled
@@ -107,9 +109,11 @@ def _begin_condition_yaw(
 
 @compiled
 def _begin_position_item(
-    m: FloatArray, item: FloatArray, state: VehicleState, params: GuidanceParams
+    m: FloatArray, item: FloatArray, state: VehicleState, landed: bool, params: GuidanceParams
 ) -> None:
+    """Aim for the item. From the ground the vehicle rises first, as PX4's does: at least to MIS_TAKEOFF_ALT."""
     command = item[COMMAND]
+    m[M_RISE_X], m[M_RISE_Y] = m[M_X], m[M_Y]
     x = m[M_X] if math.isnan(item[NORTH]) else item[NORTH]
     y = m[M_Y] if math.isnan(item[EAST]) else item[EAST]
     if command != LAND and not math.isnan(item[DOWN]):  # LAND: fly there at the present height, then descend
@@ -121,7 +125,8 @@ def _begin_position_item(
     m[M_YAW_IS_COUNTED] = 0.0
     m[M_X], m[M_Y] = x, y
     m[M_YAW_RATE] = params.yaw_rate_rad_s
-    m[M_PHASE] = TRAVEL
+    m[M_RISE_Z] = min(m[M_Z], state.position_ned_m.z - params.takeoff_altitude_m)
+    m[M_PHASE] = RISE if landed and command not in (TAKEOFF, LAND) else TRAVEL
 
 
 @compiled
@@ -139,6 +144,7 @@ def _begin(
     jumps_left: FloatArray,
     state: VehicleState,
     reference_yaw_rad: float,
+    landed: bool,
     params: GuidanceParams,
 ) -> None:
     """Carry out items that take no time until one that does, and begin that one."""
@@ -167,7 +173,7 @@ def _begin(
             m[M_PHASE] = STAY
             return
         else:
-            _begin_position_item(m, item, state, params)
+            _begin_position_item(m, item, state, landed, params)
             return
     m[M_FINISHED] = 1.0
 
@@ -264,12 +270,15 @@ def mission_step(
     """Advance the mission by one outer tick; ``reference_yaw_rad`` is the trajectory's present heading."""
     if m[M_FINISHED] > 0.0:
         return
-    if m[M_PHASE] == TRAVEL:
+    if m[M_PHASE] == RISE:
+        if abs(m[M_RISE_Z] - state.position_ned_m.z) <= params.altitude_acceptance_m:
+            m[M_PHASE] = TRAVEL
+    elif m[M_PHASE] == TRAVEL:
         _travel(m, plan[int(m[M_CURRENT])], state, reference_yaw_rad, landed, params)
     elif m[M_PHASE] == STAY:
         _stay(m, plan[int(m[M_CURRENT])], state, landed, params, dt_s)
     if m[M_PHASE] == BEGIN:
-        _begin(m, plan, jumps_left, state, reference_yaw_rad, params)
+        _begin(m, plan, jumps_left, state, reference_yaw_rad, landed, params)
 
 
 @compiled
@@ -286,6 +295,9 @@ def mission_goal(
             climb = params.takeoff_speed_m_s
             if m[M_PHASE] == TRAVEL:  # straight up first
                 x, y = start_x, start_y
+        elif m[M_PHASE] == RISE:
+            x, y, z = m[M_RISE_X], m[M_RISE_Y], m[M_RISE_Z]
+            climb = params.takeoff_speed_m_s
         elif command == LAND and m[M_PHASE] == STAY:
             z = params.far_below_m
             descent = landing_speed(down_m, params)

@@ -20,6 +20,7 @@ class GuidanceParams(NamedTuple):
     climb_speed_m_s: float
     descent_speed_m_s: float
     takeoff_speed_m_s: float
+    takeoff_altitude_m: float
     land_speed_m_s: float
     land_slow_altitude_m: float
     acceleration_m_s2: float
@@ -56,6 +57,7 @@ def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:
         climb_speed_m_s=b.climb_speed_m_s,
         descent_speed_m_s=b.descent_speed_m_s,
         takeoff_speed_m_s=b.takeoff_speed_m_s,
+        takeoff_altitude_m=b.takeoff_altitude_m,
         land_speed_m_s=b.land_speed_m_s,
         land_slow_altitude_m=b.land_slow_altitude_m,
         acceleration_m_s2=min(b.acceleration_m_s2, in_time_m_s2),

@@ -161,3 +161,44 @@ def test_an_upright_vehicle_keeps_its_integrators_quiet_on_the_ground() -> None:
         climbs.append(world.position)
     for a, b in itertools.pairwise(climbs):
         assert np.allclose(a, b, atol=1e-3)  # 4e-6 seen
+
+
+@pytest.mark.parametrize(
+    ("height_m", "least_m"),
+    [pytest.param(5.0, 5.0, id="high"), pytest.param(1.0, 2.5, id="lower than MIS_TAKEOFF_ALT")],
+)
+def test_a_mission_that_begins_with_a_waypoint_rises_before_it_sets_out(
+    height_m: float, least_m: float
+) -> None:
+    world = World()
+    world.upload([item(16, north=8.0, z=height_m), item(21, north=8.0, z=0.0)])
+    world.start_mission()
+    aside_m, highest_m = 0.0, 0.0
+    while world.armed:
+        world.run(0.02)
+        highest_m = max(highest_m, world.altitude)
+        if highest_m < least_m - 0.5:
+            aside_m = max(aside_m, abs(world.position[0]))
+        assert world.time_s < 60.0, world.texts
+    assert world.reached == [0, 1]
+    assert aside_m < 0.02  # 0.001 m seen: straight up to within NAV_MC_ALT_RAD
+    assert highest_m > least_m - 0.45
+    assert abs(world.position[0] - 8.0) < 0.1
+
+
+def test_a_mission_that_goes_on_after_a_landing_rises_from_there() -> None:
+    world = World(params=["COM_DISARM_LAND=-1"])
+    world.upload([
+        item(22, z=3.0), item(16, north=6.0, z=3.0), item(21, north=6.0, z=0.0), item(16, north=12.0, z=3.0),
+        item(21, north=12.0, z=0.0),
+    ])  # fmt: skip
+    world.start_mission()
+    world.until(lambda: 2 in world.reached, 60.0)
+    farthest_m = world.position[0]
+    while world.altitude < 2.0:
+        world.run(0.02)
+        farthest_m = max(farthest_m, world.position[0])
+        assert world.time_s < 60.0, world.texts
+    assert farthest_m < 6.1
+    world.until(lambda: 4 in world.reached, 60.0)
+    assert abs(world.position[0] - 12.0) < 0.1

@@ -135,12 +135,12 @@ def test_a_second_takeoff_in_the_air_is_refused(hovering: World) -> None:
     assert hovering.takeoff(10.0) == REJECTED
 
 
-def test_a_mission_without_takeoff_does_not_start_on_the_ground() -> None:
+def test_a_mission_that_begins_with_a_landing_does_not_start_on_the_ground() -> None:
     world = World()
-    world.upload([item(16, north=5.0, z=3.0)])
+    world.upload([item(21, z=0.0), item(16, north=5.0, z=3.0)])
     assert world.command(mavlink.MAV_CMD_MISSION_START) == REJECTED
     world.run(0.02)
-    assert any("does not begin with a takeoff" in text for text in world.texts)
+    assert any("begins with a landing" in text for text in world.texts)
 
 
 def test_a_tilted_vehicle_does_not_arm() -> None:

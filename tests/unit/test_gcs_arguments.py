@@ -122,8 +122,8 @@ def test_a_plan_that_the_vehicle_would_refuse_is_not_flown(tmp_path: Path) -> No
     assert error.value.exit_code == USAGE
 
 
-@pytest.mark.parametrize("first", [(16, 47.3978, 8.5456, 5), (20, 0, 0, 0)])
-def test_a_plan_that_does_not_begin_with_a_takeoff_is_not_flown(
+@pytest.mark.parametrize("first", [(21, 47.3978, 8.5456, 0), (20, 0, 0, 0)])
+def test_a_plan_that_begins_with_the_end_of_a_flight_is_not_flown(
     tmp_path: Path, first: tuple[float, ...]
 ) -> None:
     plan = tmp_path / "hover.waypoints"
@@ -131,7 +131,7 @@ def test_a_plan_that_does_not_begin_with_a_takeoff_is_not_flown(
     code, *position = first
     item = "\t".join(map(str, (1, 0, 3, code, 0, 0, 0, 0, *position, 1)))
     plan.write_text(f"QGC WPL 110\n{home}\n{item}\n")
-    with pytest.raises(CliError, match=r"hover.waypoints: the mission must begin with a takeoff") as error:
+    with pytest.raises(CliError, match=r"hover.waypoints: the mission begins with a landing or a return") as error:
         checked_plan(FlyOptions(plan))
     assert error.value.exit_code == USAGE
 

@@ -27,7 +27,7 @@ READY = Facts(
     upright=True,
     landed=True,
     has_mission=True,
-    mission_begins_with_takeoff=True,
+    mission_takes_off=True,
     manual_fresh=True,
     offboard_fresh=True,
 )
@@ -136,7 +136,7 @@ REFUSALS = [
     (Need.ARMED, Status(False, Mode.TAKEOFF), READY, Event.TAKEOFF_REACHED),
     (Need.ARMED, Status(False, Mode.MISSION), READY, Event.MISSION_ASKS_RETURN),
     (Need.MISSION, STANDING, READY._replace(has_mission=False), Event.SELECT_MISSION),
-    (Need.TAKEOFF_ITEM, FLYING, READY._replace(mission_begins_with_takeoff=False), Event.SELECT_MISSION),
+    (Need.TAKES_OFF, FLYING, READY._replace(mission_takes_off=False), Event.SELECT_MISSION),
     (Need.MANUAL_STREAM, FLYING, IN_AIR._replace(manual_fresh=False), Event.SELECT_POSITION),
     (Need.MANUAL_STREAM, FLYING, IN_AIR._replace(manual_fresh=False), Event.SELECT_ALTITUDE),
     (Need.OFFBOARD_STREAM, FLYING, IN_AIR._replace(offboard_fresh=False), Event.SELECT_OFFBOARD),
@@ -163,7 +163,7 @@ def test_every_need_is_used_and_tested() -> None:
         (STANDING, READY, Event.SELECT_MISSION, Status(False, Mode.MISSION)),
         (
             FLYING,
-            IN_AIR._replace(mission_begins_with_takeoff=False),
+            IN_AIR._replace(mission_takes_off=False),
             Event.SELECT_MISSION,
             flying(Mode.MISSION),
         ),
