@@ -75,7 +75,8 @@ def _run(case: Case, seconds: float) -> tuple[np.ndarray, np.ndarray, float]:
         stack = running.enter_context(
             child(
                 "benchmarks.timed_stack", str(file), "--clock=realtime", f"--sim-{port}",
-                f"--instance={instance}", f"--gcs-port={ground_port(instance)}", f"--log={folder}/flight.ulg",
+                f"--instance={instance}", f"--gcs-port={ground_port(instance)}", "--log=none", "--params=none",
+                errors=subprocess.PIPE,
             )
         )  # fmt: skip
         _wait_for(station, stack)
@@ -100,7 +101,9 @@ def _wait_for(station: socket.socket, stack: subprocess.Popen[bytes]) -> None:
         with contextlib.suppress(TimeoutError):
             station.recv(4096)
             return
-    raise RuntimeError("the flight stack did not start: try flightstack --check")
+    stack.kill()
+    said = stack.communicate()[1].decode(errors="replace").strip()
+    raise RuntimeError(f"the flight stack did not start: {said or 'no word from it'}")
 
 
 def loads(seconds: float, rounds: int) -> dict[str, Seen]:

@@ -82,11 +82,12 @@ def _flight_stack(seconds: float) -> list[float]:
 
 
 @contextlib.contextmanager
-def child(module: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+def child(
+    module: str, *arguments: str, errors: int = subprocess.DEVNULL
+) -> Iterator[subprocess.Popen[bytes]]:
     """Run a module as a process that ends with the block."""
-    quiet = subprocess.DEVNULL
     command = [sys.executable, "-m", module, *arguments]
-    with subprocess.Popen(command, cwd=ROOT, stdout=quiet, stderr=quiet) as process:
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=errors) as process:
         try:
             yield process
         finally:

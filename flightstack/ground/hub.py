@@ -29,6 +29,7 @@ from flightstack.mavlink.telemetry import MAKERS, VehicleFacts, heartbeat, messa
 HEARTBEAT_S = 1.0
 PEER_FORGOTTEN_S = 30.0
 MAX_PEERS = 64
+"""Peers that came by themselves; those addressed unasked, and TCP clients, have limits of their own."""
 GIVES_WAY_S = 5.0
 """A peer silent for so long gives way to a new one when all places are taken: five heartbeats are missing."""
 FORWARDED_A_POLL = 64
@@ -122,10 +123,10 @@ class GroundHub:
         """Make a peer of a stranger who sends a valid frame, if there is room: noise takes no place."""
         if not any(frame.known for frame in FrameReader().feed(data)):
             return None
-        if len(self._peers) >= MAX_PEERS:
-            passing = [(peer.heard_s, where) for where, peer in self._peers.items() if not peer.permanent]
-            silent_s, silent = min(passing, default=(math.inf, None))
-            if silent is None or now_s - silent_s < GIVES_WAY_S:
+        passing = [(peer.heard_s, where) for where, peer in self._peers.items() if not peer.permanent]
+        if len(passing) >= MAX_PEERS:
+            silent_s, silent = min(passing)
+            if now_s - silent_s < GIVES_WAY_S:
                 return None
             self.drop_peer(silent)
         return self.add_peer(address)

@@ -1,0 +1,139 @@
+"""The hub among many peers: what it passes on, who gets a place, and a poll that is taken in parts."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from flightstack.ground.hub import FORWARDED_A_POLL, GIVES_WAY_S, MAX_PEERS
+from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link
+from tests.unit.test_ground_hub import ALICE, BOB, Net
+
+CAMERA = PeerAddress("tcp", "camera", 3)
+
+
+@pytest.fixture
+def net() -> Net:
+    return Net()
+
+
+def address(number: int) -> PeerAddress:
+    return PeerAddress(GROUND, "host", number)
+
+
+def test_frames_are_passed_on_unchanged_to_whom_they_concern(net: Net) -> None:
+    alice, bob = net.join(ALICE, system=250), net.join(BOB, system=251)
+    camera = net.join(CAMERA, system=7, component=100)
+    net.poll()
+    for station in (alice, bob, camera):
+        station.frames.clear()
+    to_camera = alice.codec.encode(mavlink.MAVLink_command_long_message(7, 100, 2000, 0, *[0.0] * 7))
+    to_all = alice.codec.encode(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    unknown = bytes([0xFD, 2, 0, 0, 5, 250, 190]) + (54321).to_bytes(3, "little") + b"\x01\x02\x11\x22"
+    for frame in (to_camera, to_all, unknown):
+        net.hub.receive(ALICE, frame, net.now_s)
+    net.poll()
+    passed = [[f for f in station.frames if f[5] == 250] for station in (alice, bob, camera)]
+    assert passed == [[], [to_all, unknown], [to_camera, to_all, unknown]]
+
+
+def test_a_command_for_another_vehicle_is_passed_on_and_not_carried_out(net: Net) -> None:
+    alice, other = net.join(ALICE), net.join(BOB, system=8, component=1)
+    net.poll()
+    other.inbox.clear()
+    alice.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, system=8)
+    net.poll()
+    assert not net.autopilot.now.status.armed
+    assert len(other.take("COMMAND_LONG")) == 1
+    assert alice.take("COMMAND_ACK") == []
+
+
+def test_a_peer_that_has_gone_gets_nothing_more(net: Net) -> None:
+    alice = net.join(ALICE)
+    net.join(BOB)
+    net.poll()
+    alice.heartbeat()
+    net.hub.drop_peer(BOB)
+    assert BOB not in [where for where, _ in net.hub.poll(net.now_s + 1.0)]
+
+
+def test_what_is_passed_on_is_limited_in_a_poll_and_in_all(net: Net) -> None:
+    for number in range(20):
+        net.join(address(number))
+    net.poll()
+    talker = net.stations[address(0)]
+    for _ in range(1000):
+        talker.heartbeat()
+    assert len(net.hub._to_forward) <= 4096
+    sent = [frame for _, frame in net.hub.poll(net.now_s) if frame[5] == 255]
+    assert len(sent) == FORWARDED_A_POLL
+
+
+def test_noise_takes_no_place(net: Net) -> None:
+    chance = random.Random(5)
+    for number in range(500):
+        net.hub.receive(address(number), chance.randbytes(280), net.now_s)
+    assert net.hub._peers == {}
+
+
+def test_new_peers_take_the_place_of_silent_ones_and_never_of_one_that_is_heard(net: Net) -> None:
+    station = net.join(ALICE)
+    for number in range(MAX_PEERS - 1):
+        net.join(address(number))
+    net.run(GIVES_WAY_S + 0.5)
+    station.heartbeat()
+    for number in range(1000, 1000 + 2 * MAX_PEERS):  # somebody opens port after port
+        net.join(address(number))
+    assert net.hub.is_heard(ALICE)
+    assert net.hub.is_heard(address(1000))
+    assert len(net.hub._peers) == MAX_PEERS
+
+
+def test_peers_that_are_addressed_unasked_take_no_place_from_others(net: Net) -> None:
+    for number in range(MAX_PEERS):
+        net.hub.add_peer(PeerAddress("tcp", "silent", number), permanent=True)
+    net.join(ALICE)
+    assert net.hub.is_heard(ALICE)
+
+
+def test_a_poll_may_be_taken_in_parts_while_messages_arrive(net: Net) -> None:
+    """Every peer gets the same frames as in one go: numbers without a gap, and its answer."""
+    stations = [net.join(address(number)) for number in range(5)]
+    net.poll()
+    for station in stations:
+        station.inbox.clear()
+        station.frames.clear()
+    for _ in range(50):
+        net.now_s += 0.02
+        net.autopilot.now.time_us += 20_000
+        for count, (where, data) in enumerate(net.hub.poll(net.now_s)):
+            net.stations[where].frames.append(data)
+            if count < 2:  # answered in the next poll
+                asked = mavlink.MAVLINK_MSG_ID_ATTITUDE
+                stations[0].command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, asked, 20_000)
+                stations[1].command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+    net.poll()
+    for station in stations:
+        own = [frame for frame in station.frames if frame[5] == 7]
+        first = own[0][4]
+        assert [frame[4] for frame in own] == [(first + index) % 256 for index in range(len(own))]
+        kinds = [m.get_type() for frame in own for m in Link(1, 1).decode(frame)]
+        assert kinds.count("ATTITUDE") >= 45
+    answers = [m for frame in stations[1].frames for m in Link(1, 1).decode(frame)]
+    assert any(message.get_type() == "HOME_POSITION" for message in answers)
+
+
+def test_a_peer_may_go_in_the_middle_of_a_poll(net: Net) -> None:
+    net.join(ALICE)
+    net.join(BOB)
+    net.run(0.1)
+    net.now_s += 1.0
+    net.autopilot.now.time_us += 1_000_000
+    poll = net.hub.poll(net.now_s)
+    (where, _) = next(poll)
+    other = BOB if where == ALICE else ALICE
+    net.hub.drop_peer(other)
+    assert other not in [where for where, _ in poll]
