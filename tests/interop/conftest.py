@@ -59,3 +59,11 @@ def client(request: pytest.FixtureRequest, fleet: Fleet) -> Iterator[Client]:
     yield fleet.client(speed, link)
     if request.session.testsfailed > failed:
         fleet.discard(speed)
+
+
+@pytest.fixture(scope="package")
+def station_vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealVehicle]:
+    """A vehicle at ten times real time for ground stations that bind its UDP ports themselves."""
+    vehicle = RealVehicle(tmp_path_factory.mktemp("station-vehicle"), 10.0)
+    yield vehicle
+    vehicle.stop()

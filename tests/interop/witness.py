@@ -1,0 +1,64 @@
+"""pymavlink's own connection to a vehicle, to see with eyes that are not ours what another client did to it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+os.environ.setdefault("MAVLINK20", "1")  # read by mavutil when it is imported
+
+from pymavlink import mavutil
+
+from tests.support.process import BOUND_S
+
+
+class Witness:
+    """A connection of pymavlink; ``url`` as ``mavutil.mavlink_connection`` takes it."""
+
+    def __init__(self, url: str, system: int, **options: Any) -> None:
+        """Open it; ``system`` is the vehicle's."""
+        self.connection = mavutil.mavlink_connection(url, **options)
+        self.system = system
+        self.connection.target_system, self.connection.target_component = system, 1
+        if url.startswith("udpout"):
+            self.beat()  # nobody knows of a datagram socket before it has sent
+        self.until("HEARTBEAT")
+
+    @property
+    def mav(self) -> Any:
+        """What sends messages."""
+        return self.connection.mav
+
+    def beat(self) -> None:
+        """Send the HEARTBEAT of a ground station."""
+        self.mav.heartbeat_send(mavutil.mavlink.MAV_TYPE_GCS, mavutil.mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4)
+
+    def until(self, kind: str | list[str], holds: Callable[[Any], object] = lambda message: True) -> Any:
+        """Return the next message of a type (or of several) from the vehicle for which ``holds``."""
+        seen = None
+        while True:
+            message = self.connection.recv_match(type=kind, blocking=True, timeout=BOUND_S)
+            assert message is not None, f"no such {kind} came; the last was {seen}"
+            if message.get_srcSystem() == self.system and holds(message):
+                return message
+            seen = message
+
+    def until_modes(self, *custom_modes: int) -> None:
+        """Wait until the heartbeats have shown these modes, in this order: each change sends one at once."""
+        for custom_mode in custom_modes:
+            self.until("HEARTBEAT", lambda beat, wanted=custom_mode: beat.custom_mode == wanted)
+
+    def catch_up(self) -> None:
+        """Forget what came so far."""
+        while self.connection.recv_match(blocking=False) is not None:
+            pass
+
+    def command(self, number: int, *params: float, component: int = 1) -> Any:
+        """Send a COMMAND_LONG and return its acknowledgement, that of an earlier one aside."""
+        values = (*params, *[0.0] * (7 - len(params)))
+        self.mav.command_long_send(self.system, component, number, 0, *values)
+        return self.until("COMMAND_ACK", lambda ack: ack.command == number)
+
+    def close(self) -> None:
+        self.connection.close()
