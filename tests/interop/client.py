@@ -49,10 +49,10 @@ class Client:
     def _await(self, wanted: str) -> None:
         said: list[str] = []
         while (line := self._process.next_line()) is not None:
-            if line.strip() == wanted:
+            if wanted in line:
                 return
             said.append(line)
-            if line.strip() == FAILED:
+            if FAILED in line:
                 break
         else:
             said.append("(silent for too long, or dead)\n")

@@ -11,24 +11,32 @@ import json
 import sys
 import traceback
 
+import pytest
+
 from tests.interop.drone import Drone
 
-CONNECTED, PASSED, FAILED = "connected", "passed", "failed"
+CONNECTED, PASSED, FAILED = (f"[{word}]" for word in ("connected", "passed", "failed"))
+"""Words to the parent. MAVSDK writes to the same output, in pieces: a word may stand anywhere in a line."""
+
+
+def say(word: str) -> None:
+    sys.stdout.write(f"{word}\n")
+    sys.stdout.flush()
 
 
 async def serve(url: str) -> None:
     drone = await Drone.connect(url)
-    print(CONNECTED, flush=True)
+    say(CONNECTED)
     loop = asyncio.get_running_loop()
     while line := await loop.run_in_executor(None, sys.stdin.readline):
         module, function, arguments = json.loads(line)
         try:
             await getattr(importlib.import_module(module), function).story(drone, **arguments)
-        except Exception:
+        except (Exception, pytest.fail.Exception):
             traceback.print_exc()
-            print(FAILED, flush=True)
+            say(FAILED)
         else:
-            print(PASSED, flush=True)
+            say(PASSED)
     drone.mavsdk.destroy()
 
 

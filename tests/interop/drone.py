@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing
 from typing import TypeVar
@@ -68,6 +69,12 @@ class Drone:
                     return value
         raise AssertionError(f"the stream ended before {what}")
 
+    def later(
+        self, what: str, stream: AsyncGenerator[T, None], holds: Callable[[T], object] = lambda _: True
+    ) -> asyncio.Task[T]:
+        """Begin to follow a stream now, for what the next steps of the story cause; await the result."""
+        return asyncio.ensure_future(self.until(what, stream, holds))
+
     def step(self, text: str) -> None:
         """Say how far the story is: what a test that hangs shows."""
         print(f"  {text}", flush=True)
@@ -81,7 +88,16 @@ class Drone:
         """Arm, take off and wait for the end of the climb."""
         await self.arm()
         await self.action.takeoff()
-        await self.until("holding", self.telemetry.subscribe_flight_mode(), lambda mode: mode.name == "HOLD")
+        await self.until("in the air", self.telemetry.subscribe_in_air(), bool)
+        await self.until_mode("HOLD")
+
+    async def until_mode(self, name: str) -> None:
+        """Wait for a flight mode, by MAVSDK's name of it."""
+        await self.until(name, self.telemetry.subscribe_flight_mode(), lambda mode: mode.name == name)
+
+    def later_mode(self, name: str) -> asyncio.Task[object]:
+        """As :meth:`until_mode`, for a mode that may pass before the story comes to it."""
+        return self.later(name, self.telemetry.subscribe_flight_mode(), lambda mode: mode.name == name)
 
     async def land(self) -> None:
         """Land and wait for the vehicle to disarm itself."""
