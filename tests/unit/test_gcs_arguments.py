@@ -131,7 +131,9 @@ def test_a_plan_that_begins_with_the_end_of_a_flight_is_not_flown(
     code, *position = first
     item = "\t".join(map(str, (1, 0, 3, code, 0, 0, 0, 0, *position, 1)))
     plan.write_text(f"QGC WPL 110\n{home}\n{item}\n")
-    with pytest.raises(CliError, match=r"hover.waypoints: the mission begins with a landing or a return") as error:
+    with pytest.raises(
+        CliError, match=r"hover.waypoints: the mission begins with a landing or a return"
+    ) as error:
         checked_plan(FlyOptions(plan))
     assert error.value.exit_code == USAGE
 
