@@ -61,6 +61,7 @@ class Autopilot(PlanKeeper):
         self._rotor_speed = rotor_speed_rad_s
         self._tick = 0
         self._flying = False
+        self._target_is_given = False  # by guidance, in place of the outer loop's
         self._ground = GroundWatch()
         self._takeoff_altitude_m = behaviour.takeoff_altitude_m
         self.has_state = False  # set once a state has arrived
@@ -88,7 +89,7 @@ class Autopilot(PlanKeeper):
             row[:] = self._good_row
             row[LoopRow.STATUS] = LoopStatus.INPUT_STALE
         else:
-            aims = outer_due and not self._navigator.flies_attitude(now.status.mode)
+            aims = outer_due and not self._target_is_given
             self._backend.step(state, now.setpoint, self._rotor_speed, aims, row)
             self.supervisor.follow_rotors(row)
         now.row = row
@@ -106,9 +107,15 @@ class Autopilot(PlanKeeper):
         waits = mode is Mode.MISSION  # a mission also waits on the ground
         if self.supervisor.holds_rotors or not (self._flying or waits):
             return
-        self._navigator.step(mode, self._state, now.attitude_target)
-        if self._flying and self._navigator.flies_attitude(mode):
-            self._backend.set_attitude_target(self._navigator.attitude_target)
+        navigator, target = self._navigator, None
+        navigator.step(mode, self._state, now.attitude_target)
+        if self._flying and navigator.flies_attitude(mode):
+            target = navigator.attitude_target
+        elif self._flying and navigator.touches_ground:
+            target = navigator.level_target(self._state, now.attitude_target)
+        if target is not None:
+            self._backend.set_attitude_target(target)
+        self._target_is_given = target is not None
 
     # ------------------------------------------------------------------ events of the flight
 

@@ -9,6 +9,10 @@ from flightstack.contract import VehicleState
 
 SETTLE_S = 0.6
 """How long all signs must agree before the vehicle counts as landed."""
+CONTACT_S = 0.1
+"""How long they must agree before it counts as touching the ground. In the air they cannot: it would be falling."""
+CONTACT_THRUST = 0.3
+"""Thrust on touching the ground, as share of the weight."""
 CLIMB_M = 0.15
 """Rise above the point of the last landing that ends it."""
 
@@ -36,7 +40,10 @@ def land_detector_step(
         if z < memory.ground_z_m - CLIMB_M:
             return LandMemory(0.0, 0.0, z)
         return memory
-    still = abs(v.z) < 0.2 and v.x * v.x + v.y * v.y < 0.16
+    sinking = (
+        0.5 if memory.settled_s >= CONTACT_S else 0.2
+    )  # a tilted vehicle levels with one foot on the ground
+    still = abs(v.z) < sinking and v.x * v.x + v.y * v.y < 0.16
     if not (descending and still and thrust_n < 0.75 * weight_n):
         return LandMemory(0.0, 0.0, z)
     settled_s = memory.settled_s + dt_s

@@ -26,7 +26,7 @@ from flightstack.guidance.aim import (
     CLIMBING,
 )
 from flightstack.guidance.kernels import T_YAW, TRAJECTORY_SIZE, goal_kernel, stream_kernel
-from flightstack.guidance.land_detector import CLIMB_M, LandMemory
+from flightstack.guidance.land_detector import CLIMB_M, CONTACT_S, CONTACT_THRUST, LandMemory
 from flightstack.guidance.manual import TAKEOFF_STICK, shaped
 from flightstack.guidance.mission import (
     COMMAND,
@@ -140,6 +140,20 @@ class Navigator:
     def landed(self) -> bool:
         """Whether the vehicle stands on the ground."""
         return bool(self._land[0] > 0.0)
+
+    @property
+    def touches_ground(self) -> bool:
+        """Whether something other than the rotors holds the vehicle up: landed, or about to count as landed."""
+        return bool(self._land[1] >= CONTACT_S)
+
+    def level_target(self, state: FloatArray, attitude_target: FloatArray) -> FloatArray:
+        """Return a level attitude with little thrust, shape (5,), for a vehicle that touches the ground.
+
+        There the outer loop would lean against wind that the ground now withstands, and wind itself up.
+        """
+        half_yaw = 0.5 * euler_from_quaternion(vehicle_state(state).attitude).z
+        thrust_n = min(float(attitude_target[4]), CONTACT_THRUST * self.params.weight_n)
+        return np.array([math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw), thrust_n])
 
     @property
     def progress(self) -> MissionProgress:

@@ -255,3 +255,21 @@ def test_a_failsafe_in_a_landing_lets_it_end() -> None:
     breach_fence(world)
     world.until_disarmed(30.0)
     assert world.position[0] > 5.0
+
+
+def test_a_landing_in_wind_does_not_lean_on_the_ground() -> None:
+    """Once it touches, the attitude is level: the lean against the wind is for the air. 0.65 s to land, as in calm."""
+    world = World(vehicle="x_quad", wind=(5.0, 0.0, 0.0), gust=0.5, seed=2)
+    assert world.arm() == 0
+    assert world.takeoff(3.0) == 0
+    world.until(lambda: world.mode is Mode.HOLD, 20.0)
+    assert world.land() == 0
+    world.until(lambda: world.altitude < 0.03, 30.0)
+    touched_s = world.time_s
+    world.run(0.3)
+    while not world.landed:
+        world.run(0.01)
+        q = world.stack.autopilot.now.attitude_target
+        assert q[1] == q[2] == 0.0
+        assert world.time_s - touched_s < 1.5
+    assert abs(world.altitude) < 0.01

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flightstack.contract import Quaternion, Vector3, VehicleState
-from flightstack.guidance.land_detector import CLIMB_M, SETTLE_S, LandMemory, land_detector_step
+from flightstack.guidance.land_detector import CLIMB_M, CONTACT_S, SETTLE_S, LandMemory, land_detector_step
 
 WEIGHT_N, DT = 10.0, 0.01
 FLYING = LandMemory(0.0, 0.0, 0.0)
@@ -34,8 +34,8 @@ def test_it_needs_all_signs_for_the_settling_time() -> None:
 @pytest.mark.parametrize(
     ("state", "thrust", "descending"),
     [
-        (moving(down=0.25), 3.0, True),
-        (moving(down=-0.25), 3.0, True),
+        (moving(down=0.55), 3.0, True),
+        (moving(down=-0.55), 3.0, True),
         (moving(north=0.3, east=0.3), 3.0, True),
         (moving(), 7.6, True),
         (moving(), 3.0, False),
@@ -50,6 +50,14 @@ def test_one_missing_sign_is_enough_to_be_flying(
     almost = watch(SETTLE_S - 2 * DT, moving())
     interrupted = land_detector_step(almost, state, thrust, WEIGHT_N, descending, DT)
     assert watch(SETTLE_S - 2 * DT, moving(), memory=interrupted).landed == 0.0
+
+
+@pytest.mark.parametrize("down", [0.25, -0.25])
+def test_a_foot_on_the_ground_may_turn_the_vehicle_but_a_slow_sink_begins_nothing(down: float) -> None:
+    """A tilted vehicle levels about the foot that touches; before contact the same speed is flight."""
+    assert watch(10.0, moving(down=down)) == (0.0, 0.0, -0.02)
+    touching = watch(CONTACT_S + DT, moving())
+    assert watch(SETTLE_S, moving(down=down), memory=touching).landed == 1.0
 
 
 def test_a_slow_descent_in_the_air_is_no_landing() -> None:
