@@ -13,6 +13,7 @@ import numpy as np
 
 from flightstack.contract import MAX_ROTORS, STATE_SIZE, FloatArray
 from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.mavlink.battery_frame import UNUSED_CELL, BatteryReport, decode_battery, report_of
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, mavlink
 from flightstack.mavlink.frame_finder import FrameFinder
 from flightstack.mavlink.hot_frames import (
@@ -34,8 +35,6 @@ LATEST_START_US = 1 << 53
 
 LONGEST_STEP_US = 2_000_000
 """Largest step between two states' times that the vehicle's clock follows: twice that of the slowest loops."""
-
-_UNUSED_CELL = 0xFFFF
 
 
 class Battery(NamedTuple):
@@ -139,11 +138,21 @@ class SimulatorLink:
             self._take_time(self._plant.time_us)
             self._speaks_hil = False
             return True
-        return self._receive_any(data)
+        return self._receive_with_battery(data) or self._receive_any(data)
+
+    def _receive_with_battery(self, data: memoryview) -> bool:
+        """Take a battery's report and the state right behind it, as the simulator sends them; else nothing."""
+        split = len(data) - self._plant.size
+        if split <= 0 or (report := decode_battery(data[:split])) is None or not self._plant.open(data[split:]):
+            return False
+        self._take_time(self._plant.time_us)
+        self._speaks_hil = False
+        self._take_battery(report)
+        return True
 
     def _receive_any(self, data: memoryview) -> bool:
         fresh = False
-        battery: Message | None = None
+        battery: BatteryReport | None = None
         for frame in self._finder.find(data):
             if self._plant.open(frame):
                 self._take_time(self._plant.time_us)
@@ -159,7 +168,7 @@ class SimulatorLink:
                     self._take_hil(message)
                     fresh = True
                 elif kind == mavlink.MAVLINK_MSG_ID_BATTERY_STATUS:
-                    battery = message
+                    battery = report_of(message)
                 else:
                     self._take_other(message)
         if battery is not None:
@@ -203,19 +212,17 @@ class SimulatorLink:
         )  # its coarse numbers may well stay the same
         return Freshness(now_us - self._arrived_us, frozen_us)
 
-    def _take_battery(self, m: Message) -> None:
-        """Take BATTERY_STATUS of the first battery; −1 and unused cells mean unknown."""
-        if m.id != 0:
+    def _take_battery(self, report: BatteryReport) -> None:
+        """Take the report of the first battery; −1 and unused cells mean unknown."""
+        if report.number != 0:
             return
-        cells = [v for v in m.voltages if v != _UNUSED_CELL] + [
-            v for v in m.voltages_ext if v != _UNUSED_CELL
-        ]
+        cells_mv = [cell for cell in report.cells_mv if cell != UNUSED_CELL]
         self.battery = Battery(
-            sum(cells) * 1e-3 if any(cells) else math.nan,
-            m.current_battery * 0.01 if m.current_battery >= 0 else math.nan,
-            min(m.battery_remaining, 100) * 0.01 if m.battery_remaining >= 0 else math.nan,
+            sum(cells_mv) * 1e-3 if any(cells_mv) else math.nan,
+            report.current_ca * 0.01 if report.current_ca >= 0 else math.nan,
+            min(report.remaining_percent, 100) * 0.01 if report.remaining_percent >= 0 else math.nan,
             self.time_us,
-            m.battery_remaining >= 0,
+            report.remaining_percent >= 0,
         )
 
     def failure_request(self, unit: int, failure: int, instance: int) -> bytes:
