@@ -1,4 +1,4 @@
-"""The battery in the simulator: how fast it empties, and the message that tells the flight stack.
+"""The battery in the simulator: how fast it empties, and what tells the flight stack.
 
 An open-circuit voltage E that depends on the charge, behind a resistance R, feeds a constant-power load P:
 
@@ -12,19 +12,15 @@ controllers, and what the avionics take.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from flightstack.compiled import compiled
-from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.battery_frame import EXTRA_PLACES, PLACES, UNUSED_CELL, BatteryReport
 from flightstack.params.battery import Battery
 from sim_bridge.layout import Record
 
 INTERVAL_US = 100_000
 """Simulated time between two messages."""
-
-_UNUSED = 0xFFFF  # a place of BATTERY_STATUS without a cell
-_PLACES = 10
 
 
 class BatteryOptions(NamedTuple):
@@ -108,20 +104,16 @@ def battery_state(m: Record) -> BatteryState:
     )
 
 
-def battery_status(state: BatteryState, cells: int) -> Message:
+def battery_report(state: BatteryState, cells: int) -> BatteryReport:
     """BATTERY_STATUS of a pack whose cells are equal."""
-    in_cell = min(round(state.voltage_v / cells * 1e3), _UNUSED - 1)
-    first, more = min(cells, _PLACES), max(cells - _PLACES, 0)
-    fields: dict[str, Any] = {
-        "id": 0,
-        "battery_function": mavlink.MAV_BATTERY_FUNCTION_ALL,
-        "type": mavlink.MAV_BATTERY_TYPE_LIPO,
-        "temperature": 0x7FFF,
-        "voltages": [in_cell] * first + [_UNUSED] * (_PLACES - first),
-        "current_battery": min(round(state.current_a * 100.0), 0x7FFF),
-        "current_consumed": min(round(state.consumed_mah), 0x7FFFFFFF),
-        "energy_consumed": min(round(state.energy_j / 100.0), 0x7FFFFFFF),
-        "battery_remaining": round(state.remaining * 100.0),
-        "voltages_ext": [in_cell] * more + [0] * (4 - more),
-    }
-    return mavlink.MAVLink_battery_status_message(**fields)
+    in_cell = min(round(state.voltage_v / cells * 1e3), UNUSED_CELL - 1)
+    first, more = min(cells, PLACES), max(cells - PLACES, 0)
+    unused = [UNUSED_CELL] * (PLACES - first) + [in_cell] * more + [0] * (EXTRA_PLACES - more)
+    return BatteryReport(
+        0,
+        (*[in_cell] * first, *unused),
+        min(round(state.current_a * 100.0), 0x7FFF),
+        min(round(state.consumed_mah), 0x7FFFFFFF),
+        min(round(state.energy_j / 100.0), 0x7FFFFFFF),
+        round(state.remaining * 100.0),
+    )

@@ -9,11 +9,11 @@ import math
 
 import numpy as np
 
+from flightstack.mavlink.battery_frame import encode_battery
 from flightstack.mavlink.hot_frames import GROUND_CONTACT_FLAG, HEADER_SIZE, ActuatorsFrame, PlantStateFrame
-from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.battery import INTERVAL_US as BATTERY_INTERVAL_US
-from sim_bridge.battery import battery_status
+from sim_bridge.battery import battery_report
 from sim_bridge.compiled_plant import CompiledPlant
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.faults import Fault, Kind, Schedule
@@ -53,7 +53,7 @@ class Simulator:
         self._frame.set_rotor_count(len(vehicle.rotors))
         self.plant.output = np.frombuffer(self._frame.frame, OUTPUT, 1, _STATE_AT)
         self._flags = 0
-        self._codec = Link(system_id, SIMULATOR_COMPONENT)
+        self._battery_seq = 0
         self._battery_due_us = _NEVER_US if self.plant.battery is None else 0
         self._schedule = Schedule()
         self._change_us = _NEVER_US
@@ -105,7 +105,9 @@ class Simulator:
         if self.time_us < self._battery_due_us or battery is None or self.vehicle.battery is None:
             return b""
         self._battery_due_us = (self.time_us // BATTERY_INTERVAL_US + 1) * BATTERY_INTERVAL_US
-        return self._codec.encode(battery_status(battery, self.vehicle.battery.cells))
+        report = battery_report(battery, self.vehicle.battery.cells)
+        seq, self._battery_seq = self._battery_seq, (self._battery_seq + 1) & 255
+        return encode_battery(report, seq, self._system_id, SIMULATOR_COMPONENT)
 
     @property
     def frame(self) -> PlantStateFrame:

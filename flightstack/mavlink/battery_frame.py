@@ -50,7 +50,9 @@ def encode_battery(report: BatteryReport, seq: int, system_id: int, component_id
         report.remaining_percent, *_TAIL, *cells[PLACES:], *_MODE,
     ).rstrip(b"\x00")  # fmt: skip
     number = mavlink.MAVLINK_MSG_ID_BATTERY_STATUS
-    header = _HEADER.pack(0xFD, len(payload), 0, 0, seq, system_id, component_id, number & 0xFFFF, number >> 16)
+    header = _HEADER.pack(
+        0xFD, len(payload), 0, 0, seq, system_id, component_id, number & 0xFFFF, number >> 16
+    )
     frame = header + payload
     return frame + _crc16(frame[1:] + _EXTRA).to_bytes(CHECKSUM_SIZE, "little")
 

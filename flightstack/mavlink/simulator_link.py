@@ -143,7 +143,11 @@ class SimulatorLink:
     def _receive_with_battery(self, data: memoryview) -> bool:
         """Take a battery's report and the state right behind it, as the simulator sends them; else nothing."""
         split = len(data) - self._plant.size
-        if split <= 0 or (report := decode_battery(data[:split])) is None or not self._plant.open(data[split:]):
+        if (
+            split <= 0
+            or (report := decode_battery(data[:split])) is None
+            or not self._plant.open(data[split:])
+        ):
             return False
         self._take_time(self._plant.time_us)
         self._speaks_hil = False

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from flightstack.mavlink.battery_frame import encode_battery
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.hot_frames import ARMED_FLAG, ActuatorsFrame
 from flightstack.mavlink.link import Link
 from flightstack.params.battery import LIPO_CELL_V, Battery
 from flightstack.params.errors import ConfigError
 from flightstack.params.vehicle import BUILT_IN, Vehicle, load_vehicle
-from sim_bridge.battery import BatteryOptions, BatteryState, battery_status
+from sim_bridge.battery import BatteryOptions, BatteryState, battery_report
 from sim_bridge.plant import PlantOptions
 from sim_bridge.simulator import Simulator
 
@@ -164,8 +165,8 @@ def test_the_message_comes_ten_times_a_second_just_before_its_state() -> None:
 
 @pytest.mark.parametrize("cells", [1, 3, 10, 12, 14])
 def test_the_message_has_standard_units_and_cells(cells: int) -> None:
-    message = battery_status(BatteryState(3.7 * cells, 12.345, 0.426, 321.4, 9876.0), cells)
-    (m,) = decoded(Link(1, 200).encode(message))
+    report = battery_report(BatteryState(3.7 * cells, 12.345, 0.426, 321.4, 9876.0), cells)
+    (m,) = decoded(encode_battery(report, 0, 1, 200))
     voltages = [v for v in m.voltages if v != 0xFFFF] + [v for v in m.voltages_ext if v]
     assert voltages == [3700] * cells
     assert (m.current_battery, m.battery_remaining, m.current_consumed, m.energy_consumed) == (

@@ -259,6 +259,20 @@ def test_a_battery_is_taken_with_the_time_of_its_state() -> None:
     assert (stack.battery.remaining, stack.battery.time_us) == (0.5, 4000)
 
 
+def test_a_battery_and_state_are_the_same_whichever_way_they_come() -> None:
+    """Both at once take a short cut; after junk, cut in two, or the other way round, they do not."""
+    data = battery() + plant_state(4000)
+    ways = [[data], [b"\x55\x66" + data], [data[:20], data[20:]], [data + battery()]]
+    seen = []
+    for way in ways:
+        stack = link()
+        receive(stack, plant_state(2000))
+        assert [receive(stack, piece) for piece in way][-1]
+        seen.append((stack.battery, stack.state.tolist(), stack.time_us, stack.odd_times))
+    assert seen == [seen[0]] * len(ways)
+    assert seen[0][0].time_us == seen[0][2] == 4000
+
+
 def test_what_a_battery_does_not_know_is_not_a_number() -> None:
     stack = link()
     receive(stack, battery(voltages=[0xFFFF] * 10, current_battery=-1, battery_remaining=-1))
