@@ -278,6 +278,7 @@ class Autopilot(PlanKeeper):
             self.now.takeoff_us = self.now.landing_us = 0
             self.supervisor.armed()
             self._ground.armed(self.now.time_us)
+            self._takeoff_altitude_m += self._bring_home()
             self.now.landed = True
         if before.armed and not after.armed:  # the log ends with disarming: its last words come first
             in_air = not self.now.landed

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flightstack.commander.supervisor import Supervisor
-from flightstack.contract import FloatArray
+from flightstack.contract import FloatArray, Vector3
 from flightstack.geodesy import GeoPoint
 from flightstack.guidance.mission import LAND, NAV_DELAY, RETURN_TO_LAUNCH
 from flightstack.guidance.navigator import Navigator
@@ -45,14 +45,28 @@ class PlanKeeper:
         """Where a return goes, and from where relative altitudes count."""
         return self.places.home_point
 
-    def set_home(self, point: GeoPoint) -> str | None:
-        """Move home; return why not, or None. A mission's relative altitudes follow, and the fence's limits."""
-        refusal = self.places.set_home(point)
+    def set_home(self, point: GeoPoint, chosen: bool = True) -> str | None:
+        """Move home; return why not, or None. A mission's relative altitudes follow, and the fence's limits.
+
+        A home that was ``chosen`` stays when the vehicle arms elsewhere.
+        """
+        refusal = self.places.set_home(point, chosen)
         if refusal is None:
             home = self.places.home
+            home_ned_m = Vector3(home.north_m, home.east_m, -home.altitude_m)
             self._navigator.change_plan(*self._plan_table())
-            self.supervisor.set_home((home.north_m, home.east_m, -home.altitude_m))
+            self.supervisor.set_home(home_ned_m)
+            self._recorder.home(self.now.time_us, point, home_ned_m)
         return refusal
+
+    def _bring_home(self) -> float:
+        """Move home to where the vehicle stands, as it arms; return by how much that is higher [m]."""
+        places, here = self.places, Vector3(*self._state[:3].tolist())
+        before_m = places.home.altitude_m
+        follows = self._behaviour.home_follows and not places.home_is_chosen
+        if follows and places.has_left_home(here):
+            self.set_home(places.frame.to_geo(here), chosen=False)
+        return places.home.altitude_m - before_m
 
     def _plan_table(self) -> tuple[FloatArray, FloatArray]:
         return plan_table(self.items, self.places.frame, self.home.altitude_m)

@@ -20,7 +20,7 @@ def carry_over(old: Stack, new: Stack) -> None:
     """Give the new stack what is not the process's to forget: peers, plans, home, and the newest state."""
     for address, permanent in old.ground.addresses():
         new.ground.add_peer(address, permanent)
-    new.autopilot.set_home(old.autopilot.home)
+    new.autopilot.set_home(old.autopilot.home, old.autopilot.places.home_is_chosen)
     new.ground.adopt_plans(old.ground)
     new.simulator.resume(old.simulator)
     new.autopilot.has_state = old.autopilot.has_state

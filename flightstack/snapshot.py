@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 from flightstack.commander.transitions import Status
-from flightstack.contract import FloatArray
+from flightstack.contract import FloatArray, Vector3
+from flightstack.geodesy import GeoPoint
 from flightstack.guidance.navigator import MissionProgress
 
 EMERGENCY, ALERT, CRITICAL, ERROR, WARNING, NOTICE, INFO = range(7)
@@ -35,6 +36,9 @@ class Recorder(Protocol):
 
     def mission(self, time_us: int, progress: MissionProgress, count: int) -> None:
         """Record progress of the mission."""
+
+    def home(self, time_us: int, home: GeoPoint, position_ned_m: Vector3) -> None:
+        """Record where home is now."""
 
     def text(self, time_us: int, severity: int, text: str) -> None:
         """Record a text."""

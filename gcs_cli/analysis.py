@@ -76,6 +76,7 @@ class _Reader:
             info=MappingProxyType(dict(log.msg_info_dict)),
             parameters=MappingProxyType(dict(log.initial_parameters)),
             home=self._home(),
+            local_origin=self._origin(),
             position=self._series("vehicle_local_position", ["x", "y", "z"]),
             velocity=self._series("vehicle_local_position", ["vx", "vy", "vz"]),
             position_setpoint=self._series("trajectory_setpoint", _elements("position", 3)),
@@ -136,6 +137,10 @@ class _Reader:
     def _home(self) -> GeoPoint | None:
         rows = self._rows("home_position", "lat", "lon", "alt")
         return GeoPoint(*rows[-1][1:]) if rows else None
+
+    def _origin(self) -> GeoPoint | None:
+        rows = self._rows("vehicle_local_position", "ref_lat", "ref_lon", "ref_alt")
+        return GeoPoint(*rows[0][1:]) if rows else None
 
     def _overruns(self) -> int | None:
         rows = self._rows("loop_timing", "overruns")

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from flightstack.contract import FloatArray
-from flightstack.geodesy import GeoPoint
+from flightstack.geodesy import GeoPoint, LocalFrame
 
 FlagArray: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -86,12 +86,14 @@ def series(time_s: FloatArray, values: FloatArray) -> Series:
 
 @dataclass(frozen=True)
 class Flight:
-    """One flight. Positions NED [m] from home, velocities NED [m/s], angles roll, pitch, yaw [rad]."""
+    """One flight. Positions NED [m] from the origin, velocities NED [m/s], angles roll, pitch, yaw [rad]."""
 
     duration_s: float = 0.0
     info: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     home: GeoPoint | None = None
+    local_origin: GeoPoint | None = None
+    """Origin of the local frame as the log names it; :attr:`origin` is home where it does not."""
     position: Series = field(default_factory=lambda: empty_series(3))
     velocity: Series = field(default_factory=lambda: empty_series(3))
     position_setpoint: Series = field(default_factory=lambda: empty_series(3))
@@ -104,6 +106,18 @@ class Flight:
     texts: tuple[Text, ...] = ()
     overruns: int | None = None
     loop_timing: tuple[LoopTiming, ...] = ()
+
+    @property
+    def origin(self) -> GeoPoint | None:
+        """Where positions count from: home at the start, which may have moved since."""
+        return self.local_origin or self.home
+
+    def home_ne_m(self) -> tuple[float, float] | None:
+        """Where home is, north and east of the origin [m]; None if it is not known."""
+        if self.home is None or self.origin is None:
+            return None
+        local = LocalFrame(self.origin).to_ned(self.home)
+        return local.x, local.y
 
     def flying(self, time_s: FloatArray) -> FlagArray:
         """Tell for each time whether the vehicle was armed and off the ground.

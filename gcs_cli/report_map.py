@@ -68,7 +68,8 @@ def path_chart(flight: Flight, plan: Plan) -> str:
 
 
 def _plan_markers(flight: Flight, plan: Plan) -> list[Marker]:
-    markers = [Marker(0.0, 0.0, "home", 0.0)] if flight.home else []
+    home = flight.home_ne_m()
+    markers = [Marker(*home, "home", 0.0)] if home else []
     for seq, item in enumerate(plan.items):
         place = item_ned_m(item, flight)
         if place is not None:
@@ -86,13 +87,14 @@ def _radius_m(item: MissionItem, flight: Flight) -> float:
 
 def _route(flight: Flight, plan: Plan) -> FloatArray:
     """Places of the plan in the order of its items, shape (n, 2); a return leads home."""
-    places = [(0.0, 0.0)] if flight.home else []
+    home = flight.home_ne_m()
+    places = [home] if home else []
     for item in plan.items:
         place = item_ned_m(item, flight)
         if place is not None:
             places.append((float(place[0]), float(place[1])))
         elif item.command == Command.NAV_RETURN_TO_LAUNCH:
-            places.append((0.0, 0.0))
+            places.append(home or (0.0, 0.0))
     return np.array(places).reshape(-1, 2)
 
 

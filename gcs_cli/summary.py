@@ -106,10 +106,10 @@ def file_sha256(path: Path) -> str:
 def item_ned_m(item: MissionItem, flight: Flight) -> FloatArray | None:
     """Position NED [m] of an item in the flight's local frame, shape (3,); None for an item without one."""
     position_deg = item.position_deg
-    if position_deg is None or flight.home is None or not math.isfinite(item.z):
+    if position_deg is None or flight.home is None or flight.origin is None or not math.isfinite(item.z):
         return None
     altitude_m = item.z + (flight.home.altitude_m if item.altitude_is_relative else 0.0)
-    local = LocalFrame(flight.home)
+    local = LocalFrame(flight.origin)
     return np.array(local.to_ned(flight.home._replace(
         latitude_deg=position_deg[0], longitude_deg=position_deg[1], altitude_m=altitude_m
     )))  # fmt: skip

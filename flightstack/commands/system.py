@@ -49,13 +49,16 @@ def terminate_flight(vehicle: VehicleContext, command: Command) -> Answer:
 
 
 def set_home(vehicle: VehicleContext, command: Command) -> Answer:
-    """DO_SET_HOME: parameter 1 is 1 for the present place, else latitude, longitude and altitude above the sea."""
+    """DO_SET_HOME: parameter 1 is 1 for the present place, else latitude, longitude and altitude above the sea.
+
+    A named place stays home for all flights to come; the present one follows the vehicle to where it arms next (PX4).
+    """
     autopilot = vehicle.autopilot
     if command.params[0] == 1.0:
         if not autopilot.facts.state_is_valid:
             return answer_to(Need.STATE.value)
         position = Vector3(*autopilot.now.state[:3].tolist())
-        refusal = autopilot.set_home(autopilot.places.frame.to_geo(position))
+        refusal = autopilot.set_home(autopilot.places.frame.to_geo(position), chosen=False)
     else:
         latitude, longitude, altitude = command.params[4:7]
         if command.frame in RELATIVE_FRAMES:

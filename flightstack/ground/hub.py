@@ -51,6 +51,7 @@ class GroundHub:
             for kind in service.handles:
                 self._by_type.setdefault(kind, []).append(service)
         self._shown = (facts.armed, facts.mode)
+        self._home = facts.home
         self._signing: Signing | None = None
         self._router: Router[PeerAddress] = Router(self._own)
         self._to_forward: deque[tuple[PeerAddress, bytes]] = deque(maxlen=MAX_TO_FORWARD)
@@ -202,7 +203,7 @@ class GroundHub:
             yield from peer.streams.due(self._facts, now_s, self._make)
 
     def _note_changes(self) -> bool:
-        """Announce reached items; tell whether mode or arming changed."""
+        """Announce reached items and another home; tell whether mode or arming changed."""
         facts = self._facts
         reached = self._autopilot.now.reached
         for seq in reached:
@@ -210,6 +211,9 @@ class GroundHub:
         shown = (facts.armed, facts.mode)
         changed = shown != self._shown
         self._shown = shown
+        if facts.home != self._home:
+            self._home = facts.home
+            self._to_all(MAKERS[mavlink.MAVLINK_MSG_ID_HOME_POSITION](facts))
         if changed or reached:
             self._to_all(MAKERS[mavlink.MAVLINK_MSG_ID_MISSION_CURRENT](facts))
         reached.clear()

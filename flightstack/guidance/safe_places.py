@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from flightstack.contract import Vector3
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.fence import NO_FENCE, Fence
 from flightstack.guidance.rally import HOME, ReturnPlace, choose, rally_points
@@ -33,6 +34,8 @@ def plan_limits(b: Behaviour) -> Limits:
 
 FARTHEST_HOME_M = 100_000.0
 """Beyond this a home is a mistake: the local frame is flat."""
+HOME_SPREAD_M = 0.05
+"""So far a vehicle may stand from home and be there: the ground gives by less, and home need not follow that."""
 
 
 class SafePlaces:
@@ -45,16 +48,14 @@ class SafePlaces:
         self.fence: Fence = NO_FENCE
         self.home: ReturnPlace = HOME
         """Where home is; it may be set elsewhere than at the origin."""
+        self.home_is_chosen = False
+        """Whether somebody named the place: then it does not follow the vehicle."""
         self.points: tuple[ReturnPlace, ...] = ()
         self.ids: tuple[int, int, int] = (0, 0, 0)
         """Opaque ids of mission, geofence and rally points; the owner of the stores keeps them."""
 
-    @property
-    def _origin(self) -> GeoPoint:
-        return self.frame.origin
-
-    def set_home(self, point: GeoPoint) -> str | None:
-        """Move home; return why not, or None."""
+    def set_home(self, point: GeoPoint, chosen: bool) -> str | None:
+        """Move home; return why not, or None. ``chosen`` is whether somebody named the place."""
         if not all(math.isfinite(number) for number in point):
             return "home has no such position"
         if abs(point.latitude_deg) > 90.0 or abs(point.longitude_deg) > 180.0:
@@ -62,9 +63,14 @@ class SafePlaces:
         local = self.frame.to_ned(point)
         if math.hypot(local.x, local.y) > FARTHEST_HOME_M or abs(local.z) > FARTHEST_HOME_M:
             return f"home is more than {FARTHEST_HOME_M / 1e3:g} km from where the vehicle started"
-        self.home_point = point
+        self.home_point, self.home_is_chosen = point, chosen
         self.home = ReturnPlace(local.x, local.y, -local.z)
         return None
+
+    def has_left_home(self, position_ned_m: Vector3) -> bool:
+        """Tell whether a place is another than home."""
+        home = self.home
+        return math.dist(position_ned_m, (home.north_m, home.east_m, -home.altitude_m)) > HOME_SPREAD_M
 
     def check_mission(self, items: Sequence[MissionItem], limits: Limits) -> Rejection | None:
         """Return why a mission is refused: by itself, by the limits or by the geofence."""
@@ -73,8 +79,10 @@ class SafePlaces:
     def check_fence(
         self, items: Sequence[MissionItem], vehicle_ne_m: tuple[float, float] | None
     ) -> Rejection | None:
-        """Return why a geofence is refused; ``vehicle_ne_m`` is where a flying vehicle is."""
-        return check_fence(items, self._origin, vehicle_ne_m)
+        """Return why a geofence is refused; ``vehicle_ne_m`` is where a flying vehicle is, from the origin."""
+        if vehicle_ne_m is not None:
+            vehicle_ne_m = (vehicle_ne_m[0] - self.home.north_m, vehicle_ne_m[1] - self.home.east_m)
+        return check_fence(items, self.home_point, vehicle_ne_m)
 
     def check_rally(self, items: Sequence[MissionItem], limits: Limits) -> Rejection | None:
         """Return why a list of rally points is refused."""
@@ -91,7 +99,7 @@ class SafePlaces:
 
     def way_out(self, items: Sequence[MissionItem]) -> str | None:
         """Return where a stored mission leaves the geofence: one may have been loaded after it."""
-        rejection = leg_rejection(items, self._origin, self.fence.shape)
+        rejection = leg_rejection(items, self.home_point, self.fence.shape)
         return None if rejection is None else rejection.reason
 
     def return_place(self, north_m: float, east_m: float, return_type: float) -> ReturnPlace:

@@ -109,14 +109,14 @@ class FlightLog:
         time_us: int,
         info: Mapping[str, str | int | float],
         parameters: Mapping[str, float],
-        home: GeoPoint,
+        origin: GeoPoint,
     ) -> None:
-        """Write header and definitions; ``home`` is the origin of the local frame. Call once, first."""
+        """Write header and definitions; ``origin`` is that of the local frame. Call once, first."""
         self._outer_block = RowBlock(
             OUTER_TOPICS,
             self._first_outer_id,
             self.outer.capacity,
-            {"ref_lat": home.latitude_deg, "ref_lon": home.longitude_deg, "ref_alt": home.altitude_m},
+            {"ref_lat": origin.latitude_deg, "ref_lon": origin.longitude_deg, "ref_alt": origin.altitude_m},
         )
         topics = (*self._inner_topics, *OUTER_TOPICS, *EVENT_TOPICS)
         parts = [ulog.file_header(time_us)]
@@ -127,9 +127,6 @@ class FlightLog:
         parts.extend(ulog.parameter(name, value) for name, value in parameters.items())
         parts.extend(ulog.subscription(message_id, topic.name) for message_id, topic in enumerate(topics))
         self._write(b"".join(parts))
-        self.event(
-            "home_position", time_us, lat=home.latitude_deg, lon=home.longitude_deg, alt=home.altitude_m
-        )
 
     def flush(self) -> None:
         """Write all waiting rows. The rows of both traces are free again."""

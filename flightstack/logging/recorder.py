@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from flightstack.commander.transitions import Status
-from flightstack.contract import FloatArray, LoopRow
+from flightstack.contract import FloatArray, LoopRow, Vector3
 from flightstack.geodesy import GeoPoint
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.logging.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
@@ -28,11 +28,12 @@ class FlightRecorder:
         parameters: Callable[[], Mapping[str, float]],
         home: GeoPoint,
     ) -> None:
-        """``parameters`` returns the present values, which begin a log."""
+        """``parameters`` returns the present values, which begin a log; ``home`` is the local frame's origin too."""
         self._open_log = open_log
         self._info = info
         self._parameters = parameters
-        self._home = home
+        self._origin = home
+        self._home = (home, Vector3(0.0, 0.0, 0.0))
         self._log: FlightLog | None = None
         self._scratch = np.zeros(LoopRow.SIZE)
         self._mission = (MissionProgress(0, -1, False, False), 0)
@@ -81,7 +82,8 @@ class FlightRecorder:
         self._log = self._open_log()
         if self._log is None:
             return
-        self._log.start(time_us, self._info, self._parameters(), self._home)
+        self._log.start(time_us, self._info, self._parameters(), self._origin)
+        self._write_home(time_us)
         self.landed(time_us, True)
         self._write_mission(time_us)
 
@@ -89,6 +91,17 @@ class FlightRecorder:
         """Record a change of the land detector."""
         if self._log is not None:
             self._log.event("vehicle_land_detected", time_us, landed=int(landed), ground_contact=int(landed))
+
+    def home(self, time_us: int, home: GeoPoint, position_ned_m: Vector3) -> None:
+        """Record where home is now."""
+        self._home = (home, position_ned_m)
+        self._write_home(time_us)
+
+    def _write_home(self, time_us: int) -> None:
+        if self._log is None:
+            return
+        (lat, lon, alt), (x, y, z) = self._home
+        self._log.event("home_position", time_us, lat=lat, lon=lon, alt=alt, x=x, y=y, z=z)
 
     def mission(self, time_us: int, progress: MissionProgress, count: int) -> None:
         """Record progress of the mission."""

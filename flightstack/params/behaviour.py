@@ -113,6 +113,10 @@ class Behaviour:
     waypoint_distance_m: float = _param(
         "MIS_DIST_WPS", 10000, -1, 100000, "m", "Farthest waypoint from the one before; -1 for no limit"
     )
+    home_follows: int = _param(
+        "COM_HOME_EN", 1, 0, 1, "", "Home moves to where the vehicle arms, unless it was set to a named place",
+        choices=((0, "Off"), (1, "On")),
+    )  # fmt: skip
     disarm_after_landing_s: float = _param(
         "COM_DISARM_LAND", 1.0, -1, 20, "s", "Disarm after landing; -1 never"
     )

@@ -17,7 +17,7 @@ Place = tuple[float, float]
 
 
 class Leg(NamedTuple):
-    """A straight way from one place to another, north and east of home [m]."""
+    """A straight way from one place to another, north and east of the geofence's origin [m]."""
 
     begin: Place
     end: Place
@@ -27,9 +27,8 @@ class Leg(NamedTuple):
     """Where it begins, in words."""
 
 
-def mission_legs(items: Sequence[MissionItem], shape: FenceShape) -> list[Leg]:
+def mission_legs(items: Sequence[MissionItem], home: Place, shape: FenceShape) -> list[Leg]:
     """Return the ways from home through all positions, by jumps too; a return goes to home."""
-    home: Place = (0.0, 0.0)
     places: list[Place | None] = []
     for item in items:
         position = item.position_deg
@@ -54,7 +53,8 @@ def leg_rejection(items: Sequence[MissionItem], home: GeoPoint, fence: FenceShap
     """Return the rejection of the first item outside ``fence``, or the way to which leaves it."""
     if fence is None or not len(fence.areas):
         return None
-    legs = mission_legs(items, fence)
+    home_ne_m = fence.local(home.latitude_deg, home.longitude_deg)
+    legs = mission_legs(items, home_ne_m, fence)
     if not legs:
         return None
     outside = fence.ways_out(np.array([leg.begin for leg in legs]), np.array([leg.end for leg in legs]))
@@ -66,7 +66,6 @@ def leg_rejection(items: Sequence[MissionItem], home: GeoPoint, fence: FenceShap
         fault = Fault(MissionResult.INVALID, "is outside the geofence")
     else:
         way = f"the way from {leg.start} to it leaves the geofence"
-        fault = Fault(
-            MissionResult.INVALID, f"{way}, {place[0]:.0f} m north and {place[1]:.0f} m east of home"
-        )
+        north_m, east_m = place[0] - home_ne_m[0], place[1] - home_ne_m[1]
+        fault = Fault(MissionResult.INVALID, f"{way}, {north_m:.0f} m north and {east_m:.0f} m east of home")
     return item_rejection(leg.seq, items[leg.seq], fault)

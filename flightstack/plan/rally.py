@@ -34,7 +34,9 @@ def check_rally(
 def _fault(item: MissionItem, home: GeoPoint, limits: Limits, shape: FenceShape) -> Fault | None:
     if item.command != RALLY_POINT:
         return Fault(MissionResult.UNSUPPORTED, f"is not a rally point ({RALLY_POINT})")
-    return place_fault(item) or _altitude_fault(item, home, limits) or _distance_fault(item, limits, shape)
+    return (
+        place_fault(item) or _altitude_fault(item, home, limits) or _distance_fault(item, home, limits, shape)
+    )
 
 
 def _altitude_fault(item: MissionItem, home: GeoPoint, limits: Limits) -> Fault | None:
@@ -48,10 +50,11 @@ def _altitude_fault(item: MissionItem, home: GeoPoint, limits: Limits) -> Fault 
     return Fault(MissionResult.INVALID_PARAM7, reason)
 
 
-def _distance_fault(item: MissionItem, limits: Limits, shape: FenceShape) -> Fault | None:
+def _distance_fault(item: MissionItem, home: GeoPoint, limits: Limits, shape: FenceShape) -> Fault | None:
     assert item.position_deg is not None  # of a rally point whose place was checked
     north_m, east_m = shape.local(*item.position_deg)
-    distance_m, far_m = math.hypot(north_m, east_m), limits.max_home_distance_m
+    home_ne_m = shape.local(home.latitude_deg, home.longitude_deg)
+    distance_m, far_m = math.dist((north_m, east_m), home_ne_m), limits.max_home_distance_m
     if 0.0 < far_m < distance_m:
         reason = f"is {distance_m:.0f} m from home, and at most {far_m:g} m are allowed"
         return Fault(MissionResult.INVALID, reason)

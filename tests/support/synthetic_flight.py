@@ -133,6 +133,7 @@ def write_synthetic_flight(file: Any, inner_ms: int = 2, outer_ms: int = 10, sec
     """Write the flight into ``file``; items: 0 takeoff, 1–4 corners, 5 land."""
     log = FlightLog(file, rotors=4)
     log.start(0, INFO, PARAMETERS, HOME)
+    log.event("home_position", 0, lat=HOME.latitude_deg, lon=HOME.longitude_deg, alt=HOME.altitude_m)
     noise = np.random.default_rng(1).standard_normal((round(seconds * 1000) + 1, 6))
     total = round(seconds * 1000)
     for tick_ms in range(0, total, inner_ms):

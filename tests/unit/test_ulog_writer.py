@@ -159,8 +159,6 @@ def test_info_parameters_texts_and_home_read_back() -> None:
     assert {name: type(value) for name, value in got.initial_parameters.items()}["INNER_DIVISOR"] is int
     texts = [(m.timestamp, m.log_level_str(), m.message) for m in got.logged_messages]
     assert texts == [(200, "WARNING", "wind is 3 m/s — careful"), (300, "EMERGENCY", "emergency")]
-    home = got.get_dataset("home_position").data
-    assert (home["lat"][0], home["lon"][0], home["alt"][0]) == HOME
 
 
 def test_the_same_flight_gives_the_same_bytes_whatever_the_block_size(

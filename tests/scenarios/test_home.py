@@ -1,0 +1,142 @@
+"""Home: where it is when the vehicle arms, who may move it, who is told, and what is measured from it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from flightstack.config import DEFAULT_HOME
+from flightstack.contract import Vector3
+from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.services.mission_client import Failed
+from flightstack.modes import Mode
+from flightstack.plan import MissionItem
+from gcs_cli.analysis import read_flight
+from gcs_cli.summary import item_ned_m
+from tests.support.fences import polygon
+from tests.support.world import World, item
+
+ACCEPTED = 0
+FRAME = LocalFrame(DEFAULT_HOME)
+
+
+def square(half_m: float) -> list[MissionItem]:
+    """A geofence around the place where the simulator starts."""
+    return polygon([(half_m, half_m), (half_m, -half_m), (-half_m, -half_m), (-half_m, half_m)])
+
+
+def landed_away(*params: str) -> World:
+    """A vehicle that flew 20 m north, landed there and disarmed itself."""
+    world = World(params=params)
+    world.upload([item(22, z=3.0), item(16, north=20.0, z=3.0), item(21, north=20.0)])
+    world.start_mission()
+    world.until_disarmed()
+    assert abs(world.position[0] - 20.0) < 0.1
+    return world
+
+
+def fly_and_return(world: World) -> None:
+    """Arm where it stands, go 15 m east and return."""
+    assert world.arm() == ACCEPTED
+    world.takeoff(3.0)
+    world.until(lambda: world.mode is Mode.HOLD)
+    north_m, east_m = world.position[:2]
+    world.stack.autopilot.go_to(north_m, east_m + 15.0, math.nan, math.nan, math.nan)
+    world.run(10.0)
+    assert world.return_home() == ACCEPTED
+    world.until_disarmed()
+
+
+def told_home(world: World) -> Vector3:
+    """Where the vehicle last said that home is."""
+    said = world.received["HOME_POSITION"]
+    return FRAME.to_ned(GeoPoint(said.latitude / 1e7, said.longitude / 1e7, said.altitude / 1e3))
+
+
+def test_home_moves_to_where_the_vehicle_arms_and_a_return_ends_there() -> None:
+    world = landed_away()
+    assert world.stack.autopilot.home == DEFAULT_HOME  # not by landing: by arming
+    north_m = world.position[0]
+    fly_and_return(world)
+    assert abs(world.position[0] - north_m) < 0.1
+    assert abs(world.position[1]) < 0.1
+    assert told_home(world).x == pytest.approx(north_m, abs=0.02)
+
+
+def test_everybody_is_told_at_once() -> None:
+    world = landed_away()
+    world.run(0.02)
+    before = world.counts["HOME_POSITION"]
+    world.arm()
+    assert world.counts["HOME_POSITION"] == before + 1  # the stream sends one every two seconds
+    assert told_home(world).x == pytest.approx(world.position[0], abs=0.02)
+
+
+def test_the_first_flight_leaves_home_exactly_where_it_was_configured() -> None:
+    world = World()
+    world.arm()
+    assert world.stack.autopilot.home == DEFAULT_HOME
+
+
+def test_com_home_en_off_keeps_home() -> None:
+    world = landed_away("COM_HOME_EN=0")
+    fly_and_return(world)
+    assert np.linalg.norm(world.position[:2]) < 0.1
+
+
+def test_a_home_that_was_chosen_stays_and_the_present_place_does_not() -> None:
+    world = landed_away()
+    here = FRAME.to_geo(Vector3(5.0, 0.0, 0.0))
+    numbers = (0, 0, 0, math.nan, here.latitude_deg, here.longitude_deg, here.altitude_m)
+    assert world.command(mavlink.MAV_CMD_DO_SET_HOME, *numbers) == ACCEPTED
+    fly_and_return(world)
+    home = world.stack.autopilot.places.home
+    assert (home.north_m, home.east_m) == pytest.approx((5.0, 0.0), abs=0.5)  # degrees in a float32
+    assert world.position[:2] == pytest.approx([home.north_m, home.east_m], abs=0.1)
+    assert world.command(mavlink.MAV_CMD_DO_SET_HOME, 1) == ACCEPTED
+    assert not world.stack.autopilot.places.home_is_chosen
+
+
+def test_a_takeoff_selected_before_home_rose_ends_above_the_new_one() -> None:
+    world = World()
+    autopilot = world.stack.autopilot
+    autopilot.set_home(FRAME.to_geo(Vector3(0.0, 0.0, 1.0)), chosen=False)  # a metre below where it stands
+    world.takeoff()
+    world.arm()
+    world.until(lambda: world.mode is Mode.HOLD)
+    world.run(3.0)
+    assert world.altitude == pytest.approx(2.5, abs=0.02)
+
+
+def test_a_geofence_is_judged_where_it_lies_after_home_has_moved() -> None:
+    world = landed_away()
+    world.arm()
+    world.disarm()
+    assert world.stack.autopilot.places.home.north_m == pytest.approx(20.0, abs=0.1)
+    autopilot = world.stack.autopilot
+    around_old_home = square(10.0)
+    rejection = autopilot.check_fence(around_old_home)
+    assert rejection is not None
+    assert "leaves out the home position" in rejection.reason
+    autopilot.set_fence(polygon([(5, 9), (5, -9), (15, -9), (15, 9)], inclusion=False))
+    beyond = world.upload([item(16, north=-5.0, z=3.0)])  # from here, not from where home was
+    assert isinstance(beyond, Failed)
+    world.run(0.02)
+    assert any("the way from home to it leaves the geofence" in text for text in world.texts), world.texts
+    assert not isinstance(world.upload([item(16, north=25.0, z=3.0)]), Failed)
+
+
+def test_the_log_knows_home_and_origin(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    world = landed_away()
+    north_m = float(world.position[0])
+    fly_and_return(world)
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(world.log)
+    flight = read_flight(path)
+    assert flight.origin == DEFAULT_HOME
+    assert flight.home_ne_m() == pytest.approx((north_m, 0.0), abs=0.01)
+    place = item_ned_m(item(16, north=30.0, z=3.0), flight)
+    assert place == pytest.approx([30.0, 0.0, -3.0], abs=0.02)
