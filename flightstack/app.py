@@ -294,6 +294,7 @@ class App:
             if time.monotonic() >= next_sign_s:  # the simulator waits for an answer: say that we are here
                 next_sign_s = time.monotonic() + 1.0
                 simulator.send(self.stack.simulator.heartbeat(now.status.armed))
+            self._pass_requests(simulator)
             poller.poll(20)
             data = simulator.receive_now()
             if data is not None:
@@ -316,7 +317,7 @@ class App:
                 timing.tick(began_ns, clock_ns())
                 tick += 1
                 if tick % divisor == 0:
-                    self._between_ticks()
+                    self._between_ticks(simulator)
             data = receive()
             fresh = self._wait_slowly(simulator) if data is None else link.receive(data)
 
@@ -350,12 +351,12 @@ class App:
             timing.tick(began_ns, time.monotonic_ns())
             tick += 1
             if tick % self.stack.rates.divisor == 0:
-                self._between_ticks()
+                self._between_ticks(simulator)
                 self._check_simulator(heard_s + self._process.simulator_timeout_s)
             elif self._sending is not None:
                 self._send()
 
-    def _between_ticks(self) -> None:
+    def _between_ticks(self, simulator: TcpClient) -> None:
         """Do what is due between two ticks: ground links, timing report, reasons to stop."""
         time_us = self.stack.autopilot.now.time_us
         if time_us >= self._next_log_us:
@@ -369,7 +370,12 @@ class App:
         if self._follower is not None:
             self._follower.follow()
         self._serve_ground()
+        self._pass_requests(simulator)
         self._check_stop()
+
+    def _pass_requests(self, simulator: TcpClient) -> None:
+        if requests := self.stack.simulator.take_requests():
+            simulator.send(requests)
 
     # ------------------------------------------------------------------ ground links
 

@@ -109,7 +109,7 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
     report = TimingReport(timing, pace, config.lockstep)
     generic = params.value(AUTOPILOT) == GENERIC
     facts = AutopilotFacts(autopilot, vehicle, system_id, generic, report.message, lambda: simulator.battery)
-    ground = GroundHub(VehicleContext(autopilot, params, generic, logs=logs), facts, system_id)
+    ground = GroundHub(VehicleContext(autopilot, params, simulator, generic, logs=logs), facts, system_id)
     return Stack(vehicle, pace, simulator, autopilot, ground, recorder, timing, report, params, loaded)
 
 

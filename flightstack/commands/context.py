@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from flightstack.autopilot import Autopilot
 from flightstack.mavlink.dialect import mavlink
@@ -32,12 +32,27 @@ def answer_to(refusal: str | None) -> Answer:
     return Answer(ACCEPTED) if refusal is None else Answer(REJECTED, refusal)
 
 
+class FailureLink(Protocol):
+    """A simulator that can be asked for failures."""
+
+    @property
+    def has_state(self) -> bool:
+        """Whether it ever sent a state."""
+
+    def ask_for_failure(self, unit: int, failure: int, instance: int) -> None:
+        """Ask for a failure, with the parameters of MAV_CMD_INJECT_FAILURE."""
+
+    def take_failure_result(self) -> int | None:
+        """Return the MAV_RESULT of what was asked for, once; None while there is none."""
+
+
 @dataclass
 class VehicleContext:
     """The vehicle as its commands see it."""
 
     autopilot: Autopilot
     params: ParamStore
+    simulator: FailureLink
     is_generic: bool = False
     """Whether the vehicle calls itself a generic autopilot (FS_AUTOPILOT), as it was when it started."""
     shutdown_requested: bool = False

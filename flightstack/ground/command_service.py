@@ -7,12 +7,16 @@ from collections.abc import Callable, Hashable
 from flightstack.commands import HANDLERS, VehicleContext, execute
 from flightstack.commands.context import ACCEPTED, UNSUPPORTED, Answer
 from flightstack.commands.modes import select_custom_mode
+from flightstack.ground.failure_commands import FailureCommands
 from flightstack.ground.link_commands import LINK_COMMANDS
 from flightstack.ground.peer import Peer
+from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.command_server import Command, CommandServer
 from flightstack.snapshot import WARNING
+
+INJECT_FAILURE = int(mavlink.MAV_CMD_INJECT_FAILURE)
 
 
 class CommandService:
@@ -26,12 +30,14 @@ class CommandService:
         vehicle: VehicleContext,
         peer_at: Callable[[Hashable], Peer],
         link_answer: Callable[[Peer, Command], Answer],
+        failures: FailureCommands,
     ) -> None:
         self._own = own
         self._vehicle = vehicle
         self._peer_at = peer_at
         self._link_answer = link_answer
-        self._server = CommandServer(own, [*HANDLERS, *LINK_COMMANDS])
+        self._failures = failures
+        self._server = CommandServer(own, [*HANDLERS, *LINK_COMMANDS, INJECT_FAILURE])
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Execute a command and answer it."""
@@ -42,10 +48,16 @@ class CommandService:
         command = self._server.receive(message, peer, now_s)
         if command is None:
             return
-        if command.command in LINK_COMMANDS:
+        if command.command == INJECT_FAILURE:
+            answer = self._failures.begin(command, now_s)
+        elif command.command in LINK_COMMANDS:
             answer = self._link_answer(self._peer_at(peer), command)
         else:
             answer = execute(self._vehicle, command)
+        if answer is not None:
+            self._answer(command, answer)
+
+    def _answer(self, command: Command, answer: Answer) -> None:
         self._server.answer(command, answer.result)
         self._report(answer, "Command refused")
 
@@ -55,8 +67,11 @@ class CommandService:
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Return the answers."""
+        for command, answer in self._failures.poll(now_s):
+            self._answer(command, answer)
         return list(self._server.poll(now_s))
 
     def next_deadline(self) -> float | None:
         """Return when to poll next."""
-        return self._server.next_deadline()
+        deadlines = (self._server.next_deadline(), self._failures.next_deadline())
+        return min((deadline for deadline in deadlines if deadline is not None), default=None)

@@ -8,6 +8,7 @@ from flightstack import __version__
 from flightstack.commands import VehicleContext
 from flightstack.ground.command_service import CommandService
 from flightstack.ground.facts import AutopilotFacts
+from flightstack.ground.failure_commands import FailureCommands
 from flightstack.ground.file_services import file_services
 from flightstack.ground.link_commands import LinkCommands
 from flightstack.ground.link_loss import LinkLossService
@@ -35,9 +36,10 @@ def make_services(
     )
     log_stream = LogStream(own, lambda: vehicle.open_log_tail())  # noqa: PLW0108  # the process sets it later
     link_commands = LinkCommands(own, facts, peer_at, log_stream, metadata)
+    failures = FailureCommands(vehicle.simulator, lambda: vehicle.autopilot.behaviour.failures_allowed != 0)
     return [
         MissionService(own, vehicle.autopilot),
-        CommandService(own, vehicle, peer_at, link_commands.answer),
+        CommandService(own, vehicle, peer_at, link_commands.answer, failures),
         link_commands,
         *stream_services(own, vehicle.autopilot),
         LinkLossService(vehicle.autopilot),

@@ -92,6 +92,8 @@ class SimulatorLink:
         self._seen = b""
         self.has_state = False
         self.request_refused = False
+        self._requests: list[bytes] = []
+        self._failure_result: int | None = None
         self.peer_said_goodbye = False
 
     def resume(self, other: SimulatorLink) -> None:
@@ -184,6 +186,8 @@ class SimulatorLink:
         if kind == mavlink.MAVLINK_MSG_ID_COMMAND_ACK:
             if message.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
                 self.request_refused = message.result != mavlink.MAV_RESULT_ACCEPTED
+            elif message.command == mavlink.MAV_CMD_INJECT_FAILURE:
+                self._failure_result = int(message.result)
         elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
             self.peer_said_goodbye = message.system_status == mavlink.MAV_STATE_POWEROFF
 
@@ -228,6 +232,23 @@ class SimulatorLink:
             self.time_us,
             report.remaining_percent >= 0,
         )
+
+    def ask_for_failure(self, unit: int, failure: int, instance: int) -> None:
+        """Put a request for a failure among those that ``take_requests`` returns."""
+        self._failure_result = None
+        self._requests.append(self.failure_request(unit, failure, instance))
+
+    def take_failure_result(self) -> int | None:
+        """Return the simulator's MAV_RESULT of the newest request, once; None while there is none."""
+        result, self._failure_result = self._failure_result, None
+        return result
+
+    def take_requests(self) -> bytes:
+        """Return the bytes that the simulator is to get besides its answers, once."""
+        if not self._requests:
+            return b""
+        requests, self._requests = b"".join(self._requests), []
+        return requests
 
     def failure_request(self, unit: int, failure: int, instance: int) -> bytes:
         """Return the bytes that ask the simulator for a failure: MAV_CMD_INJECT_FAILURE with its values."""

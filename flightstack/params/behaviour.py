@@ -202,6 +202,10 @@ class Behaviour:
         "COM_ACT_FAIL_ACT", 2, 0, 4, "", "A rotor does not follow its command",
         choices=((0, "Warning"), (1, "Hold"), (2, "Land"), (3, "Return"), (4, "Terminate")),
     )  # fmt: skip
+    failures_allowed: int = _param(
+        "SYS_FAILURE_EN", 0, 0, 1, "", "Whether a ground station may make the simulator fail (INJECT_FAILURE)",
+        choices=((0, "Off"), (1, "On")), group="System",
+    )  # fmt: skip
     stale_s: float = _param(
         "FS_STALE_T", 0.5, 0.05, 10, "s", "Age at which a state is stale", group="Failure Detector"
     )

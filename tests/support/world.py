@@ -29,13 +29,15 @@ from flightstack.mavlink.hot_frames import ActuatorsFrame
 from flightstack.mavlink.link import Link, Message
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.command_client import CommandClient
+from flightstack.mavlink.services.log_store import NO_LOGS, LogStore
 from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
 from flightstack.modes import Mode
 from flightstack.plan import MissionItem, load_plan
 from sim_bridge.disturbance import Disturbance
+from sim_bridge.failure_command import inject_failure
 from sim_bridge.faults import parse_fault
 from sim_bridge.plant import PlantOptions
-from sim_bridge.simulator import Simulator
+from sim_bridge.simulator import SIMULATOR_COMPONENT, Simulator
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 PEER = PeerAddress(GROUND, "memory", 0)
@@ -73,17 +75,19 @@ class World:
         torque_gust: float = 0.0,
         seed: int = 1,
         params: Sequence[str] = (),
+        flight_logs: LogStore = NO_LOGS,
         **config: object,
     ) -> None:
         self.logs: list[LogBuffer] = []
         self.config = StackConfig(params=tuple(params), **config)  # type: ignore[arg-type]
-        self.stack: Stack = build(self.config, self._open_log)
+        self.stack: Stack = build(self.config, self._open_log, flight_logs)
         disturbance = Disturbance(wind, gust, force, torque, torque_gust)
         self.simulator = Simulator(
             self.stack.vehicle, plant, PlantOptions(disturbance=disturbance, seed=seed)
         )
         self.simulator.set_interval_us(self.stack.rates.interval_us)
         self._actuators = ActuatorsFrame()
+        self._simulator_codec = Link(1, SIMULATOR_COMPONENT)
         self._held_s = 0.0
         self._link = Link(*GCS)
         vehicle = Address(self.config.system_id, 1)
@@ -168,6 +172,14 @@ class World:
         else:
             assert stack.simulator.receive(memoryview(self.simulator.outgoing()))
 
+    def _pass_requests(self) -> None:
+        """Carry what the vehicle asks of the simulator, and the answers."""
+        requests = self.stack.simulator.take_requests()
+        for request in self._simulator_codec.decode(requests) if requests else ():
+            result = inject_failure(self.simulator, request.param1, request.param2, request.param3)
+            ack = mavlink.MAVLink_command_ack_message(request.command, result)
+            self.stack.simulator.receive(memoryview(self._simulator_codec.encode(ack)))
+
     def run(self, seconds: float) -> None:
         """Let simulated time pass."""
         for _ in range(round(seconds * self.stack.rates.inner_hz)):
@@ -202,6 +214,7 @@ class World:
                 self.send(make())
         for message in (*self._missions.poll(now_s), *self._commands.poll(now_s)):
             self.send(message)
+        self._pass_requests()
         for _, data in list(ground.poll(now_s)):
             for message in self._link.decode(data):
                 self._take(message, now_s)

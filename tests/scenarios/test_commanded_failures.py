@@ -1,0 +1,97 @@
+"""INJECT_FAILURE from the ground: who may, what the simulator does, and what the client is told."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from flightstack.ground.failure_commands import LONGEST_WAIT_S
+from flightstack.mavlink.dialect import mavlink
+from flightstack.modes import Mode
+from tests.support.world import World
+
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
+MOTOR, BATTERY, GPS = 101, 100, 4
+OK, OFF = 0, 1
+ALLOWED = ("SYS_FAILURE_EN=1",)
+
+
+def fail(world: World, unit: float, failure: float, instance: float = 0) -> int | None:
+    return world.command(mavlink.MAV_CMD_INJECT_FAILURE, unit, failure, instance)
+
+
+def hovering(*params: str) -> World:
+    world = World(params=(*ALLOWED, *params))
+    world.arm()
+    world.takeoff(6.0)
+    world.until(lambda: world.mode is Mode.HOLD)
+    return world
+
+
+def said(world: World, text: str) -> bool:
+    world.run(0.02)
+    return any(text in line for line in world.texts)
+
+
+def test_a_rotor_that_is_told_to_stop_is_noticed_as_a_failure() -> None:
+    world = hovering()
+    assert fail(world, MOTOR, OFF, 2) == ACCEPTED
+    world.until(lambda: world.mode is Mode.LAND, 5.0)  # COM_ACT_FAIL_ACT
+    assert world.simulator.frame.rotor_speed_rad_s[1] < 0.5 * world.simulator.frame.rotor_speed_rad_s[0]
+    assert said(world, "A rotor does not follow its command"), world.texts
+
+
+def test_a_failure_that_is_taken_back_leaves_a_vehicle_that_flies() -> None:
+    world = World(params=ALLOWED)
+    assert fail(world, MOTOR, OFF, 2) == ACCEPTED
+    assert fail(world, MOTOR, OK, 2) == ACCEPTED
+    world.arm()
+    world.takeoff(3.0)
+    world.until(lambda: world.mode is Mode.HOLD, 10.0)
+
+
+def test_nothing_fails_unless_it_is_allowed() -> None:
+    world = World()
+    assert fail(world, MOTOR, OFF, 1) == DENIED
+    assert said(world, "SYS_FAILURE_EN is 0")
+    assert world.stack.simulator.take_requests() == b""
+
+
+@pytest.mark.parametrize(
+    ("numbers", "result", "reason"),
+    [
+        ((MOTOR, OFF, 9), DENIED, "no such motor"),
+        ((BATTERY, OFF, 3), DENIED, "no such motor or battery"),
+        ((math.nan, OFF, 0), DENIED, "whole numbers"),
+        ((MOTOR, math.inf, 0), DENIED, "whole numbers"),
+        ((MOTOR, OFF, 1.5), DENIED, "whole numbers"),
+        ((MOTOR, OFF, -1), DENIED, "whole numbers"),
+    ],
+)
+def test_what_the_simulator_cannot_do_is_refused(
+    numbers: tuple[float, ...], result: int, reason: str
+) -> None:
+    world = World(params=ALLOWED)
+    assert fail(world, *numbers) == result
+    assert said(world, reason), world.texts
+
+
+def test_a_failure_of_what_the_simulator_has_not_is_unsupported() -> None:
+    assert fail(World(params=ALLOWED), GPS, OFF) == UNSUPPORTED
+
+
+def test_without_a_simulator_there_is_nothing_to_fail() -> None:
+    world = World(params=ALLOWED)
+    world.stack.simulator.has_state = False
+    assert fail(world, MOTOR, OFF, 1) == REJECTED
+    assert said(world, "no simulator is connected")
+
+
+def test_a_simulator_that_does_not_answer_makes_the_command_fail() -> None:
+    world = World(params=ALLOWED)
+    world.stack.simulator.take_requests = bytes  # type: ignore[method-assign]  # they get lost on the way
+    began_s = world._held_s
+    assert fail(world, MOTOR, OFF, 1) == FAILED
+    assert world._held_s - began_s == pytest.approx(LONGEST_WAIT_S, abs=0.05)
+    assert said(world, "the simulator does not answer")
