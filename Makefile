@@ -44,10 +44,12 @@ imports: $(READY)
 generated: $(READY)
 	$(BIN)/python tools/generate_dialect.py --check
 	$(BIN)/python tools/generate_params.py --check
+	$(BIN)/python firmware/tools/generate_codec.py --check
 
 generate: $(READY) ## Regenerate files made from others
 	$(BIN)/python tools/generate_dialect.py
 	$(BIN)/python tools/generate_params.py
+	$(BIN)/python firmware/tools/generate_codec.py
 
 bench: $(READY) ## Print speeds beside their floors
 	@$(BIN)/python -m benchmarks
