@@ -54,7 +54,11 @@ def run(
         bool, typer.Option("--allow-unsigned", help="With --signing-key: take unsigned messages as well.")
     ] = False,
     log: Annotated[
-        str | None, typer.Option(help="Log file [runs/<stamp>-flight.ulg]; 'none' for no log.")
+        str | None,
+        typer.Option(
+            help="Log file [<stamp>-flight.ulg in runs, or runs/instance-<instance>]; 'none' for no log. "
+            "Ground stations see the logs of its folder."
+        ),
     ] = None,
     param: Annotated[
         list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")
@@ -84,6 +88,7 @@ def run(
     from flightstack.assembly import build
     from flightstack.clock import nearest_outer_hz
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
+    from flightstack.logging.log_files import default_log
     from flightstack.params.errors import ConfigError
     from flightstack.ports import described, ports_config, warning
     from flightstack.transport.udp import PortBusyError
@@ -105,7 +110,7 @@ def run(
             print(f"flightstack: {vehicle_name} with {controller} ({gains}) is ready to fly")
             return
         stamp = datetime.now(UTC).strftime("%Y%m%d-%H%M%S")
-        path = Path("runs") / f"{stamp}-flight.ulg" if log is None else Path(log)
+        path = default_log(instance, stamp) if log is None else Path(log)
         process = ProcessConfig(
             sim_host,
             4560 + instance if sim_port is None else sim_port,

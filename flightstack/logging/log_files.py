@@ -9,6 +9,17 @@ from flightstack.logging.flight_log import FlightLog
 from flightstack.logging.log_library import create_log_file
 from flightstack.logging.log_tail import FileTail
 
+RUNS = Path("runs")
+
+
+def default_log(instance: int, stamp: str) -> Path:
+    """Return where a vehicle that is told nothing begins its logs, at ``stamp``.
+
+    A vehicle shows its ground stations, and erases for them, the logs of one folder; so each has a folder of its own.
+    """
+    folder = RUNS if instance == 0 else RUNS / f"instance-{instance}"
+    return folder / f"{stamp}-flight.ulg"
+
 
 class LogFiles:
     """Opens ``first`` for the first flight, and for the next ones files with a number behind its name."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.logging.log_files import LogFiles, default_log
 from flightstack.logging.log_library import LogLibrary, create_log_file
 from flightstack.mavlink.services.log_store import DatedLogs, FlatLogs, LogInfo
 from flightstack.mavlink.services.virtual_files import Entry
@@ -115,3 +116,22 @@ def test_logs_as_directories(folder: Path) -> None:
     opened.close()
     assert dated.open("1970-01-01/a.ulg") is None
     assert dated.open("a.ulg") is None
+
+
+def test_each_instance_lists_and_erases_its_own_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    paths = [default_log(instance, "20260101-000000") for instance in (0, 1, 11)]
+    assert paths[0] == Path("runs/20260101-000000-flight.ulg")
+    libraries = []
+    for path in paths:
+        files = LogFiles(path)
+        for _ in range(2):
+            log = files.open(rotors=4)
+            assert log is not None
+            log.close()
+        libraries.append(LogLibrary(path.parent))
+    names = ["20260101-000000-flight-2.ulg", "20260101-000000-flight.ulg"]
+    for library in libraries:
+        assert sorted(log.name for log in library.logs()) == names
+    assert libraries[0].erase() == 2
+    assert [len(library.logs()) for library in libraries] == [0, 2, 2]
