@@ -90,6 +90,7 @@ def run(
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.logging.log_files import default_log
     from flightstack.params.errors import ConfigError
+    from flightstack.params.param_file import begin_param_file
     from flightstack.ports import described, ports_config, warning
     from flightstack.transport.udp import PortBusyError
 
@@ -105,6 +106,11 @@ def run(
             params_file=None if params == "none" else params or f"runs/params-{instance}.params",
             params=tuple(param or []),
         )  # fmt: skip
+        is_new = params not in (None, "none") and not Path(str(params)).exists()
+        if is_new:
+            print(
+                f"flightstack: {params}: there is no such file: it begins with the defaults", file=sys.stderr
+            )
         if check:
             vehicle_name = build(config, lambda: None).vehicle.name
             print(f"flightstack: {vehicle_name} with {controller} ({gains}) is ready to fly")
@@ -122,6 +128,8 @@ def run(
             signing_key,
             allow_unsigned,
         )
+        if is_new:
+            begin_param_file(Path(str(params)), instance + 1)
         stack = App(config, process)
     except (ConfigError, PortBusyError) as error:
         print(f"flightstack: {error}", file=sys.stderr)

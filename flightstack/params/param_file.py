@@ -114,6 +114,18 @@ def read_param_file(path: Path) -> list[ParamLine]:
         raise ConfigError(path, "", "is not a text file") from error
 
 
+def begin_param_file(path: Path, system_id: int) -> None:
+    """Write a parameter file that changes nothing; raise ConfigError where that cannot be.
+
+    Who names a file finds at the start, and not after a flight, that it cannot be kept.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_text_atomically(path, format_params([], system_id))
+    except OSError as error:
+        raise ConfigError(path, "", f"cannot be written: {error.strerror}") from error
+
+
 class LoadedParams(NamedTuple):
     """What a parameter file held."""
 

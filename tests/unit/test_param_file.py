@@ -18,6 +18,7 @@ from flightstack.params.errors import ConfigError
 from flightstack.params.param_file import (
     NOTHING_LOADED,
     ParamLine,
+    begin_param_file,
     format_params,
     lines_to_save,
     load_into,
@@ -253,3 +254,21 @@ def test_the_process_refuses_a_damaged_file_in_one_sentence(tmp_path: Path) -> N
     sentence = f"{path}: line 1: MPC_XY_CRUISE: 50 is outside 0.1 to 20 m/s"
     assert done.stderr == f"flightstack: {sentence}\n"
     assert run("--params", "none", "--param", "PID_ROLL_P=100").returncode == 0
+
+
+def test_a_file_that_is_named_and_missing_is_mentioned_and_begun(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "my.params"
+    done = run("--params", str(path))
+    assert done.returncode == 0
+    assert done.stderr == f"flightstack: {path}: there is no such file: it begins with the defaults\n"
+    assert not path.exists()  # a check changes nothing
+    begin_param_file(path, 3)
+    assert read_param_file(path) == []
+    assert run("--params", str(path)).stderr == ""
+
+
+def test_a_file_that_cannot_be_begun_ends_the_start(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    path = tmp_path / "file" / "my.params"
+    with pytest.raises(ConfigError, match=r"my\.params: cannot be written: (Not a directory|File exists)"):
+        begin_param_file(path, 1)
