@@ -171,8 +171,7 @@ def test_setpoints_that_make_no_sense_are_refused_once() -> None:
 
 def test_nothing_that_is_streamed_breaks_the_flight() -> None:
     """Random masks, frames and numbers, NaN, infinite and huge ones among them, 50 times a second."""
-    # without the rotor check: such setpoints drive the rotors from limit to limit
-    world = in_offboard(params=["MPC_XY_VEL_MAX=6", "FD_ACT_EN=0"])
+    world = in_offboard(params=["MPC_XY_VEL_MAX=6"])  # with the rotor check: from limit to limit is no fault
     random = np.random.default_rng(3)
     odd = (math.nan, math.inf, -math.inf, 3e38, -3e38, 0.0)
     held_on, steepest, fastest = 0, 0.0, 0.0
