@@ -6,14 +6,15 @@ many times real time telemetry is sparse, and any datagram may be lost.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from enum import Enum
-from typing import NamedTuple
 
-from flightstack.plan import NAV_COMMANDS, Command, MissionItem
+from flightstack.plan import Plan
 from gcs_cli import calls
-from gcs_cli.calls import Call
-from gcs_cli.errors import DONE, FAILED, NO_ANSWER
+from gcs_cli.calls import Answer, Call
+from gcs_cli.errors import FAILED, NO_ANSWER
+from gcs_cli.flight_outcome import Outcome, ends_in_air, judged
+from gcs_cli.plan_parts import Uploads
 from gcs_cli.session import Session
 from gcs_cli.view_types import LOST_AFTER_S, VehicleView
 
@@ -23,16 +24,14 @@ SHUT_DOWN_PATIENCE_S = 3.0
 STALL_S = 10.0
 """How long simulated time may stand still in flight, at real time or faster."""
 _FACTOR_NEEDS_S = 0.05
-_ON_GROUND, _IN_AIR = 1, 2  # MAV_LANDED_STATE
-_WARNING = 4  # MAV_SEVERITY_WARNING
-_GROUND_ENDS = (Command.NAV_LAND, Command.NAV_RETURN_TO_LAUNCH)
+_IN_AIR = 2  # MAV_LANDED_STATE
 
 
 class Phase(Enum):
     """Where the flight is; the value is for people."""
 
     CONNECT = "waiting for the vehicle"
-    UPLOAD = "uploading the mission"
+    UPLOAD = "uploading the plan"
     READY = "waiting until the vehicle is ready"
     ARM = "arming"
     START = "starting the mission"
@@ -42,28 +41,13 @@ class Phase(Enum):
     OVER = "over"
 
 
-class Outcome(NamedTuple):
-    """How the flight ended: "completed" or the reason why not, and the exit code."""
-
-    reason: str
-    exit_code: int
-
-    @property
-    def completed(self) -> bool:
-        """Whether the mission was flown to its end."""
-        return self.exit_code == DONE
-
-
-COMPLETED = Outcome("completed", DONE)
-
-
 class Flight:
-    """Flies ``items`` on the vehicle of ``session``."""
+    """Flies ``plan`` on the vehicle of ``session``."""
 
     def __init__(
         self,
         session: Session,
-        items: Sequence[MissionItem],
+        plan: Plan,
         now_s: float,
         connect_s: float,
         limit_s: float,
@@ -76,9 +60,9 @@ class Flight:
         self.returned_by_us = False
         self.shut_down_accepted = False
         self._session = session
-        self._items = items
-        self._last = max((seq for seq, item in enumerate(items) if item.command in NAV_COMMANDS), default=0)
-        self._ends_in_air = bool(items) and items[self._last].command not in _GROUND_ENDS
+        self._items = plan.items
+        self._uploads = Uploads(session, plan)
+        self._ends_in_air = ends_in_air(plan.items)
         self._connect_s = connect_s
         self._connect_due_s = now_s + connect_s
         self._limit_s = limit_s
@@ -117,8 +101,8 @@ class Flight:
 
     @property
     def upload_progress(self) -> tuple[int, int]:
-        """Items sent and in all, while the mission is uploaded."""
-        return self._call.progress if self._call is not None else (0, 0)
+        """Items sent and in all, while the plan is uploaded."""
+        return self._uploads.progress
 
     def abort(self, reason: str, exit_code: int, now_s: float, vehicle_is_gone: bool = False) -> None:
         """End the flight for a reason from outside; a vehicle that is not gone is asked to shut down."""
@@ -146,13 +130,14 @@ class Flight:
 
     def _connect(self, now_s: float) -> None:
         if self.view.identity is not None:
-            self._call = calls.upload(self._session, self._items)
             self.phase = Phase.UPLOAD
         elif now_s >= self._connect_due_s:
             self._end(Outcome(f"no vehicle answered within {self._connect_s:g} s", NO_ANSWER), now_s)
 
     def _upload(self, now_s: float) -> None:
-        if self._answered("the vehicle refused the mission: ", now_s):
+        if self._accepted(
+            self._uploads.answer(now_s), f"the vehicle refused the {self._uploads.name}: ", now_s
+        ):
             self._order(calls.REQUEST_SYS_STATUS, now_s)
             self.phase = Phase.READY
 
@@ -216,7 +201,7 @@ class Flight:
         if self._questions:
             self._order(self._questions.pop(), now_s)
         else:
-            self._end(self._judged(), now_s)
+            self._end(judged(self.view, self._items), now_s)
 
     def _shut_down(self, now_s: float) -> None:
         answer = self._call.answer(now_s) if self._call else None
@@ -232,7 +217,9 @@ class Flight:
 
     def _answered(self, refusal: str, now_s: float) -> bool:
         """Tell whether the request under way was accepted; end the flight when it was refused."""
-        answer = self._call.answer(now_s) if self._call else None
+        return self._accepted(self._call.answer(now_s) if self._call else None, refusal, now_s)
+
+    def _accepted(self, answer: Answer | None, refusal: str, now_s: float) -> bool:
         if answer is None:
             return False
         if answer.accepted:
@@ -240,24 +227,6 @@ class Flight:
         reason = answer.reason if answer.silent else refusal + answer.reason
         self._end(Outcome(reason, NO_ANSWER if answer.silent else FAILED), now_s)
         return False
-
-    def _judged(self) -> Outcome:
-        """Judge a vehicle that has disarmed: did it fly its mission?"""
-        mission = self.view.mission
-        last = self._last
-        reached_end = mission.reached is not None and mission.reached >= last
-        landed_at_end = (
-            mission.current is not None
-            and mission.current >= last
-            and not self._ends_in_air
-            and self.view.landed_state == _ON_GROUND
-        )
-        if mission.complete or reached_end or landed_at_end:
-            return COMPLETED
-        warnings = [entry.text for entry in self.view.texts if entry.severity <= _WARNING]
-        said = f": {warnings[-1]}" if warnings else ""
-        at = "" if mission.current is None else f" at item {mission.current} of {len(self._items)}"
-        return Outcome(f"the vehicle disarmed{at}, before the mission was done{said}", FAILED)
 
     def _end(self, outcome: Outcome, now_s: float, vehicle_is_gone: bool = False) -> None:
         self.outcome = outcome

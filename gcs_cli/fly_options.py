@@ -12,9 +12,10 @@ from flightstack.clock import nearest_outer_hz, rates
 from flightstack.geodesy import GeoPoint
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
-from flightstack.plan import POSITION_COMMANDS, Command, Plan, check_mission, load_plan
+from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
 from flightstack.transport.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.plan_parts import plan_problem
 from gcs_cli.run_directory import LOG_NAME
 
 CONTROLLERS = "flightstack.attitude_controllers"
@@ -83,9 +84,11 @@ def checked_plan(options: FlyOptions) -> Plan:
     if options.params is not None and not options.params.is_file():
         raise CliError(f"--params {options.params}: there is no such file", USAGE)
     rates(options.inner_hz, options.outer_rate_hz)
-    rejection = check_mission(plan.items, plan.home or DEFAULT_HOME)
-    if rejection is not None:
-        raise CliError(f"{options.plan_path}: {rejection.reason}", USAGE)
+    if not plan.items:
+        raise CliError(f"{options.plan_path}: holds no mission to fly", USAGE)
+    problem = plan_problem(plan, plan.home or DEFAULT_HOME)
+    if problem is not None:
+        raise CliError(f"{options.plan_path}: {problem}", USAGE)
     moving = (item.command for item in plan.items if item.command in POSITION_COMMANDS | {_RETURN})
     if next(moving, None) in (Command.NAV_LAND, _RETURN):
         problem = "the mission begins with a landing or a return, and the vehicle stands on the ground"

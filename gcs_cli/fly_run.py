@@ -14,7 +14,8 @@ from flightstack.plan import Plan
 from gcs_cli.connection import Connection
 from gcs_cli.endpoint import Endpoint
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
-from gcs_cli.flight import STALL_S, Flight, Outcome
+from gcs_cli.flight import STALL_S, Flight
+from gcs_cli.flight_outcome import Outcome
 from gcs_cli.fly_display import Display
 from gcs_cli.fly_options import (
     DEFAULT_HOME,
@@ -30,7 +31,6 @@ from gcs_cli.tlog_file import TlogFile
 TLOG_NAME, SUMMARY_NAME, REPORT_NAME = "gcs.tlog", "summary.json", "report.html"
 _STEP_S = 0.1
 _END_PATIENCE_S = 10.0
-_LAST_WORDS_S = 1.0
 
 
 class Flown(NamedTuple):
@@ -75,7 +75,7 @@ def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> 
         folder = make_run_directory(options.plan_path, out)
         flight = Flight(
             connection.session,
-            plan.items,
+            plan,
             connection.now_s,
             options.timeout_s,
             options.limit_s,
@@ -139,15 +139,13 @@ def _run(
 
 
 def _casualty(flight: Flight, children: Children) -> Child | None:
-    """Return the child that ended first and took the other along, while there is a flight to end."""
-    ended = children.ended()
-    if flight.outcome is not None or not (ended or flight.view.powered_off):
+    """Return the child that ended first and took the other along, while there is a flight to end.
+
+    Who said goodbye, or lost the other, has that one's exit still to come: it is what tells.
+    """
+    if flight.outcome is not None or not (children.ended() or flight.view.powered_off):
         return None
-    if all(child.blames_another for child in ended):
-        children.wait(_LAST_WORDS_S)  # the one to blame is about to end, and to say why
-    # of two that ended in order, the one started last depends on the other and would have blamed it
-    ended = list(reversed(children.ended()))
-    return min(ended, key=lambda child: ((child.exit_code or 0) >= 0, child.blames_another), default=None)
+    return children.culprit(_END_PATIENCE_S)
 
 
 def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:

@@ -5,12 +5,53 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 _TAIL_BYTES = 4096
 _POLL_S = 0.02
 _BLAME = ("lost at", "lost:", "was shut down")  # in the words of simulator and flight stack
+
+
+class Process(Protocol):
+    """A process that has ended, or not yet."""
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code; negative when a signal ended it, None while it runs."""
+
+    @property
+    def blames_another(self) -> bool:
+        """Whether it ended because another process did."""
+
+
+P = TypeVar("P", bound=Process)
+
+
+def is_explained(processes: Sequence[Process]) -> bool:
+    """Tell whether those that have ended say why, so that nobody else need be waited for.
+
+    Each process depends on those before it. One that failed, and blames nobody, is the cause. One that ended in
+    order and blames nobody is it only if it is the last: those that depend on it may have ended first, in order.
+    """
+    *others, last = processes
+    failed = (other for other in others if other.exit_code and not other.blames_another)
+    if next(failed, None) is not None or all(process.exit_code is not None for process in processes):
+        return True
+    return last.exit_code is not None and not last.blames_another
+
+
+def culprit(processes: Sequence[P]) -> P | None:
+    """Return the one whose end made the others end; each depends on those before it.
+
+    A signal comes before all else, then who blames nobody. Of two that ended in order, the one that depends on
+    the other would have blamed it.
+    """
+    ended = [process for process in reversed(processes) if process.exit_code is not None]
+    return min(
+        ended, key=lambda process: ((process.exit_code or 0) >= 0, process.blames_another), default=None
+    )
 
 
 class Child:
@@ -99,6 +140,11 @@ class Children:
         """Wait until all have ended; return False when they have not within ``timeout_s``."""
         return _wait(self._all, timeout_s)
 
+    def culprit(self, timeout_s: float) -> Child | None:
+        """Wait until those that have ended, or are about to, say why; return the one that began it."""
+        _wait_until(lambda: is_explained(self._all), timeout_s)
+        return culprit(self._all)
+
     def stop(self, patience_s: float = 5.0) -> None:
         """Ask each to end, and kill it when it does not within ``patience_s``."""
         for child in reversed(self._all):
@@ -119,8 +165,12 @@ class Children:
 
 
 def _wait(children: Sequence[Child], timeout_s: float) -> bool:
+    return _wait_until(lambda: all(child.exit_code is not None for child in children), timeout_s)
+
+
+def _wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
     end_s = time.monotonic() + timeout_s
-    while any(child.exit_code is None for child in children):
+    while not condition():
         if time.monotonic() >= end_s:
             return False
         time.sleep(_POLL_S)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gcs_cli.settings import ConnectOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
-    from flightstack.plan import MissionItem, MissionType, Plan
+    from flightstack.plan import MissionItem
 
 app = typer.Typer(help="The vehicle's mission.", no_args_is_help=True)
 
@@ -42,6 +41,7 @@ def upload(
     """
     from flightstack.plan import load_plan  # noqa: PLC0415
     from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.plan_parts import plan_parts  # noqa: PLC0415
 
     plan = load_plan(file)
     parts = [part for part in plan_parts(plan) if part.items or part.kind == 0]
@@ -61,21 +61,15 @@ def upload(
 def check(file: FileArgument) -> None:
     """Check a file as the vehicle does, without one: mission, geofence and rally points."""
     from flightstack.geodesy import GeoPoint  # noqa: PLC0415
-    from flightstack.plan import check_fence, check_mission, check_rally, fence_shape, load_plan  # noqa: PLC0415
+    from flightstack.plan import load_plan  # noqa: PLC0415
     from gcs_cli.errors import FAILED, CliError  # noqa: PLC0415
+    from gcs_cli.plan_parts import plan_parts, plan_problem  # noqa: PLC0415
 
     plan = load_plan(file)
     first = next((item.position_deg for item in plan.items if item.position_deg is not None), (0.0, 0.0))
-    home = plan.home or GeoPoint(*first, 0.0)
-    fence = fence_shape(plan.fence, home)
-    checks = {
-        "geofence": check_fence(plan.fence, home),
-        "mission": check_mission(plan.items, home, fence=fence) if plan.items else None,
-        "list of rally points": check_rally(plan.rally, home, fence=fence),
-    }
-    for name, rejection in checks.items():
-        if rejection is not None:
-            raise CliError(f"{file}: {name}: {rejection.reason}", FAILED)
+    problem = plan_problem(plan, plan.home or GeoPoint(*first, 0.0))
+    if problem is not None:
+        raise CliError(f"{file}: {problem}", FAILED)
     for part in plan_parts(plan):
         typer.echo(f"{part.name} of {len(part.items)} items: good")
 
@@ -93,6 +87,7 @@ def download(
     from flightstack.geodesy import GeoPoint  # noqa: PLC0415
     from flightstack.plan import MissionType, Plan, save_plan  # noqa: PLC0415
     from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.plan_parts import plan_parts  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout) as connection:
         session = connection.session
@@ -149,22 +144,6 @@ def start(context: typer.Context, connect: ConnectOption = None, timeout: Timeou
     with meet_vehicle(context, connect, timeout) as connection:
         order(connection, calls.START_MISSION, "mission start")
     typer.echo("mission started")
-
-
-class PlanPart(NamedTuple):
-    """One of the three plans in a file or on a vehicle."""
-
-    kind: MissionType
-    name: str
-    items: Sequence[MissionItem]
-
-
-def plan_parts(plan: Plan) -> list[PlanPart]:
-    """Return mission, geofence and rally points, in the order in which ground stations send them."""
-    from flightstack.plan import PLAN_NAMES  # noqa: PLC0415
-
-    items = (plan.items, plan.fence, plan.rally)
-    return [PlanPart(kind, name, part) for (kind, name), part in zip(PLAN_NAMES.items(), items, strict=True)]
 
 
 def item_line(seq: int, item: MissionItem) -> str:

@@ -51,6 +51,7 @@ class FakeVehicle:
         self.codec = mavlink.MAVLink(None, self.system_id, 1)
         self.codec.robust_parsing = True
         self.plans: dict[int, list[Any]] = {0: [], 1: [], 2: []}
+        self.uploaded: list[int] = []
         self._type = 0
         self.commands: list[tuple[int, tuple[float, ...]]] = []
         self.heard: list[str] = []
@@ -133,6 +134,7 @@ class FakeVehicle:
         self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, result, self._type))
         if result == ACCEPTED:
             self.plans[self._type] = self._uploading
+            self.uploaded.append(self._type)
         elif self.mission_refusal:
             self._say(self.mission_refusal)
 

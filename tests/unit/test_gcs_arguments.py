@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import io
+import json
 import math
+import re
 import socket
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -116,8 +120,56 @@ def test_a_plan_that_the_vehicle_would_refuse_is_not_flown(tmp_path: Path) -> No
     home = "0\t1\t0\t16\t0\t0\t0\t0\t47.397742\t8.545594\t488\t1"
     plan.write_text(f"QGC WPL 110\n{home}\n1\t0\t3\t16\t0\t0\t0\t0\t48.0\t8.5\t10\t1\n")
     with pytest.raises(
-        CliError, match=r"far.waypoints: item 0 \(NAV_WAYPOINT\): is \d+ m from home"
+        CliError, match=r"far.waypoints: mission: item 0 \(NAV_WAYPOINT\): is \d+ m from home"
     ) as error:
+        checked_plan(FlyOptions(plan))
+    assert error.value.exit_code == USAGE
+
+
+def _fenced(tmp_path: Path, change: Callable[[dict[str, Any]], None]) -> Path:
+    """Write ``fenced_square.plan`` with a change."""
+    document = json.loads((MISSIONS / "fenced_square.plan").read_text())
+    change(document)
+    path = tmp_path / "changed.plan"
+    path.write_text(json.dumps(document))
+    return path
+
+
+def _shrink_fence(document: dict[str, Any]) -> None:
+    home = document["mission"]["plannedHomePosition"][:2]
+    document["geoFence"]["circles"] = [
+        {"circle": {"center": home, "radius": 5.0}, "inclusion": True, "version": 1}
+    ]
+    document["geoFence"]["polygons"] = []
+
+
+def _cross_fence(document: dict[str, Any]) -> None:
+    polygon = document["geoFence"]["polygons"][0]["polygon"]
+    polygon[0], polygon[1] = polygon[1], polygon[0]
+
+
+def _rally_far_out(document: dict[str, Any]) -> None:
+    document["rallyPoints"]["points"] = [[47.5, 8.545594, 10.0]]
+
+
+def _no_mission(document: dict[str, Any]) -> None:
+    document["mission"]["items"] = []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (_shrink_fence, r"mission: item 1 \(NAV_WAYPOINT\): is outside the geofence"),
+        (_cross_fence, r"geofence: item \d \(.*\): the polygon crosses itself"),
+        (_rally_far_out, r"list of rally points: item 0 \(.*\): is outside the geofence"),
+        (_no_mission, "holds no mission to fly"),
+    ],
+)
+def test_geofence_and_rally_points_are_checked_before_anything_starts(
+    tmp_path: Path, change: Callable[[dict[str, Any]], None], said: str
+) -> None:
+    plan = _fenced(tmp_path, change)
+    with pytest.raises(CliError, match=f"^{re.escape(str(plan))}: {said}") as error:
         checked_plan(FlyOptions(plan))
     assert error.value.exit_code == USAGE
 
@@ -292,7 +344,7 @@ def test_lines_tell_the_course_of_a_flight() -> None:
         display.update(story.flight)
     assert isinstance(console.file, io.StringIO)
     lines = console.file.getvalue().splitlines()
-    assert lines[0] == "uploading the mission"
+    assert lines[0] == "uploading the plan"
     assert lines[1] == "arming"
     assert lines[2].startswith("MISSION  item ")
     assert "N   +1.0 E   +2.0 up   3.0 m" in lines[2]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from flightstack.plan import Command, Frame, MissionItem
+from flightstack.plan import RALLY_POINT, Command, FenceCommand, Frame, MissionItem, MissionType, Plan
 from gcs_cli.errors import DONE, FAILED, NO_ANSWER
 from gcs_cli.flight import STALL_S, Flight, Phase
 from gcs_cli.session import Session
@@ -17,6 +17,8 @@ TAKEOFF = MissionItem(Command.NAV_TAKEOFF, Frame.GLOBAL_RELATIVE_ALT, x=47397742
 WAYPOINT = MissionItem(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, x=473978320, y=85455940, z=3.0)
 LAND = MissionItem(Command.NAV_LAND, Frame.GLOBAL_RELATIVE_ALT, x=473977420, y=85455940)
 HOP = (TAKEOFF, WAYPOINT, LAND)
+CIRCLE = MissionItem(FenceCommand.CIRCLE_INCLUSION, Frame.GLOBAL, param1=50.0, x=473977420, y=85455940)
+RALLY = MissionItem(RALLY_POINT, Frame.GLOBAL_RELATIVE_ALT, x=473977420, y=85455940, z=5.0)
 
 
 @dataclass
@@ -25,6 +27,8 @@ class Story:
 
     vehicle: FakeVehicle
     items: tuple[MissionItem, ...] = HOP
+    fence: tuple[MissionItem, ...] = ()
+    rally: tuple[MissionItem, ...] = ()
     connect_s: float = 10.0
     limit_s: float = 3600.0
     now_s: float = 100.0
@@ -32,7 +36,8 @@ class Story:
 
     def __post_init__(self) -> None:
         self.session = Session()
-        self.flight = Flight(self.session, self.items, self.now_s, self.connect_s, self.limit_s)
+        plan = Plan(self.items, fence=self.fence, rally=self.rally)
+        self.flight = Flight(self.session, plan, self.now_s, self.connect_s, self.limit_s)
 
     def run(self, most_s: float = 60.0, until: Phase = Phase.OVER) -> Story:
         end_s = self.now_s + most_s
@@ -73,6 +78,34 @@ def test_a_mission_is_flown_to_its_end() -> None:
     assert story.flight.began_s is not None
     assert story.flight.ended_s is not None
     assert story.flight.began_s < story.flight.ended_s < story.now_s
+
+
+def test_geofence_and_rally_points_go_before_the_mission_that_is_checked_against_them() -> None:
+    story = Story(FakeVehicle(), fence=(CIRCLE,), rally=(RALLY, RALLY)).run(until=Phase.UPLOAD)
+    assert story.flight.upload_progress == (0, 6)
+    story.run()
+    assert story.reason == "completed"
+    plans = story.vehicle.plans
+    assert [item.command for item in plans[MissionType.FENCE]] == [CIRCLE.command]
+    assert [item.command for item in plans[MissionType.RALLY]] == [RALLY_POINT] * 2
+    assert [item.command for item in plans[MissionType.MISSION]] == [22, 16, 21]
+    counts = [name for name in story.vehicle.heard if name == "MISSION_COUNT"]
+    assert len(counts) == 3
+    assert story.vehicle.uploaded == [MissionType.FENCE, MissionType.RALLY, MissionType.MISSION]
+    assert story.flight.upload_progress == (6, 6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [(MissionType.FENCE, "geofence"), (MissionType.RALLY, "list of rally points")],
+)
+def test_a_refused_part_of_the_plan_is_named(kind: MissionType, name: str) -> None:
+    prefixes = {"geofence": "Geofence refused: ", "list of rally points": "List of rally points refused: "}
+    vehicle = FakeVehicle(refused_type=kind, mission_refusal=prefixes[name] + "it leaves out home")
+    story = Story(vehicle, fence=(CIRCLE,), rally=(RALLY,)).run()
+    assert (story.reason, story.code) == (f"the vehicle refused the {name}: it leaves out home", FAILED)
+    assert MissionType.MISSION not in story.vehicle.uploaded
+    assert story.orders == [SHUT_DOWN]
 
 
 def test_no_vehicle() -> None:
