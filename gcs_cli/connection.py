@@ -10,7 +10,7 @@ from flightstack.plan import MissionResult
 from flightstack.transport.udp import PortBusyError, UdpSocket, resolve
 from gcs_cli.calls import Answer, Call
 from gcs_cli.endpoint import VEHICLE_CONNECTION, Endpoint
-from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
+from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError, PortInUseError
 from gcs_cli.session import Session
 
 _LONGEST_WAIT_S = 0.25
@@ -41,9 +41,10 @@ class Connection:
                 self._socket = UdpSocket("127.0.0.1" if host.startswith("127.") else "0.0.0.0")
                 self.session = Session((host, endpoint.port), record, signing)
         except PortBusyError as error:
-            raise CliError(
-                f"{error}: end the other ground station, or use --connect {VEHICLE_CONNECTION}", USAGE
-            ) from None
+            sentence = f"{error}: end the other ground station, or use --connect {VEHICLE_CONNECTION}"
+            if error.is_in_use:
+                raise PortInUseError(endpoint, sentence) from None
+            raise CliError(sentence, USAGE) from None
         except OSError:
             raise CliError(f"--connect: there is no host named {endpoint.host}", USAGE) from None
 

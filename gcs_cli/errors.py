@@ -17,3 +17,11 @@ class CliError(Exception):
     def __init__(self, sentence: str, exit_code: int = FAILED) -> None:
         super().__init__(sentence)
         self.exit_code = exit_code
+
+
+class PortInUseError(CliError):
+    """Another program listens on ``port``, named with its address."""
+
+    def __init__(self, port: object, sentence: str) -> None:
+        super().__init__(sentence, USAGE)
+        self.port = port

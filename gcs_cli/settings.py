@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from gcs_cli.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
+from gcs_cli.endpoint import DEFAULT_CONNECTION, VEHICLE_CONNECTION, Endpoint, parse_endpoint
 from gcs_cli.errors import USAGE, CliError
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ ConnectOption = Annotated[
         "--connect",
         metavar="LINK",
         help="Where the vehicle is: udp:PORT, udpin:HOST:PORT or udpout:HOST:PORT.  "
-        f"[default: {DEFAULT_CONNECTION}]",
+        f"[default: {DEFAULT_CONNECTION}, or {VEHICLE_CONNECTION} while another program listens there]",
         show_default=False,
     ),
 ]
@@ -84,14 +85,31 @@ def settings_of(context: typer.Context) -> Settings:
     return Settings() if found is None else found
 
 
-def meet_vehicle(context: typer.Context, connect: str | None, timeout_s: float | None) -> Connection:
-    """Open the link and wait for the vehicle; raise CliError."""
+def open_link(settings: Settings) -> Connection:
+    """Open the link to the vehicle; raise CliError.
+
+    While another ground station, `gcs watch` say, listens on the usual port, the vehicle is called at its own.
+    """
     from gcs_cli.connection import Connection  # noqa: PLC0415
+    from gcs_cli.errors import PortInUseError  # noqa: PLC0415
     from gcs_cli.signing import open_signing  # noqa: PLC0415
 
+    signing = open_signing(settings.signing_key)
+    try:
+        return Connection(settings.endpoint, signing=signing)
+    except PortInUseError as error:
+        if settings.connect is not None:
+            raise
+        other = parse_endpoint(VEHICLE_CONNECTION)
+        print(f"gcs: {error.port} is in use: calling the vehicle at {other}", file=sys.stderr, flush=True)
+        return Connection(other, signing=signing)
+
+
+def meet_vehicle(context: typer.Context, connect: str | None, timeout_s: float | None) -> Connection:
+    """Open the link and wait for the vehicle; raise CliError."""
     settings = settings_of(context).merged(connect, timeout_s)
     patience_s = settings.patience_s
-    connection = Connection(settings.endpoint, signing=open_signing(settings.signing_key))
+    connection = open_link(settings)
     try:
         connection.meet(patience_s)
     except BaseException:

@@ -19,9 +19,11 @@ _DATAGRAMS_A_CALL = 1000
 class PortBusyError(Exception):
     """A port is taken (or may not be used); its text is one sentence that names it."""
 
-    def __init__(self, kind: str, address: Address, reason: str) -> None:
+    def __init__(self, kind: str, address: Address, reason: str, is_in_use: bool = True) -> None:
         super().__init__(f"{kind} port {address[1]} on {address[0]} {reason}")
         self.address = address
+        self.is_in_use = is_in_use
+        """Whether another program has it; else it may not be used at all."""
 
 
 def _bound(address: Address) -> socket.socket:
@@ -35,7 +37,7 @@ def _bound(address: Address) -> socket.socket:
         made.close()
         busy = getattr(error, "errno", None) == errno.EADDRINUSE
         reason = "is in use" if busy else f"cannot be used: {getattr(error, 'strerror', None) or error}"
-        raise PortBusyError("UDP", address, reason) from None
+        raise PortBusyError("UDP", address, reason, busy) from None
     return made
 
 

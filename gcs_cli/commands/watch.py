@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from gcs_cli.settings import ConnectOption, TimeoutOption, settings_of
+from gcs_cli.settings import ConnectOption, TimeoutOption, open_link, settings_of
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -21,10 +21,8 @@ LINE_S = 1.0
 
 def watch(context: typer.Context, connect: ConnectOption = None, timeout: TimeoutOption = None) -> None:
     """Watch the vehicle; q or Ctrl-C ends."""
-    from gcs_cli.connection import Connection  # noqa: PLC0415
-
     settings = settings_of(context).merged(connect, timeout)
-    with Connection(settings.endpoint) as connection:
+    with open_link(settings) as connection:
         try:
             if _draws():
                 watch_screen(connection)

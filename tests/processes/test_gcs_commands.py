@@ -196,6 +196,23 @@ def test_a_busy_port_is_named_with_the_way_round() -> None:
     assert "--connect udpout:127.0.0.1:18570" in result.stderr
 
 
+@pytest.mark.parametrize("command", [["arm"], ["--timeout", "20", "watch"]])
+def test_beside_a_ground_station_the_vehicle_is_called_at_its_own_port(
+    monkeypatch: pytest.MonkeyPatch, command: list[str]
+) -> None:
+    """The same vehicle sends to the usual port, where `gcs watch` may listen, and hears on another."""
+    vehicle = FakeVehicle()
+    monkeypatch.setattr("gcs_cli.commands.watch.watch_lines", lambda _connection: print("watching"))
+    with UdpSocket("127.0.0.1") as taken, serve(vehicle) as socket:
+        usual, own = taken.address[1], socket.address[1]
+        monkeypatch.setattr("gcs_cli.settings.DEFAULT_CONNECTION", f"udp:127.0.0.1:{usual}")
+        monkeypatch.setattr("gcs_cli.settings.VEHICLE_CONNECTION", f"udpout:127.0.0.1:{own}")
+        result = gcs(*command)
+    said = f"gcs: UDP 127.0.0.1:{usual} is in use: calling the vehicle at UDP 127.0.0.1:{own}\n"
+    assert result == ("armed\n" if command == ["arm"] else "watching\n", said, 0)
+    assert vehicle.codec.total_packets_received > 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
