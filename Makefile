@@ -45,11 +45,13 @@ generated: $(READY)
 	$(BIN)/python tools/generate_dialect.py --check
 	$(BIN)/python tools/generate_params.py --check
 	$(BIN)/python firmware/tools/generate_codec.py --check
+	$(BIN)/python firmware/tools/generate_core.py --check
 
 generate: $(READY) ## Regenerate files made from others
 	$(BIN)/python tools/generate_dialect.py
 	$(BIN)/python tools/generate_params.py
 	$(BIN)/python firmware/tools/generate_codec.py
+	$(BIN)/python firmware/tools/generate_core.py
 
 bench: $(READY) ## Print speeds beside their floors
 	@$(BIN)/python -m benchmarks

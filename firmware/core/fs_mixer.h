@@ -1,0 +1,40 @@
+/* From a wrench to rotor speeds, for any rotor set, with limits: roll and pitch before thrust before yaw. */
+#ifndef FS_MIXER_H
+#define FS_MIXER_H
+
+#include "fs_types.h"
+
+/*
+ * Rotor geometry in the form that the mixer computes with.
+ *
+ * allocation maps (thrust [N], torque FRD [N m]) to squared speeds [rad^2/s^2]; effectiveness maps back. low and high bound
+ * squared speeds, and are of either sign with ideal rotors. spin is +1 for a rotor that turns clockwise from above.
+ */
+typedef struct {
+    fs_real allocation[FS_MAX_ROTORS][4];
+    fs_real effectiveness[4][FS_MAX_ROTORS];
+    fs_real low[FS_MAX_ROTORS];
+    fs_real high[FS_MAX_ROTORS];
+    fs_real spin[FS_MAX_ROTORS];
+} fs_mixer;
+
+/* Direction in which the mixer could not follow, for thrust and each torque: -1 it made more, +1 less than demanded. */
+typedef struct {
+    fs_real thrust;
+    fs_vector3 torque;
+} fs_saturation;
+
+/*
+ * Write the rotor speeds [rad/s] that come nearest to the wrench, the wrench that they make, and where the two differ by more
+ * than the rounding of the sums.
+ *
+ * Torque about roll and pitch is served first (they keep the vehicle upright), then thrust, then yaw with what is left. With
+ * ideal rotors a squared speed may be negative: the speed then carries the sign. Speeds beyond the rotors become zero.
+ */
+void fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
+            fs_wrench *achieved, fs_saturation *saturation);
+
+/* Omega_r of the paper: counter-clockwise minus clockwise rotor speeds [rad/s]. */
+fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_mixer *mixer, uint16_t rotors);
+
+#endif

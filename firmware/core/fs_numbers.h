@@ -1,0 +1,118 @@
+/* Generated from Python by firmware/tools/generate_core.py: do not edit. */
+#ifndef FS_NUMBERS_H
+#define FS_NUMBERS_H
+
+#include "fs_types.h"
+
+#define FS_PARAM_COUNT 131U
+
+#define FS_CONTROLLER_PID 0U
+#define FS_CONTROLLER_BACKSTEPPING 1U
+#define FS_CONTROLLERS 2U
+
+/* Integral of the position error, as acceleration [m/s^2], NED. */
+typedef struct {
+    fs_real x;
+    fs_real y;
+    fs_real z;
+} fs_position_memory;
+
+/* Gains in acceleration per error (1/s^2, 1/s^3, 1/s) and limits. */
+typedef struct {
+    fs_real kp_xy;
+    fs_real ki_xy;
+    fs_real kd_xy;
+    fs_real kp_z;
+    fs_real ki_z;
+    fs_real kd_z;
+    fs_real mass_kg;
+    fs_real gravity_m_s2;
+    fs_real min_thrust_n;
+    fs_real max_thrust_n;
+    fs_real max_tilt_rad;
+    fs_real max_integral_m_s2;
+} fs_position_params;
+
+/* State of the filter: attitude and body rates of the reference. */
+typedef struct {
+    fs_real w;
+    fs_real x;
+    fs_real y;
+    fs_real z;
+    fs_real p_rad_s;
+    fs_real q_rad_s;
+    fs_real r_rad_s;
+} fs_reference_memory;
+
+/* Second-order filter: natural frequency (0: pass the target through) and limits. */
+typedef struct {
+    fs_real bandwidth_rad_s;
+    fs_real damping;
+    fs_real max_rate_rad_s;
+    fs_real max_acceleration_rad_s2;
+} fs_reference_params;
+
+/* What an attitude controller sees in one tick. */
+typedef struct {
+    fs_quaternion attitude;
+    fs_vector3 rates_frd_rad_s;
+    fs_attitude_reference reference;
+    fs_vector3 error_rad;
+    fs_real relative_rotor_speed_rad_s;
+    fs_vector3 saturation;
+} fs_attitude_inputs;
+
+/* Integral of the attitude error [rad s]. */
+typedef struct {
+    fs_real roll;
+    fs_real pitch;
+    fs_real yaw;
+} fs_pid_memory;
+
+/* Gains in angular acceleration per error, which fit any vehicle; its inertia turns them into torque. */
+typedef struct {
+    fs_real kp_roll;
+    fs_real kp_pitch;
+    fs_real kp_yaw;
+    fs_real ki_roll;
+    fs_real ki_pitch;
+    fs_real ki_yaw;
+    fs_real kd_roll;
+    fs_real kd_pitch;
+    fs_real kd_yaw;
+    fs_real rate_feedforward;
+    fs_real acceleration_feedforward;
+    fs_real ix_kg_m2;
+    fs_real iy_kg_m2;
+    fs_real iz_kg_m2;
+} fs_pid_params;
+
+/* c1 to c6 [1/s] of the paper's Table III, inertias, and how much of x_d' and x_d'' is fed in (0 or 1). */
+typedef struct {
+    fs_real c1;
+    fs_real c2;
+    fs_real c3;
+    fs_real c4;
+    fs_real c5;
+    fs_real c6;
+    fs_real rate_feedforward;
+    fs_real acceleration_feedforward;
+    fs_real ix_kg_m2;
+    fs_real iy_kg_m2;
+    fs_real iz_kg_m2;
+    fs_real rotor_inertia_kg_m2;
+} fs_backstepping_params;
+
+/* What several structures are made of, as it was set. */
+typedef struct {
+    fs_real controller; /* index of the attitude law: one of FS_CONTROLLER_* */
+    fs_real rotors; /* 4 to FS_MAX_ROTORS */
+    fs_real inner_hz; /* rate of the inner loop */
+    fs_real outer_divisor; /* the outer loop runs in every so many inner ticks */
+    fs_real max_tilt_deg; /* MPC_TILTMAX_AIR */
+    fs_real ix_kg_m2; /* inertias, which every attitude law has a copy of */
+    fs_real iy_kg_m2;
+    fs_real iz_kg_m2;
+} fs_setup;
+
+#endif

@@ -1,0 +1,175 @@
+"""The numbers of the loops on a target: one declaration, from which C's table and a flight's values are made.
+
+A target knows the parameters of Python's loops by their names, and what is derived from the vehicle by names of its
+own (FS_MASS …), because a vehicle file does not reach it. Indices in names count from zero, as in the arrays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from flightstack.config import DEFAULT_INNER_HZ, DEFAULT_OUTER_HZ
+from flightstack.contract import MAX_ROTORS
+from flightstack.control import attitude_backstepping, attitude_pid
+from flightstack.control.attitude_controller import AttitudeController
+from flightstack.control.attitude_reference import REFERENCE_TUNABLES, ReferenceParams
+from flightstack.control.loop_parameters import TILT, LoopNumbers, loop_numbers
+from flightstack.control.mixer import mixer_for
+from flightstack.control.position_pid import POSITION_TUNABLES, PositionParams
+from flightstack.params.behaviour import SPECS
+from flightstack.params.errors import ConfigError
+from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
+from flightstack.params.toml_reader import Table
+from flightstack.params.tunable import Tunable
+from flightstack.params.vehicle import DEFAULT_VEHICLE, GRAVITY_M_S2, Vehicle, load_vehicle
+
+CONTROLLERS = (attitude_pid.CONTROLLER, attitude_backstepping.CONTROLLER)
+"""The laws that exist in C; FS_CTRL is the index."""
+WIDEST = 1e6
+"""Range of gains and thrusts on a target: a gains file in the paper's units, or a heavy vehicle, goes beyond the
+ranges that Python declares, and Python stretches them for it; C's table is the same for every vehicle."""
+_STRETCHED = ("POS_Z_", "POS_THR_", "PID_ROLL_", "PID_PITCH_", "PID_YAW_")
+
+
+class TargetNumber(NamedTuple):
+    """One number of the loops on a target."""
+
+    name: str
+    place: str
+    """Where it stands in C's ``fs_loops``."""
+    low: float
+    high: float
+    is_whole: bool = False
+    integral: str = ""
+    """The memory that this gain multiplies, which is scaled when the gain changes; see ``Tunable.integrates``."""
+
+
+def _tunable(tunable: Tunable, law: str) -> TargetNumber:
+    stretched = tunable.name.startswith(_STRETCHED)
+    integral = f"{law}_memory.{tunable.integrates}" if tunable.integrates else ""
+    place, high = f"{law}.{tunable.field}", WIDEST if stretched else tunable.high
+    return TargetNumber(tunable.name, place, tunable.low, high, integral=integral)
+
+
+def _tunables() -> Iterator[TargetNumber]:
+    laws = {
+        "position": POSITION_TUNABLES,
+        "reference": REFERENCE_TUNABLES,
+        **{controller.name: controller.tunables or () for controller in CONTROLLERS},
+    }
+    for law, tunables in laws.items():
+        for tunable in tunables:
+            yield _tunable(tunable, law)
+
+
+def _mixer_numbers() -> Iterator[TargetNumber]:
+    rotors, axes = range(MAX_ROTORS), range(4)
+    for rotor in rotors:
+        for axis in axes:
+            yield TargetNumber(f"FS_ALLOC_{rotor}{axis}", f"mixer.allocation[{rotor}][{axis}]", -1e15, 1e15)
+    for axis in axes:
+        for rotor in rotors:
+            yield TargetNumber(f"FS_EFF_{axis}{rotor}", f"mixer.effectiveness[{axis}][{rotor}]", -1e3, 1e3)
+    for name, field, limit in (("LOW", "low", 1e12), ("HIGH", "high", 1e12), ("SPIN", "spin", 1.0)):
+        for rotor in rotors:
+            yield TargetNumber(f"FS_{name}_{rotor}", f"mixer.{field}[{rotor}]", -limit, limit)
+
+
+TARGET_NUMBERS: tuple[TargetNumber, ...] = (
+    *_tunables(),
+    TargetNumber(TILT, "setup.max_tilt_deg", SPECS[TILT].low, SPECS[TILT].high),
+    TargetNumber("FS_CTRL", "setup.controller", 0.0, len(CONTROLLERS) - 1.0, is_whole=True),
+    TargetNumber("FS_ROTORS", "setup.rotors", 4.0, MAX_ROTORS, is_whole=True),
+    TargetNumber("FS_INNER_HZ", "setup.inner_hz", 1.0, 20e3),
+    TargetNumber("FS_OUTER_DIV", "setup.outer_divisor", 1.0, 20e3, is_whole=True),
+    TargetNumber("FS_MASS", "position.mass_kg", 1e-3, 1e3),
+    TargetNumber("FS_GRAVITY", "position.gravity_m_s2", 0.1, 30.0),
+    TargetNumber("FS_IX", "setup.ix_kg_m2", 1e-8, 1e4),
+    TargetNumber("FS_IY", "setup.iy_kg_m2", 1e-8, 1e4),
+    TargetNumber("FS_IZ", "setup.iz_kg_m2", 1e-8, 1e4),
+    TargetNumber("FS_JR", "backstepping.rotor_inertia_kg_m2", 0.0, 1.0),
+    *_mixer_numbers(),
+)
+"""All numbers that a target has, in the order of its table."""
+
+
+def target_numbers(
+    vehicle: Vehicle,
+    controller: AttitudeController,
+    gains: Table,
+    max_tilt_rad: float,
+    inner_hz: float,
+    divisor: int,
+) -> dict[str, float]:
+    """Return the numbers that make a target's loops those of ``PythonLoops`` with the same arguments.
+
+    The gains of the controller that does not fly are not among them: the target keeps what it has. Raise
+    ConfigError if the controller does not exist in C, or a number is beyond what the target takes.
+    """
+    names = [known.name for known in CONTROLLERS]
+    if controller.name not in names:
+        known = ", ".join(names)
+        raise ConfigError("--controller", controller.name, f"exists in Python alone; in C there are {known}")
+    values = _loop_values(loop_numbers(vehicle, controller, gains, max_tilt_rad), controller)
+    ix, iy, iz = vehicle.inertia_kg_m2
+    values |= {
+        TILT: math.degrees(max_tilt_rad),
+        "FS_CTRL": float(names.index(controller.name)),
+        "FS_ROTORS": float(len(vehicle.rotors)),
+        "FS_INNER_HZ": inner_hz,
+        "FS_OUTER_DIV": float(divisor),
+        "FS_MASS": vehicle.mass_kg,
+        "FS_GRAVITY": GRAVITY_M_S2,
+        "FS_IX": ix,
+        "FS_IY": iy,
+        "FS_IZ": iz,
+        "FS_JR": sum(r.inertia_kg_m2 for r in vehicle.rotors) / len(vehicle.rotors),
+        **_mixer_values(vehicle),
+    }
+    for number in TARGET_NUMBERS:
+        value = values.get(number.name, number.low)
+        if not number.low <= value <= number.high:
+            limits = f"{number.low:g} to {number.high:g}"
+            raise ConfigError(
+                "--loops", f"{number.name}={value:g}", f"is beyond what a target takes, {limits}"
+            )
+    return values
+
+
+def _loop_values(numbers: LoopNumbers, controller: AttitudeController) -> dict[str, float]:
+    of_laws: tuple[tuple[Sequence[Tunable], type, Any], ...] = (
+        (POSITION_TUNABLES, PositionParams, numbers.position),
+        (REFERENCE_TUNABLES, ReferenceParams, numbers.reference),
+        (controller.tunables or (), controller.params_type, numbers.controller),
+    )
+    values: dict[str, float] = {}
+    for tunables, params_type, array in of_laws:
+        fields: Mapping[str, float] = dict(zip(params_type._fields, array.tolist(), strict=True))  # type: ignore[attr-defined]
+        values |= {tunable.name: fields[tunable.field] for tunable in tunables}
+    return values
+
+
+def _mixer_values(vehicle: Vehicle) -> dict[str, float]:
+    mixer = mixer_for(vehicle)
+    values = {number.name: 0.0 for number in _mixer_numbers()}
+    for rotor in range(len(vehicle.rotors)):
+        for axis in range(4):
+            values[f"FS_ALLOC_{rotor}{axis}"] = float(mixer.allocation[rotor, axis])
+            values[f"FS_EFF_{axis}{rotor}"] = float(mixer.effectiveness[axis, rotor])
+        values[f"FS_LOW_{rotor}"] = float(mixer.low[rotor])
+        values[f"FS_HIGH_{rotor}"] = float(mixer.high[rotor])
+        values[f"FS_SPIN_{rotor}"] = float(mixer.spin[rotor])
+    return values
+
+
+def default_numbers() -> dict[str, float]:
+    """Return the numbers that a target starts with: default vehicle, gains and rates, and the gains of every law."""
+    vehicle, values = load_vehicle(DEFAULT_VEHICLE), dict[str, float]()
+    divisor = round(DEFAULT_INNER_HZ / DEFAULT_OUTER_HZ)
+    tilt_rad = math.radians(SPECS[TILT].default)
+    for controller in reversed(CONTROLLERS):  # the first one flies
+        gains = open_gains(DEFAULT_GAINS)
+        values |= target_numbers(vehicle, controller, gains, tilt_rad, DEFAULT_INNER_HZ, divisor)
+    return values
