@@ -138,8 +138,7 @@ class Inputs:
             payload = payload.rstrip(b"\0") or b"\0"
         source = (draw.randrange(256), draw.choice(self._sources), draw.choice((0, 1, 190)))
         if kind.number < 256 and style > 0.9:
-            head = bytes((len(payload), *source, kind.number))
-            return b"\xfe" + head + payload + _checksum(head + payload, kind)
+            return sealed_v1(kind, payload, source)
         signed = 0.8 < style < 0.85
         return sealed(kind, payload, source, draw.randbytes(13) if signed else b"")
 
@@ -211,6 +210,12 @@ def sealed(kind: Kind, payload: bytes, source: tuple[int, int, int], signature: 
     """Return the MAVLink 2 frame with a right checksum; ``source``: sequence number, system and component."""
     head = bytes((len(payload), bool(signature), 0, *source)) + kind.number.to_bytes(3, "little")
     return b"\xfd" + head + payload + _checksum(head + payload, kind) + signature
+
+
+def sealed_v1(kind: Kind, payload: bytes, source: tuple[int, int, int]) -> bytes:
+    """Return the frame of MAVLink 1."""
+    head = bytes((len(payload), *source, kind.number))
+    return b"\xfe" + head + payload + _checksum(head + payload, kind)
 
 
 def _checksum(body: bytes, kind: Kind) -> bytes:

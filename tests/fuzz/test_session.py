@@ -10,22 +10,15 @@ from rich.console import Console
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.command_client import CommandClient
-from flightstack.mavlink.services.ftp_client import FtpClient
-from flightstack.mavlink.services.log_client import LogClient, LogEntry
-from flightstack.mavlink.services.mission_client import MissionClient
-from flightstack.mavlink.services.param_client import ParamClient
 from gcs_cli.session import Service, Session
 from gcs_cli.watch_lines import state_line, text_line
 from gcs_cli.watch_render import render
+from tests.fuzz.clients import SERVICES
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import calls, held
-from tests.support.world import item
 
 MESSAGES = 1_000
 STEP_S = 0.02
-VEHICLE, OWN = Address(1, 1), Address(255, 190)
 HERE = ("192.0.2.1", 18570)
 MOST_HELD = 400_000
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)
@@ -40,63 +33,6 @@ def show(session: Session, now_s: float) -> None:
     state_line(session.view, now_s)
     for text in session.view.texts:
         text_line(text)
-
-
-def upload() -> Service:
-    client = MissionClient(VEHICLE, OWN)
-    client.start_upload([item(22, z=8.0), item(16, 10.0, 5.0, 8.0), item(21, 10.0, 5.0)])
-    return client
-
-
-def download() -> Service:
-    client = MissionClient(VEHICLE, OWN)
-    client.start_download()
-    return client
-
-
-def command() -> Service:
-    client = CommandClient(VEHICLE, OWN)
-    client.send(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0,), 0.0)
-    return client
-
-
-def parameter_list() -> Service:
-    client = ParamClient(VEHICLE, OWN)
-    client.start_list()
-    return client
-
-
-def parameter_set() -> Service:
-    client = ParamClient(VEHICLE, OWN)
-    client.start_set("MPC_XY_CRUISE", 3.0)
-    return client
-
-
-def file() -> Service:
-    client = FtpClient(VEHICLE, OWN)
-    client.start_download("@PARAM/param.pck")
-    return client
-
-
-def directory() -> Service:
-    client = FtpClient(VEHICLE, OWN)
-    client.start_list("/")
-    return client
-
-
-def log_list() -> Service:
-    client = LogClient(VEHICLE)
-    client.start_list()
-    return client
-
-
-def log() -> Service:
-    client = LogClient(VEHICLE)
-    client.start_download(LogEntry(1, 100_000, 0))
-    return client
-
-
-SERVICES = [upload, download, command, parameter_list, parameter_set, file, directory, log_list, log]
 
 
 @pytest.mark.parametrize("make", SERVICES)

@@ -132,8 +132,9 @@ class LogClient:
         if message.num_logs == 0:
             self._end(LogDone())
             return
-        # the newest numbers hold: a log may have begun meanwhile
-        self._ids = range(message.last_log_num - message.num_logs + 1, message.last_log_num + 1)
+        # the newest numbers hold: a log may have begun meanwhile; none is below 0, whatever the count says
+        last = message.last_log_num
+        self._ids = range(max(0, last - message.num_logs + 1), last + 1)
         if message.id not in self._entries:
             self._progress_s = now_s
         self._entries[message.id] = LogEntry(message.id, message.size, message.time_utc)
@@ -144,9 +145,7 @@ class LogClient:
     def _ask_for_entries(self, now_s: float) -> None:
         missing = [log_id for log_id in self._ids or () if log_id not in self._entries]
         first, last = (missing[0], missing[-1]) if missing else (0, ALL_LOGS)
-        self._outbox.append(
-            mavlink.MAVLink_log_request_list_message(*self.vehicle, max(0, first), min(last, ALL_LOGS))
-        )
+        self._outbox.append(mavlink.MAVLink_log_request_list_message(*self.vehicle, first, last))
         self._retry_s = now_s + RETRY_S
 
     # -- download

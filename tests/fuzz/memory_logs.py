@@ -1,0 +1,26 @@
+"""Flight logs in memory, as the vehicle's link services see them."""
+
+from __future__ import annotations
+
+from flightstack.mavlink.services.log_store import LogInfo
+from flightstack.mavlink.services.virtual_files import BytesFile, VirtualFile
+
+
+class MemoryLogs:
+    """Logs of these sizes; the last one is being written, and stays when the others are erased."""
+
+    def __init__(self, *sizes: int) -> None:
+        self._content = {f"{n:02}.ulg": bytes(i % 251 for i in range(size)) for n, size in enumerate(sizes)}
+
+    def logs(self) -> list[LogInfo]:
+        return [LogInfo(name, len(data), 1_750_000_000) for name, data in self._content.items()]
+
+    def open(self, name: str) -> VirtualFile | None:
+        data = self._content.get(name)
+        return None if data is None else BytesFile(data)
+
+    def erase(self) -> int:
+        gone = list(self._content)[:-1]
+        for name in gone:
+            del self._content[name]
+        return len(gone)

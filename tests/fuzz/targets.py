@@ -1,0 +1,168 @@
+"""The four ends of links that bytes arrive at, each as a function of a script (``tests.fuzz.script``).
+
+A target begins anew for every script, so that a script that fails does so again. It raises for whatever must not be,
+and returns how many datagrams and pieces of streams arrived.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from flightstack.config import DEFAULT_HOME
+from flightstack.ground.hub import MAX_TO_FORWARD
+from flightstack.ground.peer import API, GROUND, PeerAddress
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.frames import LARGEST_FRAME
+from flightstack.mavlink.link import Link
+from flightstack.mavlink.signing import LinkSigning, Signing
+from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.params.vehicle import load_vehicle
+from gcs_cli.session import Session
+from sim_bridge.errors import PlantDivergedError
+from sim_bridge.lockstep import SimulatorLink as SimulatorEnd
+from sim_bridge.plant import PlantOptions
+from sim_bridge.simulator import Simulator
+from tests.fuzz.clients import SERVICES
+from tests.fuzz.memory_logs import MemoryLogs
+from tests.fuzz.script import KEY, MOST_STEPS, steps
+from tests.support.world import World
+
+SIGNED, FLYING = 1, 2
+"""Bits of a hub script's first octet."""
+MOST_SENT = 20_000
+"""Frames that a hub may send in reply to one script: a file in bursts is most of it."""
+VEHICLE = load_vehicle("x_quad")
+PEERS = (
+    PeerAddress(GROUND, "192.0.2.1", 1),
+    PeerAddress(API, "192.0.2.2", 2),
+    PeerAddress(GROUND, "127.0.0.1", 3),  # it may set signing keys
+    PeerAddress("tcp", "192.0.2.4", 4),
+)
+HEARTBEAT = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)
+
+
+def hub(script: bytes) -> int:
+    """The vehicle's ground links and all services; the first octet says which vehicle it is."""
+    options = script[0] if script else 0
+    world = World(flight_logs=MemoryLogs(0, 300, 5_000))
+    ground = world.stack.ground
+    link = Link(250, 190)
+    if options & FLYING:
+        assert world.arm() == 0
+        assert world.takeoff(5.0) == 0
+    if options & SIGNED:
+        ground.use_signing(Signing(KEY, lambda: 1.75e9), lambda _key: None)
+        link = Link(250, 190, signing=LinkSigning(Signing(KEY, lambda: 1.75e9), 9))
+    now_s, sent, arrivals = world._link_now_s(), 0, 0
+    for step in steps(script[1:]):
+        now_s += step.pause_s
+        for piece in step.pieces:
+            ground.receive(PEERS[step.peer], piece, now_s)
+            arrivals += 1
+        sent += sum(1 for _ in ground.poll(now_s))
+    assert sent < MOST_SENT
+    world._held_s = now_s - world.time_s
+    world.sends_heartbeats = False
+    world.tick()
+    check_vehicle(world)
+    # whoever is left in charge of the key, a client that has it gets its answer
+    if options & SIGNED and ground._signing is not None and ground._signing._key != KEY:
+        return arrivals
+    assert "AUTOPILOT_VERSION" in answers(world, link)
+    return arrivals
+
+
+def check_vehicle(world: World) -> None:
+    """What holds of a vehicle, whatever it was told."""
+    autopilot, params = world.stack.autopilot, world.stack.params
+    assert np.isfinite(world.simulator.frame.state).all()
+    assert np.isfinite(autopilot._navigator.setpoint).all()
+    for name, value in params.values().items():
+        assert params.specs[name].accepted(value) == value
+    assert len(world.stack.ground._to_forward) <= MAX_TO_FORWARD
+    places = autopilot.places
+    assert all(math.isfinite(number) for number in places.home_point)
+    assert autopilot.now.progress.current <= len(autopilot.items)
+
+
+def answers(world: World, link: Link) -> set[str]:
+    """Return what a proper client is sent when it asks for AUTOPILOT_VERSION."""
+    request = mavlink.MAVLink_command_long_message(
+        world.stack.ground._own.system, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 148, 0, 0, 0, 0, 0, 0
+    )
+    address = PeerAddress(GROUND, "192.0.2.99", 99)
+    now_s = world._link_now_s() + 100.0  # transactions of others have timed out
+    kinds: set[str] = set()
+    for _ in range(20):
+        for message in (mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), request):
+            world.stack.ground.receive(address, link.encode(message), now_s)
+        for peer, frame in world.stack.ground.poll(now_s):
+            if peer == address:
+                kinds.update(message.get_type() for message in link.decode(frame))
+        if "AUTOPILOT_VERSION" in kinds:
+            break
+        now_s += 0.1
+    return kinds
+
+
+def simulator(script: bytes) -> int:
+    """The vehicle's end of the simulator link."""
+    stack = SimulatorLink(VEHICLE, DEFAULT_HOME, lockstep=True)
+    commands, arrivals = np.full(8, 100.0), 0
+    for step in steps(script):
+        for piece in step.pieces:
+            stack.receive(memoryview(piece))
+            arrivals += 1
+            assert len(stack._finder._held) <= LARGEST_FRAME
+            assert stack.freshness(stack.time_us).age_us >= 0
+            if stack.has_state:
+                assert len(bytes(stack.answer(commands, armed=True))) <= LARGEST_FRAME
+    return arrivals
+
+
+def bridge(script: bytes) -> int:
+    """The simulator's end of the simulator link; the plant flies on what it is told."""
+    end = SimulatorEnd(Simulator(VEHICLE, "rigid", PlantOptions()), VEHICLE, DEFAULT_HOME)
+    arrivals = 0
+    for step in steps(script):
+        for piece in step.pieces:
+            end.receive(memoryview(piece))
+            arrivals += 1
+            assert len(end._finder._held) <= LARGEST_FRAME
+            assert len(end.replies()) <= MOST_STEPS
+        end.state()
+        try:
+            end.step()
+        except PlantDivergedError:  # its right, with impossible commands
+            break
+    return arrivals
+
+
+def session(script: bytes) -> int:
+    """The ground station's session, with the client that the first octet names, until that one ends."""
+    station = Session(record=lambda _frame: None)
+    here = ("192.0.2.1", 18570)
+    station.receive(Link(1, 1).encode(HEARTBEAT), here, 0.0)
+    service = SERVICES[(script[0] if script else 0) % len(SERVICES)]()
+    station.use(service)
+    now_s, arrivals = 0.0, 0
+    station.poll(now_s)
+    for step in steps(script[1:], ((1, 1), (1, 1), (1, 1), (1, 2))):
+        now_s += step.pause_s
+        for piece in step.pieces:
+            station.receive(piece, here, now_s)
+            arrivals += 1
+        assert len(station.poll(now_s)) < 500
+    while getattr(service, "result", None) is None and now_s < 1_000.0:
+        now_s += 0.5
+        station.poll(now_s)
+    assert getattr(service, "result", None) is not None
+    return arrivals
+
+
+TARGETS: dict[str, Callable[[bytes], int]] = {
+    "hub": hub, "simulator": simulator, "bridge": bridge, "session": session,
+}  # fmt: skip
