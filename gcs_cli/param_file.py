@@ -1,17 +1,14 @@
-"""Parameter files as QGroundControl writes them: one tab-separated line for each parameter. Pure but for ``load``."""
+"""Parameter files of ``gcs``: read as the flight stack reads them, written with all parameters of any vehicle."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from pathlib import Path
 
 from flightstack.mavlink.services.param_values import INT32, REAL32, Parameter
 from flightstack.params.errors import ConfigError
+from flightstack.params.param_file import read_param_file
 from gcs_cli.param_info import number_text
-
-_COLUMNS = 5  # system, component, name, value, MAV_PARAM_TYPE
-_LONGEST_NAME = 16
 
 
 def render_parameters(parameters: Iterable[Parameter], system_id: int, component_id: int) -> str:
@@ -28,35 +25,7 @@ def render_parameters(parameters: Iterable[Parameter], system_id: int, component
 
 
 def load_parameters(path: Path) -> dict[str, float]:
-    """Read a file; raise ConfigError that names it and the line."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise ConfigError(str(path), "file", "is no text") from None
-    except OSError as error:
-        raise ConfigError(str(path), "file", error.strerror or str(error)) from None
-    values: dict[str, float] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        name, value = _read_line(line, str(path), f"line {number}")
-        if name in values:
-            raise ConfigError(str(path), f"line {number}", f"{name} stands twice in it")
-        values[name] = value
-    return values
-
-
-def _read_line(line: str, path: str, where: str) -> tuple[str, float]:
-    columns = line.split("\t") if "\t" in line else line.split()
-    if len(columns) != _COLUMNS:
-        raise ConfigError(path, where, "expected system, component, name, value and type")
-    name = columns[2].strip()
-    if not name.isascii() or not name.isprintable() or not 0 < len(name) <= _LONGEST_NAME:
-        raise ConfigError(path, where, "has no name of 1 to 16 characters")
-    try:
-        value = float(columns[3])
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ConfigError(path, where, f"{columns[3].strip()} is not a number")
-    return name, value
+    """Read a file by the rule of the flight stack; raise ConfigError that names file and line."""
+    if not path.exists():
+        raise ConfigError(path, "", "there is no such file")
+    return {line.name: float(line.value) for line in read_param_file(path)}

@@ -17,6 +17,7 @@ from flightstack.mavlink.services.param_client import ParamTiming
 from flightstack.mavlink.services.param_values import Parameter
 from flightstack.mavlink.signing import timestamp_of
 from flightstack.params.errors import ConfigError
+from flightstack.params.param_file import ParamLine, format_params
 from gcs_cli.param_file import load_parameters, render_parameters
 from gcs_cli.param_info import ParamInfo, number_text, parse_metadata
 from gcs_cli.param_table import matching, parameter_table
@@ -185,7 +186,7 @@ def test_what_was_saved_is_loaded(vehicle: ParamVehicle, tmp_path: Path) -> None
 
 def test_what_cannot_be_loaded_is_named_and_the_rest_is_loaded(vehicle: ParamVehicle, tmp_path: Path) -> None:
     file = tmp_path / "other.params"
-    file.write_text("1 1 FOREIGN 1 9\n1 1 MPC_XY_CRUISE 99 9\n1 1 MPC_YAW_MODE 5 6\n")
+    file.write_text("1\t1\tFOREIGN\t1\t9\n1\t1\tMPC_XY_CRUISE\t99\t9\n1\t1\tMPC_YAW_MODE\t5\t6\n")
     result = told(vehicle, "load", file)
     assert result.returncode == 1
     assert result.stdout == "1 of 3 parameters changed\n"
@@ -212,7 +213,7 @@ def test_a_bad_file_is_a_usage_error_before_anything_is_asked(tmp_path: Path) ->
     for command in ("load", "diff"):
         result = gcs("param", command, tmp_path / "none.params")
         assert result.returncode == 2
-        assert "No such file" in result.stderr
+        assert "none.params: there is no such file" in result.stderr
 
 
 def test_a_vehicle_that_does_not_answer_about_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,7 +264,8 @@ def test_the_table_fits_a_terminal_of_80_columns() -> None:
 @given(
     st.dictionaries(
         st.text("ABC_", min_size=1, max_size=16),
-        st.tuples(st.floats(width=32, allow_nan=False, allow_infinity=False), st.booleans()),
+        st.tuples(st.floats(width=32, allow_nan=False, allow_infinity=False), st.just(False))
+        | st.tuples(st.integers(-(2**31), 2**31 - 1).map(float), st.just(True)),
         max_size=9,
     )
 )
@@ -282,14 +284,12 @@ def test_a_file_brings_every_value_back(
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("1 1 NAME", "line 1: expected system, component, name, value and type"),
-        ("# fine\n\n1 1 NAME x 9", "line 3: x is not a number"),
-        ("1 1 NAME nan 9", "line 1: nan is not a number"),
-        ("1 1 NAME inf 9", "line 1: inf is not a number"),
-        ("1 1 NAME_OF_TOO_MANY_LETTERS 1 9", "line 1: has no name of 1 to 16 characters"),
-        ("1\t1\t\t1\t9", "line 1: has no name"),
-        ("1 1 NÄME 1 9", "line 1: has no name"),
-        ("1 1 A 1 9\n1 1 A 2 9", "line 2: A stands twice"),
+        ("1\t1\tNAME", "line 1: has 3 columns between tabs, expected 5"),
+        ("1 1 NAME 1 9", "line 1: has 1 columns between tabs"),
+        ("# fine\n\n1\t1\tNAME\tx\t9", "line 3: NAME: 'x' is not a number"),
+        ("1\t1\tNAME\tnan\t9", "line 1: NAME: 'nan' is not a number"),
+        ("1\t1\tNAME_OF_TOO_MANY_LETTERS\t1\t9", "line 1: 'NAME_OF_TOO_MANY_LETTERS' is no name"),
+        ("1\t1\tA\t1\t9\n1\t1\tA\t2\t9", "line 2: A stands in line 1 already"),
     ],
 )
 def test_a_bad_line_is_named(tmp_path: Path, text: str, problem: str) -> None:
@@ -302,8 +302,19 @@ def test_a_bad_line_is_named(tmp_path: Path, text: str, problem: str) -> None:
 def test_a_file_that_is_no_text(tmp_path: Path) -> None:
     path = tmp_path / "bad.params"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigError, match="is no text"):
+    with pytest.raises(ConfigError, match="is not a text file"):
         load_parameters(path)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="there is no such file"):
+        load_parameters(tmp_path / "none.params")
+
+
+def test_a_file_of_the_flight_stack_is_read_too(tmp_path: Path) -> None:
+    path = tmp_path / "params-0.params"
+    path.write_text(format_params([ParamLine("MPC_XY_CRUISE", 3.5, False), ParamLine("GF_ACTION", 2, True)]))
+    assert load_parameters(path) == {"MPC_XY_CRUISE": 3.5, "GF_ACTION": 2.0}
 
 
 JSON = st.recursive(
