@@ -5,7 +5,7 @@
 typedef enum {
     FS_WAIT,    /* more octets are needed to tell */
     FS_NOISE,   /* no frame begins here */
-    FS_BAD,     /* a frame seemed to begin here, but its checksum is wrong */
+    FS_BAD,     /* a frame seemed to begin here, but its checksum or what follows it is wrong */
     FS_UNKNOWN, /* a frame of a message that we do not know */
     FS_GOOD
 } fs_verdict;
@@ -49,7 +49,21 @@ static void fs_judge_v1(const fs_octet *at, uint16_t count, fs_candidate *candid
     }
 }
 
-static void fs_judge_v2(const fs_octet *at, uint16_t count, fs_candidate *candidate)
+/* Judge a whole frame whose checksum we cannot verify, by what follows it. */
+static void fs_judge_unknown(const fs_octet *at, uint16_t count, uint16_t silent, fs_candidate *candidate)
+{
+    if (count > candidate->size) {
+        fs_octet next = at[candidate->size];
+
+        candidate->verdict = ((next == FS_MAGIC_V1) || (next == FS_MAGIC_V2)) ? FS_UNKNOWN : FS_BAD;
+    } else if (silent != 0U) {
+        candidate->verdict = FS_UNKNOWN;
+    } else {
+        candidate->size++;
+    }
+}
+
+static void fs_judge_v2(const fs_octet *at, uint16_t count, uint16_t silent, fs_candidate *candidate)
 {
     fs_message_kind kind;
 
@@ -71,21 +85,21 @@ static void fs_judge_v2(const fs_octet *at, uint16_t count, fs_candidate *candid
     }
     candidate->id = fs_get_u32(&at[7], 3U, 0U); /* of 24 bits */
     if (fs_message_kind_of(candidate->id, &kind) == 0U) {
-        candidate->verdict = FS_UNKNOWN;
+        fs_judge_unknown(at, count, silent, candidate);
     } else {
         candidate->crc_extra = kind.crc_extra;
         candidate->verdict = fs_check(at, candidate);
     }
 }
 
-/* Judge the count octets, one at least, from a place on where a frame may begin. */
-static void fs_judge(const fs_octet *at, uint16_t count, fs_candidate *candidate)
+/* Judge the count octets, one at least, from a place on where a frame may begin; silent: no more will come. */
+static void fs_judge(const fs_octet *at, uint16_t count, uint16_t silent, fs_candidate *candidate)
 {
     candidate->verdict = FS_WAIT;
     if (at[0] == FS_MAGIC_V1) {
         fs_judge_v1(at, count, candidate);
     } else if (at[0] == FS_MAGIC_V2) {
-        fs_judge_v2(at, count, candidate);
+        fs_judge_v2(at, count, silent, candidate);
     } else {
         candidate->verdict = FS_NOISE;
     }
@@ -116,17 +130,17 @@ static void fs_drop(fs_parser *parser, uint16_t octets)
 
 /*
  * Find the first frame among what is held, and drop everything before it and itself. Without one, keep only the
- * beginning that has to wait for its rest; with give_up nothing waits.
+ * beginning that has to wait for its rest; when the line is silent nothing waits.
  */
-static uint16_t fs_scan(fs_parser *parser, uint16_t give_up, fs_frame *frame)
+static uint16_t fs_scan(fs_parser *parser, uint16_t silent, fs_frame *frame)
 {
     uint16_t at = 0U, found = 0U, waiting = 0U;
     fs_candidate candidate;
 
     parser->needed = 1U;
     while ((at < parser->count) && (found == 0U) && (waiting == 0U)) {
-        fs_judge(&parser->held[at], (uint16_t)(parser->count - at), &candidate);
-        if ((candidate.verdict == FS_WAIT) && (give_up == 0U)) {
+        fs_judge(&parser->held[at], (uint16_t)(parser->count - at), silent, &candidate);
+        if ((candidate.verdict == FS_WAIT) && (silent == 0U)) {
             waiting = 1U;
             parser->needed = candidate.size;
         } else if (candidate.verdict == FS_GOOD) {
@@ -161,7 +175,7 @@ void fs_parser_init(fs_parser *parser)
 
 uint16_t fs_parser_push(fs_parser *parser, fs_octet octet, fs_frame *frame)
 {
-    /* There is room: octets that wait are fewer than the frame they wait for, and a frame found leaves more. */
+    /* There is room: fewer octets wait than are waited for, and a frame that is found leaves more of it. */
     parser->held[parser->count] = (fs_octet)(octet & 0xFFU);
     parser->count++;
     return (parser->count < parser->needed) ? 0U : fs_scan(parser, 0U, frame);
