@@ -53,6 +53,7 @@ class Actions:
         """FirmwarePlugin.cc, _armVehicleAndValidate: once, and seen in the heartbeat within 1.5 s."""
         if not self._station.armed:
             self.arm()
+        if not self._station.armed:
             self._station.wait("HEARTBEAT", within_s=ARM_WAIT_S, holds=lambda beat: self._station.armed)
         return self._station.armed
 

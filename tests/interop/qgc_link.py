@@ -117,6 +117,11 @@ class Station:
         assert message is not None, f"no {kinds} came; {self.texts[-5:]}"
         return message
 
+    def until_text(self, part: str) -> None:
+        """Wait until a STATUSTEXT with ``part`` has come."""
+        while not any(part in text for text in self.texts):
+            self.until("STATUSTEXT")
+
     def _read(self, within_s: float) -> None:
         data = self._port.read(max(within_s, 1e-3))
         for message in self._codec.parse_buffer(data) or []:
