@@ -6,72 +6,35 @@ import contextlib
 import math
 import select
 import signal
-import sys
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 from types import FrameType
 
-from flightstack.assembly import Stack, build
 from flightstack.clock import DeadlineScheduler, ask_for_punctual_sleeps
 from flightstack.config import StackConfig
-from flightstack.ground.peer import PeerAddress
-from flightstack.logging.flight_log import FlightLog
-from flightstack.logging.log_files import LogFiles
-from flightstack.logging.log_library import LogLibrary
-from flightstack.logging.log_tail import FileTail
-from flightstack.mavlink.services.log_store import NO_LOGS
-from flightstack.mavlink.signing import Signing
+from flightstack.ground_end import GroundEnd
 from flightstack.modes import Mode
-from flightstack.params.identity import SYSTEM_ID
-from flightstack.params.saver import ParamSaver
+from flightstack.process_config import (
+    EXIT_LOST,
+    EXIT_OK,
+    EXIT_TIMEOUT,
+    Ended,
+    ProcessConfig,
+    RebootRequestedError,
+    complain,
+)
+from flightstack.process_files import ProcessFiles
 from flightstack.reboot import carry_over, config_after
-from flightstack.signing_file import create_key, open_signing, replace_key
+from flightstack.simulator_end import check_deadline, connect, wait_for_state
 from flightstack.snapshot import ERROR, NOTICE
 from flightstack.transport.processor import Follower
 from flightstack.transport.tcp import LinkClosedError, TcpClient
-from flightstack.transport.vehicle_ports import Place, PortsConfig, VehiclePorts
 
-EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
 GROUND_POLL_NS = 500_000
 GROUND_SHARE = 0.4
 """In real time, sending to ground stations takes so much of a tick at most; what is left waits for the next."""
 REPORT_S = 0.2
-SECOND_HELLO_S = 1.0
-"""Silence after which a simulator is asked for the standard message."""
-SIMULATOR_NOTICE_S = 10.0
-"""Silence of a connected simulator after which the user is told; it is waited for longer: it may be compiling."""
 FIRST_CONTACT_S = 60.0
 """How long a process that must not outlive its ground station waits for the first word from it."""
-
-
-@dataclass(frozen=True)
-class ProcessConfig:
-    """What concerns the process and not the flight."""
-
-    simulator_host: str
-    simulator_port: int
-    simulator_timeout_s: float
-    ports: PortsConfig
-    log: Path | None
-    wait_for_start: bool
-    exit_on_ground_loss_s: float | None
-    signing_key: Path | None = None
-    """File of the key that signs MAVLink; None: nothing is signed."""
-    allow_unsigned: bool = False
-
-
-class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops
-    """The process ends, with this exit code and sentence."""
-
-    def __init__(self, code: int, sentence: str) -> None:
-        super().__init__(sentence)
-        self.code = code
-
-
-class RebootRequestedError(Exception):
-    """A ground station wants the vehicle to start anew."""
 
 
 class App:
@@ -79,47 +42,17 @@ class App:
 
     def __init__(self, config: StackConfig, process: ProcessConfig) -> None:
         self._process = process
-        self._log_files = LogFiles(process.log)
         self._config = config
-        self._saver: ParamSaver | None = None
-        self._signing: Signing | None = None
-        self.stack: Stack = self._build(config)
-        self._ports = VehiclePorts(process.ports)
+        self._files = ProcessFiles(process)
+        self.stack = self._files.build(config)
+        self._ground = GroundEnd(process.ports, self.stack.ground)
         self._lockstep = config.lockstep
         self._stop_signal = 0
-        for channel, peer in self._ports.first_peers:
-            self.stack.ground.add_peer(PeerAddress(channel, *peer), permanent=True)
         self._began_s = time.monotonic()
         self._next_report_s = self._began_s + REPORT_S
         self._next_log_us = 0
         self._next_ground_ns = 0
         self._follower: Follower | None = None
-        self._sending: Iterator[tuple[PeerAddress, bytes]] | None = None
-        self._slice_ns: int | None = None
-
-    def _build(self, config: StackConfig) -> Stack:
-        """Build a stack and join it to the files of this process; raise ConfigError."""
-        log = self._process.log
-        stack = build(config, self._open_log, NO_LOGS if log is None else LogLibrary(log.parent))
-        stack.ground.vehicle.open_log_tail = self._open_tail
-        self._signing = self._open_signing(stack)
-        if config.params_file is not None:
-            system_id = int(stack.params.value(SYSTEM_ID))
-            self._saver = ParamSaver(stack.params, stack.loaded_params, Path(config.params_file), system_id)
-        return stack
-
-    def _open_signing(self, stack: Stack) -> Signing | None:
-        """Sign the ground links if there is to be a key; raise ConfigError."""
-        path = self._process.signing_key
-        if path is None:
-            return None
-        if not path.exists():
-            create_key(path)
-            print(f"flightstack: a new signing key is in {path}", flush=True)
-        role = f"vehicle-{self._process.ports.instance}"
-        signing = open_signing(path, role, self._process.allow_unsigned)
-        stack.ground.use_signing(signing, lambda key: replace_key(path, key))
-        return signing
 
     # ------------------------------------------------------------------ life
 
@@ -130,13 +63,13 @@ class App:
         simulator: TcpClient | None = None
         code = EXIT_LOST
         try:
-            simulator = self._connect()
+            simulator = connect(self._process, self._meanwhile)
             simulator.send(self.stack.simulator.hello(self.stack.rates.interval_us))
-            self._wait_for_state(simulator)
+            wait_for_state(simulator, self.stack, self._process, self._meanwhile)
             self._fly(simulator)
         except Ended as ended:
             if str(ended):
-                print(f"flightstack: {ended}", file=sys.stderr, flush=True)
+                complain(ended)
             code = ended.code
         except LinkClosedError:
             code = self._simulator_gone()
@@ -159,22 +92,19 @@ class App:
             except RebootRequestedError:
                 self._reboot()
                 if not holds_time:  # the last state was answered: the next one comes by itself
-                    self._wait_for_state(simulator)
+                    wait_for_state(simulator, self.stack, self._process, self._meanwhile)
 
     def _reboot(self) -> None:
         old = self.stack
         old.recorder.close()
-        for (channel, host, port), data in old.ground.poll(time.monotonic()):  # the command's answer
-            self._ports.send(channel, (host, port), data)
-        if self._saver is not None:
-            self._saver.close()
-        if self._signing is not None:
-            self._signing.close()
-        self._sending = None
-        self.stack = self._build(config_after(old, self._config))
+        self._ground.leave(time.monotonic())  # with the command's answer
+        self._files.close_parameters()
+        self._files.close_signing()
+        self.stack = self._files.build(config_after(old, self._config))
+        self._ground.join(self.stack.ground)
         carry_over(old, self.stack)
         self.stack.autopilot.say(NOTICE, "Rebooted")
-        print("flightstack: rebooted", file=sys.stderr, flush=True)
+        complain("rebooted")
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._stop_signal = number
@@ -185,112 +115,41 @@ class App:
             return EXIT_OK
         at = f"at t={now.time_us * 1e-6:.3f} s"
         if self.stack.simulator.peer_said_goodbye and not now.status.armed:
-            print(f"flightstack: the simulator was shut down {at}", file=sys.stderr, flush=True)
+            complain(f"the simulator was shut down {at}")
             return EXIT_OK
-        print(f"flightstack: simulator lost {at}: it closed the connection", file=sys.stderr, flush=True)
+        complain(f"simulator lost {at}: it closed the connection")
         return EXIT_LOST
 
     def _close(self, simulator: TcpClient | None, orderly: bool) -> None:
         """End the log and, if all is in order, say goodbye: who hears nothing counts us as lost."""
         self.stack.recorder.close()
-        if self._saver is not None:
-            self._saver.close()
-            if (problem := self._saver.take_error()) is not None:
-                print(f"flightstack: {problem}", file=sys.stderr, flush=True)
+        self._files.close_parameters()
+        if (problem := self._files.take_problem()) is not None:
+            complain(problem)
         if orderly:
-            for (channel, host, port), data in self.stack.ground.farewell():
-                self._ports.send(channel, (host, port), data)
-            self._ports.flush()
-        if self._signing is not None:
-            self._signing.close()
+            self._ground.farewell()
+        self._files.close_signing()
         if simulator is not None:
             if orderly:
                 with contextlib.suppress(LinkClosedError):
                     armed = self.stack.autopilot.now.status.armed
                     simulator.send(self.stack.simulator.heartbeat(armed, leaving=True))
             simulator.close()
-        self._ports.close()
+        self._ground.close()
         if self.stack.recorder.error is not None:
-            print(
-                f"flightstack: the log is incomplete: {self.stack.recorder.error}",
-                file=sys.stderr,
-                flush=True,
-            )
-
-    def _open_log(self) -> FlightLog | None:
-        try:
-            return self._log_files.open(len(self.stack.vehicle.rotors))
-        except OSError as error:
-            path = self._log_files.current
-            self.stack.autopilot.say(ERROR, f"No log: {path}: {error.strerror}")
-            print(
-                f"flightstack: no log can be written to {path}: {error.strerror}", file=sys.stderr, flush=True
-            )
-            return None
-
-    def _open_tail(self) -> FileTail | None:
-        return self._log_files.tail(lambda: self.stack.recorder.is_logging)
+            complain(f"the log is incomplete: {self.stack.recorder.error}")
 
     # ------------------------------------------------------------------ start
-
-    def _connect(self) -> TcpClient:
-        p = self._process
-        try:
-            return TcpClient.connect(
-                p.simulator_host, p.simulator_port, p.simulator_timeout_s, self._between_tries
-            )
-        except (TimeoutError, OSError):
-            raise Ended(
-                EXIT_TIMEOUT,
-                f"no simulator at {p.simulator_host}:{p.simulator_port} within {p.simulator_timeout_s:g} s: "
-                "start sim-bridge, or name its port with --sim-port",
-            ) from None
-
-    def _between_tries(self) -> None:
-        self._check_stop()
-        self._serve_ground()
-
-    def _wait_for_state(self, simulator: TcpClient) -> None:
-        link, interval_us = self.stack.simulator, self.stack.rates.interval_us
-        began_s = time.monotonic()
-        asked_again = told = False
-        while True:
-            self._check_stop()
-            self._serve_ground()
-            data = simulator.receive()
-            if data is not None and link.receive(data):
-                break
-            silent = time.monotonic() - began_s > SECOND_HELLO_S
-            if not asked_again and (silent or link.request_refused):
-                asked_again = True
-                simulator.send(link.second_hello(interval_us))
-            if not told and time.monotonic() - began_s > SIMULATOR_NOTICE_S:
-                told = True
-                self._tell_simulator_silent()
-            self._check_simulator(began_s + self._process.simulator_timeout_s)
-        self.stack.autopilot.has_state = True
-
-    def _tell_simulator_silent(self) -> None:
-        p = self._process
-        sentence = f"the simulator at {p.simulator_host}:{p.simulator_port} is connected but sends no state"
-        self.stack.autopilot.say(4, f"Waiting: {sentence}")
-        print(
-            f"flightstack: {sentence} for {SIMULATOR_NOTICE_S:g} s; it hangs, or compiles; waiting up to "
-            f"{p.simulator_timeout_s:g} s",
-            file=sys.stderr,
-            flush=True,
-        )
 
     def _hold_time(self, simulator: TcpClient) -> None:
         """Keep time at zero until the vehicle flies a mission; the ground links go on meanwhile."""
         poller = select.poll()
         poller.register(simulator, select.POLLIN)
-        self._ports.register(poller)
+        self._ground.register(poller)
         now = self.stack.autopilot.now
         next_sign_s = 0.0
         while not (now.status.armed and now.status.mode is Mode.MISSION):
-            self._check_stop()
-            self._serve_ground()
+            self._meanwhile()
             if time.monotonic() >= next_sign_s:  # the simulator waits for an answer: say that we are here
                 next_sign_s = time.monotonic() + 1.0
                 simulator.send(self.stack.simulator.heartbeat(now.status.armed))
@@ -325,19 +184,18 @@ class App:
         """Serve the ground links while the simulator takes its time; return whether a state came."""
         deadline_s = time.monotonic() + self._process.simulator_timeout_s
         while True:
-            self._check_stop()
-            self._serve_ground()
+            self._meanwhile()
             data = simulator.receive()
             if data is not None:
                 return self.stack.simulator.receive(data)
-            self._check_simulator(deadline_s)
+            check_deadline(deadline_s, self.stack, self._process)
 
     def _run_real_time(self, simulator: TcpClient) -> None:
         """Tick at fixed deadlines on the newest state; the machine's clock owns time."""
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
         ask_for_punctual_sleeps()
         scheduler = DeadlineScheduler(timing)
-        self._slice_ns = round(GROUND_SHARE * timing.period_ns)
+        self._ground.slice_ns = round(GROUND_SHARE * timing.period_ns)
         interval_us, tick, time_us = self.stack.rates.interval_us, 0, 0
         heard_s = time.monotonic()
         while True:
@@ -352,9 +210,9 @@ class App:
             tick += 1
             if tick % self.stack.rates.divisor == 0:
                 self._between_ticks(simulator)
-                self._check_simulator(heard_s + self._process.simulator_timeout_s)
-            elif self._sending is not None:
-                self._send()
+                check_deadline(heard_s + self._process.simulator_timeout_s, self.stack, self._process)
+            elif self._ground.is_sending:
+                self._ground.send()
 
     def _between_ticks(self, simulator: TcpClient) -> None:
         """Do what is due between two ticks: ground links, timing report, reasons to stop."""
@@ -384,35 +242,14 @@ class App:
         if now_s >= self._next_report_s:
             self._next_report_s = now_s + REPORT_S
             self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
-            if self._saver is not None and (problem := self._saver.take_error()) is not None:
-                self.stack.autopilot.say(3, problem[0].upper() + problem[1:])
-        ground, ports = self.stack.ground, self._ports
-        for channel, peer, data in ports.receive(self._is_heard):
-            ground.receive(PeerAddress(channel, *peer), data, now_s)
-        for channel, peer in ports.opened():
-            ground.add_peer(PeerAddress(channel, *peer), permanent=True)
-        for channel, peer in ports.closed():
-            ground.drop_peer(PeerAddress(channel, *peer))
-        if self._sending is None:
-            self._sending = ground.poll(now_s)
-        self._send()
+            if (problem := self._files.take_problem()) is not None:
+                self.stack.autopilot.say(ERROR, problem[0].upper() + problem[1:])
+        self._ground.serve(now_s)
 
-    def _send(self) -> None:
-        """Send what is due, as far as the time goes that a tick leaves for it."""
-        assert self._sending is not None
-        clock_ns, send = time.monotonic_ns, self._ports.send
-        end_ns = math.inf if self._slice_ns is None else clock_ns() + self._slice_ns
-        for (channel, host, port), data in self._sending:
-            send(channel, (host, port), data)
-            if clock_ns() >= end_ns:
-                break
-        else:
-            self._sending = None
-        self._ports.flush()
-
-    def _is_heard(self, place: Place) -> bool:
-        channel, peer = place
-        return self.stack.ground.is_heard(PeerAddress(channel, *peer))
+    def _meanwhile(self) -> None:
+        """Do what must go on while the simulator is waited for."""
+        self._check_stop()
+        self._serve_ground()
 
     # ------------------------------------------------------------------ reasons to stop
 
@@ -432,9 +269,3 @@ class App:
             raise Ended(EXIT_LOST, f"ground station lost: nothing heard for {limit_s:g} s")
         if heard_s == -math.inf and now_s - self._began_s > FIRST_CONTACT_S:
             raise Ended(EXIT_TIMEOUT, f"no ground station within {FIRST_CONTACT_S:g} s")
-
-    def _check_simulator(self, deadline_s: float) -> None:
-        if time.monotonic() > deadline_s:
-            at = f"t={self.stack.autopilot.now.time_us * 1e-6:.3f} s"
-            timeout_s = self._process.simulator_timeout_s
-            raise Ended(EXIT_LOST, f"simulator lost at {at}: no state for {timeout_s:g} s")

@@ -1,0 +1,61 @@
+"""The options of the ``flightstack`` command, each with its type and its help, in the order that help shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Vehicle = Annotated[str, typer.Option(help="Built-in vehicle or TOML file.")]
+Controller = Annotated[str, typer.Option(help="Attitude controller: pid, backstepping or yours.")]
+Gains = Annotated[str, typer.Option(help="Gains: tuned, paper or a TOML file.")]
+InnerHz = Annotated[float, typer.Option(help="Rate of the inner loop [Hz].")]
+OuterHz = Annotated[
+    float | None,
+    typer.Option(help="Rate of the outer loop [Hz]; divides the inner rate [nearest to 100]."),
+]
+Clock = Annotated[str, typer.Option(help="lockstep (the simulator owns time) or realtime.")]
+Loops = Annotated[str, typer.Option(help="Which loops fly: python.")]
+SimHost = Annotated[str, typer.Option(help="Host of the simulator.")]
+SimPort = Annotated[int | None, typer.Option(help="Port of the simulator [4560 + instance].")]
+SimTimeout = Annotated[float, typer.Option(help="Longest wait for the simulator [s].")]
+Instance = Annotated[int, typer.Option(min=0, max=249, help="Number of this vehicle; shifts ports and id.")]
+GroundStations = Annotated[
+    list[str] | None,
+    typer.Option(help="Ground station to address unasked: HOST:PORT. May be repeated [127.0.0.1:14550]."),
+]
+GcsPort = Annotated[int, typer.Option(help="UDP port of the ground station, without --gcs.")]
+ApiPort = Annotated[int | None, typer.Option(help="UDP port of the API client [14540 + instance].")]
+TcpPort = Annotated[
+    int | None, typer.Option(help="TCP port to listen on [5760 + 10 per instance]; 0 for none.")
+]
+Listen = Annotated[
+    str, typer.Option(help="Address of this machine to listen on for MAVLink; 0.0.0.0 for all.")
+]
+SigningKey = Annotated[
+    Path | None,
+    typer.Option(help="Sign MAVLink with the key in this file (made if missing); refuse what is unsigned."),
+]
+AllowUnsigned = Annotated[
+    bool, typer.Option("--allow-unsigned", help="With --signing-key: take unsigned messages as well.")
+]
+LogFile = Annotated[
+    str | None,
+    typer.Option(
+        help="Log file [<stamp>-flight.ulg in runs, or runs/instance-<instance>]; 'none' for no log. "
+        "Ground stations see the logs of its folder."
+    ),
+]
+Assignments = Annotated[list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")]
+ParamFile = Annotated[
+    str | None,
+    typer.Option(
+        help="Parameter file [runs/params-<instance>.params]; 'none' for none.", metavar="FILE|none"
+    ),
+]
+Home = Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of the local origin.")]
+IdealRotors = Annotated[bool, typer.Option(help="Rotors without lag and limits, as the paper assumes.")]
+WaitForStart = Annotated[bool, typer.Option(help="Keep time at zero until a mission is started.")]
+Check = Annotated[bool, typer.Option("--check", help="Check the configuration, compile the loops, end.")]
+ExitOnGcsLoss = Annotated[float | None, typer.Option(help="End when no ground station is heard [s].")]

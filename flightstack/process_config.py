@@ -1,0 +1,44 @@
+"""What concerns the process and not the flight: its configuration, how it ends, and what it says."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from flightstack.transport.vehicle_ports import PortsConfig
+
+EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
+
+
+@dataclass(frozen=True)
+class ProcessConfig:
+    """What concerns the process and not the flight."""
+
+    simulator_host: str
+    simulator_port: int
+    simulator_timeout_s: float
+    ports: PortsConfig
+    log: Path | None
+    wait_for_start: bool
+    exit_on_ground_loss_s: float | None
+    signing_key: Path | None = None
+    """File of the key that signs MAVLink; None: nothing is signed."""
+    allow_unsigned: bool = False
+
+
+class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops
+    """The process ends, with this exit code and sentence."""
+
+    def __init__(self, code: int, sentence: str) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+
+class RebootRequestedError(Exception):
+    """A ground station wants the vehicle to start anew."""
+
+
+def complain(sentence: object) -> None:
+    """Say a sentence on stderr, where it is seen at once."""
+    print(f"flightstack: {sentence}", file=sys.stderr, flush=True)
