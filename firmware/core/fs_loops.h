@@ -78,7 +78,8 @@ void fs_loops_reset(fs_loops *loops, const fs_vehicle_state *state);
  *
  * An input that is not finite never reaches a memory: the outer loop keeps its target, the inner loop repeats its last output
  * with FS_STATUS_INPUT_NOT_FINITE. The same with FS_STATUS_OUTPUT_NOT_FINITE when finite inputs are so large that the result
- * is not. The output is finite in every case, but for an attitude target that was set so. clock may be NULL.
+ * is not. The output is finite in every case, but for an attitude target that was set so, or a reset at such a state, which
+ * takes another reset to recover from. clock may be NULL.
  */
 void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, fs_loop_output *output,
                    fs_loop_cost *cost);

@@ -1,0 +1,14 @@
+/* Smooth the attitude target and differentiate it: flightstack/control/attitude_reference.py. */
+#ifndef FS_ATTITUDE_REFERENCE_H
+#define FS_ATTITUDE_REFERENCE_H
+
+#include "fs_numbers.h"
+
+/* Advance the reference by dt_s towards the target; rates and acceleration come in the reference's own body frame. */
+void fs_attitude_reference_step(fs_reference_memory *memory, const fs_quaternion *target,
+                                const fs_reference_params *params, fs_real dt_s, fs_attitude_reference *reference);
+
+/* Turn the reference's rates and acceleration from its own body frame into that of a vehicle at this attitude. */
+void fs_in_body_frame(fs_attitude_reference *reference, const fs_quaternion *attitude);
+
+#endif

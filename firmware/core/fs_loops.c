@@ -1,0 +1,263 @@
+#include "fs_loops.h"
+
+#include "fs_attitude_backstepping.h"
+#include "fs_attitude_pid.h"
+#include "fs_attitude_reference.h"
+#include "fs_geometry.h"
+#include "fs_math.h"
+#include "fs_params.h"
+#include "fs_position_pid.h"
+
+/* What a tick changes if it turns out sound. */
+typedef struct {
+    fs_reference_memory reference;
+    fs_pid_memory pid;
+    fs_saturation saturation;
+    fs_loop_output output;
+} fs_tick;
+
+static const fs_vector3 no_vector = {FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)};
+
+static uint32_t now(fs_clock clock)
+{
+    return clock != NULL ? clock() : 0UL;
+}
+
+static uint16_t state_is_finite(const fs_vehicle_state *state)
+{
+    return (fs_vector_is_finite(&state->position_ned_m) && fs_vector_is_finite(&state->velocity_ned_m_s) &&
+            fs_quaternion_is_finite(&state->attitude) && fs_vector_is_finite(&state->rates_frd_rad_s))
+               ? 1U
+               : 0U;
+}
+
+static uint16_t setpoint_is_finite(const fs_position_setpoint *setpoint)
+{
+    return (fs_vector_is_finite(&setpoint->position_ned_m) && fs_vector_is_finite(&setpoint->velocity_ned_m_s) &&
+            fs_vector_is_finite(&setpoint->acceleration_ned_m_s2) && fs_is_finite(setpoint->yaw_rad) &&
+            fs_is_finite(setpoint->yaw_rate_rad_s))
+               ? 1U
+               : 0U;
+}
+
+static uint16_t target_is_finite(const fs_attitude_target *target)
+{
+    return (fs_quaternion_is_finite(&target->attitude) && fs_is_finite(target->thrust_n)) ? 1U : 0U;
+}
+
+static uint16_t output_is_finite(const fs_loop_output *output)
+{
+    uint16_t i;
+
+    for (i = 0U; i < FS_MAX_ROTORS; i++) {
+        if (!fs_is_finite(output->rotor_command_rad_s[i])) {
+            return 0U;
+        }
+    }
+    return (fs_is_finite(output->wrench_achieved.thrust_n) &&
+            fs_vector_is_finite(&output->wrench_achieved.torque_frd_n_m))
+               ? 1U
+               : 0U;
+}
+
+void fs_loops_init(fs_loops *loops)
+{
+    const fs_vehicle_state level = {{FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)},
+                                    {FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)},
+                                    {FS_LIT(1.0), FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)},
+                                    {FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)}};
+
+    loops->rates.controller = FS_CONTROLLERS; /* none yet: the first one starts without memory */
+    fs_params_reset(loops);
+    fs_loops_reset(loops, &level);
+}
+
+static void clear_last(fs_loops *loops)
+{
+    fs_loop_output *last = &loops->last;
+    uint16_t i;
+
+    last->reference.attitude.w = FS_LIT(0.0);
+    last->reference.attitude.x = FS_LIT(0.0);
+    last->reference.attitude.y = FS_LIT(0.0);
+    last->reference.attitude.z = FS_LIT(0.0);
+    last->reference.rates_frd_rad_s = no_vector;
+    last->reference.acceleration_frd_rad_s2 = no_vector;
+    last->wrench.thrust_n = FS_LIT(0.0);
+    last->wrench.torque_frd_n_m = no_vector;
+    last->wrench_achieved = last->wrench;
+    for (i = 0U; i < FS_MAX_ROTORS; i++) {
+        last->rotor_command_rad_s[i] = FS_LIT(0.0);
+    }
+    last->status = 0U;
+    loops->saturation.thrust = FS_LIT(0.0);
+    loops->saturation.torque = no_vector;
+}
+
+void fs_loops_reset(fs_loops *loops, const fs_vehicle_state *state)
+{
+    const fs_quaternion *attitude = &state->attitude;
+
+    loops->position_memory.x = FS_LIT(0.0);
+    loops->position_memory.y = FS_LIT(0.0);
+    loops->position_memory.z = FS_LIT(0.0);
+    loops->reference_memory.w = attitude->w;
+    loops->reference_memory.x = attitude->x;
+    loops->reference_memory.y = attitude->y;
+    loops->reference_memory.z = attitude->z;
+    loops->reference_memory.p_rad_s = FS_LIT(0.0);
+    loops->reference_memory.q_rad_s = FS_LIT(0.0);
+    loops->reference_memory.r_rad_s = FS_LIT(0.0);
+    loops->pid_memory.roll = FS_LIT(0.0);
+    loops->pid_memory.pitch = FS_LIT(0.0);
+    loops->pid_memory.yaw = FS_LIT(0.0);
+    loops->target.attitude = *attitude;
+    loops->target.thrust_n = FS_LIT(0.0);
+    loops->last_target = loops->target;
+    loops->fraction = FS_LIT(0.0);
+    clear_last(loops);
+    loops->last.attitude_target = loops->target;
+}
+
+/* From here the target moves from where it is to a new one, over an outer period. */
+static void begin_outer_period(fs_loops *loops)
+{
+    loops->last_target = loops->target;
+    loops->fraction = FS_LIT(0.0);
+}
+
+/* Run the position loop, or keep its memory and the target as they were. */
+static void outer_loop(fs_loops *loops, const fs_loop_input *input)
+{
+    fs_position_memory memory = loops->position_memory;
+    fs_attitude_target target;
+
+    if (!state_is_finite(&input->state) || !setpoint_is_finite(&input->setpoint)) {
+        return;
+    }
+    fs_position_pid_step(&memory, &input->state, &input->setpoint, &loops->position, loops->rates.outer_dt_s,
+                         loops->saturation.thrust, &target);
+    if (target_is_finite(&target)) {
+        loops->position_memory = memory;
+        loops->target = target;
+    }
+}
+
+/* Reference filter and attitude controller, into the tick. Nonzero: the controller's result is finite. */
+static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *state, fs_tick *tick)
+{
+    const fs_quaternion aim = fs_blend(&loops->last_target.attitude, &loops->target.attitude, loops->fraction);
+    const fs_quaternion inverse = fs_conjugate(&state->attitude);
+    fs_attitude_reference *reference = &tick->output.reference;
+    fs_vector3 *torque = &tick->output.wrench.torque_frd_n_m;
+    fs_attitude_inputs inputs;
+    fs_quaternion turn;
+
+    tick->reference = loops->reference_memory;
+    tick->pid = loops->pid_memory;
+    fs_attitude_reference_step(&tick->reference, &aim, &loops->reference, loops->rates.inner_dt_s, reference);
+    fs_in_body_frame(reference, &state->attitude);
+    turn = fs_quaternion_product(&inverse, &reference->attitude);
+    inputs.attitude = state->attitude;
+    inputs.rates_frd_rad_s = state->rates_frd_rad_s;
+    inputs.reference = *reference;
+    inputs.error_rad = fs_rotation_vector(&turn);
+    inputs.relative_rotor_speed_rad_s =
+        fs_relative_rotor_speed(loops->last.rotor_command_rad_s, &loops->mixer, loops->rates.rotors);
+    inputs.saturation = loops->saturation.torque;
+    if (loops->rates.controller == FS_CONTROLLER_PID) {
+        *torque = fs_attitude_pid_step(&tick->pid, &inputs, &loops->pid, loops->rates.inner_dt_s);
+    } else {
+        *torque = fs_attitude_backstepping_step(&inputs, &loops->backstepping);
+    }
+    tick->output.wrench.thrust_n = loops->target.thrust_n;
+    return (fs_vector_is_finite(torque) && fs_is_finite(tick->pid.roll) && fs_is_finite(tick->pid.pitch) &&
+            fs_is_finite(tick->pid.yaw))
+               ? 1U
+               : 0U;
+}
+
+static uint16_t saturation_bits(const fs_saturation *saturation)
+{
+    uint16_t bits = 0U;
+
+    if (saturation->torque.x != FS_LIT(0.0)) {
+        bits |= FS_STATUS_ROLL_SATURATED;
+    }
+    if (saturation->torque.y != FS_LIT(0.0)) {
+        bits |= FS_STATUS_PITCH_SATURATED;
+    }
+    if (saturation->torque.z != FS_LIT(0.0)) {
+        bits |= FS_STATUS_YAW_SATURATED;
+    }
+    if (saturation->thrust != FS_LIT(0.0)) {
+        bits |= FS_STATUS_THRUST_SATURATED;
+    }
+    return bits;
+}
+
+/* Run inner loop and mixer; return 0 and keep the tick, or the status bit that tells why it is not sound. */
+static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, fs_clock clock, fs_loop_cost *cost)
+{
+    const uint32_t began = now(clock);
+    fs_loop_output *out;
+    uint16_t is_sound;
+    uint32_t controlled;
+    fs_tick tick;
+
+    cost->inner = 0UL;
+    cost->mixer = 0UL;
+    if (!state_is_finite(state) || !target_is_finite(&loops->target)) {
+        return FS_STATUS_INPUT_NOT_FINITE;
+    }
+    is_sound = attitude_loop(loops, state, &tick);
+    controlled = now(clock);
+    cost->inner = controlled - began;
+    if (!is_sound) {
+        return FS_STATUS_OUTPUT_NOT_FINITE;
+    }
+    out = &tick.output;
+    fs_mix(&out->wrench, &loops->mixer, loops->rates.rotors, out->rotor_command_rad_s, &out->wrench_achieved,
+           &tick.saturation);
+    cost->mixer = now(clock) - controlled;
+    if (!output_is_finite(out)) {
+        return FS_STATUS_OUTPUT_NOT_FINITE;
+    }
+    out->attitude_target = loops->target;
+    out->status = saturation_bits(&tick.saturation);
+    loops->reference_memory = tick.reference;
+    loops->pid_memory = tick.pid;
+    loops->saturation = tick.saturation;
+    loops->last = *out;
+    return 0U;
+}
+
+void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, fs_loop_output *output,
+                   fs_loop_cost *cost)
+{
+    const uint32_t began = now(clock);
+    uint16_t unsound;
+
+    if ((input->flags & FS_RESET) != 0U) {
+        fs_loops_reset(loops, &input->state);
+    }
+    if ((input->flags & FS_SET_TARGET) != 0U) {
+        begin_outer_period(loops);
+        loops->target = input->target;
+    }
+    cost->outer = 0UL;
+    if ((input->flags & FS_OUTER_DUE) != 0U) {
+        const uint32_t outer_began = now(clock);
+        begin_outer_period(loops);
+        outer_loop(loops, input);
+        cost->outer = now(clock) - outer_began;
+    }
+    loops->fraction += loops->rates.fraction_step;
+    unsound = inner_loop(loops, &input->state, clock, cost);
+    *output = loops->last;
+    if (unsound != 0U) {
+        output->attitude_target = loops->target;
+        output->status = unsound;
+    }
+    cost->whole = now(clock) - began;
+}

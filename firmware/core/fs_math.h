@@ -1,0 +1,67 @@
+/*
+ * The functions that the loops need of a mathematics library, so that results depend on none.
+ *
+ * Only + - * / and square root are used, which IEEE 754 rounds in one way: every machine that follows it, and does not contract
+ * or reorder (-ffp-contract=off, no fast-math), gives the same bits.
+ */
+#ifndef FS_MATH_H
+#define FS_MATH_H
+
+#include "fs_real.h"
+
+#if !defined(__GNUC__)
+#include <math.h>
+#endif
+
+/* Angles up to this, of either sign, have a sine; 1e4 rad is 1591 turns. */
+#define FS_LARGEST_ANGLE_RAD FS_LIT(10000.0)
+
+typedef struct {
+    fs_real sine, cosine;
+} fs_sine_cosine;
+
+/*
+ * Sine and cosine of an angle [rad]; both NaN beyond FS_LARGEST_ANGLE_RAD and for what is not finite.
+ *
+ * Error: see docs/firmware.md; tests/firmware/test_core_math.py measures it.
+ */
+fs_sine_cosine fs_sin_cos(fs_real angle_rad);
+
+/* Angle [rad] of the point (x, y), in [-pi, pi]; of the origin 0. Zeros have no sign here. NaN for what is not finite. */
+fs_real fs_atan2(fs_real y, fs_real x);
+
+/* Correctly rounded square root; the argument must not be negative. */
+static inline fs_real fs_sqrt(fs_real square)
+{
+#if defined(FS_DOUBLE)
+    return __builtin_sqrt(square);
+#elif defined(__GNUC__)
+    return __builtin_sqrtf(square);
+#else
+    return sqrtf(square);
+#endif
+}
+
+/* Neither infinite nor NaN. By comparison, because some processors take a NaN for an infinity. */
+static inline uint16_t fs_is_finite(fs_real value)
+{
+    return (value >= -FS_REAL_MAX && value <= FS_REAL_MAX) ? 1U : 0U;
+}
+
+static inline fs_real fs_abs(fs_real value)
+{
+    return value < FS_LIT(0.0) ? -value : value;
+}
+
+/* Python's max and min: the first argument unless the second is beyond it, also when one is NaN. */
+static inline fs_real fs_max(fs_real first, fs_real second)
+{
+    return second > first ? second : first;
+}
+
+static inline fs_real fs_min(fs_real first, fs_real second)
+{
+    return second < first ? second : first;
+}
+
+#endif

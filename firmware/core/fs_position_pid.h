@@ -1,0 +1,16 @@
+/* Position and altitude control, the outer loop: flightstack/control/position_pid.py. */
+#ifndef FS_POSITION_PID_H
+#define FS_POSITION_PID_H
+
+#include "fs_numbers.h"
+
+/*
+ * Write the attitude and the thrust that accelerate the vehicle along the setpoint, and advance the integrals.
+ *
+ * thrust_saturation: -1 the mixer made more, +1 less thrust than demanded in the last tick.
+ */
+void fs_position_pid_step(fs_position_memory *memory, const fs_vehicle_state *state,
+                          const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,
+                          fs_real thrust_saturation, fs_attitude_target *target);
+
+#endif
