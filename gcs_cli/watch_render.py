@@ -18,9 +18,8 @@ from gcs_cli.panels import (
     number,
     position_panel,
     rotors_panel,
-    timing_line,
-    timing_panel,
 )
+from gcs_cli.timing_panels import timing_line, timing_panel
 from gcs_cli.view_types import VehicleView
 
 _NARROW, _LOW = 72, 20
