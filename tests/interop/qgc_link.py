@@ -77,8 +77,8 @@ class Station:
         self.latest: dict[str, Any] = {}
         """The last message of each type: Vehicle/Vehicle.cc, _mavlinkMessageReceived, keeps what is in them."""
         self.texts: list[str] = []
-        self.mode_lists: set[int] = set()
-        """Sequence numbers of AVAILABLE_MODES_MONITOR that were seen."""
+        self.mode_lists: list[int] = []
+        """Sequence numbers of the AVAILABLE_MODES_MONITOR that came."""
         self._port = port
         self._codec = mavlink.MAVLink(None, *QGC)
         self._codec.robust_parsing = True
@@ -151,7 +151,7 @@ class Station:
         if kind == "STATUSTEXT":
             self.texts.append(message.text)
         elif kind == "AVAILABLE_MODES_MONITOR":
-            self.mode_lists.add(message.seq)
+            self.mode_lists.append(message.seq)
 
     # ------------------------------------------------------------------ what it knows of the vehicle
 

@@ -67,13 +67,14 @@ class PlanManager:
 
     # ------------------------------------------------------------------ writing
 
-    def write(self, items: Sequence[Item]) -> int:
+    def write(self, items: Sequence[Item], lost: Sequence[int] = ()) -> int:
         """Send a plan and return the result: _writeMissionItemsWorker, _handleMissionRequest, _handleMissionAck.
 
         MISSION_COUNT is repeated until the first item was asked for. From then on nothing is: an item that
-        is lost comes again only when the vehicle asks again.
+        is lost comes again only when the vehicle asks again. ``lost``: items that the link loses once.
         """
         self.items = list(items)
+        to_lose = set(lost)
         unsent = set(range(len(items)))
         retries = 0
         self._write_count()
@@ -96,6 +97,9 @@ class PlanManager:
             else:
                 assert message.seq < len(items), "item requested outside range"
                 unsent.discard(message.seq)
+                if message.seq in to_lose:
+                    to_lose.discard(message.seq)
+                    continue
                 self._station.send(self._message(message.seq, self.items[message.seq]))
 
     def _write_count(self) -> None:

@@ -71,15 +71,18 @@ class Ground:
             self.station.until(kind)
 
     def until_altitude(self, relative_m: float) -> None:
-        self.station.until("ALTITUDE", holds=lambda at: abs(at.altitude_relative - relative_m) < 0.3)
+        self.station.until(
+            "GLOBAL_POSITION_INT", holds=lambda at: abs(at.relative_alt * 1e-3 - relative_m) < 0.2
+        )
+        self.station.until("ALTITUDE")  # by which QGroundControl reckons, once a second
 
     def until_mode(self, custom_mode: int) -> None:
         self.station.until("HEARTBEAT", holds=lambda beat: beat.custom_mode == custom_mode)
 
     def until_disarmed(self) -> None:
         self.station.until("HEARTBEAT", holds=lambda beat: not self.station.armed)
-        self.station.until("EXTENDED_SYS_STATE", holds=lambda state: not self.station.flying)
-        self.station.until("ALTITUDE")
+        if self.station.flying:
+            self.station.until("EXTENDED_SYS_STATE", holds=lambda state: not self.station.flying)
 
 
 @pytest.fixture(scope="module", params=["udp", "tcp"])
@@ -93,6 +96,7 @@ def ground(request: pytest.FixtureRequest, station_vehicle: RealVehicle) -> Iter
 def test_guided_actions(ground: Ground) -> None:
     """Takeoff, change of altitude, heading and speed, goto, pause, return: one flight of its user."""
     fly, station = ground.fly, ground.station
+    station.until("ALTITUDE")
     begin_m, home = station.altitude_relative_m, station.coordinate  # home is where it arms
     north, east = (home[0] + NORTH_DEG, home[1]), (home[0], home[1] + EAST_DEG)
     assert fly.take_off(4.0) == ACCEPTED
@@ -111,7 +115,7 @@ def test_guided_actions(ground: Ground) -> None:
         place = station.until("GLOBAL_POSITION_INT")
         fastest_m_s = max(fastest_m_s, math.hypot(place.vx, place.vy) * 1e-2)
     assert fastest_m_s == pytest.approx(2.0, abs=0.3)
-    ground.until_altitude(begin_m + 6.0)
+    assert station.latest["GLOBAL_POSITION_INT"].relative_alt * 1e-3 == pytest.approx(begin_m + 6.0, abs=0.3)
     assert fly.go_to(*east) == ACCEPTED
     assert fly.pause() == ACCEPTED
     station.until("GLOBAL_POSITION_INT", holds=lambda at: math.hypot(at.vx, at.vy) < 10.0)
@@ -143,15 +147,6 @@ def test_disarming_in_the_air_is_refused_and_the_emergency_stop_is_not(ground: G
     station.until_text("Command refused: ")
     assert fly.emergency_stop() == ACCEPTED
     ground.until_disarmed()
-
-
-def test_a_mode_that_cannot_be_is_seen_in_the_heartbeat(ground: Ground) -> None:
-    """_setFlightModeAndValidate: three times 1.3 s without the mode mean that it failed."""
-    assert ground.mission.remove_all() == ACCEPTED
-    before = ground.station.custom_mode
-    assert not ground.fly.start_mission(), "there is no mission"
-    assert ground.station.custom_mode == before
-    assert any("mission" in text.lower() for text in ground.station.texts)
 
 
 def test_plans_go_up_and_come_back(ground: Ground) -> None:
@@ -188,6 +183,12 @@ def assert_same_fence(one: Fence, other: Fence) -> None:
         assert (circle.inclusion, circle.radius_m) == (drawn.inclusion, drawn.radius_m)
         assert circle.centre == pytest.approx(drawn.centre, abs=2e-7)
     assert one.return_point == pytest.approx(other.return_point, abs=2e-7)
+
+
+def test_items_lost_on_the_way_are_asked_for_again(ground: Ground) -> None:
+    """PlanManager.cc, _ackTimeout: by itself it sends no item but the first ever again, and gives up."""
+    assert ground.mission.write(without_home(PLAN), lost=(0, 2, len(PLAN) - 2)) == ACCEPTED
+    assert len(ground.mission.load()) == len(PLAN) - 1
 
 
 def test_a_plan_that_is_refused_leaves_the_one_before(ground: Ground) -> None:
