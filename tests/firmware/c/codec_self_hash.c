@@ -53,7 +53,7 @@ static void take(self_hash *s)
 static void round_of(self_hash *s)
 {
     uint32_t id = IDS[draw(s) % 15U];
-    uint16_t i, size, cut = draw(s), length;
+    uint16_t i, size, length, cut = draw(s), sequence = draw(s), system = draw(s), component = draw(s);
 
     for (i = 0U; i < FS_MAX_PAYLOAD; i++) {
         s->payload[i] = draw(s); /* with rubbish in the high bits */
@@ -62,7 +62,7 @@ static void round_of(self_hash *s)
     for (i = 0U; i < length; i++) {
         s->payload[i] = s->octets[i];
     }
-    size = fs_frame_encode(s->octets, id, draw(s), draw(s), draw(s), s->payload, length);
+    size = fs_frame_encode(s->octets, id, sequence, system, component, s->payload, length);
     for (i = 0U; i < size; i++) {
         fs_octet octet = s->octets[i];
 
