@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 .DEFAULT_GOAL := help
 
-.PHONY: help setup fly test check lint types imports generated generate bench clean
+.PHONY: help setup fly test check lint types imports generated generate bench fuzz clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
@@ -55,6 +55,10 @@ generate: $(READY) ## Regenerate files made from others
 
 bench: $(READY) ## Print speeds beside their floors
 	@$(BIN)/python -m benchmarks
+
+SECONDS ?= 60
+fuzz: $(READY) ## Coverage-guided fuzz of every link, SECONDS=60 each; needs atheris
+	@$(BIN)/python -m tests.fuzz.guided --seconds $(SECONDS)
 
 clean: ## Remove the environment and all that was made
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

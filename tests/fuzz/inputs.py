@@ -33,7 +33,16 @@ NAMES = (
     b"",
     b"\xff" * 16,
 )
-PATHS = (b"/", b"@PARAM/param.pck", b"@MAV_LOG", b"fs/log", b"../../x", b"general.json.xz", b"\xff\x00/")
+PATHS = (
+    b"/",
+    b"@PARAM/param.pck",
+    b"@MAV_LOG",
+    b"fs/log",
+    b"../../x",
+    b"general.json.xz",
+    b"\xff\x00/",
+    b"@MAV_LOG/02.ulg",
+)
 
 
 class Field(NamedTuple):

@@ -61,7 +61,7 @@ def test_nothing_raises_memory_stays_bounded_and_the_vehicle_still_answers(flyin
     throw(world, inputs, MESSAGES)
     assert len(inputs.drawn) == len(KINDS)
     hub = world.stack.ground
-    assert len(hub._peers) <= MAX_PEERS
+    assert sum(not peer.permanent for peer in hub._peers.values()) <= MAX_PEERS
     assert len(hub._to_forward) <= MAX_TO_FORWARD
     assert np.isfinite(world.simulator.frame.state).all()
     world.run(0.5)
