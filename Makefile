@@ -5,10 +5,10 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 .DEFAULT_GOAL := help
 
-.PHONY: help setup fly test check lint types imports generated generate bench fuzz clean
+.PHONY: help setup fly test check lint types imports generated generate bench fuzz fuzz-firmware clean
 
 help: ## Show the targets
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
 
 setup: $(READY) ## Make the virtual environment and compile the control loops
 
@@ -59,6 +59,9 @@ bench: $(READY) ## Print speeds beside their floors
 SECONDS ?= 60
 fuzz: $(READY) ## Coverage-guided fuzz of every link, SECONDS=60 each; needs atheris
 	@$(BIN)/python -m tests.fuzz.guided --seconds $(SECONDS)
+
+fuzz-firmware: $(READY) ## Coverage-guided fuzz of the firmware's parser and codec, SECONDS=60; needs clang
+	@$(BIN)/python -m tests.firmware.codec_fuzz $(SECONDS)
 
 clean: ## Remove the environment and all that was made
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
