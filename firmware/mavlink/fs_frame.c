@@ -4,9 +4,9 @@
 
 uint16_t fs_crc_add(uint16_t crc, fs_octet octet)
 {
-    uint16_t mixed = (uint16_t)((octet ^ crc) & 0xFFU);
+    uint16_t mixed = (uint16_t)(octet ^ crc);
 
-    /* bit by bit in closed form: faster than eight shifts, and no table that would need RAM on an AVR */
+    /* eight shifts in closed form, without a table that would need RAM on an AVR; high bits drop out here */
     mixed = (uint16_t)((mixed ^ (uint16_t)(mixed << 4)) & 0xFFU);
     return (uint16_t)((crc >> 8) ^ (uint16_t)(mixed << 8) ^ (uint16_t)(mixed << 3) ^ (mixed >> 4));
 }

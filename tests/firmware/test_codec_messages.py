@@ -253,6 +253,16 @@ def test_a_floats_bits_survive(codec: ctypes.CDLL, bits: int) -> None:
     assert struct.pack("<f", codec.fs_bits_float(bits)) == struct.pack("<I", bits)
 
 
+@pytest.mark.parametrize(
+    ("payload", "length"), [(b"\0\0\0", 1), (b"\1\0\0", 1), (b"\0\0\1", 3), (b"\0\2\0", 2)]
+)
+def test_trimming_looks_at_eight_bits_and_leaves_one_octet(
+    codec: ctypes.CDLL, payload: bytes, length: int
+) -> None:
+    poisoned = (ctypes.c_uint16 * 3)(*(octet | 0x7700 for octet in payload))
+    assert codec.fs_trimmed(poisoned, 3) == length == len(trimmed(payload))
+
+
 @pytest.mark.parametrize("text", ["", "FS_MASS", "ATT_REF_BW_LIMIT", "a text that is longer than its field"])
 def test_text_fills_its_field_and_comes_back(codec: ctypes.CDLL, text: str) -> None:
     field, out = (ctypes.c_uint16 * 17)(*([0xA5A5] * 17)), ctypes.create_string_buffer(b"x" * 17, 17)
