@@ -1,0 +1,161 @@
+"""A Cortex-M4F inside the process: unicorn executes an image, and every instruction is counted.
+
+Host memory is mapped into the emulated machine, so an exchange is one call: the mailbox
+(``firmware/ports/cortex_m4/fs_mailbox.h``) is filled, the target runs from ``fs_emulated_exchange`` to
+``fs_emulated_stop``, and the mailbox is read.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+from typing import ClassVar
+
+from unicorn import Uc, UcError, arm_const, unicorn_const
+from unicorn.unicorn_py3.unicorn import uclib
+
+from flightstack.firmware.elf import Elf, ElfError
+
+FLASH_AT, FLASH_SIZE = 0x0000_0000, 512 * 1024
+RAM_AT, RAM_SIZE = 0x2000_0000, 128 * 1024
+MAILBOX_AT, MAILBOX_SIZE = 0x4000_0000, 20 * 1024
+MAX_RECEIVED, MAX_SENT = 4096, 12288
+LONGEST_RUN = 100_000_000
+"""Instructions after which a run that does not end is stopped; a step takes some thousands."""
+MOST_RUNS = 1000
+"""Runs of one exchange: what is sent in more of them is more than any answer."""
+PAINT = 0xA5
+_THUMB = 1
+
+
+class EmulationError(RuntimeError):
+    """The emulated target cannot be loaded, faulted, or did not come back."""
+
+
+class Mailbox(ctypes.Structure):
+    """The fields of ``fs_mailbox``."""
+
+    _fields_: ClassVar = [
+        ("instructions", ctypes.c_uint32),
+        ("now_ms", ctypes.c_uint32),
+        ("received_length", ctypes.c_uint32),
+        ("sent_length", ctypes.c_uint32),
+        ("more", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32 * 3),
+        ("received", ctypes.c_ubyte * MAX_RECEIVED),
+        ("sent", ctypes.c_ubyte * MAX_SENT),
+    ]
+
+
+class _Counter(ctypes.Structure):
+    """The fields of ``fs_counter`` that come before its table of blocks."""
+
+    _fields_: ClassVar = [
+        ("clock", ctypes.c_void_p),
+        ("code", ctypes.c_void_p),
+        ("stop", ctypes.c_void_p),
+        ("code_size", ctypes.c_uint32),
+        ("uncounted", ctypes.c_uint32),
+        ("limit", ctypes.c_uint32),
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+class Emulator:
+    """One emulated processor with an image in its flash."""
+
+    def __init__(self, image: Path, counter: Path) -> None:
+        """Load ``image`` (ELF); ``counter`` is the library of ``emulator_counter.c``. Raise EmulationError."""
+        try:
+            elf = Elf(image.read_bytes())
+            self._start, self._stop = elf.symbols["fs_emulated_exchange"], elf.symbols["fs_emulated_stop"]
+            self._stack = range(elf.symbols["fs_stack_bottom"], elf.symbols["fs_stack_top"])
+            clock = elf.symbols["fs_port_clock"]
+        except (ElfError, OSError, KeyError) as error:
+            raise EmulationError(f"{image}: cannot be emulated: {error}") from error
+        self._flash = (ctypes.c_ubyte * FLASH_SIZE)()
+        self._ram = (ctypes.c_ubyte * RAM_SIZE)()
+        bottom, top = self._stack.start - RAM_AT, self._stack.stop - RAM_AT
+        self._ram[bottom:top] = [PAINT] * (top - bottom)
+        self._memory = (ctypes.c_ubyte * MAILBOX_SIZE)()
+        self.mailbox = Mailbox.from_buffer(self._memory)
+        self._received = memoryview(self._memory).cast("B")[Mailbox.received.offset :]
+        self._sent = memoryview(self._memory).cast("B")[Mailbox.sent.offset :]
+        for address, content in elf.segments:
+            if not address + len(content) <= FLASH_SIZE:
+                raise EmulationError(f"{image}: has content at {address:#x}, outside the flash")
+            self._flash[address : address + len(content)] = list(content)
+        self._engine = self._machine()
+        self._count(counter, clock & ~_THUMB)
+
+    def _machine(self) -> Uc:
+        engine = Uc(unicorn_const.UC_ARCH_ARM, unicorn_const.UC_MODE_THUMB | unicorn_const.UC_MODE_MCLASS)
+        engine.ctl_set_cpu_model(arm_const.UC_CPU_ARM_CORTEX_M4)
+        read_write = unicorn_const.UC_PROT_READ | unicorn_const.UC_PROT_WRITE
+        read_execute = unicorn_const.UC_PROT_READ | unicorn_const.UC_PROT_EXEC
+        for address, held, rights in (
+            (FLASH_AT, self._flash, read_execute),
+            (RAM_AT, self._ram, read_write),
+            (MAILBOX_AT, self._memory, read_write),
+        ):
+            engine.mem_map_ptr(address, len(held), rights, ctypes.addressof(held))
+        return engine
+
+    def _count(self, library: Path, clock: int) -> None:
+        """Let the compiled counter see every block: a callback into Python would cost more than the block."""
+        counting = ctypes.CDLL(str(library))
+        self._table = ctypes.create_string_buffer(counting.fs_counter_size())
+        self._counter = _Counter.from_buffer(self._table)
+        self._counter.clock = ctypes.addressof(self.mailbox)
+        self._counter.code = ctypes.addressof(self._flash)
+        self._counter.stop = ctypes.cast(uclib.uc_emu_stop, ctypes.c_void_p)
+        self._counter.code_size, self._counter.uncounted = FLASH_SIZE, clock
+        callback = ctypes.cast(counting.fs_counter_block, ctypes.c_void_p)
+        self._hook = ctypes.c_size_t()
+        everywhere = ctypes.c_uint64(1), ctypes.c_uint64(0)
+        status = uclib.uc_hook_add(
+            self._engine._uch,
+            ctypes.byref(self._hook),
+            unicorn_const.UC_HOOK_BLOCK,
+            callback,
+            ctypes.byref(self._counter),
+            *everywhere,
+        )
+        if status != unicorn_const.UC_ERR_OK:
+            raise EmulationError(f"unicorn does not call the counter: error {status}")
+
+    def exchange(self, data: bytes, now_ms: int) -> bytes:
+        """Let the target take ``data`` at time ``now_ms`` and return what it sends. Raise EmulationError."""
+        pieces = range(0, max(1, len(data)), MAX_RECEIVED)
+        answers = [self._run(data[at : at + MAX_RECEIVED], now_ms) for at in pieces]
+        while self.mailbox.more:
+            answers.append(self._run(b"", now_ms))
+            if len(answers) > len(pieces) + MOST_RUNS:
+                raise EmulationError("the emulated target sends without end")
+        return b"".join(answers)
+
+    def _run(self, data: bytes, now_ms: int) -> bytes:
+        mailbox = self.mailbox
+        self._received[: len(data)] = data
+        mailbox.received_length, mailbox.now_ms = len(data), now_ms & 0xFFFF_FFFF
+        self._counter.limit = (mailbox.instructions + LONGEST_RUN) & 0xFFFF_FFFF
+        self._engine.reg_write(arm_const.UC_ARM_REG_SP, self._stack.stop)
+        try:
+            self._engine.emu_start(self._start | _THUMB, self._stop & ~_THUMB)
+        except UcError as error:
+            place = self._engine.reg_read(arm_const.UC_ARM_REG_PC)
+            raise EmulationError(f"the emulated target stopped at {place:#010x}: {error}") from error
+        if self._engine.reg_read(arm_const.UC_ARM_REG_PC) != self._stop & ~_THUMB:
+            raise EmulationError(f"the emulated target did not come back within {LONGEST_RUN} instructions")
+        return bytes(self._sent[: min(mailbox.sent_length, MAX_SENT)])
+
+    def close(self) -> None:
+        """Take the counter out of the machine; it runs no more."""
+        self._engine.hook_del(self._hook.value)
+
+    @property
+    def stack_high_water(self) -> int:
+        """Octets of the stack that were ever used."""
+        bottom, top = self._stack.start - RAM_AT, self._stack.stop - RAM_AT
+        untouched = bytes(self._ram[bottom:top])
+        return top - bottom - (len(untouched) - len(untouched.lstrip(bytes([PAINT]))))
