@@ -14,7 +14,6 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from tests.firmware.codec_support import (
-    HARNESS,
     KINDS,
     LARGEST_FRAME,
     LARGEST_PAYLOAD,
@@ -23,6 +22,7 @@ from tests.firmware.codec_support import (
     SOURCES,
     WARNINGS,
     compile_c,
+    load,
     octets,
     parse,
     sealed,
@@ -45,14 +45,7 @@ WORDS = (0, 0x80000000, 0x7F800000, 0xFF800000, 0x7FC00000, 0x7F800001, 0xFFFFFF
 
 @pytest.fixture(scope="module")
 def codec(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    path = tmp_path_factory.mktemp("codec") / "codec.so"
-    sources = [*SOURCES, HARNESS / "codec_shim.c"]
-    library = ctypes.CDLL(str(compile_c(path, sources, "-shared", "-fPIC", "-O2", *WARNINGS)))
-    library.fs_bits_float.restype = ctypes.c_float
-    library.fs_bits_float.argtypes = [ctypes.c_uint32]
-    library.fs_float_bits.restype = ctypes.c_uint32
-    library.fs_float_bits.argtypes = [ctypes.c_float]
-    return library
+    return load(tmp_path_factory.mktemp("codec"))
 
 
 def generator() -> Any:

@@ -15,14 +15,11 @@ from flightstack.mavlink import frames as python_parser
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import FrameReader
 from tests.firmware.codec_support import (
-    HARNESS,
     KINDS,
-    SOURCES,
-    WARNINGS,
     Found,
     any_frame,
-    compile_c,
     damaged,
+    load,
     parse,
     sealed,
     stream,
@@ -36,9 +33,7 @@ QUIET = bytes(600)
 
 @pytest.fixture(scope="module")
 def codec(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    path = tmp_path_factory.mktemp("codec") / "codec.so"
-    sources = [*SOURCES, HARNESS / "codec_shim.c"]
-    return ctypes.CDLL(str(compile_c(path, sources, "-shared", "-fPIC", "-O2", *WARNINGS)))
+    return load(tmp_path_factory.mktemp("codec"))
 
 
 @pytest.fixture(scope="module", autouse=True)
