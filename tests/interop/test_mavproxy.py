@@ -153,7 +153,11 @@ def test_it_lists_files_and_logs_and_asks_for_home(proxy: MavProxy, witness: Wit
     proxy.tell("ftp list /", "D @MAV_LOG", "D @PARAM")
     proxy.tell("log list", "Log 0  numLogs")
     proxy.tell("gethome")
-    proxy.tell("status HOME_POSITION", "HOME_POSITION {latitude : 473977420, longitude : 85455940")
+    witness.mav.command_long_send(witness.system, 1, mavlink.MAV_CMD_GET_HOME_POSITION, 0, *[0.0] * 7)
+    home = witness.until("HOME_POSITION")  # where the last flight armed
+    proxy.tell(
+        "status HOME_POSITION", f"HOME_POSITION {{latitude : {home.latitude}, longitude : {home.longitude}"
+    )
 
 
 def test_it_had_nothing_to_complain_about(proxy: MavProxy) -> None:

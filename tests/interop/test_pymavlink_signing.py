@@ -39,6 +39,17 @@ def connect(vehicle: RealVehicle) -> Witness:
     return Witness(f"tcp:{HOST}:{vehicle.tcp_port}", 1 + vehicle.instance)
 
 
+def sign(script: Witness, key: bytes = KEY, **options: Any) -> None:
+    """Use a key from now on, and hear the vehicle's time first: the script before this one did, and was as far.
+
+    Timestamps are counted on in tens of microseconds, so a burst of the vehicle's takes them ahead of the clock,
+    and a new script that believes the clock alone would repeat what the old one, of the same ids, has used.
+    """
+    script.connection.setup_signing(key, **options)
+    good = script.mav.signing.goodsig_count
+    script.until("HEARTBEAT", lambda _: script.mav.signing.goodsig_count > good)
+
+
 def set_message(script: Witness, value: float) -> Any:
     name = NAME.encode()
     return mavlink.MAVLink_param_set_message(script.system, 1, name, value, mavlink.MAV_PARAM_TYPE_REAL32)
@@ -61,7 +72,7 @@ def test_what_is_signed_is_taken_and_what_is_not_is_refused(script: Witness) -> 
     script.mav.send(set_message(script, 6.0))
     script.connection.setup_signing(OTHER_KEY, allow_unsigned_callback=lambda *_: True)
     script.mav.send(set_message(script, 7.0))
-    script.connection.setup_signing(KEY)
+    sign(script)
     assert first_answer(script) == 2.5
     script.mav.send(set_message(script, 5.0))
     assert script.until("PARAM_VALUE").param_value == 5.0
@@ -71,7 +82,7 @@ def test_what_is_signed_is_taken_and_what_is_not_is_refused(script: Witness) -> 
 
 
 def test_what_was_heard_is_not_taken_again_on_any_link(script: Witness, signed_vehicle: RealVehicle) -> None:
-    script.connection.setup_signing(KEY)
+    sign(script)
     message = set_message(script, 5.0)
     script.mav.send(message)
     assert script.until("PARAM_VALUE").param_value == 5.0
@@ -81,7 +92,7 @@ def test_what_was_heard_is_not_taken_again_on_any_link(script: Witness, signed_v
     try:
         for witness in (script, other):
             witness.connection.write(message.get_msgbuf())
-        other.connection.setup_signing(KEY)
+        sign(other)
         assert first_answer(other) == 4.0
         assert first_answer(script) == 4.0
     finally:
@@ -89,7 +100,7 @@ def test_what_was_heard_is_not_taken_again_on_any_link(script: Witness, signed_v
 
 
 def test_the_key_is_changed_on_the_ground_only(script: Witness, signed_vehicle: RealVehicle) -> None:
-    script.connection.setup_signing(KEY, allow_unsigned_callback=lambda *_: True)
+    sign(script, allow_unsigned_callback=lambda *_: True)
     change = (script.system, 1, list(OTHER_KEY), script.mav.signing.timestamp)
     script.connection.arducopter_arm()
     script.connection.motors_armed_wait()

@@ -12,6 +12,9 @@ from pymavlink import mavutil
 
 from tests.support.process import BOUND_S
 
+MOST_UNWANTED = 20_000
+"""Messages of the wanted type that may come before the right one: minutes of the fastest stream."""
+
 
 class Witness:
     """A connection of pymavlink; ``url`` as ``mavutil.mavlink_connection`` takes it."""
@@ -37,12 +40,14 @@ class Witness:
     def until(self, kind: str | list[str], holds: Callable[[Any], object] = lambda message: True) -> Any:
         """Return the next message of a type (or of several) from the vehicle for which ``holds``."""
         seen = None
-        while True:
+        for _ in range(MOST_UNWANTED):
             message = self.connection.recv_match(type=kind, blocking=True, timeout=BOUND_S)
-            assert message is not None, f"no such {kind} came; the last was {seen}"
+            if message is None:
+                break
             if message.get_srcSystem() == self.system and holds(message):
                 return message
             seen = message
+        raise AssertionError(f"no such {kind} came; the last was {seen}")
 
     def until_modes(self, *custom_modes: int) -> None:
         """Wait until the heartbeats have shown these modes, in this order: each change sends one at once."""
