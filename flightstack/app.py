@@ -63,9 +63,7 @@ class App:
         simulator: TcpClient | None = None
         code = EXIT_LOST
         try:
-            simulator = connect(self._process, self._meanwhile)
-            simulator.send(self.stack.simulator.hello(self.stack.rates.interval_us))
-            wait_for_state(simulator, self.stack, self._process, self._meanwhile)
+            simulator = self._connect()
             self._fly(simulator)
         except Ended as ended:
             if str(ended):
@@ -77,11 +75,23 @@ class App:
             self._close(simulator, orderly=code == EXIT_OK)
         return code
 
-    def _fly(self, simulator: TcpClient) -> None:
-        """Run the loops until the process ends; a reboot begins anew."""
-        holds_time = self._process.wait_for_start
+    def _connect(self) -> TcpClient:
+        """Connect to the simulator; a reboot meanwhile begins anew."""
         while True:
             try:
+                return connect(self._process, self._meanwhile)
+            except RebootRequestedError:
+                self._reboot()
+
+    def _fly(self, simulator: TcpClient) -> None:
+        """Wait for the first state and run the loops until the process ends; a reboot begins anew."""
+        holds_time, waits = self._process.wait_for_start, True
+        simulator.send(self.stack.simulator.hello(self.stack.rates.interval_us))
+        while True:
+            try:
+                if waits:
+                    wait_for_state(simulator, self.stack, self._process, self._meanwhile)
+                waits = False
                 if holds_time:
                     self._hold_time(simulator)
                 holds_time = False
@@ -92,7 +102,7 @@ class App:
             except RebootRequestedError:
                 self._reboot()
                 if not holds_time:  # the last state was answered: the next one comes by itself
-                    wait_for_state(simulator, self.stack, self._process, self._meanwhile)
+                    waits = True
 
     def _reboot(self) -> None:
         old = self.stack

@@ -69,7 +69,7 @@ class MissionService:
         for event in self._server.events():
             if isinstance(event, MissionReplaced):
                 self._setters[event.mission_type](event.items)
-                autopilot.say(NOTICE, f"{_name(event.mission_type)} of {len(event.items)} items loaded")
+                autopilot.say(NOTICE, f"{_name(event.mission_type)} loaded, items: {len(event.items)}")
             elif isinstance(event, MissionCleared):
                 self._setters[event.mission_type](())
             elif isinstance(event, CurrentRequested):

@@ -41,3 +41,18 @@ def test_no_reboot_in_the_air(tmp_path: Path) -> None:
         refused = gcs("--connect", there.link, "reboot")
         assert refused.returncode == 1
         assert "armed" in refused.stderr or "in the air" in refused.stderr
+
+
+def test_a_reboot_while_no_simulator_is_there_is_a_reboot_too(tmp_path: Path) -> None:
+    with vehicle(tmp_path, "--log", "none", "--params", "none", with_simulator=False) as there:
+        for _ in range(2):
+            ended = gcs("--connect", there.link, "--timeout", 60, "reboot")
+            assert ended.returncode == 0, ended.stderr
+        assert (
+            gcs("--connect", there.link, "--timeout", 60, "param", "get", "MIS_TAKEOFF_ALT").returncode == 0
+        )
+        there.stack.terminate()
+        _, errors = there.stack.communicate(timeout=60)
+        assert there.stack.returncode == 0
+        assert errors.count("flightstack: rebooted") == 2
+        assert "Traceback" not in errors

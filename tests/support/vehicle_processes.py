@@ -20,7 +20,7 @@ class VehicleProcesses:
     """Where the vehicle is."""
 
     instance: int
-    simulator: subprocess.Popen[str]
+    simulator: subprocess.Popen[str] | None
     stack: subprocess.Popen[str]
     folder: Path
 
@@ -31,7 +31,9 @@ class VehicleProcesses:
 
 
 @contextlib.contextmanager
-def vehicle(folder: Path, *arguments: object, speed: object = 10) -> Iterator[VehicleProcesses]:
+def vehicle(
+    folder: Path, *arguments: object, speed: object = 10, with_simulator: bool = True
+) -> Iterator[VehicleProcesses]:
     """Run both; ``arguments`` go to the flight stack. Both are ended, whatever happens."""
     instance = free_instance()
     with contextlib.ExitStack() as ends:
@@ -44,7 +46,7 @@ def vehicle(folder: Path, *arguments: object, speed: object = 10) -> Iterator[Ve
             ends.callback(process.kill)
             return process
 
-        simulator = run("sim_bridge", "--speed", speed)
+        simulator = run("sim_bridge", "--speed", speed) if with_simulator else None
         options = ("--gcs-port", 14550 + 200 + instance, *arguments)
         stack = run("flightstack", *options)
         assert stack.stdout is not None
