@@ -23,7 +23,7 @@ from tests.firmware.codec_support import (
 SHIM, DRIVER = HARNESS / "codec_shim.c", HARNESS / "codec_driver.c"
 UNDEFINED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g"]
 SAME_EVERYWHERE = "74899574"
-"""What codec_self_hash prints: on a host of 64 bits with gcc and clang, on an AVR with its int of 16."""
+"""What codec_self_hash prints: on a host of 64 bits with gcc and clang, on a Cortex-M4, on an AVR with its int of 16."""
 
 
 @pytest.mark.parametrize("name", ["gcc", "clang"])
@@ -94,6 +94,26 @@ def test_an_avr_agrees_where_an_int_has_16_bits(tmp_path: Path) -> None:
     command = ["simavr", "-m", "atmega1284p", "-f", "16000000", str(program)]
     done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)
     assert SAME_EVERYWHERE in done.stdout + done.stderr
+
+
+def test_a_cortex_m4_agrees(tmp_path: Path) -> None:
+    """The same in QEMU. The compiler must not make calls of loops: there is no C library to call."""
+    cpu = ["-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"]
+    bare = [
+        "-std=gnu99",
+        "-nostdlib",
+        "-fno-tree-loop-distribute-patterns",
+        f"-T{HARNESS / 'codec_cortex_m4.ld'}",
+    ]
+    arm = [*compiler("arm-none-eabi-gcc"), *cpu]
+    if not shutil.which("qemu-system-arm"):
+        pytest.skip("no qemu-system-arm on this machine")
+    program = compile_c(tmp_path / "hash.elf", self_hash_sources(), "-O2", *bare, cc=arm)
+    machine = ["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "none"]
+    semihosting = ["-semihosting-config", "enable=on,target=native", "-kernel", str(program)]
+    command = ["qemu-system-arm", *machine, *semihosting]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, timeout=120)
+    assert (done.stdout + done.stderr).strip() == SAME_EVERYWHERE
 
 
 def self_hash_sources() -> list[Path]:
