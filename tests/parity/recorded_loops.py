@@ -1,0 +1,101 @@
+"""Fly a mission in one process and keep what went into the loops, and what Python's made of it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flightstack.contract import FloatArray, LoopRow
+from flightstack.control.controller_loading import load_controller
+from flightstack.control.loops import PythonLoops
+from flightstack.firmware.numbers import target_numbers
+from flightstack.params.gains_file import open_gains
+from tests.support.world import World
+
+OUTER_DUE, SET_TARGET, RESET = 1, 2, 4
+
+
+class Recording(NamedTuple):
+    """The inputs of each tick in the form of the core in C, and the outputs as its driver writes them."""
+
+    numbers: dict[str, float]
+    states: np.ndarray
+    setpoints: np.ndarray
+    targets: np.ndarray
+    flags: np.ndarray
+    outputs: np.ndarray
+    """Attitude target, reference, wrench, wrench achieved, rotor command; shape (ticks, 31)."""
+    status: np.ndarray
+
+
+class RecordingLoops:
+    """Loops that note each call before they pass it on."""
+
+    def __init__(self, loops: PythonLoops) -> None:
+        self.loops = loops
+        self.rows: list[tuple[np.ndarray, ...]] = []
+        self.flags: list[int] = []
+        self._pending, self._target = 0, np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+        self._reset_at: np.ndarray | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.loops, name)
+
+    def reset(self, state: FloatArray) -> None:
+        self._pending, self._reset_at = RESET, state.copy()
+        self.loops.reset(state)
+
+    def set_attitude_target(self, target: FloatArray) -> None:
+        self._pending |= SET_TARGET
+        self._target = target.copy()
+        self.loops.set_attitude_target(target)
+
+    def step(
+        self,
+        state: FloatArray,
+        setpoint: FloatArray,
+        rotor_speed: FloatArray,
+        outer_due: bool,
+        row: FloatArray,
+    ) -> None:
+        if self._pending & RESET:
+            assert self._reset_at is not None
+            assert np.array_equal(self._reset_at, state)  # C resets at the state of the step
+        self.loops.step(state, setpoint, rotor_speed, outer_due, row)
+        output = np.concatenate([self.loops.attitude_target, row[13 : LoopRow.ROTOR_SPEED.start]])
+        self.rows.append(
+            (state.copy(), setpoint.copy(), self._target, output, row[LoopRow.STATUS : LoopRow.SIZE].copy())
+        )
+        self.flags.append(self._pending | (OUTER_DUE if outer_due else 0))
+        self._pending = 0
+
+    def recording(self, numbers: dict[str, float]) -> Recording:
+        """Return all that was noted."""
+        states, setpoints, targets, outputs, status = (
+            np.array(column) for column in zip(*self.rows, strict=True)
+        )
+        flags = np.array(self.flags, np.uint16)
+        return Recording(numbers, states, setpoints, targets, flags, outputs, status[:, 0].astype(int))
+
+
+def record(plan: str, **config: Any) -> Recording:
+    """Fly a plan of ``missions/`` to its end with Python's loops."""
+    world = World(**config)
+    stack = world.stack
+    loops = stack.autopilot._backend
+    assert isinstance(loops, PythonLoops)
+    recorder = RecordingLoops(loops)
+    stack.autopilot._backend = recorder
+    world.upload(plan)
+    world.start_mission()
+    world.until_disarmed()
+    numbers = target_numbers(
+        stack.vehicle,
+        load_controller(world.config.controller),
+        open_gains(world.config.gains),
+        np.radians(world.config.behaviour.max_tilt_deg),
+        stack.rates.inner_hz,
+        stack.rates.divisor,
+    )
+    return recorder.recording(numbers)

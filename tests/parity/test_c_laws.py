@@ -1,0 +1,305 @@
+"""Each law of the core in C against Python's, on a million random inputs.
+
+With double the order of operations is Python's, so that the laws that only add, multiply, divide and take roots give
+the same bits, and those with sine and arc tangent differ by these alone. With float the difference is counted in units
+of the last place of the largest value that the quantity has among the samples (its full scale, as of an instrument);
+the same inputs go to both, because all of them fit in float32. The number measured stands beside each bound.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from flightstack.control.mixer import mixer_for
+from flightstack.params.vehicle import Vehicle, load_vehicle
+from tests.firmware import core_reference as python
+from tests.firmware.core_samples import Samples
+from tests.firmware.core_support import Core, ulps
+from tests.support.rotor_sets import multirotor, ring
+
+COUNT = 1_000_000
+DT_S = (0.0005, 0.02)
+
+
+@functools.cache
+def core(real: str) -> Core:
+    return Core(real)
+
+
+class Compared(NamedTuple):
+    """A quantity from both sides, shape (samples, width)."""
+
+    c: np.ndarray
+    python: np.ndarray
+
+    def relative(self) -> float:
+        """Largest difference by the length of the sample's vector, or a millionth of full scale if that is more."""
+        length = np.linalg.norm(self.python, axis=1)
+        return float((self._distance() / np.maximum(length, 1e-6 * length.max())).max())
+
+    def full_scale_ulps(self) -> np.ndarray:
+        """Difference of each sample in float32's ulps of the largest value."""
+        return ulps(self._distance(), np.abs(self.python).max(), np.dtype(np.float32))
+
+    def _distance(self) -> np.ndarray:
+        return np.linalg.norm(self.c - self.python, axis=1)
+
+
+# ------------------------------------------------------------------ position
+
+
+def position(real: str) -> dict[str, Compared]:
+    s = Samples(COUNT, 1)
+    attitude = s.attitudes()
+    states = np.hstack([s.normal(3, 20.0), s.normal(3, 5.0), attitude, s.normal(3, 1.0)])
+    setpoints = np.hstack(
+        [s.narrow(states[:, :3] + s.normal(3, 0.5)), s.normal(3, 3.0), s.normal(3, 1.0), s.normal(2, 2.0)]
+    )
+    gain, integral = (0.0, 15.0), (0.0, 5.0)
+    params = s.uniform(
+        *(gain, integral, gain, gain, integral, gain, (0.3, 3.0), (9.7, 9.9)),
+        *((0.2, 2.0), (10.0, 60.0), (0.1, 1.2), (0.0, 5.0)),
+    )
+    memory, dt_s, saturation = s.normal(3, 1.0), s.uniform(DT_S), s.choice(1, [-1.0, 0.0, 1.0])
+    c = core(real)
+    c_memory, c_target = c.array(memory), np.zeros((COUNT, 5), c.dtype)
+    c.call(
+        "drive_position", COUNT, c_memory, c.array(states), c.array(setpoints), c.array(params), c.array(dt_s),
+        c.array(saturation), c_target,
+    )  # fmt: skip
+    py_memory, py_target = memory.copy(), np.zeros((COUNT, 5))
+    python.position(py_memory, states, setpoints, params, dt_s, saturation, py_target)
+    c_target, c_memory = c_target.astype(np.float64), c_memory.astype(np.float64)
+    return {
+        "attitude": Compared(c_target[:, :4], py_target[:, :4]),
+        "thrust": Compared(c_target[:, 4:], py_target[:, 4:]),
+        "integral": Compared(c_memory, py_memory),
+    }
+
+
+def test_position_loop_in_double_is_pythons_to_1e_12() -> None:
+    for name, compared in position("double").items():
+        assert compared.relative() < 1e-12, name  # measured 5e-16; thrust and integrals have Python's bits
+
+
+def test_position_loop_in_float_is_near() -> None:
+    made = position("float")
+    assert made["attitude"].full_scale_ulps().max() < 16  # measured 8.4
+    assert made["thrust"].full_scale_ulps().max() < 20  # measured 9.9
+    # an integral goes on or rests; where that hangs by a rounding the two may decide otherwise
+    integral = made["integral"].full_scale_ulps()
+    assert np.count_nonzero(integral > 2) < 10  # measured 0.6, and none decided otherwise
+
+
+# ------------------------------------------------------------------ attitude reference
+
+
+def reference(real: str) -> dict[str, Compared]:
+    s = Samples(COUNT, 2)
+    attitude = s.attitudes()
+    start = s.near(attitude, 0.1)
+    end = s.near(start, 0.05)
+    memory = np.hstack([s.near(start, 0.05), s.normal(3, 2.0)])
+    params = s.uniform((0.0, 120.0), (0.5, 1.5), (1.0, 10.0), (20.0, 300.0))
+    params[s.random.random(COUNT) < 0.05, 0] = 0.0  # no filter
+    fraction, dt_s = s.uniform((0.0, 1.2)), s.uniform(DT_S)
+    c = core(real)
+    c_memory, c_reference, c_error = (
+        c.array(memory),
+        np.zeros((COUNT, 10), c.dtype),
+        np.zeros((COUNT, 3), c.dtype),
+    )
+    c.call(
+        "drive_reference", COUNT, c_memory, c.array(start), c.array(end), c.array(fraction), c.array(params),
+        c.array(dt_s), c.array(attitude), c_reference, c_error,
+    )  # fmt: skip
+    py_memory, py_reference, py_error = memory.copy(), np.zeros((COUNT, 10)), np.zeros((COUNT, 3))
+    python.reference(py_memory, start, end, fraction, params, dt_s, attitude, py_reference, py_error)
+    c_reference, c_memory = c_reference.astype(np.float64), c_memory.astype(np.float64)
+    return {
+        "attitude": Compared(c_reference[:, :4], py_reference[:, :4]),
+        "rates": Compared(c_reference[:, 4:7], py_reference[:, 4:7]),
+        "acceleration": Compared(c_reference[:, 7:], py_reference[:, 7:]),
+        "kept attitude": Compared(c_memory[:, :4], py_memory[:, :4]),
+        "kept rates": Compared(c_memory[:, 4:], py_memory[:, 4:]),
+        "error": Compared(c_error.astype(np.float64), py_error),
+    }
+
+
+REFERENCE_FLOAT_ULPS = {
+    "attitude": 10,  # measured 4.6
+    "rates": 64,  # 32.5: the stiffest filter multiplies the error by 14400 before it is limited
+    "acceleration": 6,  # 2.3
+    "kept attitude": 10,
+    "kept rates": 64,
+    "error": 10,  # 4.6
+}
+
+
+def test_attitude_reference_in_double_is_pythons_to_1e_12() -> None:
+    for name, compared in reference("double").items():
+        assert compared.relative() < 1e-12, name  # measured 3e-14
+
+
+def test_attitude_reference_in_float_is_near() -> None:
+    for name, compared in reference("float").items():
+        assert compared.full_scale_ulps().max() < REFERENCE_FLOAT_ULPS[name], name
+
+
+# ------------------------------------------------------------------ attitude laws
+
+
+def attitude_inputs(s: Samples) -> np.ndarray:
+    """Rows of ``AttitudeInputs``, shape (n, 24)."""
+    attitude = s.attitudes()
+    return np.hstack(
+        [
+            *(attitude, s.normal(3, 2.0), s.near(attitude, 0.1), s.normal(3, 2.0), s.normal(3, 30.0)),
+            *(s.normal(3, 0.1), s.normal(1, 50.0)[:, None], s.choice(3, [-1.0, 0.0, 1.0])),
+        ]
+    )
+
+
+INERTIAS = ((1e-3, 0.1), (1e-3, 0.1), (1e-3, 0.1))
+
+
+def pid(real: str) -> dict[str, Compared]:
+    s = Samples(COUNT, 3)
+    inputs, memory, dt_s = attitude_inputs(s), s.normal(3, 0.2), s.uniform(DT_S)
+    params = s.uniform(
+        *[(0.0, 400.0)] * 3, *[(0.0, 300.0)] * 3, *[(0.0, 40.0)] * 3, *[(0.0, 1.0)] * 2, *INERTIAS
+    )
+    c = core(real)
+    c_memory, c_torque = c.array(memory), np.zeros((COUNT, 3), c.dtype)
+    c.call("drive_pid", COUNT, c_memory, c.array(inputs), c.array(params), c.array(dt_s), c_torque)
+    py_memory, py_torque = memory.copy(), np.zeros((COUNT, 3))
+    python.pid(py_memory, inputs, params, dt_s, py_torque)
+    return {
+        "torque": Compared(c_torque.astype(np.float64), py_torque),
+        "integral": Compared(c_memory.astype(np.float64), py_memory),
+    }
+
+
+def backstepping(real: str) -> dict[str, Compared]:
+    s = Samples(COUNT, 4)
+    inputs = attitude_inputs(s)
+    params = s.uniform(*[(0.0, 40.0)] * 6, *[(0.0, 1.0)] * 2, *INERTIAS, (0.0, 1e-4))
+    c = core(real)
+    c_torque, py_torque = np.zeros((COUNT, 3), c.dtype), np.zeros((COUNT, 3))
+    c.call("drive_backstepping", COUNT, c.array(inputs), c.array(params), c_torque)
+    python.backstepping(inputs, params, py_torque)
+    return {"torque": Compared(c_torque.astype(np.float64), py_torque)}
+
+
+@pytest.mark.parametrize("law", [pid, backstepping])
+def test_attitude_laws_in_double_have_pythons_bits(law) -> None:  # type: ignore[no-untyped-def]
+    for name, compared in law("double").items():
+        assert np.array_equal(compared.c, compared.python), name
+
+
+@pytest.mark.parametrize("law", [pid, backstepping])
+def test_attitude_laws_in_float_are_near(law) -> None:  # type: ignore[no-untyped-def]
+    for name, compared in law("float").items():
+        assert compared.full_scale_ulps().max() < 4, name  # measured 1.3
+
+
+# ------------------------------------------------------------------ mixer
+
+
+def askew() -> Vehicle:
+    """Return six rotors at uneven places: allocations of many sizes."""
+    places = [(0.3, 0.02), (0.14, 0.24), (-0.1, 0.27), (-0.29, -0.01), (-0.13, -0.22), (0.16, -0.26)]
+    return multirotor(places, [1, -1, 1, -1, 1, -1])
+
+
+VEHICLES = {
+    "plus": lambda: load_vehicle("paper_quad"),
+    "cross": lambda: load_vehicle("x_quad"),
+    "ideal": lambda: load_vehicle("x_quad").with_ideal_rotors(),
+    "askew": askew,
+    "octo": lambda: ring(8, first_deg=22.5),
+}
+
+
+MIXER_FLOAT_ULPS = {"squares": 16, "thrust": 6, "torque": 8, "relative speed": 32}
+"""Measured, the largest of all vehicles: 9.1, 2.9, 4.6 and 15.7."""
+
+
+class Mixed(NamedTuple):
+    """What both sides made of the same wrenches."""
+
+    quantities: dict[str, Compared]
+    saturation: np.ndarray
+    python_saturation: np.ndarray
+    wrenches: np.ndarray
+    beyond: np.ndarray
+    """Speeds that C wrote beyond the vehicle's rotors."""
+
+
+def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
+    vehicle = VEHICLES[name]()
+    s = Samples(count, 5)
+    weight, n = vehicle.weight_n, len(vehicle.rotors)
+    # from easy to far beyond what the rotors can do
+    wrenches = np.hstack(
+        [
+            s.normal(1, weight)[:, None] + weight,
+            s.normal(2, 0.2 * weight),
+            s.normal(1, 0.02 * weight)[:, None],
+        ]
+    )
+    wrenches = s.narrow(wrenches)
+    rotors = mixer_for(
+        vehicle
+    )  # not narrowed: with float the rounding of these numbers is part of the difference
+    c = core(real)
+    flat = np.zeros(8 * 4 + 4 * 8 + 3 * 8, c.dtype)
+    flat[: 4 * n] = rotors.allocation.ravel()
+    for axis in range(4):
+        flat[32 + 8 * axis : 32 + 8 * axis + n] = rotors.effectiveness[axis]
+    for place, values in enumerate((rotors.low, rotors.high, rotors.spin)):
+        flat[64 + 8 * place : 64 + 8 * place + n] = values
+    speeds, achieved = np.full((count, 8), np.nan, c.dtype), np.zeros((count, 4), c.dtype)
+    saturation, relative = np.zeros((count, 4), c.dtype), np.zeros(count, c.dtype)
+    c.call("drive_mixer", count, c.array(wrenches), flat, n, speeds, achieved, saturation, relative)
+    py_speeds, py_achieved, py_relative = np.zeros((count, n)), np.zeros((count, 4)), np.zeros(count)
+    python.mixer(wrenches, *rotors, py_speeds, py_achieved, py_relative)
+    lag = wrenches - py_achieved
+    quantities = {
+        "speeds": Compared(speeds[:, :n].astype(np.float64), py_speeds),
+        "squares": Compared(speeds[:, :n].astype(np.float64) ** 2, py_speeds**2),
+        "thrust": Compared(achieved[:, :1].astype(np.float64), py_achieved[:, :1]),
+        "torque": Compared(achieved[:, 1:].astype(np.float64), py_achieved[:, 1:]),
+        "relative speed": Compared(relative[:, None].astype(np.float64), py_relative[:, None]),
+    }
+    return Mixed(quantities, saturation, np.sign(lag) * (np.abs(lag) > 1e-9), wrenches, speeds[:, n:])
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_mixer_in_double_has_pythons_bits(name: str) -> None:
+    made = mixed("double", name)
+    for quantity, compared in made.quantities.items():
+        assert np.array_equal(compared.c, compared.python), quantity
+    assert np.array_equal(made.saturation, made.python_saturation)
+    assert not made.beyond.any()
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_mixer_in_float_is_near_and_takes_no_rounding_for_a_limit(name: str) -> None:
+    made = mixed("float", name)
+    for quantity, compared in made.quantities.items():
+        if quantity != "speeds":  # a root of nearly nothing has no digits; its square tells
+            assert compared.full_scale_ulps().max() < MIXER_FLOAT_ULPS[quantity], quantity
+    c, expected = made.saturation, made.python_saturation
+    assert not np.any((c != 0.0) & (c != expected))
+    assert np.count_nonzero(c != expected) < 10  # a limit by less than the rounding: 1 found at most
+
+
+def test_the_mixers_samples_reach_every_limit_both_ways() -> None:
+    for axis in range(4):
+        assert np.isin([-1.0, 1.0], mixed("double", "cross").saturation[:, axis]).all(), axis
+    assert (mixed("double", "ideal").quantities["speeds"].python < 0.0).any()
