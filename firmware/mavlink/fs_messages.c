@@ -160,7 +160,7 @@ void fs_param_value_decode(const fs_octet *payload, uint16_t length, fs_param_va
     m->param_type = fs_get_octet(payload, length, 24U);
 }
 
-uint16_t fs_param_set_encode(const fs_param_set *m, fs_octet *payload)
+uint16_t fs_param_set_message_encode(const fs_param_set_message *m, fs_octet *payload)
 {
     fs_put_float(&payload[0], m->param_value);
     fs_put_octet(&payload[4], m->target_system);
@@ -170,7 +170,7 @@ uint16_t fs_param_set_encode(const fs_param_set *m, fs_octet *payload)
     return fs_trimmed(payload, FS_PARAM_SET_LENGTH);
 }
 
-void fs_param_set_decode(const fs_octet *payload, uint16_t length, fs_param_set *m)
+void fs_param_set_message_decode(const fs_octet *payload, uint16_t length, fs_param_set_message *m)
 {
     m->param_value = fs_get_float(payload, length, 0U);
     m->target_system = fs_get_octet(payload, length, 4U);

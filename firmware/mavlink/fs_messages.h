@@ -92,9 +92,9 @@ typedef struct {
     fs_octet param_id[16];
     float param_value;
     fs_octet param_type;
-} fs_param_set;
-uint16_t fs_param_set_encode(const fs_param_set *m, fs_octet *payload);
-void fs_param_set_decode(const fs_octet *payload, uint16_t length, fs_param_set *m);
+} fs_param_set_message;
+uint16_t fs_param_set_message_encode(const fs_param_set_message *m, fs_octet *payload);
+void fs_param_set_message_decode(const fs_octet *payload, uint16_t length, fs_param_set_message *m);
 
 /* PARAM_ERROR */
 #define FS_PARAM_ERROR_ID 345U

@@ -48,6 +48,9 @@ MESSAGES = (
 )
 """What a target speaks. The parser passes over every other message."""
 
+TAKEN = {"PARAM_SET": "fs_param_set_message"}
+"""Structures whose name would be one of the core's functions: fs_param_set."""
+
 WHOLE_ENUMS = (
     "MAV_STATE",
     "MAV_RESULT",
@@ -145,7 +148,12 @@ def constants_source() -> str:
 
 def struct_name(message: Any) -> str:
     """Return the name of a message's structure: FS_PIL_STEP and PING become fs_pil_step and fs_ping."""
-    return f"fs_{message.name.lower().removeprefix('fs_')}"
+    return TAKEN.get(message.name, f"fs_{message.name.lower().removeprefix('fs_')}")
+
+
+def constant_name(message: Any) -> str:
+    """Return how the names of a message's constants begin: FS_PIL_STEP and FS_PING."""
+    return f"FS_{message.name.removeprefix('FS_')}"
 
 
 def kind_of(field: Any) -> Kind:
@@ -158,7 +166,7 @@ def kind_of(field: Any) -> Kind:
 
 def struct_source(message: Any) -> str:
     """Return a message's constants, structure and prototypes; fields in the order of the XML."""
-    name, big = struct_name(message), struct_name(message).upper()
+    name, big = struct_name(message), constant_name(message)
     lines = [f"/* {message.name} */", constant(f"{big[3:]}_ID", message.id)]
     lines += [constant(f"{big[3:]}_LENGTH", message.wire_length), "typedef struct {"]
     for field in message.fields:
@@ -202,7 +210,7 @@ def codec_source(message: Any) -> str:
             encode_head(name),
             "{",
             *(put_line(field) for field in message.ordered_fields),
-            f"    return fs_trimmed(payload, {name.upper()}_LENGTH);",
+            f"    return fs_trimmed(payload, {constant_name(message)}_LENGTH);",
             "}",
             "",
             decode_head(name),
@@ -217,7 +225,7 @@ def extra_source() -> str:
     """Return the function that tells what a frame's checksum and length have to be."""
     cases = []
     for message in messages():
-        big = struct_name(message).upper()
+        big = constant_name(message)
         cases += [f"    case {big}_ID:", f"        kind->length = {big}_LENGTH;"]
         cases += [f"        kind->crc_extra = {message.crc_extra}U;", "        break;"]
     return "\n".join(

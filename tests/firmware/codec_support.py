@@ -80,12 +80,17 @@ def compile_c(output: Path, sources: list[Path], *flags: str, cc: list[str] | No
     return output
 
 
+def c_name(name: str) -> str:
+    """Return the name of a message's structure in C."""
+    return "fs_" + {"PARAM_SET": "param_set_message"}.get(name, name.lower().removeprefix("fs_"))
+
+
 def load(folder: Path) -> ctypes.CDLL:
     """Build the codec and the shim as a library, and tell ctypes what its functions return."""
     sources = [*SOURCES, HARNESS / "codec_shim.c"]
     path = compile_c(folder / "codec.so", sources, "-shared", "-fPIC", "-O2", *WARNINGS)
     library = ctypes.CDLL(str(path))
-    encoders = [f"fs_{name.lower().removeprefix('fs_')}_encode" for name in NAMES]
+    encoders = [f"{c_name(name)}_encode" for name in NAMES]
     for name in ("fs_message_kind_of", "fs_frame_encode", "fs_trimmed", "codec_recode", *encoders):
         getattr(library, name).restype = ctypes.c_uint16  # above, the register holds rubbish
     library.fs_bits_float.restype, library.fs_bits_float.argtypes = ctypes.c_float, [ctypes.c_uint32]

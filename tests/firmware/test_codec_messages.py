@@ -21,6 +21,7 @@ from tests.firmware.codec_support import (
     ROOT,
     SOURCES,
     WARNINGS,
+    c_name,
     compile_c,
     load,
     octets,
@@ -106,10 +107,6 @@ def structure(kind: Any, payload: bytes, rubbish: int = 0) -> ctypes.Structure:
     return made
 
 
-def c_name(kind: Any) -> str:
-    return "fs_" + kind.msgname.lower().removeprefix("fs_")
-
-
 def payloads(kind: Any, count: int) -> list[bytes]:
     """Return payloads of extreme and of random bits."""
     rng, size = random.Random(kind.id), kind.unpacker.size
@@ -139,7 +136,7 @@ def test_decoded_values_are_those_on_the_wire(codec: ctypes.CDLL, message_id: in
     """For any bits, at any length that arrives, whatever the high bits of the octets hold."""
     kind = KINDS[message_id]
     rng = random.Random(1)
-    decode = getattr(codec, f"{c_name(kind)}_decode")
+    decode = getattr(codec, f"{c_name(kind.msgname)}_decode")
     for payload in payloads(kind, 60):
         short = payload[: rng.choice([len(payload), len(trimmed(payload)), rng.randrange(len(payload) + 1)])]
         poisoned = (ctypes.c_uint16 * LARGEST_PAYLOAD)(*(octet | rng.randrange(256) << 8 for octet in short))
@@ -159,7 +156,7 @@ def test_encoded_octets_are_the_values_bits_without_zeros_at_the_end(
     codec: ctypes.CDLL, message_id: int
 ) -> None:
     kind = KINDS[message_id]
-    encode = getattr(codec, f"{c_name(kind)}_encode")
+    encode = getattr(codec, f"{c_name(kind.msgname)}_encode")
     for payload in payloads(kind, 60):
         out = (ctypes.c_uint16 * LARGEST_PAYLOAD)(*([0xA5A5] * LARGEST_PAYLOAD))
         length = encode(ctypes.byref(structure(kind, payload, rubbish=0xC300)), out)
@@ -181,7 +178,9 @@ def test_frames_are_pymavlinks(codec: ctypes.CDLL, message_id: int) -> None:
         expected = bytes(kind(*(values[name] for name in kind.fieldnames)).pack(sender))
 
         content, out = (ctypes.c_uint16 * LARGEST_PAYLOAD)(), (ctypes.c_uint16 * LARGEST_FRAME)()
-        length = getattr(codec, f"{c_name(kind)}_encode")(ctypes.byref(structure(kind, payload)), content)
+        length = getattr(codec, f"{c_name(kind.msgname)}_encode")(
+            ctypes.byref(structure(kind, payload)), content
+        )
         poisoned = (ctypes.c_uint16 * LARGEST_PAYLOAD)(*(octet | 0x9600 for octet in content))
         id_c = ctypes.c_uint32(kind.id)
         size = codec.fs_frame_encode(

@@ -15,7 +15,7 @@ uint16_t codec_recode(uint32_t id, const fs_octet *payload, uint16_t length, fs_
         RECODE(PARAM_REQUEST_READ, param_request_read)
         RECODE(PARAM_REQUEST_LIST, param_request_list)
         RECODE(PARAM_VALUE, param_value)
-        RECODE(PARAM_SET, param_set)
+        RECODE(PARAM_SET, param_set_message)
         RECODE(PARAM_ERROR, param_error)
         RECODE(COMMAND_LONG, command_long)
         RECODE(COMMAND_ACK, command_ack)
