@@ -23,7 +23,7 @@ from tests.firmware.codec_support import (
 SHIM, DRIVER = HARNESS / "codec_shim.c", HARNESS / "codec_driver.c"
 UNDEFINED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g"]
 SAME_EVERYWHERE = "74899574"
-"""What codec_self_hash prints: on a host of 64 bits with gcc and clang, on a Cortex-M4, on an AVR with its int of 16."""
+"""What codec_self_hash prints: on a host with gcc and clang, on a Cortex-M4, on an AVR, whose int has 16 bits."""
 
 
 @pytest.mark.parametrize("name", ["gcc", "clang"])
