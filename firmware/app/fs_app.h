@@ -1,0 +1,109 @@
+/*
+ * What a target does: it runs the loops step by step for a host, and lets ground stations read and set its parameters.
+ *
+ * The application has neither interrupts nor hardware. A port gives it octets and the time, and takes octets from it, all
+ * from one main loop:
+ *
+ *     for (;;) {
+ *         while (octets have come)  { fs_app_receive(&app, octet); }
+ *         fs_app_poll(&app, now_ms);
+ *         count = fs_app_transmit(&app, octets, room);  ...send them
+ *     }
+ *
+ * A step is computed inside fs_app_receive, when the last octet of its frame is given. Nothing is computed without a
+ * host: a target has no sensors of its own, and it drives no rotors.
+ */
+#ifndef FS_APP_H
+#define FS_APP_H
+
+#include "fs_loops.h"
+#include "fs_messages.h"
+#include "fs_outbox.h"
+#include "fs_parser.h"
+
+#define FS_APP_SYSTEM 1U /* MAVLink ids of the target on its own link */
+#define FS_APP_COMPONENT 1U
+
+/* Unit of the port's clock: FS_PIL_IDENTITY.cost_unit */
+#define FS_COST_NONE 0U
+#define FS_COST_CYCLES 1U
+#define FS_COST_INSTRUCTIONS 2U
+#define FS_COST_NANOSECONDS 3U
+
+/* FS_PIL_STATUS.state */
+#define FS_APP_READY 0U      /* no step for FS_APP_STEP_TIMEOUT_MS, or none yet */
+#define FS_APP_STEPPING 1U   /* a host steps */
+#define FS_APP_SAFE 2U       /* bad input came: rotors stopped until a step with RESET */
+#define FS_APP_RESTARTED 3U  /* the watchdog restarted the target: parameters are lost; until a step with RESET */
+
+/* FS_PIL_REPORT.status, above the 16 bits of the loops */
+#define FS_APP_REPEATED 0x10000UL
+#define FS_APP_OUT_OF_ORDER 0x20000UL
+#define FS_APP_OVERRUN 0x40000UL
+#define FS_APP_BAD_INPUT 0x80000UL
+
+#define FS_APP_STEP_TIMEOUT_MS 1000UL /* without a step: no host steps any more */
+#define FS_APP_SILENCE_MS 20UL        /* without an octet: what is held of a frame will not be completed */
+#define FS_APP_PERIOD_MS 1000UL       /* between heartbeats, between status messages, between complaints */
+
+/* What the application has to know about where it runs; it stays the port's and must outlive the application. */
+typedef struct {
+    fs_clock clock;                    /* cost counter that counts up modulo 2^32; NULL: none */
+    uint32_t clock_hz;                 /* of the processor; 0: unknown or emulated */
+    uint16_t cost_unit;                /* FS_COST_* */
+    uint16_t was_watchdog;             /* 1: this start is the watchdog's doing */
+    const char *board, *compiler;      /* see fs_build.h */
+    const fs_octet *source_hash;       /* 8 octets */
+    uint32_t stack_size;               /* in the smallest addressable unit */
+    uint32_t (*stack_high_water)(void); /* most of it that was ever used; NULL: unknown */
+} fs_port;
+
+/* The state of the application: the caller owns it, and looks only at what fs_app_* functions tell. */
+typedef struct {
+    const fs_port *port;
+    fs_loops loops;
+    fs_parser parser;
+    fs_frame frame;
+    fs_outbox outbox;
+    fs_octet payload[FS_MAX_PAYLOAD]; /* where a payload is made */
+
+    uint32_t now_ms, last_octet_ms, last_step_ms, last_heartbeat_ms, last_status_ms, last_complaint_ms;
+    uint16_t is_polled;    /* the three times of last news mean something */
+    uint16_t has_received; /* octets since the last poll */
+    uint16_t state;        /* FS_APP_READY … */
+
+    uint32_t expected;    /* number of the next step */
+    uint16_t has_stepped; /* the last step and its report are kept */
+    fs_pil_step step;
+    fs_pil_report report;
+    uint32_t steps, repeats, out_of_order, loop_overruns, safe_states;
+
+    uint32_t uart_overruns, uart_errors, told_overruns; /* the last: of those that were complained about */
+    uint16_t next_listed;                               /* index of the next parameter of a list; the count: no list */
+} fs_app;
+
+/* Begin: parameters at their defaults, state READY (or RESTARTED), step 0 or one with RESET expected. */
+void fs_app_init(fs_app *app, const fs_port *port);
+
+/* Take an octet from the line; its high bits may be anything. Answers wait for fs_app_transmit. */
+void fs_app_receive(fs_app *app, fs_octet octet);
+
+/* Note what the serial port has lost since the start, as totals: octets overrun; framing, parity and break errors. */
+void fs_app_uart_errors(fs_app *app, uint32_t overruns, uint32_t errors);
+
+/* Do what is due by the port's time, which counts modulo 2^32: heartbeat, status, time-outs. */
+void fs_app_poll(fs_app *app, uint32_t now_ms);
+
+/* Return in how many milliseconds after the last fs_app_poll there is something due, if no octet comes before. */
+uint32_t fs_app_wait_ms(const fs_app *app);
+
+/*
+ * Take at most `room` octets to be sent, clean of high bits; returns how many, 0 when there are none.
+ * A list of parameters under way goes on whenever nothing else waits.
+ */
+uint16_t fs_app_transmit(fs_app *app, fs_octet *out, uint16_t room);
+
+/* Return FS_APP_READY …, for lights. */
+uint16_t fs_app_state(const fs_app *app);
+
+#endif

@@ -1,0 +1,29 @@
+/* The parts of the application, for its own files. Each takes a frame that is known to be of its kind. */
+#ifndef FS_APP_PARTS_H
+#define FS_APP_PARTS_H
+
+#include "fs_app.h"
+
+/* Tell whether a message with these targets is for this target; 0 is everybody. */
+uint16_t fs_app_is_target(fs_octet system, fs_octet component);
+
+/* fs_app_news.c: what a target says by itself. They are dropped, and counted, when the line is busy. */
+void fs_app_send_heartbeat(fs_app *app);
+void fs_app_send_status(fs_app *app, uint16_t reserve);
+void fs_app_send_text(fs_app *app, uint16_t severity, const char *text);
+
+/* fs_app_pil.c: steps of the loops */
+void fs_app_on_step(fs_app *app);
+void fs_app_forget_flight(fs_app *app); /* step 0 or one with RESET is expected next */
+
+/* fs_app_params.c */
+void fs_app_on_param_list(fs_app *app);
+void fs_app_on_param_read(fs_app *app);
+void fs_app_on_param_set(fs_app *app);
+void fs_app_go_on_listing(fs_app *app); /* put the next parameter of a list under way */
+
+/* fs_app_commands.c */
+void fs_app_on_command(fs_app *app);
+void fs_app_on_ping(fs_app *app);
+
+#endif
