@@ -1,0 +1,147 @@
+"""The loops in C behave as ``PythonLoops``: resets, given targets, unsound inputs, changed gains, any rotor set."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flightstack.contract import LoopRow, LoopStatus
+from flightstack.control.controller_loading import load_controller
+from flightstack.control.loops import PythonLoops
+from flightstack.firmware.numbers import target_numbers
+from flightstack.params.gains_file import open_gains
+from flightstack.params.vehicle import Vehicle, load_vehicle
+from tests.firmware.core_samples import Sequence, sequence
+from tests.firmware.core_support import OUTER_DUE, PARTS, RESET, SET_TARGET, Core, Loops
+from tests.support.rotor_sets import ring
+
+INNER_HZ, DIVISOR, TILT_RAD = 500.0, 5, math.radians(35.0)
+FLOWN: dict[str, tuple[str, Any]] = {
+    "four": ("pid", lambda: load_vehicle("x_quad")),
+    "four ideal": ("backstepping", lambda: load_vehicle("paper_quad").with_ideal_rotors()),
+    "six": ("backstepping", lambda: ring(6)),
+    "eight": ("pid", lambda: ring(8, first_deg=22.5)),
+}
+
+
+def both(controller: str, vehicle: Vehicle, real: str = "double") -> tuple[PythonLoops, Loops]:
+    """Return the same loops in Python and in C."""
+    law = load_controller(controller)
+    outer_hz = INNER_HZ / DIVISOR
+    loops = PythonLoops(vehicle, law, open_gains("tuned"), INNER_HZ, outer_hz, TILT_RAD)
+    numbers = target_numbers(vehicle, law, open_gains("tuned"), TILT_RAD, INNER_HZ, DIVISOR)
+    return loops, Loops(Core(real), numbers)
+
+
+def run_python(loops: PythonLoops, inputs: Sequence) -> tuple[np.ndarray, np.ndarray]:
+    """Step Python's loops through the sequence, as C's driver does."""
+    rows, status = [], []
+    row, speeds = np.zeros(LoopRow.SIZE), np.zeros(8, np.float32)
+    for state, setpoint, target, flags in zip(*inputs, strict=True):
+        if flags & RESET:
+            loops.reset(state)
+        if flags & SET_TARGET:
+            loops.set_attitude_target(target)
+        loops.step(state, setpoint, speeds, bool(flags & OUTER_DUE), row)
+        rows.append(np.concatenate([loops.attitude_target, row[13:39]]))
+        status.append(int(row[LoopRow.STATUS]))
+    return np.array(rows), np.array(status)
+
+
+def assert_same(made: np.ndarray, expected: np.ndarray) -> None:
+    """Compare outputs of double: 1e-12 of the largest value of each quantity; what is no number is none in both."""
+    for name, part in PARTS.items():
+        c, python = made[:, part], expected[:, part]
+        sound = np.isfinite(python)
+        assert np.array_equal(np.isfinite(c), sound), name
+        largest = np.abs(python[sound]).max()
+        assert np.abs(c[sound] - python[sound]).max() <= 1e-12 * largest, name
+
+
+@pytest.mark.parametrize("name", FLOWN)
+def test_a_shaken_vehicle_is_answered_as_by_python(name: str) -> None:
+    controller, vehicle = FLOWN[name]
+    python, c = both(controller, vehicle())
+    inputs = sequence(5000, 41, vehicle().weight_n)
+    expected, expected_status = run_python(python, inputs)
+    made, status = c.run(*inputs)
+    assert np.array_equal(status, expected_status)
+    assert_same(made, expected)
+    assert {0, LoopStatus.INPUT_NOT_FINITE} <= set(status.tolist())
+
+
+def level(count: int, flags: int) -> Sequence:
+    """Return ticks at rest, one metre below the setpoint and a little beside it."""
+    states, setpoints, targets = np.zeros((count, 13)), np.zeros((count, 11)), np.zeros((count, 5))
+    states[:, 6] = targets[:, 0] = 1.0
+    states[:, 0:2] = 0.1  # so that the target leans and integrals grow
+    setpoints[:, 2] = -1.0
+    return Sequence(states, setpoints, targets, np.full(count, flags, np.uint16))
+
+
+def test_a_changed_gain_keeps_what_its_integral_gives() -> None:
+    python, c = both("pid", load_vehicle("paper_quad"))
+    ticks = level(200, OUTER_DUE)
+    for name, value in (
+        ("PID_ROLL_I", 50.0),
+        ("PID_PITCH_I", 0.0),
+        ("PID_YAW_P", 12.5),
+        ("MPC_TILTMAX_AIR", 20.0),
+    ):
+        assert_same(c.run(*ticks)[0], run_python(python, ticks)[0])
+        python.set_parameter(name, value)
+        before = c.integrals
+        assert c.set(name, value) == 0
+        assert c.get(name) == value
+        expected = {"PID_ROLL_I": [4.0, 1.0, 1.0], "PID_PITCH_I": [1.0, 0.0, 1.0]}.get(name, [1.0, 1.0, 1.0])
+        assert c.integrals == pytest.approx([i * factor for i, factor in zip(before, expected, strict=True)])
+        assert before[0] != 0.0
+        assert before[1] != 0.0
+    assert_same(c.run(*ticks)[0], run_python(python, ticks)[0])
+
+
+def test_an_integral_too_large_to_be_carried_over_is_dropped() -> None:
+    _, c = both("pid", load_vehicle("paper_quad"))
+    c.core.call("drive_set_integral", c.memory, c.core.c_real(1e308))
+    assert c.set("PID_ROLL_I", 1e-3) == 0
+    assert c.integrals == [0.0, 1e308, 1e308]
+
+
+def test_another_law_starts_without_memory() -> None:
+    _, c = both("pid", load_vehicle("paper_quad"))
+    c.run(*level(100, OUTER_DUE))
+    assert any(c.integrals)
+    assert c.set("FS_CTRL", 0.0) == 0
+    assert any(c.integrals)
+    assert c.set("FS_CTRL", 1.0) == 0
+    assert not any(c.integrals)
+
+
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_an_unsound_tick_repeats_the_last_sound_one(real: str) -> None:
+    _, c = both("pid", load_vehicle("x_quad"), real)
+    ticks = level(3, OUTER_DUE)
+    ticks.states[1, 4] = np.nan
+    made, status = c.run(*ticks)
+    assert status.tolist()[1] == LoopStatus.INPUT_NOT_FINITE
+    assert np.array_equal(made[1, 5:], made[0, 5:])
+    assert not np.array_equal(made[2, 5:], made[0, 5:])
+    ticks = level(2, 0)
+    ticks.states[1, 10:] = 1e38 if real == "float" else 1e308
+    made, status = c.run(*ticks)
+    assert status.tolist()[1] == LoopStatus.OUTPUT_NOT_FINITE
+    assert np.array_equal(made[1], made[0])
+
+
+def test_a_setpoint_that_is_no_number_keeps_the_target() -> None:
+    _, c = both("pid", load_vehicle("x_quad"))
+    ticks = level(6, OUTER_DUE)
+    ticks.setpoints[3, 9] = 2e4  # no sine: more than 1591 turns
+    ticks.setpoints[4, 0] = np.inf
+    made, status = c.run(*ticks)
+    assert not (status & LoopStatus.INPUT_NOT_FINITE).any()
+    assert np.array_equal(made[3, :5], made[2, :5])
+    assert np.array_equal(made[4, :5], made[2, :5])
