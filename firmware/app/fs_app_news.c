@@ -1,0 +1,72 @@
+#include "fs_app_parts.h"
+#include "fs_constants.h"
+
+#define MAVLINK_VERSION 3U
+#define TEXT_SIZE 50U
+
+static uint16_t system_status(uint16_t state)
+{
+    uint16_t status = FS_MAV_STATE_STANDBY;
+
+    if (state == FS_APP_STEPPING) {
+        status = FS_MAV_STATE_ACTIVE;
+    } else if (state == FS_APP_SAFE) {
+        status = FS_MAV_STATE_EMERGENCY;
+    } else if (state == FS_APP_RESTARTED) {
+        status = FS_MAV_STATE_CRITICAL;
+    } else {
+        /* ready */
+    }
+    return status;
+}
+
+void fs_app_send_heartbeat(fs_app *app)
+{
+    fs_heartbeat message;
+    uint16_t length;
+
+    message.type = FS_MAV_TYPE_QUADROTOR;
+    message.autopilot = FS_MAV_AUTOPILOT_GENERIC;
+    message.base_mode = FS_MAV_MODE_FLAG_HIL_ENABLED; /* never armed: it drives no rotors */
+    message.custom_mode = 0UL;
+    message.system_status = system_status(app->state);
+    message.mavlink_version = MAVLINK_VERSION;
+    length = fs_heartbeat_encode(&message, app->payload);
+    (void)fs_outbox_put(&app->outbox, FS_HEARTBEAT_ID, app->payload, length, FS_OUTBOX_NEWS);
+}
+
+void fs_app_send_status(fs_app *app, uint16_t reserve)
+{
+    fs_pil_status message;
+    uint16_t length;
+
+    message.time_boot_ms = app->now_ms;
+    message.steps = app->steps;
+    message.repeats = app->repeats;
+    message.out_of_order = app->out_of_order;
+    message.frames = app->parser.good;
+    message.bad_frames = app->parser.bad + app->parser.unknown;
+    message.skipped_octets = app->parser.skipped;
+    message.uart_overruns = app->uart_overruns + app->outbox.dropped;
+    message.uart_errors = app->uart_errors;
+    message.loop_overruns = app->loop_overruns;
+    message.safe_states = app->safe_states;
+    message.stack_size = app->port->stack_size;
+    message.stack_high_water = (app->port->stack_high_water != NULL) ? app->port->stack_high_water() : 0UL;
+    message.state = app->state;
+    length = fs_pil_status_encode(&message, app->payload);
+    (void)fs_outbox_put(&app->outbox, FS_PIL_STATUS_ID, app->payload, length, reserve);
+}
+
+void fs_app_send_text(fs_app *app, uint16_t severity, const char *text)
+{
+    fs_statustext message;
+    uint16_t length;
+
+    message.severity = severity;
+    fs_text_put(message.text, TEXT_SIZE, text);
+    message.id = 0U;
+    message.chunk_seq = 0U;
+    length = fs_statustext_encode(&message, app->payload);
+    (void)fs_outbox_put(&app->outbox, FS_STATUSTEXT_ID, app->payload, length, FS_OUTBOX_NEWS);
+}
