@@ -88,7 +88,9 @@ void fs_app_on_param_set(fs_app *app)
         send_error(app, message.param_id, -1, FS_MAV_PARAM_ERROR_DOES_NOT_EXIST);
         return;
     }
-    if (fs_param_set(&app->loops, (uint16_t)index, (fs_real)message.param_value) != FS_PARAM_DONE) {
+    if (fs_param_set(&app->loops, (uint16_t)index, (fs_real)message.param_value) == FS_PARAM_DONE) {
+        fs_app_on_new_numbers(app);
+    } else {
         send_error(app, message.param_id, -1, FS_MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE);
     }
     send_value(app, (uint16_t)index); /* also after an error, which not every ground station knows */

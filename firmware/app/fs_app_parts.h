@@ -14,6 +14,7 @@ void fs_app_send_text(fs_app *app, uint16_t severity, const char *text);
 
 /* fs_app_pil.c: steps of the loops */
 void fs_app_on_step(fs_app *app);
+void fs_app_on_new_numbers(fs_app *app);
 void fs_app_forget_flight(fs_app *app); /* step 0 or one with RESET is expected next */
 
 /* fs_app_params.c */

@@ -12,6 +12,14 @@ void fs_app_forget_flight(fs_app *app)
     app->has_stepped = 0U;
 }
 
+/* A flight that begins as the last one did, but with other numbers, is another one: its first step is not a repeated one. */
+void fs_app_on_new_numbers(fs_app *app)
+{
+    if ((app->has_stepped != 0U) && ((app->step.flags & FS_RESET) != 0UL)) {
+        app->has_stepped = 0U;
+    }
+}
+
 static void send_report(fs_app *app, const fs_pil_report *report)
 {
     uint16_t length = fs_pil_report_encode(report, app->payload);
