@@ -1,6 +1,9 @@
 #include "fs_attitude_backstepping.h"
 
-/* Angular acceleration demanded on one axis before the cancelling terms [rad/s^2]: e1 = x_d - x, e2 = x' - x_d' - c1 e1. */
+/*
+ * Angular acceleration demanded on one axis before the cancelling terms [rad/s^2]: e1 = x_d - x, e2 = x' - x_d' -
+ * c1 e1.
+ */
 static fs_real axis(fs_real error, fs_real rate, fs_real rate_d, fs_real acceleration_d, fs_real c_outer,
                     fs_real c_inner)
 {

@@ -1,8 +1,8 @@
 /*
  * The control loops: outer loop, attitude reference, attitude controller, mixer.
  *
- * The same as flightstack/control/loops.py. All that the loops know is in one structure that the caller owns; there are no
- * other variables. World frame NED, body frame FRD, SI units.
+ * The same as flightstack/control/loops.py. All that the loops know is in one structure that the caller owns; there
+ * are no other variables. World frame NED, body frame FRD, SI units.
  */
 #ifndef FS_LOOPS_H
 #define FS_LOOPS_H
@@ -17,7 +17,7 @@ typedef struct {
     fs_attitude_reference reference;
     fs_wrench wrench;
     fs_wrench wrench_achieved;
-    fs_real rotor_command_rad_s[FS_MAX_ROTORS]; /* 0 beyond the vehicle's rotors; the sign matters to ideal rotors only */
+    fs_real rotor_command_rad_s[FS_MAX_ROTORS]; /* 0 beyond the rotors; negative with ideal rotors only */
     uint16_t status;                            /* FS_STATUS_* bits */
 } fs_loop_output;
 
@@ -34,8 +34,10 @@ typedef struct {
 
 typedef uint32_t (*fs_clock)(void); /* cost counter of the port, counting up modulo 2^32 */
 
-/* What a step cost, in the clock's unit: differences modulo 2^32. The inner loop's part is reference filter and attitude
- * controller, without the mixer. All zero without a clock. */
+/*
+ * What a step cost, in the clock's unit: differences modulo 2^32. The inner loop's part is reference filter and
+ * attitude controller, without the mixer. All zero without a clock.
+ */
 typedef struct {
     uint32_t outer, inner, mixer, whole;
 } fs_loop_cost;
@@ -76,10 +78,10 @@ void fs_loops_reset(fs_loops *loops, const fs_vehicle_state *state);
 /*
  * One inner tick: what the flags ask for, in the order RESET, SET_TARGET, OUTER_DUE, then inner loop and mixer.
  *
- * An input that is not finite never reaches a memory: the outer loop keeps its target, the inner loop repeats its last output
- * with FS_STATUS_INPUT_NOT_FINITE. The same with FS_STATUS_OUTPUT_NOT_FINITE when finite inputs are so large that the result
- * is not. The output is finite in every case, but for an attitude target that was set so, or a reset at such a state, which
- * takes another reset to recover from. clock may be NULL.
+ * An input that is not finite never reaches a memory: the outer loop keeps its target, the inner loop repeats its
+ * last output with FS_STATUS_INPUT_NOT_FINITE. The same with FS_STATUS_OUTPUT_NOT_FINITE when finite inputs are so
+ * large that the result is not. The output is finite in every case, but for an attitude target that was set so, or
+ * a reset at such a state, which takes another reset to recover from. clock may be NULL.
  */
 void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, fs_loop_output *output,
                    fs_loop_cost *cost);

@@ -1,8 +1,8 @@
 /*
  * The functions that the loops need of a mathematics library, so that results depend on none.
  *
- * Only + - * / and square root are used, which IEEE 754 rounds in one way: every machine that follows it, and does not contract
- * or reorder (-ffp-contract=off, no fast-math), gives the same bits.
+ * Only + - * / and square root are used, which IEEE 754 rounds in one way: every machine that follows it, and does
+ * not contract or reorder (-ffp-contract=off, no fast-math), gives the same bits.
  */
 #ifndef FS_MATH_H
 #define FS_MATH_H
@@ -27,7 +27,10 @@ typedef struct {
  */
 fs_sine_cosine fs_sin_cos(fs_real angle_rad);
 
-/* Angle [rad] of the point (x, y), in [-pi, pi]; of the origin 0. Zeros have no sign here. NaN for what is not finite. */
+/*
+ * Angle [rad] of the point (x, y), in [-pi, pi]; of the origin 0. Zeros have no sign here. NaN for what is not
+ * finite.
+ */
 fs_real fs_atan2(fs_real y, fs_real x);
 
 /* Correctly rounded square root; the argument must not be negative. */

@@ -3,9 +3,9 @@
 #include "fs_math.h"
 
 /*
- * Difference of demanded and achieved [N, N m] that tells a limit from rounding. Python's is the first number alone, far above
- * a double's rounding. With float the sums over the rotors round by more than that: about ten operations on each term, the
- * rounding of the numbers themselves among them, are counted as sixteen.
+ * Difference of demanded and achieved [N, N m] that tells a limit from rounding. Python's is the first number
+ * alone, far above a double's rounding. With float the sums over the rotors round by more than that: about ten
+ * operations on each term, the rounding of the numbers themselves among them, are counted as sixteen.
  */
 #define FS_LAG_LEAST FS_LIT(1e-9)
 #ifdef FS_DOUBLE
@@ -44,8 +44,9 @@ static fs_real largest_scale(const fs_real *base, const fs_real *direction, cons
 }
 
 /*
- * Scale the roll-pitch part so that some thrust brings it between the limits. Rotor i allows the thrusts from (low - b)/a to
- * (high - b)/a, a being its share of a newton: there is a common one when no rotor's least is above another's most.
+ * Scale the roll-pitch part so that some thrust brings it between the limits. Rotor i allows the thrusts from (low
+ * - b)/a to (high - b)/a, a being its share of a newton: there is a common one when no rotor's least is above
+ * another's most.
  */
 static void fit_roll_pitch(fs_real *speed_squared, const fs_mixer *mixer, uint16_t rotors)
 {

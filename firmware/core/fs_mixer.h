@@ -7,8 +7,9 @@
 /*
  * Rotor geometry in the form that the mixer computes with.
  *
- * allocation maps (thrust [N], torque FRD [N m]) to squared speeds [rad^2/s^2]; effectiveness maps back. low and high bound
- * squared speeds, and are of either sign with ideal rotors. spin is +1 for a rotor that turns clockwise from above.
+ * allocation maps (thrust [N], torque FRD [N m]) to squared speeds [rad^2/s^2]; effectiveness maps back. low and
+ * high bound squared speeds, and are of either sign with ideal rotors. spin is +1 for a rotor that turns clockwise
+ * from above.
  */
 typedef struct {
     fs_real allocation[FS_MAX_ROTORS][4];
@@ -25,11 +26,12 @@ typedef struct {
 } fs_saturation;
 
 /*
- * Write the rotor speeds [rad/s] that come nearest to the wrench, the wrench that they make, and where the two differ by more
- * than the rounding of the sums.
+ * Write the rotor speeds [rad/s] that come nearest to the wrench, the wrench that they make, and where the two
+ * differ by more than the rounding of the sums.
  *
- * Torque about roll and pitch is served first (they keep the vehicle upright), then thrust, then yaw with what is left. With
- * ideal rotors a squared speed may be negative: the speed then carries the sign. Speeds beyond the rotors become zero.
+ * Torque about roll and pitch is served first (they keep the vehicle upright), then thrust, then yaw with what is
+ * left. With ideal rotors a squared speed may be negative: the speed then carries the sign. Speeds beyond the
+ * rotors become zero.
  */
 void fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
             fs_wrench *achieved, fs_saturation *saturation);

@@ -15,8 +15,7 @@ const char *fs_param_name(uint16_t index)
     return index < FS_PARAM_COUNT ? fs_param_spec_at(index)->name : "";
 }
 
-/* Whether two names are the same, each ending at NUL or after 16 characters. */
-static uint16_t same_name(const char *a, const char *b)
+uint16_t fs_param_same_name(const char *a, const char *b)
 {
     uint16_t i;
 
@@ -36,7 +35,7 @@ int16_t fs_param_find(const char *name16)
     uint16_t index;
 
     for (index = 0U; index < FS_PARAM_COUNT; index++) {
-        if (same_name(name16, fs_param_spec_at(index)->name)) {
+        if (fs_param_same_name(name16, fs_param_spec_at(index)->name)) {
             return (int16_t)index;
         }
     }

@@ -13,6 +13,9 @@ uint16_t fs_param_count(void);
 /* Name of a parameter, ending at NUL; the empty name for an index beyond the table. */
 const char *fs_param_name(uint16_t index);
 
+/* Whether two names are the same, each ending at NUL or after 16 characters. */
+uint16_t fs_param_same_name(const char *a, const char *b);
+
 /* Index of a name that ends at NUL or after 16 characters; -1 when there is none. */
 int16_t fs_param_find(const char *name16);
 
@@ -20,10 +23,11 @@ int16_t fs_param_find(const char *name16);
 fs_real fs_param_get(const fs_loops *loops, uint16_t index);
 
 /*
- * Change a parameter from the next tick on. FS_PARAM_REFUSED, and nothing is changed, for a value that is out of range, not
- * finite, or not whole where it must be.
+ * Change a parameter from the next tick on. FS_PARAM_REFUSED, and nothing is changed, for a value that is out of
+ * range, not finite, or not whole where it must be.
  *
- * An integral that the gain multiplies is scaled, so that the product stays. Another attitude law starts without memory.
+ * An integral that the gain multiplies is scaled, so that the product stays. Another attitude law starts without
+ * memory.
  */
 uint16_t fs_param_set(fs_loops *loops, uint16_t index, fs_real value);
 

@@ -22,7 +22,10 @@ static fs_vector3 horizontal_demand(const fs_position_memory *memory, const fs_v
     return demand;
 }
 
-/* Attitude and thrust for an acceleration: roll and pitch turn the thrust there, it carries the weight at the present tilt. */
+/*
+ * Attitude and thrust for an acceleration: roll and pitch turn the thrust there, it carries the weight at the
+ * present tilt.
+ */
 static void target_for(const fs_vector3 *demand, fs_real lift_m_s2, fs_real yaw_rad, const fs_quaternion *q,
                        const fs_position_params *params, fs_attitude_target *target)
 {
