@@ -1,0 +1,154 @@
+"""How far two flights of the same mission are apart, signal by signal. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flightstack.contract import FloatArray
+from gcs_cli.pil.flight_samples import FlightSamples, Samples
+from gcs_cli.pil.signals import SIGNALS, Signal
+from gcs_cli.pil.ulps import Float32Array, steps_apart, ulp_of
+
+
+class Difference(NamedTuple):
+    """Of one signal in two flights, over the ticks in which the loops of both ran."""
+
+    pair: str
+    signal: str
+    samples: int
+    largest: float
+    """In the signal's unit, of all components; infinite if only one of two values is a number."""
+    rms: float
+    at_s: float
+    """When it was largest, since the start of the first log; NaN if nothing differs."""
+    full_scale: float
+    """Largest value of the signal in the first flight."""
+    steps: int
+    """Largest number of float32 steps between two values."""
+
+    @property
+    def ulps(self) -> float:
+        """The largest difference in units of the last place of ``full_scale``."""
+        return self.largest / ulp_of(self.full_scale)
+
+    @property
+    def rms_ulps(self) -> float:
+        """The root mean square in units of the last place of ``full_scale``."""
+        return self.rms / ulp_of(self.full_scale)
+
+    def as_json(self, signal: Signal) -> dict[str, Any]:
+        """Return what ``pil.json`` says of it; null for what is not finite."""
+        figures = {
+            "largest": self.largest,
+            "rms": self.rms,
+            "at_s": self.at_s,
+            "full_scale": self.full_scale,
+            "ulps": self.ulps,
+            "rms_ulps": self.rms_ulps,
+        }
+        return {
+            "pair": self.pair,
+            "signal": self.signal,
+            "stage": signal.stage,
+            "unit": signal.unit,
+            "samples": self.samples,
+            **{key: value if math.isfinite(value) else None for key, value in figures.items()},
+            "float32_steps": self.steps,
+        }
+
+
+class Deviation(NamedTuple):
+    """A signal's difference over time: the largest of its components at ``time_s`` (n,)."""
+
+    time_s: FloatArray
+    size: FloatArray
+
+
+def compared(pair: str, first: FlightSamples, second: FlightSamples) -> Iterator[Difference]:
+    """Yield the difference of each signal that both flights have, in the order of ``SIGNALS``."""
+    for signal in SIGNALS:
+        matched = _matched(signal, first, second)
+        if matched is not None:
+            yield _difference(pair, signal, *matched, first)
+
+
+def deviation(signal: Signal, first: FlightSamples, second: FlightSamples) -> Deviation:
+    """Return how far a signal is apart over time; of no samples if one flight does not have it."""
+    matched = _matched(signal, first, second)
+    if matched is None:
+        return Deviation(np.zeros(0), np.zeros(0))
+    a, b = matched
+    return Deviation(_since_start_s(a, first), _distance(a.values, b.values).max(axis=1))
+
+
+def status_differences(first: FlightSamples, second: FlightSamples) -> tuple[int, int]:
+    """Return in how many ticks the status of the loops differs, and of how many that both logs have."""
+    a, b = _at_same_times(first.status, second.status)
+    return int(np.count_nonzero(a.values != b.values)), len(a.time_us)
+
+
+def ticks_apart(first: FlightSamples, second: FlightSamples) -> int:
+    """Return in how many ticks the loops ran in one flight only."""
+    return len(np.setxor1d(first.flown_us, second.flown_us))
+
+
+def _matched(signal: Signal, first: FlightSamples, second: FlightSamples) -> tuple[Samples, Samples] | None:
+    a, b = first.signals.get(signal.name), second.signals.get(signal.name)
+    if a is None or b is None:
+        return None
+    columns = min(a.values.shape[1], b.values.shape[1])
+    flown = np.intersect1d(first.flown_us, second.flown_us)
+    a, b = (_among(samples, flown) for samples in _at_same_times(a, b))
+    a, b = a._replace(values=a.values[:, :columns]), b._replace(values=b.values[:, :columns])
+    return (a, _same_sign(a, b)) if signal.is_attitude else (a, b)
+
+
+def _at_same_times(a: Samples, b: Samples) -> tuple[Samples, Samples]:
+    _, of_a, of_b = np.intersect1d(a.time_us, b.time_us, return_indices=True)
+    return Samples(a.time_us[of_a], a.values[of_a]), Samples(b.time_us[of_b], b.values[of_b])
+
+
+def _among(samples: Samples, times_us: Any) -> Samples:
+    kept = np.isin(samples.time_us, times_us)
+    return Samples(samples.time_us[kept], samples.values[kept])
+
+
+def _same_sign(a: Samples, b: Samples) -> Samples:
+    opposite = np.einsum("ij,ij->i", a.values, b.values) < 0.0
+    return b._replace(values=np.where(opposite[:, None], -b.values, b.values))
+
+
+def _distance(a: Float32Array, b: Float32Array) -> FloatArray:
+    """Distance of each two values: 0 between equal ones, also infinite ones and two that are no numbers."""
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(a.astype(np.float64) - b.astype(np.float64))
+    same = (a == b) | (np.isnan(a) & np.isnan(b))
+    return np.where(same, 0.0, np.where(np.isnan(apart), math.inf, apart))
+
+
+def _since_start_s(samples: Samples, flight: FlightSamples) -> FloatArray:
+    start_us = flight.status.time_us[0] if len(flight.status.time_us) else 0
+    return np.asarray((samples.time_us - start_us) * 1e-6, np.float64)
+
+
+def _difference(pair: str, signal: Signal, a: Samples, b: Samples, first: FlightSamples) -> Difference:
+    if not a.values.size:
+        return Difference(pair, signal.name, 0, 0.0, 0.0, math.nan, 0.0, 0)
+    apart = _distance(a.values, b.values)
+    largest = float(apart.max())
+    sizes = np.abs(a.values[np.isfinite(a.values)])
+    at = int(apart.max(axis=1).argmax())
+    return Difference(
+        pair,
+        signal.name,
+        len(a.time_us),
+        largest,
+        float(np.sqrt(np.mean(apart**2))),
+        float(_since_start_s(a, first)[at]) if largest else math.nan,
+        float(sizes.max()) if sizes.size else 0.0,
+        int(np.where(apart > 0.0, steps_apart(a.values, b.values), 0).max()),
+    )

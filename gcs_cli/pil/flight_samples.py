@@ -1,0 +1,95 @@
+"""The loops' inputs and outputs of a flight, as its log has them: float32, to the last bit."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from pyulog import ULog, ULogException
+
+from flightstack.contract import LoopStatus
+from flightstack.params.errors import ConfigError
+from gcs_cli.pil.signals import SIGNALS
+from gcs_cli.pil.ulps import Float32Array
+
+TimeArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.uint16]]
+
+_DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
+_TOPICS = sorted({signal.topic for signal in SIGNALS} | {"trajectory_setpoint"})
+GROUNDED = LoopStatus.IDLE | LoopStatus.INPUT_STALE
+"""Status of ticks in which the loops did not run: on the ground, or while their input stood still."""
+
+
+class Samples(NamedTuple):
+    """``values`` (n, k) at ``time_us`` (n,), which rises."""
+
+    time_us: TimeArray
+    values: Float32Array
+
+
+class FlightSamples(NamedTuple):
+    """What a log tells of the loops."""
+
+    signals: Mapping[str, Samples]
+    """By the names of ``SIGNALS``; none that the log does not have."""
+    status: Samples
+    """Status of the loops in each inner tick, (n, 1)."""
+    topics: Mapping[str, Mapping[str, Any]]
+    """The columns of the topics, for who needs more."""
+    info: Mapping[str, Any]
+    parameters: Mapping[str, float]
+    """At the start."""
+    changes: tuple[tuple[int, str, float], ...]
+    """Time [µs], name and value of each later change, in order; in force after the samples of that time."""
+
+    @property
+    def flown_us(self) -> TimeArray:
+        """Times of the ticks in which the loops ran."""
+        flags = self.status.values[:, 0].astype(np.int64)
+        times: TimeArray = self.status.time_us[(flags & GROUNDED) == 0]
+        return times
+
+
+def read_samples(path: Path) -> FlightSamples:
+    """Read a flight log; raise ConfigError if it is none, or is not one of the loops'."""
+    try:
+        # pyulog reports damage on stdout, which belongs to the command's own output
+        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):
+            log = ULog(file, _TOPICS)
+            return _samples(path, log)
+    except OSError as error:
+        raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
+    except _DAMAGE as error:
+        raise ConfigError(path, "", f"is not a readable flight log: {error}") from error
+
+
+def _samples(path: Path, log: Any) -> FlightSamples:
+    topics = {item.name: item.data for item in log.data_list}
+    if "status" not in topics.get("wrench", {}):
+        raise ConfigError(path, "", "is not a log of flightstack: it holds no wrench of its loops")
+    wrench = topics["wrench"]
+    return FlightSamples(
+        {
+            signal.name: found
+            for signal in SIGNALS
+            if (found := _columns(topics.get(signal.topic, {}), signal.fields)) is not None
+        },
+        Samples(wrench["timestamp"].astype(np.int64), wrench["status"].astype(np.float32)[:, None]),
+        topics,
+        dict(log.msg_info_dict),
+        dict(log.initial_parameters),
+        tuple((int(at), str(name), float(value)) for at, name, value in log.changed_parameters),
+    )
+
+
+def _columns(data: Mapping[str, Any], fields: tuple[str, ...]) -> Samples | None:
+    there = [data[name] for name in fields if name in data]
+    if not there:
+        return None
+    return Samples(data["timestamp"].astype(np.int64), np.column_stack(there).astype(np.float32))

@@ -1,0 +1,79 @@
+"""What the stages of a step cost on a target: figures and histogram. Pure."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flightstack.contract import FloatArray
+
+STAGES = ("outer", "inner", "mixer", "whole")
+STAGE_TITLES = {"outer": "outer loop", "inner": "inner loop", "mixer": "mixer", "whole": "whole step"}
+COST_UNITS = {0: "", 1: "cycles", 2: "instructions", 3: "ns"}
+"""By ``cost_unit`` of FS_PIL_IDENTITY: processor cycles of a board, instructions under emulation."""
+_BINS = 24
+
+
+class StageProfile(NamedTuple):
+    """Cost of one stage, in the target's unit, over the steps in which it ran."""
+
+    stage: str
+    steps: int
+    smallest: float
+    mean: float
+    p99: float
+    """The smallest cost that 99 % of the steps do not exceed."""
+    largest: float
+    edges: tuple[float, ...]
+    """Borders of the histogram's bins, rising; one more than there are bins."""
+    counts: tuple[int, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what ``pil.json`` says of it."""
+        return {
+            "count": self.steps,
+            "min": self.smallest,
+            "mean": round(self.mean, 3),
+            "p99": self.p99,
+            "max": self.largest,
+            "histogram": {"edges": list(self.edges), "counts": list(self.counts)},
+        }
+
+
+def stage_profiles(costs: FloatArray) -> list[StageProfile]:
+    """Return the profile of each stage that ran; ``costs`` is (steps, 4): outer, inner, mixer, whole.
+
+    A stage that costs nothing did not run: the outer loop does so in most steps.
+    """
+    columns = costs.reshape(-1, len(STAGES)).T
+    return [
+        _profile(stage, column[column > 0])
+        for stage, column in zip(STAGES, columns, strict=True)
+        if np.any(column > 0)
+    ]
+
+
+def _profile(stage: str, costs: FloatArray) -> StageProfile:
+    low, high = float(costs.min()), float(costs.max())
+    edges = _edges(low, high)
+    counts, _ = np.histogram(costs, edges)
+    rank = math.ceil(0.99 * len(costs)) - 1
+    return StageProfile(
+        stage,
+        len(costs),
+        low,
+        float(costs.mean()),
+        float(np.sort(costs)[rank]),
+        high,
+        tuple(edges),
+        tuple(counts.tolist()),
+    )
+
+
+def _edges(low: float, high: float) -> list[float]:
+    """Return borders of bins that are a whole number of units wide and hold all costs from low to high."""
+    width = max(1, math.ceil((high - low + 1.0) / _BINS))
+    bins = max(1, math.ceil((high - low + 1.0) / width))
+    return [low - 0.5 + width * index for index in range(bins + 1)]

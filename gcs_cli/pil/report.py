@@ -1,0 +1,160 @@
+"""The PIL report: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gcs_cli.pil.compare import Deviation
+from gcs_cli.pil.histogram_chart import histogram_chart
+from gcs_cli.pil.profile import StageProfile
+from gcs_cli.pil.report_tables import (
+    checks_section,
+    differences_section,
+    facts_section,
+    profile_table,
+    shown,
+)
+from gcs_cli.pil.signals import Signal
+from gcs_cli.report_chart import Line, time_chart
+from gcs_cli.report_plots import section
+
+_STYLE_SHEETS = (Path(__file__).parents[1] / "report.css", Path(__file__).with_name("pil.css"))
+_PAIR_STYLES = ("s1", "s2 target", "s4 thin")
+_STAGE_STYLES = {"outer": "s2", "inner": "s1", "mixer": "s3", "whole": "s5"}
+
+
+class DeviationChart(NamedTuple):
+    """How far one signal is apart over time, for each pair of flights."""
+
+    signal: Signal
+    pairs: Mapping[str, Deviation]
+
+
+def render_report(
+    result: Mapping[str, Any], charts: Sequence[DeviationChart], profiles: Sequence[StageProfile]
+) -> str:
+    """Return the report as HTML; ``result`` is what ``pil.json`` holds."""
+    title = escape(result["title"])
+    style = "".join(sheet.read_text(encoding="utf-8") for sheet in _STYLE_SHEETS)
+    body = "".join(
+        (
+            _header(title, result),
+            _tiles(result),
+            checks_section(result["checks"]),
+            differences_section(result["differences"]),
+            *_deviations(charts),
+            *_profile(result, profiles),
+            *_target(result),
+            *_link(result),
+            *_flights(result),
+            facts_section(
+                "Conditions", [(name, shown(value)) for name, value in result["conditions"].items()]
+            ),
+        )
+    )
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{title}</title><style>{style}</style></head>"
+        f"<body><main>{body}</main></body></html>\n"
+    )
+
+
+def _header(title: str, result: Mapping[str, Any]) -> str:
+    good = "good" if result["verdict"] == "passed" else "bad"
+    return (
+        f'<header><h1>{title}</h1><span class="outcome {good}">{escape(result["verdict"])}</span>'
+        f'<div class="about">{escape(result["about"])}</div></header>'
+        f'<p class="what">{escape(result["meaning"])}</p>'
+    )
+
+
+def _tiles(result: Mapping[str, Any]) -> str:
+    cells = "".join(
+        f'<div class="tile"><b>{shown(tile["value"])}</b><span>{escape(tile["name"])}</span></div>'
+        for tile in result["tiles"]
+    )
+    return f'<div class="tiles">{cells}</div>'
+
+
+def _deviations(charts: Sequence[DeviationChart]) -> Iterator[str]:
+    for signal, pairs in charts:
+        title = f"Difference over time: {signal.title}"
+        lines, same = [], []
+        for (pair, (time_s, size)), style in zip(pairs.items(), _PAIR_STYLES, strict=False):
+            if not len(size):
+                continue
+            if np.any(size > 0.0):
+                lines.append(Line(pair, time_s, size, style))
+            else:
+                same.append(pair)
+        note = f"Not drawn, because no bit differs: {', '.join(same)}." if same else ""
+        if not lines:
+            yield section(title, f'<p class="none">{escape(note or "No data.")}</p>')
+            continue
+        unit = "" if signal.unit == "1" else f" [{signal.unit}]"
+        span = (float(lines[0].x[0]), float(lines[0].x[-1]))
+        chart = time_chart(title, f"|difference|{unit}", lines, span, log=True)
+        yield section(title, chart, [(line.label, line.style, False) for line in lines], note)
+
+
+def _profile(result: Mapping[str, Any], profiles: Sequence[StageProfile]) -> Iterator[str]:
+    profile = result["profile"]
+    if not profiles:
+        return
+    histograms = "".join(
+        histogram_chart(stage, profile["unit"], _STAGE_STYLES[stage.stage]) for stage in profiles
+    )
+    body = f'{profile_table(profile)}<div class="histograms">{histograms}</div>'
+    yield section("What a step costs", body, note=profile["about"])
+
+
+def _target(result: Mapping[str, Any]) -> Iterator[str]:
+    target, stack = result["target"], result["stack"]
+    if target is None:
+        return
+    clock = f"{target['clock_hz'] / 1e6:g} MHz" if target["clock_hz"] else "none: emulated, or unknown"
+    high_water = "unknown"
+    if stack is not None and stack["high_water"]:
+        high_water = f"{stack['high_water']} of {stack['size']} units of {target['char_bits']} bits"
+    facts = [
+        ("board", shown(target["board"])),
+        ("compiler", shown(target["compiler"])),
+        ("firmware", f'<span class="mono">{shown(target["source_hash"])}</span>'),
+        ("clock", clock),
+        ("arithmetic", f"{8 * target['real_octets']}-bit floating point"),
+        ("stack high water", escape(high_water)),
+    ]
+    yield facts_section("Target", facts, "The firmware is named by the first octets of its sources' SHA-256.")
+
+
+def _link(result: Mapping[str, Any]) -> Iterator[str]:
+    link = result["link"]
+    if link:
+        facts = [(name.replace("_", " "), shown(value)) for name, value in link.items()]
+        yield facts_section("Link", facts)
+
+
+def _flights(result: Mapping[str, Any]) -> Iterator[str]:
+    flights = result["flights"]
+    if not flights:
+        return
+    head = (
+        '<tr><th></th><th>loops</th><th>outcome</th><th class="n">simulated</th><th class="n">wall time</th>'
+        '<th class="n">ticks flown</th><th>report</th></tr>'
+    )
+    rows = "".join(
+        f"<tr><td>{escape(stage)}</td><td>{shown(flight['loops'])}</td>"
+        f'<td class="{"good" if flight["outcome"] == "completed" else "bad"}">{shown(flight["outcome"])}</td>'
+        f'<td class="n">{shown(flight["sim_time_s"], ".2f", " s")}</td>'
+        f'<td class="n">{shown(flight["wall_time_s"], ".2f", " s")}</td>'
+        f'<td class="n">{shown(flight["ticks"])}</td>'
+        f'<td><a href="{escape(flight["directory"])}/report.html">{escape(flight["directory"])}</a></td></tr>'
+        for stage, flight in flights.items()
+    )
+    yield section("Flights", f"<table>{head}{rows}</table>")
