@@ -52,9 +52,10 @@ def run(
     from flightstack.app import App
     from flightstack.clock import nearest_outer_hz
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
+    from flightstack.firmware.errors import TargetError
     from flightstack.params.errors import ConfigError
     from flightstack.ports import ports_config
-    from flightstack.process_config import EXIT_USAGE, ProcessConfig
+    from flightstack.process_config import EXIT_TIMEOUT, EXIT_USAGE, ProcessConfig
     from flightstack.transport.udp import PortBusyError
 
     try:
@@ -93,6 +94,9 @@ def run(
     except (ConfigError, PortBusyError) as error:
         print(f"flightstack: {error}", file=sys.stderr)
         sys.exit(EXIT_USAGE)
+    except TargetError as error:
+        print(f"flightstack: {error}", file=sys.stderr)
+        sys.exit(EXIT_TIMEOUT)
     _introduce(vehicle_process, config, process)
     sys.exit(vehicle_process.run())
 
@@ -127,8 +131,9 @@ def _check(config: StackConfig) -> None:
     """Build the stack, which compiles the loops, and say that it can fly; raise ConfigError."""
     from flightstack.assembly import build
 
-    vehicle_name = build(config, lambda: None).vehicle.name
-    print(f"flightstack: {vehicle_name} with {config.controller} ({config.gains}) is ready to fly")
+    stack = build(config, lambda: None)
+    stack.loops.close()
+    print(f"flightstack: {stack.vehicle.name} with {config.controller} ({config.gains}) is ready to fly")
 
 
 def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig) -> None:
@@ -144,13 +149,17 @@ def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig
     clock = "lockstep" if config.lockstep else "realtime"
     print(
         f"flightstack: {stack.vehicle.name}, {config.controller} ({config.gains}), "
-        f"{config.inner_hz:g}/{config.outer_hz:g} Hz, {clock}; "
+        f"{_loops_words(config)}{config.inner_hz:g}/{config.outer_hz:g} Hz, {clock}; "
         f"simulator {process.simulator_host}:{process.simulator_port}, {described(process.ports)}",
         flush=True,
     )
     signed = process.signing_key is not None and not process.allow_unsigned
     if (caution := warning(process.ports, signed=signed)) is not None:
         complain(caution)
+
+
+def _loops_words(config: StackConfig) -> str:
+    return "" if config.loops == "python" else f"loops {config.loops}, "
 
 
 def main() -> None:

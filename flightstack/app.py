@@ -11,6 +11,7 @@ from types import FrameType
 
 from flightstack.clock import DeadlineScheduler, ask_for_punctual_sleeps
 from flightstack.config import StackConfig
+from flightstack.firmware.errors import TargetError
 from flightstack.ground_end import GroundEnd
 from flightstack.modes import Mode
 from flightstack.process_config import (
@@ -69,6 +70,9 @@ class App:
             if str(ended):
                 complain(ended)
             code = ended.code
+        except TargetError as error:
+            complain(error)
+            code = EXIT_TIMEOUT
         except LinkClosedError:
             code = self._simulator_gone()
         finally:
@@ -110,6 +114,7 @@ class App:
         self._ground.leave(time.monotonic())  # with the command's answer
         self._files.close_parameters()
         self._files.close_signing()
+        self._files.close_loops()
         self.stack = self._files.build(config_after(old, self._config))
         self._ground.join(self.stack.ground)
         carry_over(old, self.stack)
@@ -133,6 +138,7 @@ class App:
     def _close(self, simulator: TcpClient | None, orderly: bool) -> None:
         """End the log and, if all is in order, say goodbye: who hears nothing counts us as lost."""
         self.stack.recorder.close()
+        self._files.close_loops()
         self._files.close_parameters()
         if (problem := self._files.take_problem()) is not None:
             complain(problem)

@@ -14,11 +14,12 @@ from flightstack import __version__
 from flightstack.autopilot import Autopilot
 from flightstack.clock import LoopTiming, Rates, rates
 from flightstack.commands import VehicleContext
-from flightstack.config import LOOPS, StackConfig
+from flightstack.config import StackConfig
 from flightstack.contract import LoopRow
 from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import load_controller
-from flightstack.control.loops import PythonLoops
+from flightstack.firmware.c_loops import LoopsSetup
+from flightstack.firmware.targets import make_loops
 from flightstack.ground.facts import AutopilotFacts
 from flightstack.ground.hub import GroundHub
 from flightstack.guidance.navigator import Navigator
@@ -28,7 +29,6 @@ from flightstack.logging.recorder import FlightRecorder, OpenLog
 from flightstack.mavlink.services.log_store import NO_LOGS, LogStore
 from flightstack.mavlink.simulator_link import SimulatorLink
 from flightstack.parameters import behaviour_of, connect_parameters, load_parameters
-from flightstack.params.errors import ConfigError
 from flightstack.params.gains_file import open_gains
 from flightstack.params.identity import AUTOPILOT, GENERIC, SYSTEM_ID
 from flightstack.params.param_file import LoadedParams
@@ -51,6 +51,7 @@ class Stack(NamedTuple):
     params: ParamStore
     loaded_params: LoadedParams
     """What the parameter file held at the start."""
+    loops: ControlBackend
 
 
 def vehicle_of(config: StackConfig) -> Vehicle:
@@ -64,18 +65,18 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
 
     Raise ConfigError for anything in the configuration that cannot fly.
     """
-    if config.loops not in LOOPS:
-        raise ConfigError("--loops", config.loops, f"is not one of {', '.join(LOOPS)}")
     vehicle = vehicle_of(config)
     pace = rates(config.inner_hz, config.outer_hz)
-    backend = PythonLoops(
+    setup = LoopsSetup(
         vehicle,
         load_controller(config.controller),
         open_gains(config.gains),
+        math.radians(config.behaviour.max_tilt_deg),
         pace.inner_hz,
         pace.outer_hz,
-        math.radians(config.behaviour.max_tilt_deg),
+        pace.divisor,
     )
+    backend = make_loops(config.loops, setup, config.lockstep)
     info: dict[str, str | int | float] = {
         "sys_name": "flightstack",
         "ver_sw": __version__,
@@ -83,6 +84,7 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
         "controller": config.controller,
         "gains": config.gains,
         "loops": config.loops,
+        "ver_loops": backend.version,
         "inner_hz": pace.inner_hz,
         "outer_hz": pace.outer_hz,
     }
@@ -110,7 +112,9 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
     generic = params.value(AUTOPILOT) == GENERIC
     facts = AutopilotFacts(autopilot, vehicle, system_id, generic, report.message, lambda: simulator.battery)
     ground = GroundHub(VehicleContext(autopilot, params, simulator, generic, logs=logs), facts, system_id)
-    return Stack(vehicle, pace, simulator, autopilot, ground, recorder, timing, report, params, loaded)
+    return Stack(
+        vehicle, pace, simulator, autopilot, ground, recorder, timing, report, params, loaded, backend
+    )
 
 
 def warm_up(backend: ControlBackend, navigator: Navigator, simulator: SimulatorLink) -> None:

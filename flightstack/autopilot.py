@@ -10,7 +10,7 @@ from flightstack.commander.failsafe import Action, Decision, Failsafe
 from flightstack.commander.ground_watch import GroundWatch
 from flightstack.commander.supervisor import EVENTS_OF_ACTION, Supervisor
 from flightstack.commander.transitions import Event, Facts, Need, Outcome, Status, transition
-from flightstack.contract import FloatArray, LoopRow, LoopStatus
+from flightstack.contract import FloatArray, LoopFlags, LoopRow, LoopStatus
 from flightstack.control.backend import ControlBackend
 from flightstack.geodesy import GeoPoint
 from flightstack.guidance.navigator import Navigator
@@ -62,6 +62,7 @@ class Autopilot(PlanKeeper):
         self._tick = 0
         self._flying = False
         self._target_is_given = False  # by guidance, in place of the outer loop's
+        self._loops_begin = False  # in this tick
         self._ground = GroundWatch()
         self._takeoff_altitude_m = behaviour.takeoff_altitude_m
         self.has_state = False  # set once a state has arrived
@@ -81,7 +82,7 @@ class Autopilot(PlanKeeper):
         if outer_due:
             self._supervise(time_us)
             self._guide()
-        row = self._recorder.inner_row(time_us)
+        row, flags = self._recorder.inner_row(time_us), 0
         if not self._flying:
             self._backend.idle(state, self._rotor_speed, now.status.armed, row)
             self.supervisor.follow_rotors(row)
@@ -92,11 +93,15 @@ class Autopilot(PlanKeeper):
             aims = outer_due and not self._target_is_given
             self._backend.step(state, now.setpoint, self._rotor_speed, aims, row)
             self.supervisor.follow_rotors(row)
+            flags = LoopFlags.OUTER_DUE if aims else LoopFlags.SET_TARGET
+            if self._loops_begin:
+                flags |= LoopFlags.RESET
+                self._loops_begin = False
         now.row = row
         if outer_due:
             if self.supervisor.state_is_new:  # what the loops make of a frozen state is nothing to hold
                 self._good_row[:] = row
-            self._recorder.outer(time_us, state, now.setpoint, now.attitude_target)
+            self._recorder.outer(time_us, state, now.setpoint, now.attitude_target, flags)
         commands: FloatArray = row[LoopRow.ROTOR_COMMAND]
         return commands
 
@@ -307,6 +312,7 @@ class Autopilot(PlanKeeper):
         starting = flying and not self._flying
         if starting:
             self._backend.reset(self._state)
+            self._loops_begin = True
             self._navigator.rest_at(self._state)
         if status.mode is Mode.RETURN and entering:
             north_m, east_m = float(self._state[0]), float(self._state[1])

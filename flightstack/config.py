@@ -15,7 +15,6 @@ DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
 DEFAULT_CONTROLLER = "pid"
 DEFAULT_INNER_HZ = 500.0
 DEFAULT_OUTER_HZ = 100.0
-LOOPS = ("python",)
 
 
 @dataclass(frozen=True)
@@ -26,6 +25,7 @@ class StackConfig:
     controller: str = DEFAULT_CONTROLLER
     gains: str = DEFAULT_GAINS
     loops: str = "python"
+    """Which loops fly; ``flightstack.firmware.choice`` has what may stand here."""
     inner_hz: float = DEFAULT_INNER_HZ
     outer_hz: float = DEFAULT_OUTER_HZ
     ideal_rotors: bool = False

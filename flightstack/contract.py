@@ -51,6 +51,17 @@ class LoopStatus:
     INPUT_STALE = 128
 
 
+class LoopFlags:
+    """Bits that say what a tick of the loops begins with; FS_PIL_STEP and the log carry them."""
+
+    OUTER_DUE = 1
+    """The outer loop runs on the setpoint."""
+    SET_TARGET = 2
+    """Guidance gives the attitude target, in place of the outer loop."""
+    RESET = 4
+    """The loops forget the past: they begin to fly."""
+
+
 class Vector3(NamedTuple):
     """A vector; its name tells frame and unit."""
 

@@ -16,7 +16,14 @@ OuterHz = Annotated[
     typer.Option(help="Rate of the outer loop [Hz]; divides the inner rate [nearest to 100]."),
 ]
 Clock = Annotated[str, typer.Option(help="lockstep (the simulator owns time) or realtime.")]
-Loops = Annotated[str, typer.Option(help="Which loops fly: python.")]
+Loops = Annotated[
+    str,
+    typer.Option(
+        help="Which loops fly: python, c (compiled here), or those of a target: host (a process), emulated "
+        "(a Cortex-M4F), serial:DEVICE[:BAUD] (a board).",
+        metavar="LOOPS",
+    ),
+]
 SimHost = Annotated[str, typer.Option(help="Host of the simulator.")]
 SimPort = Annotated[int | None, typer.Option(help="Port of the simulator [4560 + instance].")]
 SimTimeout = Annotated[float, typer.Option(help="Longest wait for the simulator [s].")]

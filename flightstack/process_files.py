@@ -6,6 +6,7 @@ from pathlib import Path
 
 from flightstack.assembly import Stack, build
 from flightstack.config import StackConfig
+from flightstack.firmware.targets import finish_loops
 from flightstack.logging.flight_log import FlightLog
 from flightstack.logging.log_files import LogFiles
 from flightstack.logging.log_library import LogLibrary
@@ -49,6 +50,15 @@ class ProcessFiles:
         """Save what has changed; a second call does nothing."""
         if self._saver is not None:
             self._saver.close()
+
+    def close_loops(self) -> None:
+        """End the loops; those of a target leave the record of their link beside the log."""
+        if self._stack is None:
+            return
+        try:
+            finish_loops(self._stack.loops, self._process.log)
+        except OSError as error:
+            complain(f"the record of the target's link cannot be written: {error}")
 
     def close_signing(self) -> None:
         """Keep the time of the newest signature, and end; nothing is signed after it."""

@@ -24,9 +24,14 @@ class Recorder(Protocol):
         """Return the row, shape (48,), that the inner loop fills in this tick."""
 
     def outer(
-        self, time_us: int, state: FloatArray, setpoint: FloatArray, attitude_target: FloatArray
+        self,
+        time_us: int,
+        state: FloatArray,
+        setpoint: FloatArray,
+        attitude_target: FloatArray,
+        loop_flags: int,
     ) -> None:
-        """Record one outer tick."""
+        """Record one outer tick; ``loop_flags`` say what the loops began it with, 0 while they rest."""
 
     def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
         """Record mode and arming, and whether a failsafe acts, when one of them has changed."""

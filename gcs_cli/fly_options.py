@@ -9,6 +9,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from flightstack.clock import nearest_outer_hz, rates
+from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.geodesy import GeoPoint
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
@@ -51,6 +52,7 @@ class FlyOptions:
     battery_drain: float | None = None
     faults: tuple[str, ...] = ()
     params: Path | None = None
+    loops: str = PYTHON
 
     @property
     def outer_rate_hz(self) -> float:
@@ -104,6 +106,7 @@ def _check_flags(options: FlyOptions) -> None:
         )
     if options.plant not in PLANTS:
         raise CliError(f"--plant {options.plant}: expected {' or '.join(PLANTS)}", USAGE)
+    parse_loops(options.loops)
     if options.speed != "max":
         _number("--speed", options.speed, 0.001, 10_000.0)
     if options.wind is not None:
@@ -194,6 +197,7 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path) -> list[s
         f"--vehicle={options.vehicle}",
         f"--controller={options.controller}",
         f"--gains={options.gains}",
+        f"--loops={options.loops}",
         f"--inner-hz={options.inner_hz!r}",
         f"--outer-hz={options.outer_rate_hz!r}",
         f"--sim-port={options.simulator_port}",

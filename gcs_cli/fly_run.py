@@ -171,7 +171,7 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
         controller=options.controller,
         gains=options.gains,
         plant=options.plant,
-        loops="python",
+        loops=options.loops,
         seed=options.seed,
         wind=options.wind,
         gust=options.gust,

@@ -17,6 +17,8 @@ class ControlBackend(Protocol):
     """
 
     name: str
+    version: str
+    """What computes: implementation and version, for the log."""
     attitude_target: FloatArray
     """Array form of the latest ``AttitudeTarget``, shape (5,)."""
 
@@ -53,3 +55,6 @@ class ControlBackend(Protocol):
 
     def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
         """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""
+
+    def close(self) -> None:
+        """End; nothing is called after it."""

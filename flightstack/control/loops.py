@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, TypeAlias
 
+import numba
 import numpy as np
 
 from flightstack.arrays import attitude_target, position_setpoint, store_attitude_target, vehicle_state
@@ -28,6 +29,7 @@ from flightstack.control.attitude_reference import (
     in_body_frame,
 )
 from flightstack.control.controller_loading import compile_error
+from flightstack.control.idle import IdleRow
 from flightstack.control.loop_parameters import LoopParameters, loop_numbers
 from flightstack.control.mixer import Mixer, mix, mixer_for, relative_rotor_speed
 from flightstack.control.position_pid import (
@@ -239,6 +241,7 @@ class PythonLoops:
     """The loops as compiled Python; implements ``ControlBackend``."""
 
     name = "python"
+    version = f"Python, Numba {numba.__version__}"
 
     def __init__(
         self,
@@ -270,7 +273,7 @@ class PythonLoops:
         self.parameter_specs = numbers.specs
         self._last: FloatArray = kept["last"]
         self._position_memory = np.zeros(POSITION_MEMORY_SIZE)
-        self._idle_speed = np.array([max(0.0, r.min_speed_rad_s) for r in vehicle.rotors])
+        self._idle = IdleRow(vehicle)
         self._kernel = specialise(
             inner_kernel,
             controller.key,
@@ -345,10 +348,7 @@ class PythonLoops:
 
     def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
         """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""
-        row[:] = 0.0
-        row[LoopRow.STATE] = state
-        row[LoopRow.REFERENCE_ATTITUDE] = state[6:10]
-        if armed:
-            row[COMMAND_AT : COMMAND_AT + self._idle_speed.size] = self._idle_speed
-        row[LoopRow.ROTOR_SPEED] = rotor_speed_rad_s
-        row[LoopRow.STATUS] = LoopStatus.IDLE
+        self._idle.write(state, rotor_speed_rad_s, armed, row)
+
+    def close(self) -> None:
+        """End: there is nothing to end."""

@@ -50,15 +50,21 @@ class FlightRecorder:
         return self._scratch if self._log is None else self._log.inner.append(time_us)
 
     def outer(
-        self, time_us: int, state: FloatArray, setpoint: FloatArray, attitude_target: FloatArray
+        self,
+        time_us: int,
+        state: FloatArray,
+        setpoint: FloatArray,
+        attitude_target: FloatArray,
+        loop_flags: int,
     ) -> None:
-        """Record one outer tick."""
+        """Record one outer tick; ``loop_flags`` say what the loops began it with, 0 while they rest."""
         if self._log is None:
             return
         row = self._log.outer.append(time_us)
         row[OUTER.state : OUTER.setpoint] = state
         row[OUTER.setpoint : OUTER.target_attitude] = setpoint
-        row[OUTER.target_attitude :] = attitude_target
+        row[OUTER.target_attitude : OUTER.loop_flags] = attitude_target
+        row[OUTER.loop_flags] = loop_flags
 
     def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
         """Record mode and arming, and whether a failsafe acts; arming begins a log, disarming ends it."""

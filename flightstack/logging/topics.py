@@ -22,7 +22,8 @@ class OuterColumns(NamedTuple):
     setpoint: int = 13  # PositionSetpoint, 11
     target_attitude: int = 24  # AttitudeTarget: quaternion, 4
     target_thrust: int = 28  # AttitudeTarget: thrust [N]
-    size: int = 29
+    loop_flags: int = 29  # LoopFlags, 0 while the loops rest
+    size: int = 30
 
 
 OUTER = OuterColumns()
@@ -121,6 +122,10 @@ OUTER_TOPICS = (
     Topic(
         "vehicle_attitude_setpoint",
         # PX4's thrust_body is normalised; ours is in newtons, so it has a name of its own
-        (Field("float", "q_d", 4, OUTER.target_attitude), Field("float", "thrust_n", 0, OUTER.target_thrust)),
+        (
+            Field("float", "q_d", 4, OUTER.target_attitude),
+            Field("float", "thrust_n", 0, OUTER.target_thrust),
+            Field("uint8_t", "loop_flags", 0, OUTER.loop_flags),
+        ),
     ),
 )

@@ -53,6 +53,12 @@ def fly(
     instance: Annotated[int, typer.Option(help="Shifts all ports, to fly beside another one.")] = 0,
     ideal_rotors: Annotated[bool, typer.Option("--ideal-rotors", help="No rotor lag, no limits.")] = False,
     params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None,
+    loops: Annotated[
+        str,
+        typer.Option(
+            metavar="LOOPS", help="python, c, or those of a target: host, emulated, serial:DEVICE[:BAUD]."
+        ),
+    ] = "python",
     open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
     as_json: JsonOption = False,
     timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 60]")] = None,
@@ -70,7 +76,7 @@ def fly(
     options = FlyOptions(
         plan, controller, gains, plant, speed, inner_hz, outer_hz, seed, wind, gust, torque_gust, vehicle,
         instance, ideal_rotors, 60.0 if settings.timeout_s is None else settings.timeout_s, limit,
-        battery_start, battery_capacity, battery_drain, tuple(fault or ()), params,
+        battery_start, battery_capacity, battery_drain, tuple(fault or ()), params, loops,
     )  # fmt: skip
     items = checked_plan(options)
     console = FlyConsole(stderr=as_json, highlight=False)

@@ -221,6 +221,7 @@ def test_the_children_are_told_everything() -> None:
         2,
         True,
         12.0,
+        loops="c",
     )
     home = GeoPoint(47.1, -8.2, 3.5)
     assert simulator_arguments(options, home) == [
@@ -229,7 +230,7 @@ def test_the_children_are_told_everything() -> None:
         "--ideal-rotors",
     ]  # fmt: skip
     assert stack_arguments(options, home, Path("runs/x")) == [
-        "--vehicle=x_quad", "--controller=backstepping", "--gains=paper",
+        "--vehicle=x_quad", "--controller=backstepping", "--gains=paper", "--loops=c",
         "--inner-hz=1000.0", "--outer-hz=250.0", "--sim-port=4562", "--sim-timeout=12",
         "--instance=2", "--gcs-port=14570", "--log=runs/x/flight.ulg",
         "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--params=none",

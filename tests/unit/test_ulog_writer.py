@@ -64,6 +64,7 @@ def traces() -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(7)
     inner, outer = rng.normal(size=(103, LoopRow.SIZE)), rng.normal(size=(21, OUTER.size))
     inner[:, LoopRow.STATUS] = rng.integers(0, 2**16, 103)
+    outer[:, OUTER.loop_flags] = rng.integers(0, 2**8, 21)
     return inner, outer
 
 
@@ -87,7 +88,7 @@ def test_every_loop_topic_and_field_reads_back(traces: tuple[np.ndarray, np.ndar
                     expected = rows[:, field.source : field.source + field.length]
                 else:
                     got, expected = data[field.name], rows[:, field.source]
-                dtype = np.uint16 if field.type == "uint16_t" else np.float32
+                dtype = {"uint16_t": np.uint16, "uint8_t": np.uint8}.get(field.type, np.float32)
                 assert got.dtype == dtype
                 assert np.array_equal(got, expected.astype(dtype)), f"{topic.name}.{field.name}"
                 checked += max(1, field.length)
@@ -99,7 +100,8 @@ def test_columns_of_the_traces_neither_overlap_nor_leave_gaps() -> None:
     used = [(f.source, max(1, f.length)) for topic in inner_topics(8) for f in topic.fields]
     covered = sorted(column for source, length in used for column in range(source, source + length))
     assert covered == list(range(6, LoopRow.SIZE))  # position and velocity are logged at the outer rate
-    assert (OUTER.setpoint, OUTER.target_attitude, OUTER.target_thrust, OUTER.size) == (13, 24, 28, 29)
+    assert (OUTER.setpoint, OUTER.target_attitude, OUTER.target_thrust) == (13, 24, 28)
+    assert (OUTER.loop_flags, OUTER.size) == (29, 30)
 
 
 def test_local_position_has_heading_reference_and_flags(traces: tuple[np.ndarray, np.ndarray]) -> None:

@@ -1,0 +1,141 @@
+"""Compile the firmware for this machine: once for each state of sources, compiler and flags.
+
+What is made lies in ``~/.cache/flightstack/firmware``. It is written under another name and renamed, so that
+processes which start together cannot meet half a file.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from flightstack.firmware.sources import c_files, digest, files, firmware_root, source_hash
+
+EXACT = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
+"""Every operation is rounded as it is written, on every compiler."""
+KEPT_STATES = 8
+COMPILE_LIMIT_S = 300.0
+
+
+class BuildError(RuntimeError):
+    """Nothing could be compiled; the text is one sentence for the user."""
+
+
+class Compiler(NamedTuple):
+    """A C compiler of this machine."""
+
+    command: tuple[str, ...]
+    version: str
+    """Name and version, one line."""
+
+
+@functools.cache
+def host_compiler() -> Compiler:
+    """Return the compiler that $CC names, or the first of cc, gcc, clang and zig's; raise BuildError."""
+    named = os.environ.get("CC")
+    tried = [shlex.split(named)] if named else []
+    tried += [["cc"], ["gcc"], ["clang"]]
+    for command in tried:
+        if command and shutil.which(command[0]) is not None and (version := _version(command)):
+            return Compiler(tuple(command), version)
+    zig = [sys.executable, "-m", "ziglang", "cc"]
+    if version := _version(zig):
+        return Compiler((*zig, "-fno-sanitize=all"), f"zig {version}")
+    names = ", ".join([*([named] if named else []), "cc", "gcc", "clang"])
+    raise BuildError(
+        f"there is no C compiler: tried {names} and zig (pip install 'flightstack[firmware]' brings it)"
+    )
+
+
+def _version(command: Sequence[str]) -> str:
+    """Return the first line that a compiler says of itself; empty when it cannot be run."""
+    try:
+        done = subprocess.run(
+            [*command, "--version"], capture_output=True, text=True, check=False, timeout=COMPILE_LIMIT_S
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.partition("\n")[0].strip() if done.returncode == 0 else ""
+
+
+def cached(
+    name: str, compiler: Compiler, flags: Sequence[str], sources: Sequence[Path], headers: Sequence[Path] = ()
+) -> Path:
+    """Return what ``compiler flags sources -o`` makes, compiled now if it is not there; raise BuildError.
+
+    ``headers``: files that the sources include, which count for the state as they do.
+    """
+    named = [path for path in (*sources, *headers) if path.is_relative_to(firmware_root())]
+    state = digest(sorted({*named, *files("core", "mavlink", "app")})).hex()[:16]
+    key = hashlib.sha256("\0".join([*compiler.command, compiler.version, *flags]).encode()).hexdigest()[:12]
+    stem, dot, ending = name.partition(".")
+    place = _folder(state) / f"{stem}-{key}{dot}{ending}"
+    if not place.exists():
+        _compile(place, [*compiler.command, *flags, *map(str, sources)])
+    return place
+
+
+def _folder(state: str) -> Path:
+    """Return the folder for a state of the sources; the oldest states are forgotten."""
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flightstack" / "firmware"
+    folder = base / state
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        states = sorted(base.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+        for old in states[KEPT_STATES:]:
+            shutil.rmtree(old, ignore_errors=True)
+    except OSError:  # a read-only home, or another process tidies up
+        if not os.access(folder, os.W_OK):
+            return Path(tempfile.mkdtemp(prefix="flightstack-firmware-"))
+    return folder
+
+
+def _compile(place: Path, command: list[str]) -> None:
+    fresh = place.with_name(f"{place.name}.{os.getpid()}")
+    try:
+        done = subprocess.run(
+            [*command, "-lm", "-o", str(fresh)], capture_output=True, text=True, check=False,
+            timeout=COMPILE_LIMIT_S,
+        )  # fmt: skip
+        if done.returncode != 0:
+            said = next((line for line in done.stderr.splitlines() if "error" in line), "it said nothing")
+            raise BuildError(f"the firmware does not compile with {command[0]}: {said}")
+        fresh.replace(place)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise BuildError(f"the firmware cannot be compiled with {command[0]}: {error}") from error
+    finally:
+        fresh.unlink(missing_ok=True)
+
+
+def definitions(compiler: Compiler) -> list[str]:
+    """Return the flags that tell a port the hash of its sources, and its compiler."""
+    octets = ",".join(f"0x{octet:02x}" for octet in source_hash())
+    plain = "".join(c for c in compiler.version if c.isalnum() or c in " .-+()")[:47]
+    return [f"-DFS_SOURCE_HASH={octets}", f'-DFS_COMPILER="{plain}"']
+
+
+def includes(*folders: str) -> list[str]:
+    """Return the flags for the headers of folders."""
+    return [f"-I{firmware_root() / folder}" for folder in folders]
+
+
+def host_library(real: str = "float") -> Path:
+    """Return the loops as a shared library for ``c_loops``, of ``float`` or ``double``; raise BuildError."""
+    compiler = host_compiler()
+    flags = [*EXACT, "-shared", "-fPIC", *includes("core", "ports/host")]
+    if real == "double":
+        flags.append("-DFS_DOUBLE")
+    port = firmware_root() / "ports" / "host"
+    return cached(
+        f"loops-{real}.so", compiler, flags, [*c_files("core"), port / "fs_sil.c"], [port / "fs_sil.h"]
+    )

@@ -1,0 +1,155 @@
+"""The loops in C as a ``ControlBackend``, wherever they are computed: in this process, or on a target."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from flightstack.contract import ATTITUDE_TARGET_SIZE, STATE_SIZE, FloatArray, LoopFlags, LoopRow, LoopStatus
+from flightstack.control.attitude_controller import AttitudeController
+from flightstack.control.idle import IdleRow
+from flightstack.control.loop_parameters import loop_numbers
+from flightstack.firmware.numbers import target_numbers
+from flightstack.params.spec import ParamSpec
+from flightstack.params.toml_reader import Table
+from flightstack.params.vehicle import Vehicle
+
+INPUT_SIZE, OUTPUT_SIZE = 29, 32
+SETPOINT_AT, TARGET_AT = 13, 24
+"""Where setpoint and attitude target begin in the input; the state comes first."""
+STAGES = slice(LoopRow.REFERENCE_ATTITUDE.start, LoopRow.ROTOR_SPEED.start)
+"""Reference, wrenches and rotor commands: beside each other in the row as in the output."""
+NOT_FINITE = LoopStatus.INPUT_NOT_FINITE | LoopStatus.OUTPUT_NOT_FINITE
+
+
+class Computer(Protocol):
+    """What computes a tick of the loops."""
+
+    input: FloatArray
+    """State (13), setpoint (11), attitude target (5); shape (29,), written by the caller before a step."""
+    output: FloatArray
+    """Attitude target (5), reference (10), wrench (4), wrench achieved (4), rotor commands (8), status."""
+    version: str
+    """What computes, for the log."""
+
+    def set(self, name: str, value: float) -> None:
+        """Change a number from the next step on."""
+
+    def get(self, name: str) -> float:
+        """Return a number as the computer has it."""
+
+    def step(self, flags: int) -> None:
+        """Compute a tick from ``input`` into ``output``; ``flags`` are ``LoopFlags``."""
+
+    def close(self) -> None:
+        """End; nothing is computed after it."""
+
+
+class LoopsSetup(NamedTuple):
+    """What loops are made of."""
+
+    vehicle: Vehicle
+    controller: AttitudeController
+    gains: Table
+    max_tilt_rad: float
+    inner_hz: float
+    outer_hz: float
+    divisor: int
+
+    def numbers(self) -> dict[str, float]:
+        """Return the numbers for C by name; raise ConfigError when C cannot fly this."""
+        values = target_numbers(
+            self.vehicle, self.controller, self.gains, self.max_tilt_rad, self.inner_hz, self.divisor
+        )
+        return {name: value + 0.0 for name, value in values.items()}  # a target's FPU may know no -0
+
+
+class CLoops:
+    """The loops in C; implements ``ControlBackend``.
+
+    A reset takes place in the next step, at that step's state, as on a target that hears of it with the step.
+    """
+
+    def __init__(self, name: str, computer: Computer, setup: LoopsSetup) -> None:
+        """Fly on ``computer``, which has been given the numbers of ``setup``; raise ConfigError."""
+        self.name = name
+        self.version = computer.version
+        self.computer = computer
+        numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
+        self.parameter_specs: Sequence[ParamSpec] = numbers.specs
+        self._names = frozenset(spec.name for spec in numbers.specs)
+        self.attitude_target: FloatArray = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+        self._idle = IdleRow(setup.vehicle)
+        self._last: FloatArray = np.zeros(LoopRow.SIZE)
+        self._pending = LoopFlags.RESET
+        self._output = computer.output
+        self._state: FloatArray = computer.input[:STATE_SIZE]
+        self._setpoint: FloatArray = computer.input[SETPOINT_AT:TARGET_AT]
+        self._target: FloatArray = computer.input[TARGET_AT:INPUT_SIZE]
+
+    def get_parameter(self, name: str) -> float:
+        """Return a parameter as the loops use it; raise KeyError if they have none of that name."""
+        if name not in self._names:
+            raise KeyError(name)
+        return self.computer.get(name)
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Change a parameter from the next tick on; raise KeyError if unknown."""
+        if name not in self._names:
+            raise KeyError(name)
+        self.computer.set(name, value)
+
+    def reset(self, state: FloatArray) -> None:
+        """Forget the past: integrators zero, the reference at the present attitude, at rest."""
+        self._pending = LoopFlags.RESET
+        self.attitude_target[:4] = state[6:10]
+        self.attitude_target[4] = 0.0
+        self._last[:] = 0.0
+
+    def set_attitude_target(self, target: FloatArray) -> None:
+        """Fly ``target``, shape (5,), in place of the outer loop's: call it once in each outer period."""
+        self._pending |= LoopFlags.SET_TARGET
+        self._target[:] = target
+        self.attitude_target[:] = target
+
+    def step(
+        self,
+        state: FloatArray,
+        setpoint: FloatArray,
+        rotor_speed_rad_s: FloatArray,
+        outer_due: bool,
+        row: FloatArray,
+    ) -> None:
+        """Run the outer loop if it is due, then the inner loop; write ``row`` with the rotor commands."""
+        self._state[:] = state
+        self._setpoint[:] = setpoint
+        flags = self._pending | LoopFlags.OUTER_DUE if outer_due else self._pending
+        self._pending = 0
+        self.computer.step(flags)
+        output = self._output
+        self.attitude_target[:] = output[:ATTITUDE_TARGET_SIZE]
+        status = output[-1]
+        if int(status) & NOT_FINITE:  # the last sound row is repeated
+            row[:] = self._last
+        else:
+            row[:STATE_SIZE] = state
+            row[STAGES] = output[ATTITUDE_TARGET_SIZE:-1]
+            row[LoopRow.ROTOR_SPEED] = rotor_speed_rad_s
+            self._last[:] = row
+        row[LoopRow.STATUS] = status
+
+    def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
+        """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""
+        self._idle.write(state, rotor_speed_rad_s, armed, row)
+
+    def close(self) -> None:
+        """End; the loops fly no more."""
+        self.computer.close()
+
+
+def as_carried(value: float) -> float:
+    """Return a number as float32 carries it; infinite beyond its range."""
+    return float(np.float32(value)) if abs(value) <= 3.4028235e38 else math.copysign(math.inf, value)
