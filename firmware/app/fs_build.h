@@ -10,8 +10,10 @@
 #define FS_TEXT_OF(number) #number
 #define FS_TEXT(number) FS_TEXT_OF(number)
 
-/* 47 characters of it are told. */
-#if defined(__TI_COMPILER_VERSION__)
+/* 47 characters of it are told; who compiles may know better: -DFS_COMPILER="..." */
+#if defined(FS_COMPILER)
+/* given */
+#elif defined(__TI_COMPILER_VERSION__)
 #define FS_COMPILER "cl2000 " FS_TEXT(__TI_COMPILER_VERSION__)
 #elif defined(__clang__)
 #define FS_COMPILER "clang " __clang_version__
