@@ -104,7 +104,7 @@ def _compile(place: Path, command: list[str]) -> None:
     fresh = place.with_name(f"{place.name}.{os.getpid()}")
     try:
         done = subprocess.run(
-            [*command, "-lm", "-o", str(fresh)], capture_output=True, text=True, check=False,
+            [*command, *([] if "-nostdlib" in command else ["-lm"]), "-o", str(fresh)], capture_output=True, text=True, check=False,
             timeout=COMPILE_LIMIT_S,
         )  # fmt: skip
         if done.returncode != 0:

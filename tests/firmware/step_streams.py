@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from fastcrc import crc16
+
 from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
 from flightstack.mavlink.dialect import mavlink
-
 from tests.support.world import World
 
 OUTER_DUE, SET_TARGET, RESET = 1, 2, 4

@@ -6,6 +6,6 @@
 
 uint32_t fs_port_clock(void);      /* instructions executed so far, modulo 2^32 */
 fs_mailbox *fs_port_mailbox(void); /* mapped by the emulator */
-void fs_emulated_serve(void);      /* written by each image: one exchange */
+__attribute__((used)) void fs_emulated_serve(void); /* written by each image: one exchange */
 
 #endif

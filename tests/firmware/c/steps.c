@@ -2,6 +2,7 @@
 
 #define FNV_START 2166136261UL
 #define FNV_PRIME 16777619UL
+#define PARAM_SET_ID 23U
 #define NAME_ROOM 17U
 
 void steps_init(steps *s, fs_clock clock)
@@ -10,6 +11,7 @@ void steps_init(steps *s, fs_clock clock)
 
     s->clock = clock;
     s->most = nothing;
+    s->sum = nothing;
     fs_loops_init(&s->loops);
     fs_parser_init(&s->parser);
     s->steps = 0U;
@@ -82,11 +84,12 @@ static void write_report(const fs_loop_output *output, fs_pil_report *report)
     report->status = output->status;
 }
 
-static void keep_larger(uint32_t *most, uint32_t cost)
+static void account(uint32_t *most, uint32_t *sum, uint32_t cost)
 {
     if (cost > *most) {
         *most = cost;
     }
+    *sum += cost;
 }
 
 static uint16_t answer(steps *s)
@@ -97,10 +100,10 @@ static uint16_t answer(steps *s)
     fs_pil_step_decode(s->frame.payload, s->frame.length, &s->step);
     read_input(&s->step, &s->input);
     fs_loops_step(&s->loops, &s->input, s->clock, &s->output, &s->cost);
-    keep_larger(&s->most.outer, s->cost.outer);
-    keep_larger(&s->most.inner, s->cost.inner);
-    keep_larger(&s->most.mixer, s->cost.mixer);
-    keep_larger(&s->most.whole, s->cost.whole);
+    account(&s->most.outer, &s->sum.outer, s->cost.outer);
+    account(&s->most.inner, &s->sum.inner, s->cost.inner);
+    account(&s->most.mixer, &s->sum.mixer, s->cost.mixer);
+    account(&s->most.whole, &s->sum.whole, s->cost.whole);
     write_report(&s->output, &s->report);
     s->report.step = s->step.step;
     size = fs_pil_report_encode(&s->report, s->payload);
@@ -133,7 +136,7 @@ uint16_t steps_push(steps *s, fs_octet octet)
     if (s->frame.id == FS_PIL_STEP_ID) {
         return answer(s);
     }
-    if (s->frame.id == FS_PARAM_SET_ID) {
+    if (s->frame.id == PARAM_SET_ID) {
         set_parameter(s);
     }
     return 0U;

@@ -20,6 +20,7 @@ typedef struct {
     fs_clock clock; /* NULL but where instructions are counted */
     fs_loop_cost cost;
     fs_loop_cost most; /* the largest cost of each stage */
+    fs_loop_cost sum;  /* of all steps */
     fs_octet payload[FS_MAX_PAYLOAD];
     fs_octet out[FS_MAX_FRAME];
     uint32_t steps;   /* computed */

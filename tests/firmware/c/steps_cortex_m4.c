@@ -1,5 +1,5 @@
 /* The steps on the emulated Cortex-M4F: octets come through the mailbox, results go back as
- * steps_avr.c's do, and at the end the largest number of instructions of each stage.
+ * steps_avr.c's do, and at the end the largest number of instructions of each stage and their sums.
  */
 #include "emulated_start.h"
 #include "steps.h"
@@ -38,5 +38,9 @@ void fs_emulated_serve(void)
         put_u32(mailbox, all.most.inner);
         put_u32(mailbox, all.most.mixer);
         put_u32(mailbox, all.most.whole);
+        put_u32(mailbox, all.sum.outer);
+        put_u32(mailbox, all.sum.inner);
+        put_u32(mailbox, all.sum.mixer);
+        put_u32(mailbox, all.sum.whole);
     }
 }

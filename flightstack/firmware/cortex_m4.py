@@ -1,0 +1,79 @@
+"""Compile the firmware for an emulated Cortex-M4F, and what counts its instructions."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from flightstack.firmware.build import (
+    EXACT,
+    BuildError,
+    Compiler,
+    _version,
+    cached,
+    definitions,
+    host_compiler,
+    includes,
+)
+from flightstack.firmware.emulated import EmulatedTarget
+from flightstack.firmware.sources import PORTABLE, c_files, files, firmware_root
+
+CPU = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")
+"""The processor, as clang of zig names it: single precision in hardware, doubles forbidden by the sources."""
+BARE = (
+    "-fno-sanitize=all", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables", "-ffunction-sections", "-flto",
+    "-nostdlib", "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,-e,fs_emulated_exchange",
+)  # fmt: skip
+"""No library, no operating system; functions may be inlined across files."""
+_IMPLIED = ("__aeabi_memcpy", "__aeabi_memcpy4", "__aeabi_memclr", "__aeabi_memclr4", "__aeabi_memset4")
+"""Calls that the compiler adds after it has decided what is not called."""
+_PORT = "ports/cortex_m4"
+
+
+@functools.cache
+def cross_compiler() -> Compiler:
+    """Return zig's C compiler, which needs no installation but pip's; raise BuildError."""
+    zig = (sys.executable, "-m", "ziglang", "cc")
+    version = _version(zig)
+    if not version:
+        raise BuildError("zig is not installed: pip install 'flightstack[firmware]' brings it")
+    return Compiler(zig, f"zig {version}")
+
+
+def cortex_m4_image() -> Path:
+    """Return the application for the emulated Cortex-M4F as an ELF file; raise BuildError."""
+    return emulated_image(
+        "emulated.elf", [path for folder in PORTABLE for path in c_files(folder)], "emulated.c"
+    )
+
+
+def emulated_image(name: str, sources: Sequence[Path], *parts: str, flags: Sequence[str] = ()) -> Path:
+    """Return an image of ``sources`` and ``parts`` of the port with the entry that ``Emulator`` calls."""
+    compiler, port = cross_compiler(), firmware_root() / _PORT
+    own = [port / part for part in (*parts, "emulated_start.c", "support.c")]
+    kept = [f"-Wl,-u,{call}" for call in _IMPLIED]
+    script = f"-Wl,-T,{port / 'emulated.ld'}"
+    command = [
+        *CPU,
+        *EXACT,
+        *BARE,
+        *kept,
+        script,
+        *definitions(compiler),
+        *includes(*PORTABLE, _PORT),
+        *flags,
+    ]
+    return cached(name, compiler, command, [*sources, *own], [*files(_PORT), port / "emulated.ld"])
+
+
+def instruction_counter() -> Path:
+    """Return the library that counts instructions, compiled for this machine; raise BuildError."""
+    source = firmware_root() / _PORT / "emulator_counter.c"
+    return cached("counter.so", host_compiler(), ["-O2", "-shared", "-fPIC"], [source])
+
+
+def emulated_target(now_s: Callable[[], float] | None = None) -> EmulatedTarget:
+    """Compile the firmware if need be and start it on an emulated Cortex-M4F; raise BuildError, EmulationError."""
+    return EmulatedTarget(cortex_m4_image(), instruction_counter(), now_s)
