@@ -102,9 +102,10 @@ def _folder(state: str) -> Path:
 
 def _compile(place: Path, command: list[str]) -> None:
     fresh = place.with_name(f"{place.name}.{os.getpid()}")
+    libraries = [] if "-nostdlib" in command else ["-lm"]
     try:
         done = subprocess.run(
-            [*command, *([] if "-nostdlib" in command else ["-lm"]), "-o", str(fresh)], capture_output=True, text=True, check=False,
+            [*command, *libraries, "-o", str(fresh)], capture_output=True, text=True, check=False,
             timeout=COMPILE_LIMIT_S,
         )  # fmt: skip
         if done.returncode != 0:
