@@ -1,0 +1,32 @@
+/*
+ * SCIA (GPIO 84 out, 85 in: the USB bridge of the LaunchPad) through its FIFOs, interrupts and two rings. 8N1.
+ *
+ * The receive interrupt comes with every 8th octet, so that a burst costs little and 8 octets of time are left for it
+ * while the loops compute. What lies below that level in the FIFO is fetched by the main loop: the SCI has no interrupt
+ * for a line that fell silent. Errors are dealt with by the main loop as well, lest a line held low keep the processor in
+ * its interrupt. Sending goes on in the transmit interrupt for as long as there is something in the ring.
+ */
+#ifndef F28_SERIAL_H
+#define F28_SERIAL_H
+
+#include "fs_wire.h"
+
+void f28_serial_init(void); /* before interrupts are enabled */
+
+/* From every pass of the main loop: fetch what no interrupt brought, and bring the receiver back after an error. */
+void f28_serial_service(void);
+
+/* Take at most `room` received octets; returns how many. */
+uint16_t f28_serial_take(fs_octet *out, uint16_t room);
+
+/* Return how many octets f28_serial_give has room for. */
+uint16_t f28_serial_room(void);
+
+/* Queue octets to be sent; returns how many were taken, the first ones, which is all while there is room. */
+uint16_t f28_serial_give(const fs_octet *octets, uint16_t count);
+
+/* Totals since the start, modulo 2^32. */
+uint32_t f28_serial_overruns(void); /* octets lost because the ring was full, and times when the hardware lost some */
+uint32_t f28_serial_errors(void);   /* times when a framing, parity or break error was found */
+
+#endif

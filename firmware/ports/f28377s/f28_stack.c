@@ -1,0 +1,25 @@
+#include "f28_stack.h"
+
+#include "f28_board.h"
+
+#define PAINT 0xA5A5U
+
+void f28_stack_paint(volatile uint16_t *top)
+{
+    volatile uint16_t *at = top + F28_STACK_MARGIN;
+
+    while (at >= f28_stack && at < f28_stack + F28_STACK_WORDS) {
+        *at = PAINT;
+        at++;
+    }
+}
+
+uint32_t f28_stack_high_water(void)
+{
+    uint16_t used = F28_STACK_WORDS;
+
+    while (used > 0U && f28_stack[used - 1U] == PAINT) {
+        used--;
+    }
+    return used;
+}

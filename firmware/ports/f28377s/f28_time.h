@@ -1,0 +1,11 @@
+/* CPU timer 0 gives the milliseconds, CPU timer 1 runs freely and gives the cost of a step in processor cycles. */
+#ifndef F28_TIME_H
+#define F28_TIME_H
+
+#include "fs_wire.h"
+
+void f28_time_init(void);      /* before interrupts are enabled */
+uint32_t f28_now_ms(void);     /* since the start, modulo 2^32 */
+uint32_t f28_cycles(void);     /* of SYSCLK, counting up modulo 2^32: 21 s */
+
+#endif

@@ -1,0 +1,42 @@
+/*
+ * The chip that the tests simulate behind driverlib's names, cycle by cycle of SYSCLK: SCIA with its FIFOs, CPU timers
+ * 0 and 1, the interrupt controller, the watchdog, pins. Every call of a driverlib function takes FAKE_CALL cycles, in
+ * which octets come and go and interrupts strike, so the port is interrupted between any two of its calls.
+ */
+#ifndef FAKE_H
+#define FAKE_H
+
+#include "driverlib.h"
+
+#define FAKE_SYSCLK 200000000ULL
+#define FAKE_CALL 10U
+
+/* What the line brings: an octet in the low 8 bits, or with one of these. */
+#define FAKE_FRAMING 0x100U /* the octet arrives, its stop bit is low */
+#define FAKE_BREAK 0x200U   /* the line is low for longer than an octet: the receiver stops until its software reset */
+#define FAKE_PAUSE 0x400U   /* silence for the time of an octet */
+
+/*
+ * How a FIFO interrupt flag behaves, which TI's documents leave open: FAKE_LEVEL: it rises again as soon as it is cleared
+ * while its condition holds. FAKE_EDGE: it rises only when the condition begins to hold. The port has to live with both.
+ */
+#define FAKE_LEVEL 0U
+#define FAKE_EDGE 1U
+
+void fake_power_on(uint16_t flags_are, uint32_t reset_cause, uint32_t timer1_begins_at);
+void fake_run(uint32_t cycles); /* the processor is busy with something else; interrupts come through */
+uint64_t fake_time(void);       /* cycles */
+void fake_line(const uint16_t *octets, uint32_t count); /* append to what the line brings */
+uint32_t fake_line_waits(void);                         /* of it, not yet brought */
+uint32_t fake_sent(uint16_t *octets, uint32_t room);    /* take what left on the line */
+uint64_t fake_octet_cycles(void);                       /* time of an octet on the line, as SCIA is set */
+void fake_stop_timer0(void);
+uint32_t fake_watchdog_bites(void);  /* how often the watchdog ran out */
+uint32_t fake_watchdog_served(void);
+uint32_t fake_pin(uint32_t pin);     /* last level written */
+uint32_t fake_reset_cause(void);
+uint32_t fake_interrupts(uint32_t number);
+uint32_t fake_longest_masked(void);  /* cycles with interrupts off outside interrupts */
+const char *fake_misuse(void);       /* the first thing that the real chip would not have liked, or "" */
+
+#endif
