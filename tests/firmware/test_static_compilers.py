@@ -1,0 +1,120 @@
+"""Every portable source through every compiler, their warnings as errors, and without the words it must not use."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.firmware.static_support import (
+    CPPCHECK,
+    FAKE_DRIVERLIB,
+    FIRMWARE,
+    INCLUDES,
+    LANGUAGE,
+    TARGETS,
+    WARNINGS,
+    ZIG,
+    available,
+    code_lines,
+    portable_files,
+    portable_sources,
+    run,
+    without_comments,
+)
+
+POISON = ["gcc", "-std=c99", "-fsyntax-only", "-include", CPPCHECK / "poison.h", *INCLUDES]
+SIZEOF_IS_OF_AN_OBJECT = {
+    "fs_wire.c": ["memcpy(&bits, &value, sizeof bits);", "memcpy(&value, &bits, sizeof value);"]
+}
+"""The only two: memcpy counts chars as sizeof does, and both objects have 32 bits on every target."""
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_no_compiler_has_anything_to_say(name: str, tmp_path: Path) -> None:
+    target = available(TARGETS[name])
+    only = ["-r", "-o", "all.o"] if target.command == ZIG else ["-c"]
+    command = [*target.command, *LANGUAGE, *WARNINGS, *target.flags, *INCLUDES, *only, *portable_sources()]
+    done = run(command, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(list(tmp_path.glob("*.o"))) == (1 if target.command == ZIG else len(portable_sources()))
+
+
+@pytest.mark.parametrize("name", ["gcc", "clang"])
+def test_the_boards_port_compiles_on_a_host_without_a_word(name: str, tmp_path: Path) -> None:
+    """Against the tests' own driverlib. int has 32 bits here; cppcheck looks at it with 16."""
+    sources = sorted((FIRMWARE / "ports" / "f28377s").glob("*.c"))
+    assert sources
+    target = available(TARGETS[name])
+    folders = [*INCLUDES, f"-I{FIRMWARE / 'ports' / 'f28377s'}", "-isystem", FAKE_DRIVERLIB]
+    done = run([*target.command, *LANGUAGE, *WARNINGS, *target.flags, *folders, "-c", *sources], cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("path", portable_sources(), ids=lambda path: path.name)
+def test_no_source_uses_what_a_target_lacks(path: Path) -> None:
+    """The poison header ends the compilation at the first such word."""
+    available(TARGETS["gcc"])
+    allowed = ["-DPOISON_ALLOWS_MEMCPY"] if path.name in SIZEOF_IS_OF_AN_OBJECT else []
+    done = run([*POISON, *allowed, path])
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+FORBIDDEN = [
+    "uint8_t octet;",
+    "double x;",
+    "void f(void *a, void *b) { memcpy(a, b, 4); }",
+    "float root(float x) { return sqrtf(x); }",
+    "long many;",
+    "union both { float f; };",
+    "void f(void) { again: goto again; }",
+    "int size = sizeof(float);",
+]
+
+
+@pytest.mark.parametrize("code", FORBIDDEN)
+def test_the_poison_header_kills(code: str, tmp_path: Path) -> None:
+    available(TARGETS["gcc"])
+    (tmp_path / "bad.c").write_text(code + "\n")
+    done = run([*POISON, tmp_path / "bad.c"])
+    assert done.returncode != 0
+    assert "poisoned" in done.stderr
+
+
+def test_sizeof_counts_no_octets() -> None:
+    """A C28x counts 16 bits as one. The poison header sees code of one configuration, this every line."""
+    found = {
+        path.name: [line.strip() for _, line in code_lines(path) if re.search(r"\bsizeof\b", line)]
+        for path in portable_files()
+    }
+    assert {name: lines for name, lines in found.items() if lines} == SIZEOF_IS_OF_AN_OBJECT
+
+
+def test_the_boards_port_takes_no_sizes_either() -> None:
+    port = sorted((FIRMWARE / "ports" / "f28377s").glob("*.[ch]"))
+    assert port
+    used = [(path.name, n, line.strip()) for path in port for n, line in code_lines(path) if "sizeof" in line]
+    assert used == []
+
+
+SHIFTED_OCTET = re.compile(r"<<\s*(?:1[6-9]|2\d|3[01])\b")
+
+
+def test_shifts_by_a_word_are_of_a_longer_one() -> None:
+    """``<< 16`` of what C calls an int: nothing on a host shows that it is too short on an AVR or a C28x."""
+    lines = [line for path in portable_files() for _, line in code_lines(path) if SHIFTED_OCTET.search(line)]
+    assert [line.strip() for line in lines] == ["return low | (high << 16);"]  # two uint32_t in fs_get_u32
+
+
+PREPROCESSED_DOUBLE = re.compile(r"#ifdef FS_DOUBLE.*?(?:#else|#endif)", re.DOTALL)
+
+
+def test_literals_have_the_type_of_the_loops() -> None:
+    """A literal without suffix is a double: -Wdouble-promotion does not see one that is stored at once."""
+    bare = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+|\d+[eE])(?:[eE][-+]?\d+)?(?![\w.])")
+    for path in portable_files():
+        text = PREPROCESSED_DOUBLE.sub("", without_comments(path.read_text()))
+        text = re.sub(r"FS_LIT\([^()]*\)", "", text)
+        text = re.sub(r"#if defined\(FS_DOUBLE\).*", "", text)
+        assert bare.findall(text) == [], path.name

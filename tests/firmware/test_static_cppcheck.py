@@ -1,0 +1,150 @@
+"""cppcheck over the portable firmware and the F28377S port: chars and ints of 16 bits, and MISRA C:2012."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tomllib
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from tests.firmware.static_support import (
+    CPPCHECK,
+    FAKE_DRIVERLIB,
+    FIRMWARE,
+    PORTABLE,
+    code_lines,
+    run,
+)
+
+CHECKED = (*PORTABLE, "ports/f28377s")
+TEMPLATE = "{file}|{line}|{id}|{message}"
+BUILD = [
+    *("--std=c99", f"--platform={CPPCHECK / 'c28x.xml'}", f"-I{CPPCHECK / 'include'}"),
+    *("-D__TMS320C28XX__", "-DCPU1", "-D_LAUNCHXL_F28377S", "-U__GNUC__", "-UFS_DOUBLE", "-U__cplusplus"),
+]
+"""As cl2000 would see the sources; a -D also keeps cppcheck from trying other configurations."""
+CHECKS = ["--enable=warning,style,performance,portability", f"--template={TEMPLATE}", "--quiet", "-j2"]
+MISRA = "misra-c2012-"
+
+
+class Finding(NamedTuple):
+    """A line that cppcheck has something to say of."""
+
+    file: str
+    """Path below firmware/."""
+    line: int
+    rule: str
+    message: str
+
+
+class Deviation(NamedTuple):
+    """What may stay as it is."""
+
+    rule: str
+    files: list[str]
+    reason: str
+
+    def covers(self, finding: Finding) -> bool:
+        return finding.rule.removeprefix(MISRA) == self.rule and any(
+            fnmatch(finding.file, f) for f in self.files
+        )
+
+
+def cppcheck(root: Path, *arguments: str | Path) -> list[Finding]:
+    """Run cppcheck; paths of findings are told below ``root``."""
+    if not shutil.which("cppcheck"):
+        pytest.skip("no cppcheck on this machine")
+    done = run(["cppcheck", *BUILD, *CHECKS, *arguments])
+    assert done.returncode == 0, done.stdout
+    found = []
+    for line in done.stderr.splitlines():
+        file, number, rule, message = line.split("|", 3)
+        where = Path(file)
+        known = where.is_absolute() and where.is_relative_to(root)
+        found.append(
+            Finding(where.relative_to(root).as_posix() if known else file, int(number), rule, message)
+        )
+    return found
+
+
+@pytest.fixture(scope="module")
+def findings() -> list[Finding]:
+    folders = [FIRMWARE / name for name in CHECKED]
+    assert [folder.name for folder in folders if not list(folder.glob("*.c"))] == []
+    includes = [f"-I{folder}" for folder in folders]
+    not_ours = [f"--suppress=*:{folder}/*" for folder in (FAKE_DRIVERLIB, CPPCHECK / "include")]
+    return cppcheck(FIRMWARE, "--addon=misra", *includes, f"-I{FAKE_DRIVERLIB}", *not_ours, *folders)
+
+
+@pytest.fixture(scope="module")
+def deviations() -> list[Deviation]:
+    listed = tomllib.loads((CPPCHECK / "deviations.toml").read_text())["deviation"]
+    return [Deviation(one["rule"], one.get("files", ["*"]), one["reason"]) for one in listed]
+
+
+def test_whatever_is_found_is_listed_with_its_reason(
+    findings: list[Finding], deviations: list[Deviation]
+) -> None:
+    assert len(findings) > 100  # the addon ran
+    assert [f for f in findings if not any(d.covers(f) for d in deviations)] == []
+
+
+def test_no_listed_deviation_is_out_of_date(findings: list[Finding], deviations: list[Deviation]) -> None:
+    for deviation in deviations:
+        assert len(deviation.reason) > 20
+        for pattern in deviation.files:
+            narrow = deviation._replace(files=[pattern])
+            assert any(narrow.covers(finding) for finding in findings), (deviation.rule, pattern)
+
+
+def test_no_source_silences_cppcheck() -> None:
+    for folder in CHECKED:
+        for path in (FIRMWARE / folder).glob("*.[ch]"):
+            assert "cppcheck-suppress" not in path.read_text(), path.name
+
+
+PLANTED = {
+    "shiftTooManyBits": "uint32_t f(uint16_t a) { return (uint32_t)(a << 16); }",
+    "integerOverflow": "uint32_t f(uint16_t ms) { int16_t k = 40 * 1000; return (uint32_t)ms + (uint32_t)k; }",
+    "truncLongCastReturn": "int32_t f(int16_t a, int16_t b) { return a * b; }",
+    "compareValueOutOfTypeRangeError": "uint16_t f(uint16_t a) { return a > 70000UL ? 1U : 0U; }",
+    "arrayIndexOutOfBounds": "uint16_t f(uint16_t a) { uint16_t o[8] = {0U}; o[a & 7U] = a; return o[8]; }",
+    "uninitvar": "uint16_t f(uint16_t a) { uint16_t b; if (a > 3U) { b = 1U; } return b; }",
+}
+
+
+@pytest.mark.parametrize("rule", PLANTED)
+def test_the_check_sees_what_only_16_bits_make_wrong(rule: str, tmp_path: Path) -> None:
+    """Without the platform file, or without our stdint.h, the first four would pass."""
+    path = tmp_path / "planted.c"
+    path.write_text(f"#include <stdint.h>\n{PLANTED[rule]}\n")
+    assert rule in [finding.rule for finding in cppcheck(tmp_path, path)]
+
+
+RECURSIVE = """#include <stdint.h>
+uint16_t f(uint16_t n);
+uint16_t f(uint16_t n)
+{
+    if (n == 0U)
+        return 1U;
+    return (uint16_t)(n * f((uint16_t)(n - 1U)));
+}
+"""
+
+
+def test_the_misra_check_is_awake(tmp_path: Path) -> None:
+    path = tmp_path / "planted.c"
+    path.write_text(RECURSIVE)
+    rules = {finding.rule.removeprefix(MISRA) for finding in cppcheck(tmp_path, "--addon=misra", path)}
+    assert {"15.6", "17.2"} <= rules  # no braces; recursion
+
+
+def test_the_platform_is_a_c28x() -> None:
+    text = (CPPCHECK / "c28x.xml").read_text()
+    sizes = dict(re.findall(r"<([\w-]+)>(\d+)</", text))
+    assert (sizes["char_bit"], sizes["int"], sizes["long"], sizes["float"]) == ("16", "1", "2", "2")
+    assert not any("uint8_t" in line for _, line in code_lines(CPPCHECK / "include" / "stdint.h"))
