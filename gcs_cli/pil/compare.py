@@ -15,7 +15,7 @@ from gcs_cli.pil.ulps import Float32Array, steps_apart, ulp_of
 
 
 class Difference(NamedTuple):
-    """Of one signal in two flights, over the ticks in which the loops of both ran."""
+    """Of one signal in two flights, over ticks in which the loops of both ran."""
 
     pair: str
     signal: str
@@ -26,7 +26,7 @@ class Difference(NamedTuple):
     at_s: float
     """When it was largest, since the start of the first log; NaN if nothing differs."""
     full_scale: float
-    """Largest value of the signal in the first flight."""
+    """Largest value of the signal in the first flight, or its ``least_scale``."""
     steps: int
     """Largest number of float32 steps between two values."""
 
@@ -68,17 +68,23 @@ class Deviation(NamedTuple):
     size: FloatArray
 
 
-def compared(pair: str, first: FlightSamples, second: FlightSamples) -> Iterator[Difference]:
-    """Yield the difference of each signal that both flights have, in the order of ``SIGNALS``."""
+def compared(
+    pair: str, first: FlightSamples, second: FlightSamples, airborne: bool = False
+) -> Iterator[Difference]:
+    """Yield the difference of each signal that both flights have, in the order of ``SIGNALS``.
+
+    ``airborne``: leave out the ticks in which a vehicle touches the ground. A touchdown is an impact, after which
+    flights that were a micrometre apart go different ways; of two that shall be the same, it may not be left out.
+    """
     for signal in SIGNALS:
-        matched = _matched(signal, first, second)
+        matched = _matched(signal, first, second, airborne)
         if matched is not None:
             yield _difference(pair, signal, *matched, first)
 
 
 def deviation(signal: Signal, first: FlightSamples, second: FlightSamples) -> Deviation:
     """Return how far a signal is apart over time; of no samples if one flight does not have it."""
-    matched = _matched(signal, first, second)
+    matched = _matched(signal, first, second, airborne=False)
     if matched is None:
         return Deviation(np.zeros(0), np.zeros(0))
     a, b = matched
@@ -96,12 +102,15 @@ def ticks_apart(first: FlightSamples, second: FlightSamples) -> int:
     return len(np.setxor1d(first.flown_us, second.flown_us))
 
 
-def _matched(signal: Signal, first: FlightSamples, second: FlightSamples) -> tuple[Samples, Samples] | None:
+def _matched(
+    signal: Signal, first: FlightSamples, second: FlightSamples, airborne: bool
+) -> tuple[Samples, Samples] | None:
     a, b = first.signals.get(signal.name), second.signals.get(signal.name)
     if a is None or b is None:
         return None
     columns = min(a.values.shape[1], b.values.shape[1])
-    flown = np.intersect1d(first.flown_us, second.flown_us)
+    ticks = ((flight.airborne_us if airborne else flight.flown_us) for flight in (first, second))
+    flown = np.intersect1d(*ticks)
     a, b = (_among(samples, flown) for samples in _at_same_times(a, b))
     a, b = a._replace(values=a.values[:, :columns]), b._replace(values=b.values[:, :columns])
     return (a, _same_sign(a, b)) if signal.is_attitude else (a, b)
@@ -137,7 +146,7 @@ def _since_start_s(samples: Samples, flight: FlightSamples) -> FloatArray:
 
 def _difference(pair: str, signal: Signal, a: Samples, b: Samples, first: FlightSamples) -> Difference:
     if not a.values.size:
-        return Difference(pair, signal.name, 0, 0.0, 0.0, math.nan, 0.0, 0)
+        return Difference(pair, signal.name, 0, 0.0, 0.0, math.nan, signal.least_scale, 0)
     apart = _distance(a.values, b.values)
     largest = float(apart.max())
     sizes = np.abs(a.values[np.isfinite(a.values)])
@@ -149,6 +158,6 @@ def _difference(pair: str, signal: Signal, a: Samples, b: Samples, first: Flight
         largest,
         float(np.sqrt(np.mean(apart**2))),
         float(_since_start_s(a, first)[at]) if largest else math.nan,
-        float(sizes.max()) if sizes.size else 0.0,
+        max(float(sizes.max(initial=0.0)), signal.least_scale),
         int(np.where(apart > 0.0, steps_apart(a.values, b.values), 0).max()),
     )

@@ -24,6 +24,8 @@ _DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, Overfl
 _TOPICS = sorted({signal.topic for signal in SIGNALS} | {"trajectory_setpoint"})
 GROUNDED = LoopStatus.IDLE | LoopStatus.INPUT_STALE
 """Status of ticks in which the loops did not run: on the ground, or while their input stood still."""
+AIRBORNE_M = 0.05
+"""Higher than this above the place where it stood at first, a vehicle touches nothing."""
 
 
 class Samples(NamedTuple):
@@ -53,6 +55,17 @@ class FlightSamples(NamedTuple):
         """Times of the ticks in which the loops ran."""
         flags = self.status.values[:, 0].astype(np.int64)
         times: TimeArray = self.status.time_us[(flags & GROUNDED) == 0]
+        return times
+
+    @property
+    def airborne_us(self) -> TimeArray:
+        """Times of those ticks in which the vehicle also touched nothing; none if the log has no position."""
+        position, flown_us = self.signals.get("position"), self.flown_us
+        if position is None or not len(position.time_us):
+            return flown_us[:0]
+        down_m = position.values[:, 2]
+        at = np.maximum(np.searchsorted(position.time_us, flown_us, side="right") - 1, 0)
+        times: TimeArray = flown_us[down_m[at] < down_m[0] - AIRBORNE_M]
         return times
 
 

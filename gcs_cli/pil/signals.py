@@ -28,6 +28,9 @@ class Signal(NamedTuple):
     topic: str
     fields: tuple[str, ...]
     """Of the topic; those that a log does not have are left out: a vehicle may have fewer rotors."""
+    least_scale: float
+    """Differences are measured against the signal's largest value, or this where a flight hardly moves it: straight
+    up and down, torques are nothing but rounding."""
     is_attitude: bool = False
     """A quaternion: its negative is the same attitude."""
 
@@ -37,34 +40,47 @@ def _elements(name: str, count: int) -> tuple[str, ...]:
 
 
 def _attitude(name: str, title: str, stage: str, topic: str, field: str) -> Signal:
-    return Signal(name, title, stage, "1", topic, _elements(field, 4), is_attitude=True)
+    return Signal(name, title, stage, "1", topic, _elements(field, 4), 1.0, is_attitude=True)
 
 
-_TORQUE, _ACHIEVED = _elements("torque_n_m", 3), _elements("torque_achieved_n_m", 3)
+def _signal(
+    name: str, title: str, stage: str, unit: str, least_scale: float, topic: str, *fields: str
+) -> Signal:
+    return Signal(name, title, stage, unit, topic, fields, least_scale)
+
+
+_POSITION, _OUTER = "vehicle_local_position", "vehicle_attitude_setpoint"
+_INNER, _TORQUE, _ACHIEVED = "attitude_reference", "torque_n_m", "torque_achieved_n_m"
 
 SIGNALS = (
-    _attitude("target_attitude", "target attitude", TARGET, "vehicle_attitude_setpoint", "q_d"),
-    Signal("target_thrust", "target thrust", TARGET, "N", "vehicle_attitude_setpoint", ("thrust_n",)),
-    _attitude("reference_attitude", "reference attitude", REFERENCE, "attitude_reference", "q"),
-    Signal(
-        *("reference_rates", "reference rates", REFERENCE, "rad/s", "attitude_reference"),
-        _elements("rates_rad_s", 3),
+    _attitude("target_attitude", "target attitude", TARGET, _OUTER, "q_d"),
+    _signal("target_thrust", "target thrust", TARGET, "N", 1.0, _OUTER, "thrust_n"),
+    _attitude("reference_attitude", "reference attitude", REFERENCE, _INNER, "q"),
+    _signal(
+        *("reference_rates", "reference rates", REFERENCE, "rad/s", 1.0),
+        *(_INNER, *_elements("rates_rad_s", 3)),
     ),
-    Signal(
-        *("reference_acceleration", "reference acceleration", REFERENCE, "rad/s²", "attitude_reference"),
-        _elements("acceleration_rad_s2", 3),
+    _signal(
+        *("reference_acceleration", "reference acceleration", REFERENCE, "rad/s²", 10.0),
+        *(_INNER, *_elements("acceleration_rad_s2", 3)),
     ),
-    Signal("thrust", "thrust", WRENCH, "N", "wrench", ("thrust_n",)),
-    Signal("torque", "torque", WRENCH, "N m", "wrench", _TORQUE),
-    Signal("thrust_achieved", "thrust after the mixer", ACTUATORS, "N", "wrench", ("thrust_achieved_n",)),
-    Signal("torque_achieved", "torque after the mixer", ACTUATORS, "N m", "wrench", _ACHIEVED),
-    Signal(
-        *("rotor_command", "rotor speed commands", ACTUATORS, "rad/s", "rotor_speeds"),
-        _elements("command_rad_s", MAX_ROTORS),
+    _signal("thrust", "thrust", WRENCH, "N", 1.0, "wrench", "thrust_n"),
+    _signal("torque", "torque", WRENCH, "N m", 0.1, "wrench", *_elements(_TORQUE, 3)),
+    _signal("thrust_achieved", "thrust after the mixer", ACTUATORS, "N", 1.0, "wrench", "thrust_achieved_n"),
+    _signal(
+        *("torque_achieved", "torque after the mixer", ACTUATORS, "N m", 0.1),
+        *("wrench", *_elements(_ACHIEVED, 3)),
     ),
-    Signal("position", "position", TRAJECTORY, "m", "vehicle_local_position", ("x", "y", "z")),
-    Signal("velocity", "velocity", TRAJECTORY, "m/s", "vehicle_local_position", ("vx", "vy", "vz")),
+    _signal(
+        *("rotor_command", "rotor speed commands", ACTUATORS, "rad/s", 100.0),
+        *("rotor_speeds", *_elements("command_rad_s", MAX_ROTORS)),
+    ),
+    _signal("position", "position", TRAJECTORY, "m", 1.0, _POSITION, "x", "y", "z"),
+    _signal("velocity", "velocity", TRAJECTORY, "m/s", 1.0, _POSITION, "vx", "vy", "vz"),
     _attitude("attitude", "attitude", TRAJECTORY, "vehicle_attitude", "q"),
-    Signal("rates", "body rates", TRAJECTORY, "rad/s", "vehicle_angular_velocity", _elements("xyz", 3)),
+    _signal(
+        *("rates", "body rates", TRAJECTORY, "rad/s", 1.0),
+        *("vehicle_angular_velocity", *_elements("xyz", 3)),
+    ),
 )
 BY_NAME = {signal.name: signal for signal in SIGNALS}

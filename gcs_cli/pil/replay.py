@@ -1,0 +1,198 @@
+"""Open-loop replay: what went into the loops in a recorded flight, and what a target makes of the same inputs. Pure.
+
+A log holds float32, which is what a link to a target carries: a flight whose loops were C replays to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, Protocol, TypeAlias
+
+import numpy as np
+
+from flightstack.contract import MAX_ROTORS, FloatArray, LoopFlags, LoopStatus
+from gcs_cli.pil.flight_samples import FlightSamples, Samples, TimeArray
+from gcs_cli.pil.signals import BY_NAME
+
+FlagArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+
+STATE, SETPOINT, TARGET, INPUT_SIZE = slice(0, 13), slice(13, 24), slice(24, 29), 29
+OUTPUT_SIZE, STATUS_AT = 32, 31
+_OUTPUTS = {
+    "target_attitude": slice(0, 4),
+    "target_thrust": slice(4, 5),
+    "reference_attitude": slice(5, 9),
+    "reference_rates": slice(9, 12),
+    "reference_acceleration": slice(12, 15),
+    "thrust": slice(15, 16),
+    "torque": slice(16, 19),
+    "thrust_achieved": slice(19, 20),
+    "torque_achieved": slice(20, 23),
+    "rotor_command": slice(23, 23 + MAX_ROTORS),
+}
+_OF_TARGET = ("target_attitude", "target_thrust")
+_SETPOINT_FIELDS = (
+    *(f"{name}[{axis}]" for name in ("position", "velocity", "acceleration") for axis in range(3)),
+    *("yaw", "yawspeed"),
+)
+_PROGRESS_STEPS = 500
+
+
+class Loops(Protocol):
+    """What computes the steps; see ``flightstack.firmware.c_loops.Computer``."""
+
+    input: FloatArray
+    output: FloatArray
+
+    def set(self, name: str, value: float) -> None:
+        """Change a number from the next step on."""
+
+    def step(self, flags: int) -> None:
+        """Compute a step from ``input`` into ``output``."""
+
+
+class UnfitLogError(ValueError):
+    """A log does not hold what a replay needs; the text says what."""
+
+
+class Recording(NamedTuple):
+    """The steps of the loops in a flight, in order."""
+
+    time_us: TimeArray
+    """Of each step, (n,)."""
+    inputs: FloatArray
+    """State (13), setpoint (11) and attitude target (5) of each step, (n, 29)."""
+    flags: FlagArray
+    """``LoopFlags`` of each step, (n,)."""
+    is_outer: np.ndarray[Any, np.dtype[np.bool_]]
+    """Whether it is an outer tick, (n,)."""
+    changes: Mapping[int, tuple[tuple[str, float], ...]]
+    """Parameters that change before the step of that index."""
+    tells_targets: bool
+    """Whether the log says which attitude targets were given to the loops. An older one does not: all are given."""
+
+
+def recording(flight: FlightSamples) -> Recording:
+    """Take the inputs of the loops out of a log; raise UnfitLogError.
+
+    Position, velocity and setpoint are logged, and used, at the outer rate; between they stay as they are.
+    """
+    steps_us = flight.flown_us
+    if not len(steps_us):
+        raise UnfitLogError("the loops never ran in it: the vehicle stayed on the ground")
+    outer, outer_us = _outer_inputs(flight)
+    at = np.searchsorted(outer_us, steps_us, side="right") - 1
+    if at[0] < 0:
+        raise UnfitLogError("it begins without an outer tick")
+    inputs = np.empty((len(steps_us), INPUT_SIZE))
+    inputs[:] = outer[at]
+    for name, columns in (("attitude", slice(6, 10)), ("rates", slice(10, 13))):
+        inputs[:, columns] = _of(flight, name, steps_us)
+    is_outer = np.isin(steps_us, outer_us)
+    flags, tells = _outer_flags(flight)
+    step_flags = np.where(is_outer, flags[at], 0)
+    step_flags[_begins(flight, steps_us)] |= LoopFlags.RESET
+    return Recording(steps_us, inputs, step_flags, is_outer, _changes(flight, steps_us), tells)
+
+
+def _outer_inputs(flight: FlightSamples) -> tuple[FloatArray, TimeArray]:
+    missing = [
+        name
+        for name in ("position", "velocity", "target_attitude", "target_thrust", "attitude", "rates")
+        if name not in flight.signals
+    ]
+    if missing:
+        raise UnfitLogError(f"it does not hold the topic {BY_NAME[missing[0]].topic}")
+    setpoint = flight.topics.get("trajectory_setpoint", {})
+    if any(name not in setpoint for name in _SETPOINT_FIELDS):
+        raise UnfitLogError("it does not hold the topic trajectory_setpoint")
+    outer_us = flight.signals["position"].time_us
+    inputs = np.zeros((len(outer_us), INPUT_SIZE))
+    parts = {"position": slice(0, 3), "velocity": slice(3, 6), "target_attitude": slice(24, 28)}
+    for name, columns in {**parts, "target_thrust": slice(28, 29)}.items():
+        inputs[:, columns] = _of(flight, name, outer_us)
+    if not np.array_equal(setpoint["timestamp"], outer_us):
+        raise UnfitLogError("its topics of the outer loop do not belong together")
+    inputs[:, SETPOINT] = np.column_stack([setpoint[name] for name in _SETPOINT_FIELDS])
+    return inputs, outer_us
+
+
+def _of(flight: FlightSamples, name: str, times_us: TimeArray) -> FloatArray:
+    samples = flight.signals[name]
+    at = np.searchsorted(samples.time_us, times_us)
+    if (
+        len(samples.time_us) == 0
+        or at.max() >= len(samples.time_us)
+        or np.any(samples.time_us[at] != times_us)
+    ):
+        raise UnfitLogError(f"samples of {BY_NAME[name].title} are missing")
+    return samples.values[at].astype(np.float64)
+
+
+def _outer_flags(flight: FlightSamples) -> tuple[FlagArray, bool]:
+    """What the loops began each outer tick with, and whether the log tells."""
+    setpoint = flight.topics["vehicle_attitude_setpoint"]
+    if "loop_flags" not in setpoint:
+        return np.full(len(setpoint["timestamp"]), LoopFlags.SET_TARGET, np.int64), False
+    return setpoint["loop_flags"].astype(np.int64) & (LoopFlags.OUTER_DUE | LoopFlags.SET_TARGET), True
+
+
+def _begins(flight: FlightSamples, steps_us: TimeArray) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Tell which steps are the first after the vehicle stood with its loops at rest."""
+    times_us, status = flight.status.time_us, flight.status.values[:, 0].astype(np.int64)
+    at = np.searchsorted(times_us, steps_us)
+    rests = (status & LoopStatus.IDLE) != 0
+    return np.where(at > 0, rests[np.maximum(at, 1) - 1], True)
+
+
+def _changes(flight: FlightSamples, steps_us: TimeArray) -> dict[int, tuple[tuple[str, float], ...]]:
+    """A change is written behind the samples of its time; the next step is the first that knows it."""
+    found: dict[int, tuple[tuple[str, float], ...]] = {}
+    for at_us, name, value in flight.changes:
+        index = int(np.searchsorted(steps_us, at_us, side="right"))
+        if index < len(steps_us):
+            found[index] = (*found.get(index, ()), (name, value))
+    return found
+
+
+def replayed(
+    record: Recording, loops: Loops, known: Callable[[str], bool], progress: Callable[[int, int], None]
+) -> FloatArray:
+    """Feed all steps to ``loops`` and return their outputs, (n, 32).
+
+    ``known`` tells which parameters are of the loops. ``progress`` is told now and then how many steps of how many
+    are done.
+    """
+    count = len(record.time_us)
+    outputs = np.empty((count, OUTPUT_SIZE))
+    flags = record.flags.tolist()
+    for index in range(count):
+        for name, value in record.changes.get(index, ()):
+            if known(name):
+                loops.set(name, value)
+        loops.input[:] = record.inputs[index]
+        loops.step(flags[index])
+        outputs[index] = loops.output
+        if index % _PROGRESS_STEPS == 0:
+            progress(index, count)
+    progress(count, count)
+    return outputs
+
+
+def as_flight(record: Recording, outputs: FloatArray, flight: FlightSamples) -> FlightSamples:
+    """Return the outputs in the form of a log, to be compared with the one that was replayed.
+
+    The attitude target is that of the outer ticks. Where the log does not tell which ones the outer loop made, all
+    were given, and there is nothing to compare.
+    """
+    signals = {
+        name: Samples(record.time_us, outputs[:, columns].astype(np.float32))
+        for name, columns in _OUTPUTS.items()
+    }
+    aims = record.is_outer & ((record.flags & LoopFlags.OUTER_DUE) != 0)
+    for name in _OF_TARGET:
+        samples = signals.pop(name)
+        if record.tells_targets:
+            signals[name] = Samples(samples.time_us[aims], samples.values[aims])
+    status = Samples(record.time_us, outputs[:, STATUS_AT:].astype(np.float32))
+    return flight._replace(signals=signals, status=status)
