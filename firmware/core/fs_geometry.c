@@ -122,13 +122,3 @@ fs_quaternion fs_quaternion_from_euler(fs_real roll_rad, fs_real pitch_rad, fs_r
     q.z = roll.cosine * pitch.cosine * yaw.sine - roll.sine * pitch.sine * yaw.cosine;
     return q;
 }
-
-uint16_t fs_vector_is_finite(const fs_vector3 *v)
-{
-    return (fs_is_finite(v->x) && fs_is_finite(v->y) && fs_is_finite(v->z)) ? 1U : 0U;
-}
-
-uint16_t fs_quaternion_is_finite(const fs_quaternion *q)
-{
-    return (fs_is_finite(q->w) && fs_is_finite(q->x) && fs_is_finite(q->y) && fs_is_finite(q->z)) ? 1U : 0U;
-}

@@ -2,6 +2,7 @@
 #ifndef FS_GEOMETRY_H
 #define FS_GEOMETRY_H
 
+#include "fs_math.h"
 #include "fs_types.h"
 
 fs_vector3 fs_cross(const fs_vector3 *a, const fs_vector3 *b);
@@ -30,7 +31,14 @@ fs_quaternion fs_rotation_over(const fs_vector3 *rates_rad_s, fs_real dt_s);
 /* Quaternion of yaw, then pitch, then roll (3-2-1). */
 fs_quaternion fs_quaternion_from_euler(fs_real roll_rad, fs_real pitch_rad, fs_real yaw_rad);
 
-uint16_t fs_vector_is_finite(const fs_vector3 *v);
-uint16_t fs_quaternion_is_finite(const fs_quaternion *q);
+static inline uint16_t fs_vector_is_finite(const fs_vector3 *v)
+{
+    return (fs_is_finite(v->x) && fs_is_finite(v->y) && fs_is_finite(v->z)) ? 1U : 0U;
+}
+
+static inline uint16_t fs_quaternion_is_finite(const fs_quaternion *q)
+{
+    return (fs_is_finite(q->w) && fs_is_finite(q->x) && fs_is_finite(q->y) && fs_is_finite(q->z)) ? 1U : 0U;
+}
 
 #endif

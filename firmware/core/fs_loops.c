@@ -13,7 +13,6 @@ typedef struct {
     fs_reference_memory reference;
     fs_pid_memory pid;
     fs_saturation saturation;
-    fs_loop_output output;
 } fs_tick;
 
 static const fs_vector3 no_vector = {FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)};
@@ -128,12 +127,12 @@ static void begin_outer_period(fs_loops *loops)
 }
 
 /* Run the position loop, or keep its memory and the target as they were. */
-static void outer_loop(fs_loops *loops, const fs_loop_input *input)
+static void outer_loop(fs_loops *loops, const fs_loop_input *input, uint16_t state_is_sound)
 {
     fs_position_memory memory = loops->position_memory;
     fs_attitude_target target;
 
-    if (!state_is_finite(&input->state) || !setpoint_is_finite(&input->setpoint)) {
+    if (!state_is_sound || !setpoint_is_finite(&input->setpoint)) {
         return;
     }
     fs_position_pid_step(&memory, &input->state, &input->setpoint, &loops->position, loops->rates.outer_dt_s,
@@ -144,13 +143,14 @@ static void outer_loop(fs_loops *loops, const fs_loop_input *input)
     }
 }
 
-/* Reference filter and attitude controller, into the tick. Nonzero: the torque is finite. */
-static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *state, fs_tick *tick)
+/* Reference filter and attitude controller, into tick and output. Nonzero: the torque is finite. */
+static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *state, fs_tick *tick,
+                              fs_loop_output *output)
 {
     const fs_quaternion aim = fs_blend(&loops->last_target.attitude, &loops->target.attitude, loops->fraction);
     const fs_quaternion inverse = fs_conjugate(&state->attitude);
-    fs_attitude_reference *reference = &tick->output.reference;
-    fs_vector3 *torque = &tick->output.wrench.torque_frd_n_m;
+    fs_attitude_reference *reference = &output->reference;
+    fs_vector3 *torque = &output->wrench.torque_frd_n_m;
     fs_attitude_inputs inputs;
     fs_quaternion turn;
 
@@ -171,7 +171,7 @@ static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *sta
     } else {
         *torque = fs_attitude_backstepping_step(&inputs, &loops->backstepping);
     }
-    tick->output.wrench.thrust_n = loops->target.thrust_n;
+    output->wrench.thrust_n = loops->target.thrust_n;
     return fs_vector_is_finite(torque); /* an integral that is not finite makes a torque that is not */
 }
 
@@ -194,39 +194,38 @@ static uint16_t saturation_bits(const fs_saturation *saturation)
     return bits;
 }
 
-/* Run inner loop and mixer; return 0 and keep the tick, or the status bit that tells why it is not sound. */
-static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, fs_clock clock, fs_loop_cost *cost)
+/* Run inner loop and mixer; return 0 and keep the tick, or the status bit that tells why the output is not sound. */
+static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint16_t state_is_sound, fs_clock clock,
+                           fs_loop_output *output, fs_loop_cost *cost)
 {
     const uint32_t began = now(clock);
-    fs_loop_output *out;
     uint16_t is_sound;
     uint32_t controlled;
     fs_tick tick;
 
     cost->inner = 0UL;
     cost->mixer = 0UL;
-    if (!state_is_finite(state) || !target_is_finite(&loops->target)) {
+    if (!state_is_sound || !target_is_finite(&loops->target)) {
         return FS_STATUS_INPUT_NOT_FINITE;
     }
-    is_sound = attitude_loop(loops, state, &tick);
+    is_sound = attitude_loop(loops, state, &tick, output);
     controlled = now(clock);
     cost->inner = controlled - began;
     if (!is_sound) {
         return FS_STATUS_OUTPUT_NOT_FINITE;
     }
-    out = &tick.output;
-    fs_mix(&out->wrench, &loops->mixer, loops->rates.rotors, out->rotor_command_rad_s, &out->wrench_achieved,
+    fs_mix(&output->wrench, &loops->mixer, loops->rates.rotors, output->rotor_command_rad_s, &output->wrench_achieved,
            &tick.saturation);
     cost->mixer = now(clock) - controlled;
-    if (!speeds_are_finite(out->rotor_command_rad_s)) {
+    if (!speeds_are_finite(output->rotor_command_rad_s)) {
         return FS_STATUS_OUTPUT_NOT_FINITE;
     }
-    out->attitude_target = loops->target;
-    out->status = saturation_bits(&tick.saturation);
+    output->attitude_target = loops->target;
+    output->status = saturation_bits(&tick.saturation);
     loops->reference_memory = tick.reference;
     loops->pid_memory = tick.pid;
     loops->saturation = tick.saturation;
-    loops->last = *out;
+    loops->last = *output;
     return 0U;
 }
 
@@ -234,6 +233,7 @@ void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, 
                    fs_loop_cost *cost)
 {
     const uint32_t began = now(clock);
+    const uint16_t state_is_sound = state_is_finite(&input->state);
     uint16_t unsound;
 
     if ((input->flags & FS_RESET) != 0U) {
@@ -247,13 +247,13 @@ void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, 
     if ((input->flags & FS_OUTER_DUE) != 0U) {
         const uint32_t outer_began = now(clock);
         begin_outer_period(loops);
-        outer_loop(loops, input);
+        outer_loop(loops, input, state_is_sound);
         cost->outer = now(clock) - outer_began;
     }
     loops->fraction += loops->rates.fraction_step;
-    unsound = inner_loop(loops, &input->state, clock, cost);
-    *output = loops->last;
+    unsound = inner_loop(loops, &input->state, state_is_sound, clock, output, cost);
     if (unsound != 0U) {
+        *output = loops->last;
         output->attitude_target = loops->target;
         output->status = unsound;
     }

@@ -45,15 +45,21 @@ static inline fs_real fs_sqrt(fs_real square)
 #endif
 }
 
+static inline fs_real fs_abs(fs_real value)
+{
+#if defined(FS_DOUBLE)
+    return __builtin_fabs(value);
+#elif defined(__GNUC__)
+    return __builtin_fabsf(value);
+#else
+    return fabsf(value);
+#endif
+}
+
 /* Neither infinite nor NaN. By comparison, because some processors take a NaN for an infinity. */
 static inline uint16_t fs_is_finite(fs_real value)
 {
-    return (value >= -FS_REAL_MAX && value <= FS_REAL_MAX) ? 1U : 0U;
-}
-
-static inline fs_real fs_abs(fs_real value)
-{
-    return value < FS_LIT(0.0) ? -value : value;
+    return fs_abs(value) <= FS_REAL_MAX ? 1U : 0U;
 }
 
 /* Python's max and min: the first argument unless the second is beyond it, also when one is NaN. */

@@ -69,72 +69,104 @@ static void fit_roll_pitch(fs_real *speed_squared, const fs_mixer *mixer, uint16
     }
 }
 
-/* Thrust nearest to thrust_n that keeps every rotor within its limits beside the roll-pitch part. */
-static fs_real fit_thrust(const fs_real *base, fs_real thrust_n, const fs_mixer *mixer, uint16_t rotors)
+/* The thrusts [N] that keep every rotor within its limits beside the roll-pitch part. */
+typedef struct {
+    fs_real least, most;
+    uint16_t is_sure; /* there are such thrusts, and by more than rounding, so that roll and pitch need no scaling */
+} fs_thrust_range;
+
+static fs_thrust_range thrust_range(const fs_real *base, const fs_mixer *mixer, uint16_t rotors)
 {
     fs_real least = -FS_REAL_MAX, most = FS_REAL_MAX;
-    uint16_t i;
+    uint16_t all_lift = 1U, i;
+    fs_thrust_range range;
 
     for (i = 0U; i < rotors; i++) {
         const fs_real per_newton = mixer->allocation[i][0];
         if (per_newton > FS_LIT(0.0)) {
             least = fs_max(least, (mixer->low[i] - base[i]) / per_newton);
             most = fs_min(most, (mixer->high[i] - base[i]) / per_newton);
+        } else {
+            all_lift = 0U;
         }
     }
-    return fs_max(fs_min(thrust_n, most), least);
+    range.least = least;
+    range.most = most;
+    range.is_sure = (all_lift && most - least > FS_LIT(1e-3) * (fs_abs(most) + fs_abs(least))) ? 1U : 0U;
+    return range;
 }
 
-static void add(fs_wrench *sum, const fs_mixer *mixer, uint16_t rotor, fs_real squared)
+/* Turn squared speeds into speeds, zero beyond the rotors, and add up the wrench that they make. */
+static fs_wrench speeds_and_wrench(const fs_real *squared, const fs_mixer *mixer, uint16_t rotors,
+                                   fs_real *rotor_speed_rad_s)
 {
-    sum->thrust_n += mixer->effectiveness[0][rotor] * squared;
-    sum->torque_frd_n_m.x += mixer->effectiveness[1][rotor] * squared;
-    sum->torque_frd_n_m.y += mixer->effectiveness[2][rotor] * squared;
-    sum->torque_frd_n_m.z += mixer->effectiveness[3][rotor] * squared;
-}
+    fs_real thrust = FS_LIT(0.0), roll = FS_LIT(0.0), pitch = FS_LIT(0.0), heading = FS_LIT(0.0);
+    fs_wrench made;
+    uint16_t i;
 
-static void add_magnitudes(fs_wrench *sum, const fs_mixer *mixer, uint16_t rotor, fs_real squared)
-{
-    sum->thrust_n += fs_abs(mixer->effectiveness[0][rotor]) * squared;
-    sum->torque_frd_n_m.x += fs_abs(mixer->effectiveness[1][rotor]) * squared;
-    sum->torque_frd_n_m.y += fs_abs(mixer->effectiveness[2][rotor]) * squared;
-    sum->torque_frd_n_m.z += fs_abs(mixer->effectiveness[3][rotor]) * squared;
+    for (i = 0U; i < rotors; i++) {
+        const fs_real square = squared[i];
+        rotor_speed_rad_s[i] = square >= FS_LIT(0.0) ? fs_sqrt(square) : -fs_sqrt(-square);
+        thrust += mixer->effectiveness[0][i] * square;
+        roll += mixer->effectiveness[1][i] * square;
+        pitch += mixer->effectiveness[2][i] * square;
+        heading += mixer->effectiveness[3][i] * square;
+    }
+    for (i = rotors; i < FS_MAX_ROTORS; i++) {
+        rotor_speed_rad_s[i] = FS_LIT(0.0);
+    }
+    made.thrust_n = thrust;
+    made.torque_frd_n_m.x = roll;
+    made.torque_frd_n_m.y = pitch;
+    made.torque_frd_n_m.z = heading;
+    return made;
 }
 
 void fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
             fs_wrench *achieved, fs_saturation *saturation)
 {
-    const fs_wrench nothing = {FS_LIT(0.0), {FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)}};
     const fs_vector3 *torque = &wrench->torque_frd_n_m, *made = &achieved->torque_frd_n_m;
-    fs_real base[FS_MAX_ROTORS], yaw[FS_MAX_ROTORS], thrust_n, scale;
-    fs_wrench magnitudes = nothing;
+    fs_real base[FS_MAX_ROTORS], yaw[FS_MAX_ROTORS], thrust_n, scale, sum = FS_LIT(0.0);
+    fs_thrust_range range;
     uint16_t i;
 
-    for (i = 0U; i < rotors; i++) {
+    for (i = 0U; i < FS_MAX_ROTORS; i++) { /* all places, so that none is ever read unwritten */
         base[i] = mixer->allocation[i][1] * torque->x + mixer->allocation[i][2] * torque->y;
         yaw[i] = mixer->allocation[i][3] * torque->z;
     }
-    fit_roll_pitch(base, mixer, rotors);
-    thrust_n = fit_thrust(base, wrench->thrust_n, mixer, rotors);
+    range = thrust_range(base, mixer, rotors);
+    if (!range.is_sure) {
+        fit_roll_pitch(base, mixer, rotors);
+        range = thrust_range(base, mixer, rotors);
+    }
+    thrust_n = fs_max(fs_min(wrench->thrust_n, range.most), range.least);
     for (i = 0U; i < rotors; i++) {
         base[i] = fs_min(fs_max(base[i] + mixer->allocation[i][0] * thrust_n, mixer->low[i]), mixer->high[i]);
     }
     scale = largest_scale(base, yaw, mixer, rotors);
-    *achieved = nothing;
     for (i = 0U; i < rotors; i++) {
         const fs_real part = scale * yaw[i];
-        const fs_real squared = base[i] + part;
-        rotor_speed_rad_s[i] = squared >= FS_LIT(0.0) ? fs_sqrt(squared) : -fs_sqrt(-squared);
-        add(achieved, mixer, i, squared);
-        add_magnitudes(&magnitudes, mixer, i, fs_abs(base[i]) + fs_abs(part));
+        sum += fs_abs(base[i]) + fs_abs(part);
+        base[i] += part;
     }
-    for (i = rotors; i < FS_MAX_ROTORS; i++) {
-        rotor_speed_rad_s[i] = FS_LIT(0.0);
+    *achieved = speeds_and_wrench(base, mixer, rotors, rotor_speed_rad_s);
+    saturation->thrust = lag(wrench->thrust_n, achieved->thrust_n, mixer->largest_effect[0] * sum);
+    saturation->torque.x = lag(torque->x, made->x, mixer->largest_effect[1] * sum);
+    saturation->torque.y = lag(torque->y, made->y, mixer->largest_effect[2] * sum);
+    saturation->torque.z = lag(torque->z, made->z, mixer->largest_effect[3] * sum);
+}
+
+void fs_mixer_derive(fs_mixer *mixer)
+{
+    uint16_t axis, i;
+
+    for (axis = 0U; axis < 4U; axis++) {
+        fs_real largest = FS_LIT(0.0);
+        for (i = 0U; i < FS_MAX_ROTORS; i++) {
+            largest = fs_max(largest, fs_abs(mixer->effectiveness[axis][i]));
+        }
+        mixer->largest_effect[axis] = largest;
     }
-    saturation->thrust = lag(wrench->thrust_n, achieved->thrust_n, magnitudes.thrust_n);
-    saturation->torque.x = lag(torque->x, made->x, magnitudes.torque_frd_n_m.x);
-    saturation->torque.y = lag(torque->y, made->y, magnitudes.torque_frd_n_m.y);
-    saturation->torque.z = lag(torque->z, made->z, magnitudes.torque_frd_n_m.z);
 }
 
 fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_mixer *mixer, uint16_t rotors)

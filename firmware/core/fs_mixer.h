@@ -17,6 +17,7 @@ typedef struct {
     fs_real low[FS_MAX_ROTORS];
     fs_real high[FS_MAX_ROTORS];
     fs_real spin[FS_MAX_ROTORS];
+    fs_real largest_effect[4]; /* of any rotor, for each row of effectiveness: see fs_mixer_derive */
 } fs_mixer;
 
 /* Direction in which the mixer could not follow, for thrust and each torque: -1 it made more, +1 less than demanded. */
@@ -35,6 +36,9 @@ typedef struct {
  */
 void fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
             fs_wrench *achieved, fs_saturation *saturation);
+
+/* Make what follows from the other numbers of a mixer, after one of them was changed. */
+void fs_mixer_derive(fs_mixer *mixer);
 
 /* Omega_r of the paper: counter-clockwise minus clockwise rotor speeds [rad/s]. */
 fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_mixer *mixer, uint16_t rotors);

@@ -257,12 +257,13 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
         vehicle
     )  # not narrowed: with float the rounding of these numbers is part of the difference
     c = core(real)
-    flat = np.zeros(8 * 4 + 4 * 8 + 3 * 8, c.dtype)
+    flat = np.zeros(8 * 4 + 4 * 8 + 3 * 8 + 4, c.dtype)
     flat[: 4 * n] = rotors.allocation.ravel()
     for axis in range(4):
         flat[32 + 8 * axis : 32 + 8 * axis + n] = rotors.effectiveness[axis]
     for place, values in enumerate((rotors.low, rotors.high, rotors.spin)):
         flat[64 + 8 * place : 64 + 8 * place + n] = values
+    flat[88:] = np.abs(rotors.effectiveness).max(axis=1)
     speeds, achieved = np.full((count, 8), np.nan, c.dtype), np.zeros((count, 4), c.dtype)
     saturation, relative = np.zeros((count, 4), c.dtype), np.zeros(count, c.dtype)
     c.call("drive_mixer", count, c.array(wrenches), flat, n, speeds, achieved, saturation, relative)
