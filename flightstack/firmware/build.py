@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from flightstack.firmware.sources import c_files, digest, files, firmware_root, source_hash
+from flightstack.firmware.sources import PORTABLE, c_files, digest, files, firmware_root, source_hash
 
 EXACT = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
 """Every operation is rounded as it is written, on every compiler."""
@@ -75,7 +75,7 @@ def cached(
     ``headers``: files that the sources include, which count for the state as they do.
     """
     named = [path for path in (*sources, *headers) if path.is_relative_to(firmware_root())]
-    state = digest(sorted({*named, *files("core", "mavlink", "app")})).hex()[:16]
+    state = digest(sorted({*named, *files(*PORTABLE)})).hex()[:16]
     key = hashlib.sha256("\0".join([*compiler.command, compiler.version, *flags]).encode()).hexdigest()[:12]
     stem, dot, ending = name.partition(".")
     place = _folder(state) / f"{stem}-{key}{dot}{ending}"
@@ -140,3 +140,12 @@ def host_library(real: str = "float") -> Path:
     return cached(
         f"loops-{real}.so", compiler, flags, [*c_files("core"), port / "fs_sil.c"], [port / "fs_sil.h"]
     )
+
+
+def host_program() -> Path:
+    """Return the firmware as a program that serves a pseudo-terminal; raise BuildError."""
+    compiler, port = host_compiler(), firmware_root() / "ports" / "host"
+    parts = [port / f"{name}.c" for name in ("fs_host", "fs_host_app", "fs_host_program")]
+    flags = [*EXACT, *definitions(compiler), *includes(*PORTABLE, "ports/host")]
+    sources = [path for folder in PORTABLE for path in c_files(folder)]
+    return cached("fs_host", compiler, flags, [*sources, *parts], files("ports/host"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
@@ -148,8 +147,3 @@ class CLoops:
     def close(self) -> None:
         """End; the loops fly no more."""
         self.computer.close()
-
-
-def as_carried(value: float) -> float:
-    """Return a number as float32 carries it; infinite beyond its range."""
-    return float(np.float32(value)) if abs(value) <= 3.4028235e38 else math.copysign(math.inf, value)

@@ -151,7 +151,7 @@ class Emulator:
 
     def close(self) -> None:
         """Take the counter out of the machine; it runs no more."""
-        self._engine.hook_del(self._hook.value)
+        uclib.uc_hook_del(self._engine._uch, self._hook)  # unicorn's own wrapper knows only its own hooks
 
     @property
     def stack_high_water(self) -> int:

@@ -14,7 +14,7 @@ HASH_OCTETS = 8
 def firmware_root() -> Path:
     """Return the folder ``firmware``: in the package where it is installed, else beside it."""
     here = Path(__file__).resolve().parent
-    packaged = here / "sources"
+    packaged = here / "c"
     return packaged if packaged.is_dir() else here.parents[1] / "firmware"
 
 

@@ -6,15 +6,24 @@ from pathlib import Path
 
 from flightstack.control.backend import ControlBackend
 from flightstack.control.loops import PythonLoops
-from flightstack.firmware.build import BuildError, host_library
+from flightstack.firmware.build import BuildError, host_library, host_program
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
-from flightstack.firmware.choice import PYTHON, C, parse_loops
+from flightstack.firmware.choice import EMULATED, PYTHON, SERIAL, C, LoopsChoice, parse_loops
+from flightstack.firmware.errors import WrongFirmwareError
 from flightstack.firmware.host_library import HostLoops
+from flightstack.firmware.host_target import HostTarget
+from flightstack.firmware.target_loops import TargetLoops
+from flightstack.mavlink.services.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.params.errors import ConfigError
+from flightstack.transport.byte_link import ByteLink, LineError
+from flightstack.transport.serial_port import SerialPort
+
+EXCHANGE_BITS = 8000.0
+"""Bits of a step and its report twice over, in start and stop bits: what a slow line needs on top."""
 
 
 def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlBackend:
-    """Make the loops that ``loops`` names, with all their numbers; raise ConfigError."""
+    """Make the loops that ``loops`` names, with all their numbers; raise ConfigError, TargetError."""
     choice = parse_loops(loops)
     if choice.is_target and not lockstep:
         problem = f"loops on a target ({loops}) fly in lockstep alone: their link keeps no real time"
@@ -31,13 +40,51 @@ def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlB
     numbers = setup.numbers()
     try:
         if choice.kind == C:
-            computer = HostLoops(host_library(), numbers)
-            return CLoops(loops, computer, setup)
-    except BuildError as error:
+            return CLoops(loops, HostLoops(host_library(), numbers), setup)
+        return CLoops(loops, connect(open_link(choice), numbers, timing_of(choice)), setup)
+    except (BuildError, LineError, WrongFirmwareError) as error:
         raise ConfigError("--loops", loops, str(error)) from error
-    raise ConfigError("--loops", loops, "is not there yet")
+
+
+def open_link(choice: LoopsChoice) -> ByteLink:
+    """Open the line to a target, which is started if it is a program; raise BuildError, LineError."""
+    if choice.kind == SERIAL:
+        return SerialPort(choice.device, choice.baud)
+    if choice.kind == EMULATED:
+        return _emulated()
+    return HostTarget(host_program())
+
+
+def _emulated() -> ByteLink:
+    try:
+        from flightstack.firmware.cortex_m4 import emulated_target  # noqa: PLC0415  # unicorn is an extra
+        from flightstack.firmware.emulated import EmulationError  # noqa: PLC0415
+    except ImportError as error:
+        raise BuildError("unicorn is not installed: pip install 'flightstack[firmware]' brings it") from error
+    try:
+        return emulated_target()
+    except EmulationError as error:
+        raise BuildError(str(error)) from error
+
+
+def timing_of(choice: LoopsChoice) -> PilTiming:
+    """Return how long to wait for answers on the line."""
+    if choice.kind != SERIAL:
+        return DEFAULT_TIMING
+    return DEFAULT_TIMING._replace(timeout_s=DEFAULT_TIMING.timeout_s + EXCHANGE_BITS / choice.baud)
+
+
+def connect(link: ByteLink, numbers: dict[str, float], timing: PilTiming = DEFAULT_TIMING) -> TargetLoops:
+    """Return the loops at the other end, with their numbers; closes the line when they cannot fly."""
+    try:
+        return TargetLoops(link, numbers, timing)
+    except BaseException:
+        link.close()
+        raise
 
 
 def finish_loops(loops: ControlBackend, log: Path | None) -> None:
-    """End the loops; raise OSError when what they have to leave beside ``log`` cannot be written."""
+    """End the loops; those of a target leave the record of their link beside ``log``. Raise OSError."""
     loops.close()
+    if log is not None and isinstance(loops, CLoops) and isinstance(loops.computer, TargetLoops):
+        loops.computer.write_record(log)

@@ -1,0 +1,87 @@
+"""What is kept of a flight on a target: what each step cost, and how the link did."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flightstack.atomic_file import write_text_atomically
+from flightstack.contract import LoopFlags
+from flightstack.mavlink.services.pil_client import PilCounters
+from flightstack.mavlink.services.pil_operations import PilReport
+
+LINK_FILE, STEPS_FILE = "pil-link.json", "pil-steps.npz"
+COST_UNITS = ("none", "cycles", "instructions", "ns")
+STEP_ROW = np.dtype(
+    [
+        ("step", "u4"),
+        ("flags", "u4"),
+        ("status", "u4"),
+        ("cost", "u4", (4,)),
+        ("attempts", "u2"),
+        ("round_trip_s", "f8"),
+    ]
+)
+"""One step: number, ``LoopFlags``, FS_PIL_REPORT.status, cost of outer loop, inner loop, mixer and whole step, how
+often it was sent, and the wall time from the first sending to the report."""
+
+
+class PilRecord:
+    """Rows of all steps, and what is known of target and link."""
+
+    def __init__(self, target: str, identity: dict[str, Any]) -> None:
+        self._target, self._identity = target, identity
+        self._rows: np.ndarray[Any, np.dtype[np.void]] = np.zeros(1024, STEP_ROW)
+        self._count = 0
+        self.status: dict[str, Any] | None = None
+        """The target's last FS_PIL_STATUS; None if there was none."""
+
+    def add(self, flags: int, report: PilReport, attempts: int, round_trip_s: float) -> None:
+        """Note a step. One alone before a reset is no flight: the loops are tried once before the first."""
+        if flags & LoopFlags.RESET and self._count == 1:
+            self._count = 0
+        if self._count == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.zeros(self._count, STEP_ROW)])
+        self._rows[self._count] = (report.step, flags, report.status, report.cost, attempts, round_trip_s)
+        self._count += 1
+
+    @property
+    def steps(self) -> np.ndarray[Any, np.dtype[np.void]]:
+        """The rows so far; see ``STEP_ROW``."""
+        return self._rows[: self._count]
+
+    def summary(self, counters: PilCounters, ending: str | None) -> dict[str, Any]:
+        """Return what goes to ``pil-link.json``."""
+        trips = self.steps["round_trip_s"]
+        return {
+            "target": self._target,
+            "identity": self._identity,
+            "steps": self._count,
+            "link": asdict(counters),
+            "round_trip_s": _figures(trips) if len(trips) else None,
+            "status": self.status,
+            "ending": ending,
+        }
+
+    def write(self, log: Path, counters: PilCounters, texts: list[str], ending: str | None) -> None:
+        """Write both files beside the flight's log; ``ending``: why the target was given up. Raise OSError."""
+        folder, prefix = log.parent, log.stem.removesuffix("flight")
+        folder.mkdir(parents=True, exist_ok=True)
+        content = {**self.summary(counters, ending), "texts": texts}
+        write_text_atomically(folder / f"{prefix}{LINK_FILE}", json.dumps(content, indent=2) + "\n")
+        with (folder / f"{prefix}{STEPS_FILE}").open("wb") as file:
+            np.savez_compressed(file, steps=self.steps)
+
+
+def _figures(values: np.ndarray[Any, Any]) -> dict[str, float]:
+    return {
+        "min": float(values.min()),
+        "mean": float(values.mean()),
+        "median": float(np.median(values)),
+        "p99": float(np.percentile(values, 99)),
+        "max": float(values.max()),
+    }

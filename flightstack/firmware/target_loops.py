@@ -1,0 +1,212 @@
+"""The loops on a target, behind a line of octets: connected, checked, given their numbers, and stepped."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flightstack.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlags
+from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
+from flightstack.firmware.errors import TargetError, WrongFirmwareError
+from flightstack.firmware.pil_record import COST_UNITS, PilRecord
+from flightstack.firmware.sources import source_hash
+from flightstack.mavlink.services.pil_client import DEFAULT_TIMING, PilClient, PilTiming
+from flightstack.mavlink.services.pil_operations import PilReport, carried
+from flightstack.transport.byte_link import ByteLink
+
+NOTHING = (0.0,) * (TARGET_AT - SETPOINT_AT - ATTITUDE_TARGET_SIZE)
+MOST_READS = 100_000
+"""Reads of one attempt: a line that never falls silent must not keep a step waiting."""
+FAREWELL = PilTiming(timeout_s=0.2, attempts=2)
+
+
+class TargetLoops:
+    """Loops on a target; implements ``c_loops.Computer``.
+
+    A number that changes is set, and read back, before the next step. Nothing here may hang: every wait is bounded by
+    the client's timing, on the line's own clock, which runs on by what a read waited in vain.
+    """
+
+    def __init__(
+        self,
+        link: ByteLink,
+        numbers: Mapping[str, float],
+        timing: PilTiming = DEFAULT_TIMING,
+        clock_s: Callable[[], float] = time.monotonic,
+        expected_hash: bytes | None = None,
+    ) -> None:
+        """Check the target and give it ``numbers``; raise TargetError, WrongFirmwareError.
+
+        ``expected_hash``: that of the sources which the target must have; None: of these here.
+        """
+        self._link, self._client, self._clock_s = link, PilClient(timing), clock_s
+        self._waited_s = 0.0  # on top of the clock: an emulated target waits in no time
+        self._numbers: dict[str, float] = {}
+        self._pending: dict[str, float] = {}
+        self._is_closed = False
+        self.ending: str | None = None
+        """Why the target was given up; None: it was not."""
+        self.input: FloatArray = np.zeros(INPUT_SIZE)
+        self.output: FloatArray = np.zeros(OUTPUT_SIZE)
+        identity = self._identify()
+        problem = wrong_firmware(identity, source_hash() if expected_hash is None else expected_hash)
+        if problem is not None:
+            raise WrongFirmwareError(f"{link.name}: {problem}")
+        self.identity = described(identity)
+        self.record = PilRecord(link.name, self.identity)
+        words = (self.identity["board"], f"sources {self.identity['source_hash']}", self.identity["compiler"])
+        self.version = f"C, float, {', '.join(words)}"
+        for name, value in numbers.items():
+            self.set(name, value)
+        self._send_numbers()
+
+    # ------------------------------------------------------------------ Computer
+
+    def set(self, name: str, value: float) -> None:
+        """Change a number before the next step."""
+        value = carried(value) + 0.0  # no -0: not every target's FPU has one
+        if self._numbers.get(name) != value:
+            self._numbers[name] = self._pending[name] = value
+
+    def get(self, name: str) -> float:
+        """Return a number as the target has it, or will have it at the next step; KeyError if it was never set."""
+        return self._numbers[name]
+
+    def step(self, flags: int) -> None:
+        """Let the target compute a tick from ``input`` into ``output``; raise TargetError."""
+        self._send_numbers()
+        numbers = self.input.tolist()
+        if flags & LoopFlags.SET_TARGET:  # the given target travels in the setpoint's place
+            if flags & LoopFlags.OUTER_DUE:
+                raise ValueError("a step has either a setpoint or a target")
+            numbers = [*numbers[:SETPOINT_AT], *numbers[TARGET_AT:], *NOTHING]
+        else:
+            numbers = numbers[:TARGET_AT]
+        client = self._client
+        client.start_step(flags, numbers)
+        began_s = self._clock_s()
+        report = self._finish()
+        assert isinstance(report, PilReport)
+        self.record.add(flags, report, client.attempts, self._clock_s() - began_s)
+        self.output[:-1] = report.outputs
+        self.output[-1] = report.status & 0xFFFF
+
+    def close(self) -> None:
+        """Ask the target for its counters and close the line; a second call does nothing."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        try:
+            if self.ending is None:
+                self.record.status = self._farewell()
+        finally:
+            self._link.close()
+
+    def write_record(self, log: Path) -> None:
+        """Write what is known of steps and link beside the flight's log; raise OSError."""
+        texts = [text for _, text in self._client.texts]
+        self.record.write(log, self._client.counters, texts, self.ending)
+
+    # ------------------------------------------------------------------ the line
+
+    @property
+    def _now_s(self) -> float:
+        return self._clock_s() + self._waited_s
+
+    def _finish(self) -> Any:
+        """Drive the line until the client's operation has ended; return its result or raise TargetError."""
+        client, link = self._client, self._link
+        try:
+            while client.failure is None and client.result is None:
+                data = client.poll(self._now_s)
+                if data:
+                    link.write(data)
+                self._listen()
+        except (OSError, RuntimeError) as error:  # the line is gone, or the emulated processor
+            self.ending = str(error)
+            raise TargetError(str(error)) from error
+        if client.failure is not None:
+            sentence = f"the target on {link.name} {client.failure}"
+            if client.texts:
+                sentence += f"; it said: {client.texts[-1][1]}"
+            self.ending = sentence
+            raise TargetError(sentence)
+        return client.result
+
+    def _listen(self) -> None:
+        """Read until the operation has ended or its deadline has come."""
+        client, link = self._client, self._link
+        for _ in range(MOST_READS):
+            deadline_s = client.next_deadline()
+            if deadline_s is None:
+                return
+            left_s = deadline_s - self._now_s
+            if left_s <= 0.0:
+                return
+            before_s = self._clock_s()
+            data = link.read(left_s)
+            if data:
+                client.receive(data, self._now_s)
+            else:  # an emulated target has let the time pass that the clock has not
+                self._waited_s += max(0.0, left_s - (self._clock_s() - before_s))
+        self._waited_s += max(0.0, (client.next_deadline() or 0.0) - self._now_s)
+
+    def _identify(self) -> Any:
+        self._client.start_request("FS_PIL_IDENTITY")
+        return self._finish()
+
+    def _send_numbers(self) -> None:
+        while self._pending:
+            name, value = next(iter(self._pending.items()))
+            self._client.start_set(name, value)
+            self._finish()
+            del self._pending[name]
+
+    def _farewell(self) -> dict[str, Any] | None:
+        """Return the target's own counters; None when it does not tell them."""
+        self._client.timing = FAREWELL
+        self._client.start_request("FS_PIL_STATUS")
+        try:
+            message = self._finish()
+        except TargetError:
+            self.ending = None  # the flight was over
+            return None
+        status: dict[str, Any] = message.to_dict()
+        status.pop("mavpackettype", None)
+        return status
+
+
+def wrong_firmware(identity: Any, expected_hash: bytes) -> str | None:
+    """Tell why the loops behind an FS_PIL_IDENTITY cannot fly, or None."""
+    if identity.real_octets != 4:
+        return (
+            f"its loops compute with {8 * identity.real_octets} bits, not with 32: flash the firmware again"
+        )
+    if bytes(identity.source_hash) != expected_hash:
+        return (
+            f"its firmware was made of other sources ({bytes(identity.source_hash).hex()}, on {_board(identity)}) "
+            f"than these ({expected_hash.hex()}): flash it again"
+        )
+    return None
+
+
+def described(identity: Any) -> dict[str, Any]:
+    """Return an FS_PIL_IDENTITY in words and numbers, as JSON holds them."""
+    unit = identity.cost_unit
+    return {
+        "board": _board(identity),
+        "compiler": identity.compiler.strip() or "unknown compiler",
+        "source_hash": bytes(identity.source_hash).hex(),
+        "cost_unit": COST_UNITS[unit] if unit < len(COST_UNITS) else f"unit {unit}",
+        "clock_hz": identity.clock_hz,
+        "real_octets": identity.real_octets,
+        "char_bits": identity.char_bits,
+    }
+
+
+def _board(identity: Any) -> str:
+    return identity.board.strip() or "unknown board"
