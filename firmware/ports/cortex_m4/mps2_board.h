@@ -50,7 +50,8 @@ void mps2_uart_receive_interrupt(void);
 void mps2_uart_send_interrupt(void);
 
 /* mps2_time.c */
-void mps2_time_init(void);
+void mps2_time_init(void);        /* the timer */
+void mps2_tick_init(void);        /* SysTick's interrupt, every millisecond */
 uint32_t mps2_now_ms(void);       /* by SysTick's interrupt */
 uint32_t mps2_instructions(void); /* under QEMU's -icount shift=10 only */
 uint32_t mps2_nanoseconds(void);  /* of the emulated clock, modulo 2^32 */

@@ -12,6 +12,7 @@ void *memcpy(void *restrict to, const void *restrict from, size_t length);
 void *memmove(void *to, const void *from, size_t length);
 void *memset(void *to, int value, size_t length);
 int memcmp(const void *left, const void *right, size_t length);
+size_t strlen(const char *text);
 float sqrtf(float value);
 
 void *memcpy(void *restrict to, const void *restrict from, size_t length)
@@ -89,6 +90,17 @@ int memcmp(const void *left, const void *right, size_t length)
         }
     }
     return 0;
+}
+
+size_t strlen(const char *text)
+{
+    size_t length = 0U;
+
+    while (text[length] != '\0') {
+        length++;
+        FS_KEEP_LOOP();
+    }
+    return length;
 }
 
 /* the names by which the ARM run-time ABI calls the same ("Run-time ABI for the Arm Architecture", 4.3.4) */

@@ -1,0 +1,139 @@
+"""The same steps on host, emulated Cortex-M4F and simulated AVR; each tells the hash of all reports after every step."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from flightstack.firmware.build import EXACT, cached, host_compiler, includes
+from flightstack.firmware.cortex_m4 import emulated_image, instruction_counter
+from flightstack.firmware.emulator import MAX_RECEIVED, Emulator
+from flightstack.firmware.sources import c_files, firmware_root
+
+C = Path(__file__).parent / "c"
+LOOPS = [*c_files("core"), *c_files("mavlink")]
+STEPS = [C / "steps.c", C / "steps_parameters.c"]
+INCLUDES = [*includes("core", "mavlink"), f"-I{C}"]
+NIGHTLY = bool(os.environ.get("NIGHTLY"))
+"""Set by what runs at night: everything, however long it takes."""
+STAGES = ("outer", "inner", "mixer", "whole")
+LIMIT_S = 600.0
+
+
+class Costs(NamedTuple):
+    """Instructions of outer loop, inner loop, mixer and whole step: the most, and the mean of all steps."""
+
+    most: dict[str, int]
+    mean: dict[str, float]
+
+
+def tool(name: str, package: str) -> str:
+    """Return a tool's path; without it the test is skipped, but on CI, which installs it, it fails."""
+    found = shutil.which(name)
+    if found is None:
+        said = f"{name} is not installed (apt install {package})"
+        if os.environ.get("CI"):
+            pytest.fail(said)
+        pytest.skip(said)
+    return found
+
+
+def _state(*sources: Path) -> str:
+    """A definition that is another one whenever a file of the tests is: ``cached`` knows the firmware's files alone."""
+    content = b"".join(path.read_bytes() for path in (*sources, C / "steps.h"))
+    return f"-DSTEPS_STATE=0x{hashlib.sha256(content).hexdigest()[:15]}"
+
+
+def run(command: Sequence[str | Path]) -> str:
+    """Run a tool and return what it wrote to stderr; fail with that when the tool does."""
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False, timeout=LIMIT_S)
+    assert done.returncode == 0, f"{command[0]}: {done.stderr}{done.stdout}"
+    return done.stderr
+
+
+def hashes(octets: bytes) -> np.ndarray:
+    """Return the hash after each step, and at the end the number of parameters that were refused."""
+    return np.frombuffer(octets, "<u4")
+
+
+def on_host(stream: bytes, folder: Path) -> np.ndarray:
+    """Run the steps on this machine."""
+    sources = [*LOOPS, *STEPS, C / "steps_host.c"]
+    flags = [*EXACT, *INCLUDES, _state(*sources)]
+    program = cached("steps_host", host_compiler(), flags, sources)
+    (folder / "steps").write_bytes(stream)
+    run([program, folder / "steps", folder / "host"])
+    return hashes((folder / "host").read_bytes())
+
+
+@functools.cache
+def zig_image() -> Path:
+    """Return the steps for the emulator, compiled by zig as the application is."""
+    sources = [*LOOPS, *STEPS, C / "steps_cortex_m4.c"]
+    return emulated_image("steps.elf", sources, flags=[f"-I{C}", _state(*sources)])
+
+
+def gcc_image(folder: Path) -> Path:
+    """Return the steps for the emulator, compiled by gcc file by file."""
+    compiler = tool("arm-none-eabi-gcc", "gcc-arm-none-eabi")
+    port, image = firmware_root() / "ports" / "cortex_m4", folder / "steps_gcc.elf"
+    cpu = [
+        "-mthumb",
+        "-mcpu=cortex-m4",
+        "-mfpu=fpv4-sp-d16",
+        "-mfloat-abi=hard",
+        "-nostdlib",
+        "-Wl,--gc-sections",
+    ]
+    link = [f"-Wl,-T,{port / 'emulated.ld'}", "-Wl,-e,fs_emulated_exchange", "-ffunction-sections"]
+    own = [port / "emulated_start.c", port / "support.c", C / "steps_cortex_m4.c"]
+    flags = [*cpu, *link, *EXACT, *INCLUDES, f"-I{port}"]
+    run([compiler, *flags, *LOOPS, *STEPS, *own, "-lgcc", "-o", image])
+    return image
+
+
+def on_cortex_m4(stream: bytes, image: Path) -> tuple[np.ndarray, Costs]:
+    """Run the steps on the emulated Cortex-M4F."""
+    emulator = Emulator(image, instruction_counter())
+    pieces = (stream[at : at + MAX_RECEIVED] for at in range(0, len(stream), MAX_RECEIVED))
+    results = hashes(
+        b"".join([emulator.exchange(piece, 0) for piece in pieces] + [emulator.exchange(b"", 0)])
+    )
+    end = len(results) - 2 * len(STAGES)
+    most, total = results[end : end + len(STAGES)], results[end + len(STAGES) :]
+    steps = end - 1
+    return results[:end], Costs(
+        {stage: int(cost) for stage, cost in zip(STAGES, most, strict=True)},
+        {stage: float(cost) / steps for stage, cost in zip(STAGES, total, strict=True)},
+    )
+
+
+def on_avr(stream: bytes, folder: Path) -> np.ndarray:
+    """Run the steps on a simulated ATmega1284P, whose int has 16 bits and whose float arithmetic is a library."""
+    compiler, _ = tool("avr-gcc", "gcc-avr avr-libc"), tool("simavr", "simavr libsimavr-dev")
+    if not Path("/usr/include/simavr/sim_avr.h").exists():
+        tool("libsimavr-dev", "libsimavr-dev")
+    elf, simulator = folder / "steps_avr.elf", folder / "avr_simulator"
+    size = ["-mmcu=atmega1284p", "-ffunction-sections", "-Wl,--gc-sections"]
+    run([compiler, *size, *EXACT, *INCLUDES, *LOOPS, *STEPS, C / "steps_avr.c", "-o", elf])
+    run([*host_compiler().command, "-O2", C / "avr_simulator.c", "-lsimavr", "-o", simulator])
+    (folder / "steps").write_bytes(stream)
+    run([simulator, elf, folder / "steps", folder / "avr"])
+    return hashes((folder / "avr").read_bytes())
+
+
+def first_difference(one: np.ndarray, other: np.ndarray) -> str:
+    """Say at which step two machines begin to differ; the empty text if they never do."""
+    if len(one) != len(other):
+        return f"{len(one)} and {len(other)} results"
+    apart = np.flatnonzero(one != other)
+    return f"step {apart[0]} of {len(one) - 1}" if apart.size else ""

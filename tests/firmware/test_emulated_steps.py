@@ -1,0 +1,63 @@
+"""The emulated Cortex-M4F gives the host's bits, and a step costs no more instructions than it did."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from flightstack.firmware.numbers import default_numbers
+from tests.firmware.step_machines import Costs, first_difference, gcc_image, on_cortex_m4, on_host, zig_image
+from tests.firmware.step_streams import flown_steps, parameter_frame, random_steps
+
+RANDOM_STEPS = 100_000
+MOST_INSTRUCTIONS = 1500
+
+
+@cache
+def flown() -> bytes:
+    """A mission in wind with gusts: take-off, square, return, landing."""
+    return b"".join(flown_steps("square.plan"))
+
+
+@cache
+def flown_costs() -> Costs:
+    return on_cortex_m4(flown(), zig_image())[1]
+
+
+def test_random_steps_give_the_same_bits(tmp_path: Path) -> None:
+    stream = b"".join(random_steps(RANDOM_STEPS, seed=4))
+    here, (there, _) = on_host(stream, tmp_path), on_cortex_m4(stream, zig_image())
+    assert len(here) == RANDOM_STEPS + 1
+    assert here[-1] == 0, "parameters were refused"
+    assert first_difference(here, there) == ""
+
+
+def test_a_whole_mission_gives_the_same_bits(tmp_path: Path) -> None:
+    here, (there, _) = on_host(flown(), tmp_path), on_cortex_m4(flown(), zig_image())
+    assert len(here) > 10_000
+    assert first_difference(here, there) == ""
+
+
+def test_another_compiler_for_the_target_changes_no_bit(tmp_path: Path) -> None:
+    image, stream = gcc_image(tmp_path), b"".join(random_steps(5_000, seed=5))
+    assert first_difference(on_host(stream, tmp_path), on_cortex_m4(stream, image)[0]) == ""
+
+
+def test_a_gain_off_by_one_bit_is_seen(tmp_path: Path) -> None:
+    stream = random_steps(1_000, seed=6)
+    gain = np.float32(default_numbers()["PID_ROLL_P"])
+    changed = [parameter_frame("PID_ROLL_P", float(np.nextafter(gain, np.float32(np.inf)))), *stream]
+    here, (there, _) = on_host(b"".join(stream), tmp_path), on_cortex_m4(b"".join(changed), zig_image())
+    assert first_difference(here, there) != ""
+
+
+def test_instruction_counts_repeat_exactly() -> None:
+    assert on_cortex_m4(flown(), zig_image())[1] == flown_costs()
+
+
+def test_a_step_stays_within_its_instructions() -> None:
+    """The gate: means over a mission; the largest step has outer loop and saturated rotors together."""
+    costs = flown_costs()
+    assert costs.mean["whole"] < MOST_INSTRUCTIONS, costs
