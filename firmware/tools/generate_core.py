@@ -21,7 +21,7 @@ CORE = Path(__file__).resolve().parent.parent / "core"
 NOTICE = "/* Generated from Python by firmware/tools/generate_core.py: do not edit. */\n"
 ASCII = {"²": "^2", "³": "^3", "−": "-", "…": "to", "ẋ_d": "x_d'", "ẍ_d": "x_d''"}
 DIGITS = 12
-"""Of a default: enough for the loops, and the same on every machine, which the last ones of a pseudo-inverse are not."""
+"""Of a default: enough for the loops, and the same on every machine, as the last ones of a pseudo-inverse are not."""
 TYPES = {
     "float": "fs_real",
     "Vector3": "fs_vector3",
