@@ -1,0 +1,238 @@
+"""Compile the firmware's application for tests, and talk to it in the words of pymavlink."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import hashlib
+import os
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from flightstack.mavlink.dialect import mavlink
+from tests.firmware.codec_support import ROOT, WARNINGS, compiler
+
+FIRMWARE = ROOT / "firmware"
+PORTABLE = ("core", "mavlink", "app")
+LIBRARY = "FLIGHTSTACK_TEST_APP"
+"""Environment variable: run the tests with this library, which somebody has compiled in another way."""
+PROGRAM = "fs_host_program.c"
+
+READY, STEPPING, SAFE, RESTARTED = range(4)
+OUTER_DUE, SET_TARGET, RESET = 1, 2, 4
+REPEATED, OUT_OF_ORDER, OVERRUN, BAD_INPUT = (1 << bit for bit in range(16, 20))
+CYCLES, INSTRUCTIONS, NANOSECONDS = 1, 2, 3
+LEVEL = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""A state: at the origin, at rest, level."""
+ABOVE = (0.0, 0.0, -1.0, *(0.0,) * 8)
+"""A setpoint: one metre above the origin."""
+GCS = (255, 190)
+Clock = ctypes.CFUNCTYPE(ctypes.c_uint32)
+
+
+def sources(*folders: str) -> list[Path]:
+    """Return the C files of folders of the firmware."""
+    return [path for folder in folders for path in sorted((FIRMWARE / folder).glob("*.c"))]
+
+
+def host_sources() -> list[Path]:
+    """Return what makes the application on the host, without the program's main."""
+    own = [path for path in sources("ports/host") if path.name.startswith("fs_host") and path.name != PROGRAM]
+    return [*sources(*PORTABLE), *own]
+
+
+def build(output: Path, *flags: str, cc: Sequence[str] = (), program: bool = False) -> Path:
+    """Compile library or program into ``output``; the compiler's words are the failure."""
+    folders = [f"-I{FIRMWARE / folder}" for folder in (*PORTABLE, "ports/host")]
+    kind = [] if program else ["-shared", "-fPIC"]
+    files = [*host_sources(), *([FIRMWARE / "ports/host" / PROGRAM] if program else [])]
+    command = [*(cc or compiler()), *WARNINGS, *flags, "-fno-math-errno", *kind, *folders, *map(str, files)]
+    done = subprocess.run(
+        [*command, "-lm", "-o", str(output)], capture_output=True, text=True, check=False, cwd=output.parent
+    )
+    assert done.returncode == 0, done.stderr
+    return output
+
+
+@functools.cache
+def cached(name: str, *flags: str, program: bool = False) -> Path:
+    """Return what ``build`` makes, compiled once for each state of the sources."""
+    digest = hashlib.sha256(" ".join([*compiler(), *flags]).encode())
+    headers = [path for folder in (*PORTABLE, "ports/host") for path in (FIRMWARE / folder).glob("*.h")]
+    for path in sorted([*host_sources(), *headers, FIRMWARE / "ports/host" / PROGRAM]):
+        digest.update(path.read_bytes())
+    folder = Path(tempfile.gettempdir()) / f"flightstack-app-{os.getuid()}" / digest.hexdigest()[:16]
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / name
+    if not path.exists():
+        build(fresh := folder / f"{name}.{os.getpid()}", *flags, program=program)
+        fresh.replace(path)
+    return path
+
+
+class Port(ctypes.Structure):
+    """fs_port."""
+
+    _fields_ = [
+        ("clock", Clock),
+        ("clock_hz", ctypes.c_uint32),
+        ("cost_unit", ctypes.c_uint16),
+        ("was_watchdog", ctypes.c_uint16),
+        ("board", ctypes.c_char_p),
+        ("compiler", ctypes.c_char_p),
+        ("source_hash", ctypes.POINTER(ctypes.c_uint16)),
+        ("stack_size", ctypes.c_uint32),
+        ("stack_high_water", Clock),
+    ]
+
+
+@functools.cache
+def library(path: str = "", real: str = "float") -> ctypes.CDLL:
+    """Load the application with float or double, or what the environment names instead."""
+    flags = ["-O2", *(["-DFS_DOUBLE"] if real == "double" else [])]
+    if not path and real == "float":
+        path = os.environ.get(LIBRARY, "")
+    loaded = ctypes.CDLL(path or str(cached(f"app-{real}.so", *flags)))
+    loaded.fs_host_app_new.restype = ctypes.c_void_p
+    for name in ("fs_host_app_transmit", "fs_app_wait_ms"):
+        getattr(loaded, name).restype = ctypes.c_uint32
+    loaded.fs_app_state.restype = ctypes.c_uint16
+    return loaded
+
+
+class Target:
+    """An application, its port, and the ground station's codec. ``now_ms`` is the port's time."""
+
+    def __init__(
+        self,
+        *,
+        ticks: Iterable[int] = (),
+        cost_unit: int = CYCLES,
+        clock_hz: int = 200_000_000,
+        was_watchdog: bool = False,
+        real: str = "float",
+        own_port: bool = False,
+    ) -> None:
+        """``ticks``: what the clock shows at each call; without, it stands still. ``own_port``: the host's."""
+        self._library = library(real=real)
+        times = iter(ticks)
+        self._hash = (ctypes.c_uint16 * 8)(*(0xFF00 + octet for octet in range(1, 9)))  # high bits: rubbish
+        self._port = Port(
+            Clock(lambda: next(times, 0)), clock_hz, cost_unit, was_watchdog,
+            b"test board with a name of many letters", b"compiler of " + b"many words " * 5, self._hash,
+            4096, Clock(lambda: 321),
+        )  # fmt: skip
+        port = None if own_port else ctypes.byref(self._port)
+        self._app = ctypes.c_void_p(self._library.fs_host_app_new(port))
+        self.now_ms = 0
+        self.codec = mavlink.MAVLink(None, *GCS)
+        self.codec.robust_parsing = True
+        self._rest = b""
+        self._room = (ctypes.c_ubyte * 65536)()
+
+    def close(self) -> None:
+        """Give the memory back."""
+        self._library.fs_host_app_free(self._app)
+
+    def give(self, data: bytes) -> None:
+        """Let octets come from the line."""
+        self._library.fs_host_app_receive(self._app, data, ctypes.c_uint32(len(data)))
+
+    def give_element(self, element: int) -> None:
+        """Let one element come as a C28x holds an octet: with anything in its high bits."""
+        self._library.fs_app_receive(self._app, ctypes.c_uint16(element))
+
+    def take(self, room: int = 65536) -> bytes:
+        """Return at most ``room`` octets of what waits for the line."""
+        count = self._library.fs_host_app_transmit(self._app, self._room, ctypes.c_uint32(room))
+        return bytes(self._room[:count])
+
+    def frames(self, room: int) -> list[bytes]:
+        """Take at most ``room`` octets; return the frames that are whole with them."""
+        self._rest += self.take(room)
+        found = []
+        while len(self._rest) > 1 and len(self._rest) >= (size := self._rest[1] + 12):
+            found.append(self._rest[:size])
+            self._rest = self._rest[size:]
+        return found
+
+    def poll(self, passed_ms: int = 0) -> None:
+        """Let time pass, then the application do what is due."""
+        self.now_ms = (self.now_ms + passed_ms) & 0xFFFF_FFFF
+        self._library.fs_app_poll(self._app, ctypes.c_uint32(self.now_ms))
+
+    def uart_errors(self, overruns: int, errors: int) -> None:
+        """Tell the totals of the serial port."""
+        self._library.fs_app_uart_errors(self._app, ctypes.c_uint32(overruns), ctypes.c_uint32(errors))
+
+    @property
+    def state(self) -> int:
+        """READY, STEPPING, SAFE or RESTARTED."""
+        return int(self._library.fs_app_state(self._app))
+
+    @property
+    def wait_ms(self) -> int:
+        """In how many milliseconds something is due."""
+        return int(self._library.fs_app_wait_ms(self._app))
+
+    def heard(self, data: bytes | None = None) -> list[Any]:
+        """Return the messages in ``data``, or in what waits for the line; nothing in it is damaged."""
+        found = self.codec.parse_buffer(self.take() if data is None else data) or []
+        assert all(message.get_type() != "BAD_DATA" for message in found)
+        return list(found)
+
+    def pack(self, message: Any) -> bytes:
+        """Return the ground station's frame around a message."""
+        packed = bytes(message.pack(self.codec))
+        self.codec.seq = (self.codec.seq + 1) % 256
+        return packed
+
+    def ask(self, *messages: Any) -> list[Any]:
+        """Send messages; return what comes at once."""
+        for message in messages:
+            self.give(self.pack(message))
+        return self.heard()
+
+    def step(
+        self, number: int, flags: int = 0, state: Sequence[float] = LEVEL, setpoint: Sequence[float] = ABOVE
+    ) -> Any:
+        """Send a step; return the first report that comes."""
+        answers = self.ask(step(number, flags, state, setpoint))
+        return next(answer for answer in answers if answer.get_type() == "FS_PIL_REPORT")
+
+    def status(self) -> Any:
+        """Ask for FS_PIL_STATUS and return it."""
+        return self.request("FS_PIL_STATUS")
+
+    def request(self, name: str) -> Any:
+        """Ask for a message by MAV_CMD_REQUEST_MESSAGE and return it."""
+        found = self.ask(command(512, getattr(mavlink, f"MAVLINK_MSG_ID_{name}")))
+        return next(message for message in found if message.get_type() == name)
+
+    def text_after(self, act: Callable[[], Any]) -> list[tuple[int, str]]:
+        """Return severity and text of every STATUSTEXT that ``act`` causes in the next poll, or at once."""
+        act()
+        self.poll()
+        texts = [message for message in self.heard() if message.get_type() == "STATUSTEXT"]
+        return [(message.severity, message.text) for message in texts]
+
+
+def step(
+    number: int, flags: int = 0, state: Sequence[float] = LEVEL, setpoint: Sequence[float] = ABOVE
+) -> Any:
+    """Return an FS_PIL_STEP."""
+    return mavlink.MAVLink_fs_pil_step_message(number, flags, list(state), [*setpoint, *[0.0] * 11][:11])
+
+
+def command(number: int, *values: float, system: int = 1, component: int = 1) -> Any:
+    """Return a COMMAND_LONG."""
+    parameters = [*values, *[0.0] * 7][:7]
+    return mavlink.MAVLink_command_long_message(system, component, number, 0, *parameters)
+
+
+def kinds(messages: Iterable[Any]) -> list[str]:
+    """Return the names of messages."""
+    return [message.get_type() for message in messages]
