@@ -45,8 +45,12 @@ class Display(Protocol):
 
 def make_display(console: Console) -> Display:
     """Return the display that fits where ``console`` writes to."""
-    draws = console.is_terminal and not console.is_dumb_terminal
-    return BarDisplay(console) if draws else LineDisplay(console)
+    return BarDisplay(console) if draws_bars(console) else LineDisplay(console)
+
+
+def draws_bars(console: Console) -> bool:
+    """Tell whether ``console`` writes to a terminal that can draw a line anew."""
+    return console.is_terminal and not console.is_dumb_terminal
 
 
 class _NewTexts:

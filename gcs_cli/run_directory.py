@@ -16,7 +16,7 @@ def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS) -> Path:
     """Make and return the directory; raise CliError (usage) when it cannot be, or holds a flight."""
     try:
         if out is None:
-            return _fresh(base, f"{time.strftime('%Y%m%d-%H%M%S')}-{plan.stem}")
+            return _fresh(base, plan.stem)
         log = out / LOG_NAME
         if log.exists() and log.stat().st_size:
             raise CliError(f"--out {out}: {LOG_NAME} of another flight is there; choose another one", USAGE)
@@ -28,9 +28,17 @@ def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS) -> Path:
     return out
 
 
+def fresh_directory(base: Path, name: str) -> Path:
+    """Make and return a new directory ``<stamp>-<name>`` in ``base``; raise CliError (usage)."""
+    try:
+        return _fresh(base, name)
+    except OSError as error:
+        raise CliError(f"{base}: the directory cannot be made: {error.strerror}", USAGE) from None
+
+
 def _fresh(base: Path, name: str) -> Path:
     base.mkdir(parents=True, exist_ok=True)
-    attempt = 1
+    name, attempt = f"{time.strftime('%Y%m%d-%H%M%S')}-{name}", 1
     while True:
         folder = base / (name if attempt == 1 else f"{name}-{attempt}")
         try:

@@ -109,8 +109,8 @@ def _matched(
     if a is None or b is None:
         return None
     columns = min(a.values.shape[1], b.values.shape[1])
-    ticks = ((flight.airborne_us if airborne else flight.flown_us) for flight in (first, second))
-    flown = np.intersect1d(*ticks)
+    ours, theirs = ((flight.airborne_us if airborne else flight.flown_us) for flight in (first, second))
+    flown = np.intersect1d(ours, theirs)
     a, b = (_among(samples, flown) for samples in _at_same_times(a, b))
     a, b = a._replace(values=a.values[:, :columns]), b._replace(values=b.values[:, :columns])
     return (a, _same_sign(a, b)) if signal.is_attitude else (a, b)

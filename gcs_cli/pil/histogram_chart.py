@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
+from itertools import pairwise
 
 from gcs_cli.pil.profile import STAGE_TITLES, StageProfile
 from gcs_cli.report_svg import Scale, nice_ticks, rectangle, segment, text, tick_text
@@ -46,7 +47,7 @@ def _axes(x: Scale, share: Scale, unit: str) -> Iterator[str]:
 
 def _bars(profile: StageProfile, x: Scale, share: Scale, style: str) -> Iterator[str]:
     bottom = _HEIGHT - _BOTTOM
-    for left, right, count in zip(profile.edges, profile.edges[1:], profile.counts, strict=True):
+    for (left, right), count in zip(pairwise(profile.edges), profile.counts, strict=True):
         if not count:
             continue
         height = max(_SMALLEST_BAR, bottom - share.pixel(100.0 * count / profile.steps))

@@ -11,8 +11,6 @@ from flightstack.contract import FloatArray
 
 STAGES = ("outer", "inner", "mixer", "whole")
 STAGE_TITLES = {"outer": "outer loop", "inner": "inner loop", "mixer": "mixer", "whole": "whole step"}
-COST_UNITS = {0: "", 1: "cycles", 2: "instructions", 3: "ns"}
-"""By ``cost_unit`` of FS_PIL_IDENTITY: processor cycles of a board, instructions under emulation."""
 _BINS = 24
 
 

@@ -32,7 +32,7 @@ class DeviationChart(NamedTuple):
     """How far one signal is apart over time, for each pair of flights."""
 
     signal: Signal
-    pairs: Mapping[str, Deviation]
+    pairs: dict[str, Deviation]
 
 
 def render_report(

@@ -1,0 +1,118 @@
+"""``gcs pil``: the loops on a target, checked against those in Python and in C."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from gcs_cli.errors import FAILED, USAGE, CliError
+from gcs_cli.settings import JsonOption, settings_of
+
+if TYPE_CHECKING:
+    from gcs_cli.pil.result import Outcome
+
+_FLY, _HELP = "fly", ("--help",)
+
+
+class _MissionGroup(TyperGroup):
+    """Takes what is no command for the mission: ``gcs pil square.plan`` is ``gcs pil fly square.plan``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if args and args[0] not in self.commands and args[0] not in _HELP:
+            args = [_FLY, *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=_MissionGroup,
+    help="Check the loops on a target: `gcs pil MISSION` flies it as MIL, SIL and PIL.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+TargetOption = Annotated[
+    str, typer.Option(metavar="TARGET", help="emulated, host, or serial:DEVICE[:BAUD].", show_default=True)
+]
+FailOverOption = Annotated[
+    bool, typer.Option("--fail-over", help="Exit with 1 when a difference is over its limit.")
+]
+OutOption = Annotated[
+    Path | None, typer.Option(help="Directory of the results.  [default: runs/<stamp>-<name>-pil]")
+]
+OpenOption = Annotated[bool, typer.Option("--open", help="Open the report afterwards.")]
+
+
+@app.command(_FLY)
+def fly(
+    context: typer.Context,
+    plan: Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)],
+    target: TargetOption = "emulated",
+    controller: Annotated[str, typer.Option(help="pid or backstepping.")] = "pid",
+    gains: Annotated[str, typer.Option(help="tuned, paper, or a TOML file.")] = "tuned",
+    vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
+    plant: Annotated[str, typer.Option(help="rigid, or paper: the paper's small-angle model.")] = "rigid",
+    inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop.")] = 500.0,
+    outer_hz: Annotated[
+        float | None,
+        typer.Option(help="Rate of the outer loop; divides the inner one.  [default: about 100]"),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the gusts.")] = 1,
+    wind: Annotated[str | None, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")] = None,
+    gust: Annotated[float | None, typer.Option(help="Standard deviation of the gusts, m/s.")] = None,
+    ideal_rotors: Annotated[bool, typer.Option("--ideal-rotors", help="No rotor lag, no limits.")] = False,
+    params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None,
+    instance: Annotated[int, typer.Option(help="Shifts all ports, to fly beside another one.")] = 0,
+    out: OutOption = None,
+    fail_over: FailOverOption = False,
+    open_report: OpenOption = False,
+    as_json: JsonOption = False,
+    timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 60]")] = None,
+    limit: Annotated[float, typer.Option(help="Longest flight, s of simulated time.")] = 3600.0,
+) -> None:
+    """Fly a mission with the loops in Python, in C and on a target, and compare the flights."""
+    from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
+    from gcs_cli.fly_options import FlyOptions, checked_plan  # noqa: PLC0415
+    from gcs_cli.pil.run import run  # noqa: PLC0415
+    from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
+
+    settings = settings_of(context).merged(None, timeout)
+    if settings.connect is not None:
+        raise CliError("pil starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
+    options = FlyOptions(
+        plan, controller, gains, plant, inner_hz=inner_hz, outer_hz=outer_hz, seed=seed, wind=wind, gust=gust,
+        vehicle=vehicle, instance=instance, ideal_rotors=ideal_rotors, params=params, limit_s=limit,
+        timeout_s=60.0 if settings.timeout_s is None else settings.timeout_s,
+    )  # fmt: skip
+    checked_target(target)
+    items = checked_plan(options)
+    console = FlyConsole(stderr=as_json, highlight=False)
+    finished = run(options, items, target, out, console)
+    _tell(finished.outcome, finished.folder, console, as_json, open_report)
+    if finished.problem is not None:
+        raise finished.problem
+    _judge(finished.outcome, fail_over)
+
+
+def _tell(outcome: Outcome, folder: Path, console: Any, as_json: bool, open_report: bool) -> None:
+    from gcs_cli.pil.printed import print_outcome  # noqa: PLC0415
+    from gcs_cli.pil.run import HTML_NAME  # noqa: PLC0415
+
+    if as_json:
+        print(json.dumps({**outcome.result, "directory": str(folder)}), flush=True)
+    else:
+        print_outcome(console, outcome.result, folder)
+    if open_report:
+        import webbrowser  # noqa: PLC0415
+
+        webbrowser.open((folder / HTML_NAME).resolve().as_uri())
+
+
+def _judge(outcome: Outcome, fail_over: bool) -> None:
+    """With ``--fail-over``, raise CliError when the verdict is not good."""
+    if fail_over and not outcome.passed:
+        failed = [check["name"] for check in outcome.result["checks"] if not check["passed"]]
+        raise CliError(f"the verdict is not good: {', '.join(failed)}", FAILED)

@@ -1,0 +1,238 @@
+"""The content of ``pil.json``: flights compared, the target's figures, and the verdict. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations
+from typing import Any, NamedTuple
+
+from gcs_cli.pil.compare import (
+    Difference,
+    compared,
+    deviation,
+    status_differences,
+    ticks_apart,
+)
+from gcs_cli.pil.flight_samples import FlightSamples
+from gcs_cli.pil.profile import StageProfile, stage_profiles
+from gcs_cli.pil.report import DeviationChart
+from gcs_cli.pil.signals import BY_NAME
+from gcs_cli.pil.target_record import TargetRecord
+from gcs_cli.pil.verdict import (
+    CLOSED_LOOP_ULPS,
+    MIL,
+    PIL,
+    SAME_BITS_ULPS,
+    SIL,
+    Check,
+    all_passed,
+    board_limits,
+    difference_checks,
+)
+
+FORMAT = "flightstack-pil-1"
+PASSED, FAILED = "passed", "failed"
+COMPLETED = "completed"
+"""Outcome of a flight that came to its end; see ``flight_outcome``."""
+_SHOWN = ("position", "target_attitude", "torque", "rotor_command")
+_LANDING_TICKS = 25.0
+"""Two flights whose touchdown differs may be found landed in different ticks of the land detector."""
+_SHARE_OF_STATUS = 1e-3
+
+
+class Flown(NamedTuple):
+    """One flight of the comparison."""
+
+    outcome: str
+    samples: FlightSamples | None
+    """None: it left no readable log."""
+    facts: Mapping[str, Any]
+    """What ``pil.json`` says of it besides."""
+
+
+class Outcome(NamedTuple):
+    """What is written, and what the report draws."""
+
+    result: dict[str, Any]
+    charts: list[DeviationChart]
+    profiles: list[StageProfile]
+
+    @property
+    def passed(self) -> bool:
+        """The verdict."""
+        return bool(self.result["verdict"] == PASSED)
+
+
+def pair_name(first: str, second: str) -> str:
+    """Name a pair of flights."""
+    return f"{first}–{second}"
+
+
+def closed_loop(
+    flights: Mapping[str, Flown], record: TargetRecord | None, same_bits: bool, facts: Mapping[str, Any]
+) -> Outcome:
+    """Compare the flights MIL, SIL and PIL, each with its own vehicle, and judge them.
+
+    ``same_bits``: the target's arithmetic is that of the host to the last bit. ``facts``: title, about, meaning and
+    conditions.
+    """
+    there = {stage: flown.samples for stage, flown in flights.items() if flown.samples is not None}
+    differences: dict[str, list[Difference]] = {}
+    charts = {name: DeviationChart(BY_NAME[name], {}) for name in _SHOWN}
+    for (a, first), (b, second) in combinations(there.items(), 2):
+        pair = pair_name(a, b)
+        exact = same_bits and MIL not in (a, b)
+        differences[pair] = list(compared(pair, first, second, airborne=not exact))
+        for name, chart in charts.items():
+            chart.pairs[pair] = deviation(BY_NAME[name], first, second)
+    checks = [
+        Check("flights that failed", 0.0, _failures(flights), "", _reasons(flights)),
+        *_closed_loop_checks(there, differences, same_bits),
+        *(target_checks(record, len(there[PIL].flown_us)) if record is not None and PIL in there else ()),
+    ]
+    listed = [difference for pair in differences.values() for difference in pair]
+    result = assembled(listed, checks, record, facts)
+    result["flights"] = {
+        stage: {"outcome": flown.outcome, **_of_samples(flown.samples), **flown.facts}
+        for stage, flown in flights.items()
+    }
+    result["status_differences"] = {
+        pair_name(a, b): status_differences(first, second)[0]
+        for (a, first), (b, second) in combinations(there.items(), 2)
+    }
+    result["tiles"] = [*_tiles(differences, checks), *target_tiles(record)]
+    return Outcome(result, list(charts.values()), profiles_of(record))
+
+
+def assembled(
+    differences: Iterable[Difference],
+    checks: Sequence[Check],
+    record: TargetRecord | None,
+    facts: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return what every ``pil.json`` holds."""
+    return {
+        "format": FORMAT,
+        **facts,
+        "verdict": PASSED if all_passed(checks) else FAILED,
+        "checks": [check.as_json() for check in checks],
+        "differences": [found.as_json(BY_NAME[found.signal]) for found in differences],
+        "profile": _profile(record),
+        "target": None if record is None else dict(record.identity),
+        "stack": _stack(record),
+        "link": {} if record is None else dict(record.link),
+        "target_counters": {} if record is None else dict(record.status),
+        "flights": {},
+    }
+
+
+def _failures(flights: Mapping[str, Flown]) -> float:
+    done = sum(flown.outcome == COMPLETED for flown in flights.values())
+    return float(len((MIL, SIL, PIL)) - done)
+
+
+def _reasons(flights: Mapping[str, Flown]) -> str:
+    reasons = [f"{stage}: {flown.outcome}" for stage, flown in flights.items() if flown.outcome != COMPLETED]
+    missing = [stage for stage in (MIL, SIL, PIL) if stage not in flights]
+    return "; ".join([*reasons, *(f"{stage}: not flown" for stage in missing)])
+
+
+def _closed_loop_checks(
+    flights: Mapping[str, FlightSamples], differences: Mapping[str, Sequence[Difference]], same_bits: bool
+) -> Iterator[Check]:
+    for a, b in combinations(flights, 2):
+        pair, first, second = pair_name(a, b), flights[a], flights[b]
+        exact = same_bits and MIL not in (a, b)
+        apart = float(ticks_apart(first, second))
+        yield Check(f"{pair} ticks flown by one alone", 0.0 if exact else _LANDING_TICKS, apart, "")
+        if MIL not in (a, b):
+            differing, ticks = status_differences(first, second)
+            limit = 0.0 if exact else math.ceil(_SHARE_OF_STATUS * ticks)
+            yield Check(f"{pair} ticks of another status", limit, float(differing), "")
+        limits: dict[str, float] | float = CLOSED_LOOP_ULPS
+        if MIL not in (a, b):
+            limits = SAME_BITS_ULPS if exact else board_limits(CLOSED_LOOP_ULPS)
+        yield from difference_checks(differences[pair], limits)
+
+
+def target_checks(record: TargetRecord, ticks: int) -> Iterator[Check]:
+    """Yield what must hold of a target that ``ticks`` ticks were flown on."""
+    yield Check(
+        "steps flown without the target", 0.0, float(max(0, ticks - record.steps)), "", record.ending or ""
+    )
+    if record.status:
+        yield Check("safe states of the target", 0.0, float(record.status["safe_states"]), "")
+        yield Check("steps that overran their period", 0.0, float(record.status["loop_overruns"]), "")
+
+
+def profiles_of(record: TargetRecord | None) -> list[StageProfile]:
+    """Return the profile of each stage; none of a target that counts nothing."""
+    return [] if record is None or not record.unit else stage_profiles(record.costs)
+
+
+def _profile(record: TargetRecord | None) -> dict[str, Any] | None:
+    if record is None:
+        return None
+    return {
+        "unit": record.unit,
+        "about": _ABOUT_UNIT.get(record.unit, ""),
+        "stages": {profile.stage: profile.as_json() for profile in profiles_of(record)},
+    }
+
+
+_ABOUT_UNIT = {
+    "cycles": "Processor cycles, counted on the board.",
+    "instructions": (
+        "Instructions executed under emulation. They repeat exactly, and are no time: how many cycles an instruction "
+        "takes depends on the processor, its memory and its pipeline."
+    ),
+    "ns": "Nanoseconds of this machine, which did other things as well.",
+}
+
+
+def _stack(record: TargetRecord | None) -> dict[str, Any] | None:
+    if record is None or not record.status.get("stack_size"):
+        return None
+    return {"size": record.status["stack_size"], "high_water": record.status["stack_high_water"]}
+
+
+def _of_samples(samples: FlightSamples | None) -> dict[str, Any]:
+    if samples is None:
+        return {"ticks": None, "airborne_ticks": None, "loops": None}
+    version = samples.info.get("ver_loops") or samples.info.get("loops")
+    return {"ticks": len(samples.flown_us), "airborne_ticks": len(samples.airborne_us), "loops": version}
+
+
+def _tiles(differences: Mapping[str, Sequence[Difference]], checks: Sequence[Check]) -> list[dict[str, str]]:
+    tiles, ours, designed = [], pair_name(SIL, PIL), pair_name(MIL, PIL)
+    if ours in differences:
+        tiles.append({"name": f"largest difference {ours}", "value": largest_difference(differences[ours])})
+    for found in differences.get(designed, ()):
+        if found.signal == "position":
+            tiles.append({"name": f"trajectory {designed}", "value": f"{found.largest * 1e6:.3g} µm"})
+    margins = [
+        check.margin for check in checks if check.name.startswith(designed) and check.margin is not None
+    ]
+    if margins:
+        tiles.append({"name": f"smallest margin {designed}", "value": f"{min(margins):.3g}×"})
+    return tiles
+
+
+def target_tiles(record: TargetRecord | None) -> list[dict[str, str]]:
+    """Return the figures of target and link that stand on top of a report."""
+    if record is None:
+        return []
+    tiles = [{"name": "steps on the target", "value": f"{record.steps}"}]
+    whole = next((profile for profile in profiles_of(record) if profile.stage == "whole"), None)
+    if whole is not None:
+        tiles.append({"name": f"most {record.unit} of a step", "value": f"{whole.largest:.0f}"})
+    return [*tiles, {"name": "frames sent again", "value": f"{record.link.get('resent', 0)}"}]
+
+
+def largest_difference(differences: Sequence[Difference]) -> str:
+    """Say how large the largest difference is, in ulps."""
+    if not differences:
+        return "–"
+    largest = max(found.ulps for found in differences)
+    return "same bits" if largest == 0.0 else f"{largest:.3g} ulp"

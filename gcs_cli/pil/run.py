@@ -1,0 +1,160 @@
+"""``gcs pil MISSION``: three flights of the same mission, each in a directory of its own, compared and judged."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+
+from flightstack.atomic_file import write_text_atomically
+from flightstack.firmware.choice import PYTHON, C
+from flightstack.params.errors import ConfigError
+from flightstack.plan import Plan
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.flight import Flight
+from gcs_cli.fly_display import BarDisplay, Display, draws_bars
+from gcs_cli.fly_options import FlyOptions
+from gcs_cli.fly_run import fly, write_results
+from gcs_cli.pil.flight_samples import read_samples
+from gcs_cli.pil.report import render_report
+from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
+from gcs_cli.pil.target_record import TargetRecord, read_record
+from gcs_cli.pil.targets import checked_target, has_same_bits, meaning
+from gcs_cli.pil.verdict import MIL, PIL, SIL
+from gcs_cli.run_directory import LOG_NAME, RUNS, fresh_directory
+
+JSON_NAME, HTML_NAME = "pil.json", "pil.html"
+
+
+class SilentDisplay:
+    """Shows nothing of a flight: where no bar can be drawn, three times the same lines would tell nobody anything."""
+
+    def update(self, flight: Flight) -> None:
+        """Show nothing."""
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+class Finished(NamedTuple):
+    """What a run left."""
+
+    folder: Path
+    outcome: Outcome
+    problem: CliError | None
+    """Why a flight did not come to its end; None: all did."""
+
+
+def run(options: FlyOptions, plan: Plan, target: str, out: Path | None, console: Console) -> Finished:
+    """Fly the mission three times and write ``pil.json`` and ``pil.html``; raise CliError, ConfigError.
+
+    A flight that fails ends the run; what was flown until then is compared all the same.
+    """
+    choice = checked_target(target)
+    folder = make_pil_directory(options.plan_path.stem, out)
+    flights: dict[str, Flown] = {}
+    problem = None
+    for stage, loops in ((MIL, PYTHON), (SIL, C), (PIL, target)):
+        console.print(f"[bold]{stage}[/]  loops: {loops}", highlight=False)
+        flights[stage], problem = _fly(
+            stage, dataclasses.replace(options, loops=loops), plan, folder, console
+        )
+        if problem is not None:
+            break
+    record = _record(folder) if PIL in flights else None
+    facts = {
+        "title": f"{options.plan_path.stem}: MIL, SIL and PIL",
+        "about": _about(options, target),
+        "meaning": meaning(choice),
+        "conditions": _conditions(options, target),
+    }
+    outcome = closed_loop(flights, record, has_same_bits(choice), facts)
+    write_outcome(folder, outcome)
+    return Finished(folder, outcome, problem)
+
+
+def make_pil_directory(name: str, out: Path | None) -> Path:
+    """Make and return the directory of a run; raise CliError when it cannot be, or holds another run."""
+    if out is None:
+        return fresh_directory(RUNS, f"{name}-pil")
+    if (out / JSON_NAME).exists():
+        raise CliError(f"--out {out}: {JSON_NAME} of another run is there; choose another one", USAGE)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CliError(f"{out}: the directory cannot be made: {error.strerror}", USAGE) from None
+    return out
+
+
+def _fly(
+    stage: str, options: FlyOptions, plan: Plan, folder: Path, console: Console
+) -> tuple[Flown, CliError | None]:
+    display: Display = BarDisplay(console) if draws_bars(console) else SilentDisplay()
+    place = stage.lower()
+    try:
+        flown = fly(options, plan, folder / place, display)
+    finally:
+        display.close()
+    summary, outcome = write_results(options, plan, flown)
+    try:
+        samples = read_samples(folder / place / LOG_NAME)
+    except ConfigError:  # a flight that never began left none; its outcome says why
+        samples = None
+    facts = {name: summary[name] for name in ("sim_time_s", "wall_time_s", "log_sha256")}
+    problem = None
+    if not outcome.completed:
+        problem = CliError(f"{stage}: {outcome.reason} (see {folder / place})", outcome.exit_code)
+    return Flown(outcome.reason, samples, {"directory": place, **facts}), problem
+
+
+def _words(flown: Flown) -> str:
+    simulated_s, wall_s = flown.facts["sim_time_s"], flown.facts["wall_time_s"]
+    if flown.outcome != COMPLETED or wall_s is None:
+        return flown.outcome
+    return f"{flown.outcome}: {simulated_s:.1f} s simulated in {wall_s:.1f} s"
+
+
+def _record(folder: Path) -> TargetRecord | None:
+    try:
+        return read_record(folder / PIL.lower())
+    except ConfigError:  # the target was given up before it was known
+        return None
+
+
+def _about(options: FlyOptions, target: str) -> str:
+    return f"vehicle {options.vehicle} · controller {options.controller} ({options.gains}) · target {target}"
+
+
+def _conditions(options: FlyOptions, target: str) -> dict[str, Any]:
+    values = {
+        "plan": str(options.plan_path),
+        "target": target,
+        "vehicle": options.vehicle,
+        "controller": options.controller,
+        "gains": options.gains,
+        "plant": options.plant,
+        "inner loop": f"{options.inner_hz:g} Hz",
+        "outer loop": f"{options.outer_rate_hz:g} Hz",
+        "seed": options.seed,
+        "wind": options.wind,
+        "gusts": options.gust,
+        "torque gusts": options.torque_gust,
+        "faults": " ".join(options.faults) or None,
+        "ideal rotors": "yes" if options.ideal_rotors else None,
+        "parameters": None if options.params is None else str(options.params),
+    }
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def write_outcome(folder: Path, outcome: Outcome) -> None:
+    """Write ``pil.json`` and ``pil.html``, each whole or not at all; raise CliError."""
+    text = json.dumps(outcome.result, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    html = render_report(outcome.result, outcome.charts, outcome.profiles)
+    try:
+        write_text_atomically(folder / JSON_NAME, text)
+        write_text_atomically(folder / HTML_NAME, html)
+    except OSError as error:
+        raise CliError(f"{folder}: the results cannot be written: {error.strerror}") from None

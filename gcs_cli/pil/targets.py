@@ -1,0 +1,41 @@
+"""The targets that the loops can be checked on: the word behind ``--target``, and what it means."""
+
+from __future__ import annotations
+
+from flightstack.firmware.choice import EMULATED, HOST, LoopsChoice, parse_loops
+from gcs_cli.errors import USAGE, CliError
+
+MEANINGS = {
+    HOST: (
+        "PIL: the whole C program, with its protocol, as a process of its own on this machine behind a pseudo "
+        "terminal. It checks program and protocol, on no other processor than this one."
+    ),
+    EMULATED: (
+        "PIL: the whole firmware, cross-compiled for a Cortex-M4F and executed by an emulator, instruction by "
+        "instruction, on this machine. It stands for no board: nothing here was measured on an F28377S."
+    ),
+}
+_SERIAL_MEANING = (
+    "PIL: the firmware on the board named below, stepped over its serial port in simulated time."
+)
+_STAGES = "MIL: the loops in Python, float64. SIL: the loops in C, float32, inside the flight stack. "
+
+
+def checked_target(text: str) -> LoopsChoice:
+    """Read ``emulated``, ``host`` or ``serial:DEVICE[:BAUD]``; raise CliError (usage)."""
+    kind = text.partition(":")[0]
+    if kind not in (HOST, EMULATED, "serial"):
+        known = f"{EMULATED}, {HOST} or serial:DEVICE[:BAUD]"
+        raise CliError(f"--target {text}: expected {known}", USAGE)
+    return parse_loops(text)
+
+
+def has_same_bits(target: LoopsChoice) -> bool:
+    """Tell whether the target's arithmetic is the host's to the last bit: a board's need not be."""
+    return target.kind in (HOST, EMULATED)
+
+
+def meaning(target: LoopsChoice, replay: bool = False) -> str:
+    """Say what a run on this target shows, and what it does not."""
+    words = MEANINGS.get(target.kind, _SERIAL_MEANING)
+    return words if replay else _STAGES + words
