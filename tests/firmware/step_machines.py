@@ -1,4 +1,4 @@
-"""The same steps on host, emulated Cortex-M4F and simulated AVR; each tells the hash of all reports after every step."""
+"""The same steps on host, emulated Cortex-M4F and simulated AVR; each tells the hash of all its reports so far."""
 
 from __future__ import annotations
 

@@ -36,10 +36,10 @@ def parameter_frame(name: str, value: float) -> bytes:
     return frame(_SET.id, _SET.crc_extra, 0, struct.pack("<fBB16sB", value, 1, 1, name.encode(), 9))
 
 
-def random_steps(count: int, seed: int) -> list[bytes]:
+def random_steps(count: int, seed: int, one_broken_in: int = 100) -> list[bytes]:
     """Return steps that have nothing to do with each other, near and far from flight, both controllers in turn.
 
-    One in a hundred has a number that is not finite, or so large that results are not.
+    One in so many has a number that is not finite, or so large that results are not; 0: none.
     """
     rng = np.random.default_rng(seed)
     spread = 10.0 ** rng.uniform(-3.0, 1.5, (count, 1))
@@ -49,7 +49,7 @@ def random_steps(count: int, seed: int) -> list[bytes]:
     states[:, 6:10] /= np.linalg.norm(states[:, 6:10], axis=1)[:, None]
     states[:, 10:] *= np.minimum(spread, 3.0)
     setpoints *= spread
-    broken = rng.integers(100, size=count) == 0
+    broken = (rng.integers(one_broken_in, size=count) == 0) if one_broken_in else np.zeros(count, np.bool_)
     states[broken, rng.integers(STATE_SIZE, size=broken.sum())] = rng.choice(
         [np.nan, np.inf, -np.inf, 3e38, 1e-42], broken.sum()
     )
