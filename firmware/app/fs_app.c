@@ -140,8 +140,7 @@ void fs_app_poll(fs_app *app, uint32_t now_ms)
 /* Lower *wait_ms to what is left of a period. */
 static void wait_at_most(const fs_app *app, uint32_t since_ms, uint32_t period_ms, uint32_t *wait_ms)
 {
-    uint32_t passed_ms = app->now_ms - since_ms;
-    uint32_t left_ms = (passed_ms < period_ms) ? period_ms - passed_ms : 0UL;
+    uint32_t left_ms = period_ms - (app->now_ms - since_ms); /* what is overdue was done by the last fs_app_poll */
 
     if (left_ms < *wait_ms) {
         *wait_ms = left_ms;

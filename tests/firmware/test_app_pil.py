@@ -148,6 +148,20 @@ def test_a_flight_begins_with_any_number_and_forgets_the_one_before(target: Targ
     fresh.close()
 
 
+@pytest.mark.parametrize("change", ["state", "setpoint"])
+def test_the_last_number_with_other_content_is_no_repeated_step(target: Target, change: str) -> None:
+    """With RESET it begins a flight, without it is out of order: never is it answered from memory."""
+    other = {change: (0.5, *{"state": LEVEL, "setpoint": ABOVE}[change][1:])}
+    for flags in (RESET | OUTER_DUE, OUTER_DUE):
+        target.step(6, RESET)
+        target.step(7, OUTER_DUE)
+        report = target.step(7, flags, **other)
+        assert report.status & REPEATED == 0
+        assert bool(report.status & OUT_OF_ORDER) == (flags == OUTER_DUE)
+    target.step(3, RESET | OUTER_DUE)
+    assert target.step(3, RESET | OUTER_DUE, **other).status & REPEATED == 0
+
+
 def test_a_flight_that_begins_alike_with_other_numbers_is_computed(target: Target) -> None:
     """A host that tried one step, set a gain and begins anew must not be told what the old gain gave."""
     gain = mavlink.MAVLink_param_set_message(1, 1, b"POS_Z_P", 3.0, 9)

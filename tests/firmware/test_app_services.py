@@ -22,6 +22,7 @@ from tests.firmware.app_support import (
     ABOVE,
     BAD_INPUT,
     GCS,
+    NANOSECONDS,
     OUT_OF_ORDER,
     OUTER_DUE,
     REPEATED,
@@ -144,7 +145,7 @@ def test_an_unknown_parameter_cannot_be_set(target: Target) -> None:
     assert (error.get_type(), error.error, error.param_index) == ("PARAM_ERROR", DOES_NOT_EXIST, -1)
 
 
-@pytest.mark.parametrize(("system", "component"), [(2, 1), (1, 2), (255, 190)])
+@pytest.mark.parametrize(("system", "component"), [(2, 1), (1, 2), (0, 2), (255, 190)])
 def test_what_is_for_others_is_not_answered(target: Target, system: int, component: int) -> None:
     requests = [
         read("POS_XY_P", -1, system, component),
@@ -180,6 +181,17 @@ def test_autopilot_version(target: Target) -> None:
     assert version.capabilities == wanted
     assert version.flight_custom_version == [1, 2, 3, 4, 5, 6, 7, 8]
     assert version.uid2 == [0] * 18
+
+
+def test_the_host_tells_what_it_is() -> None:
+    target = Target(own_port=True)
+    identity, status = target.request("FS_PIL_IDENTITY"), target.status()
+    assert (identity.board, identity.clock_hz, identity.cost_unit) == ("host", 0, NANOSECONDS)
+    assert identity.compiler.startswith(("gcc ", "clang "))
+    assert (status.stack_size, status.stack_high_water) == (0, 0)
+    outer, inner, mixer, whole = target.step(0, RESET | OUTER_DUE).cycles
+    assert 0 < outer + inner + mixer <= whole
+    target.close()
 
 
 @pytest.mark.parametrize(
