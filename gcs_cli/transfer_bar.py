@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import (
     BarColumn,
     DownloadColumn,
+    MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     TextColumn,
     TimeRemainingColumn,
     TransferSpeedColumn,
@@ -18,14 +21,16 @@ from rich.progress import (
 class TransferBar:
     """Shows how far a transfer is; leaves nothing behind on the terminal."""
 
-    def __init__(self, name: str, console: Console | None = None) -> None:
+    def __init__(
+        self, name: str, console: Console | None = None, columns: Sequence[ProgressColumn] = ()
+    ) -> None:
+        """Show ``columns`` behind the bar: if none are given, octets and their speed."""
         console = console or Console(stderr=True)
         draws = console.is_terminal and not console.is_dumb_terminal
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
-            DownloadColumn(),
-            TransferSpeedColumn(),
+            *(columns or (DownloadColumn(), TransferSpeedColumn())),
             TimeRemainingColumn(),
             console=console,
             disable=not draws,
@@ -34,7 +39,7 @@ class TransferBar:
         self._task = self._progress.add_task(name, total=None)
 
     def show(self, done: int, total: int) -> None:
-        """Show ``done`` of ``total`` bytes; a total of 0 is not known yet."""
+        """Show ``done`` of ``total``; a total of 0 is not known yet."""
         self._progress.update(self._task, completed=done, total=total or None)
 
     def __enter__(self) -> TransferBar:
@@ -48,3 +53,8 @@ class TransferBar:
         traceback: TracebackType | None,
     ) -> None:
         self._progress.stop()
+
+
+def step_bar(name: str, console: Console) -> TransferBar:
+    """Return a bar that counts steps instead of octets."""
+    return TransferBar(name, console, (MofNCompleteColumn(),))

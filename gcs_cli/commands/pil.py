@@ -97,6 +97,36 @@ def fly(
     _judge(finished.outcome, fail_over)
 
 
+@app.command()
+def replay(
+    log: Annotated[Path, typer.Argument(help="A flight log (ULog).", show_default=False)],
+    target: Annotated[
+        str, typer.Option(metavar="TARGET", help="emulated, host, c, or serial:DEVICE[:BAUD].")
+    ] = "emulated",
+    vehicle: Annotated[
+        str | None, typer.Option(help="The vehicle's TOML file.  [default: the log's vehicle, by its name]")
+    ] = None,
+    out: OutOption = None,
+    fail_over: FailOverOption = False,
+    open_report: OpenOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Feed the inputs recorded in a flight log to a target, and compare its outputs with the log's."""
+    from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
+    from gcs_cli.pil import replay_run  # noqa: PLC0415
+    from gcs_cli.pil.run import make_pil_directory, write_outcome  # noqa: PLC0415
+    from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
+
+    choice = checked_target(target, more=("c",))
+    prepared = replay_run.prepared(log, vehicle)
+    folder = make_pil_directory(log.stem, out)
+    console = FlyConsole(stderr=as_json, highlight=False)
+    outcome = replay_run.replay(log, choice, target, prepared, folder, console)
+    write_outcome(folder, outcome)
+    _tell(outcome, folder, console, as_json, open_report)
+    _judge(outcome, fail_over)
+
+
 def _tell(outcome: Outcome, folder: Path, console: Any, as_json: bool, open_report: bool) -> None:
     from gcs_cli.pil.printed import print_outcome  # noqa: PLC0415
     from gcs_cli.pil.run import HTML_NAME  # noqa: PLC0415

@@ -24,7 +24,9 @@ from gcs_cli.report_chart import Line, time_chart
 from gcs_cli.report_plots import section
 
 _STYLE_SHEETS = (Path(__file__).parents[1] / "report.css", Path(__file__).with_name("pil.css"))
-_PAIR_STYLES = ("s1", "s2 target", "s4 thin")
+_PAIR_STYLES = ("s1 target", "s2 thin", "s4")
+_DECADES = 6.0
+"""Of a chart: what is smaller than the largest difference by more is drawn at the bottom."""
 _STAGE_STYLES = {"outer": "s2", "inner": "s1", "mixer": "s3", "whole": "s5"}
 
 
@@ -90,7 +92,7 @@ def _deviations(charts: Sequence[DeviationChart]) -> Iterator[str]:
             if not len(size):
                 continue
             if np.any(size > 0.0):
-                lines.append(Line(pair, time_s, size, style))
+                lines.append(Line(pair, time_s, np.maximum(size, 10.0**-_DECADES * size.max()), style))
             else:
                 same.append(pair)
         note = f"Not drawn, because no bit differs: {', '.join(same)}." if same else ""

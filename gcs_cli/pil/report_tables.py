@@ -28,7 +28,7 @@ def checks_section(checks: Sequence[dict[str, Any]]) -> str:
     """Return the verdict's checks, each limit beside what was measured."""
     head = (
         '<tr><th>check</th><th class="n">measured</th><th class="n">limit</th><th class="n">margin</th>'
-        "<th>passed</th><th>nearest to it</th></tr>"
+        "<th>passed</th><th>where</th></tr>"
     )
     note = (
         "ulp: unit in the last place of a float32 as large as the signal's largest value in the flight. Margin: how "

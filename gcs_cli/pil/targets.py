@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from flightstack.firmware.choice import EMULATED, HOST, LoopsChoice, parse_loops
+from flightstack.firmware.choice import EMULATED, HOST, SERIAL, C, LoopsChoice, parse_loops
 from gcs_cli.errors import USAGE, CliError
 
 MEANINGS = {
+    C: "The target is the C core inside this program, compiled for this machine.",
     HOST: (
         "PIL: the whole C program, with its protocol, as a process of its own on this machine behind a pseudo "
         "terminal. It checks program and protocol, on no other processor than this one."
@@ -21,18 +22,17 @@ _SERIAL_MEANING = (
 _STAGES = "MIL: the loops in Python, float64. SIL: the loops in C, float32, inside the flight stack. "
 
 
-def checked_target(text: str) -> LoopsChoice:
-    """Read ``emulated``, ``host`` or ``serial:DEVICE[:BAUD]``; raise CliError (usage)."""
-    kind = text.partition(":")[0]
-    if kind not in (HOST, EMULATED, "serial"):
-        known = f"{EMULATED}, {HOST} or serial:DEVICE[:BAUD]"
-        raise CliError(f"--target {text}: expected {known}", USAGE)
+def checked_target(text: str, more: tuple[str, ...] = ()) -> LoopsChoice:
+    """Read ``emulated``, ``host``, ``serial:DEVICE[:BAUD]`` or one of ``more``; raise CliError (usage), ConfigError."""
+    if text.partition(":")[0] not in (HOST, EMULATED, SERIAL, *more):
+        known = ", ".join([EMULATED, HOST, *more])
+        raise CliError(f"--target {text}: expected {known} or serial:DEVICE[:BAUD]", USAGE)
     return parse_loops(text)
 
 
 def has_same_bits(target: LoopsChoice) -> bool:
     """Tell whether the target's arithmetic is the host's to the last bit: a board's need not be."""
-    return target.kind in (HOST, EMULATED)
+    return target.kind in (C, HOST, EMULATED)
 
 
 def meaning(target: LoopsChoice, replay: bool = False) -> str:

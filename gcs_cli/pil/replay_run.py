@@ -1,0 +1,191 @@
+"""``gcs pil replay``: a log's inputs fed to a target, and its outputs compared with the log's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import Console
+
+from flightstack.contract import FloatArray
+from flightstack.firmware.c_loops import CLoops, LoopsSetup
+from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
+from flightstack.firmware.errors import TargetError
+from flightstack.firmware.numbers import CONTROLLERS
+from flightstack.firmware.targets import finish_loops, make_loops
+from flightstack.params.errors import ConfigError
+from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
+from flightstack.params.vehicle import Vehicle, load_vehicle
+from gcs_cli.errors import NO_ANSWER, USAGE, CliError
+from gcs_cli.pil.compare import compared, deviation, status_differences
+from gcs_cli.pil.flight_samples import FlightSamples, read_samples
+from gcs_cli.pil.replay import Recording, UnfitLogError, as_flight, recording, replayed
+from gcs_cli.pil.report import DeviationChart
+from gcs_cli.pil.result import (
+    Outcome,
+    assembled,
+    largest_difference,
+    pair_name,
+    profiles_of,
+    target_checks,
+    target_tiles,
+)
+from gcs_cli.pil.signals import BY_NAME
+from gcs_cli.pil.target_record import TargetRecord, read_record
+from gcs_cli.pil.targets import has_same_bits, meaning
+from gcs_cli.pil.verdict import OPEN_LOOP_ULPS, SAME_BITS_ULPS, Check, board_limits, difference_checks
+from gcs_cli.run_directory import LOG_NAME
+from gcs_cli.transfer_bar import step_bar
+
+LOG = "log"
+_TILT = "MPC_TILTMAX_AIR"
+_SHOWN = ("target_attitude", "reference_acceleration", "torque", "rotor_command")
+_MASS_TOLERANCE = 1e-6
+
+
+class Replay(NamedTuple):
+    """What is fed to the target, and how its loops are set up."""
+
+    flight: FlightSamples
+    record: Recording
+    setup: LoopsSetup
+    numbers: Mapping[str, float]
+    """Parameters of the loops as the log has them at its start."""
+
+
+def prepared(log: Path, vehicle: str | None) -> Replay:
+    """Read a log and set up the loops that flew in it; raise ConfigError, CliError (usage)."""
+    flight = read_samples(log)
+    try:
+        record = recording(flight)
+    except UnfitLogError as error:
+        raise ConfigError(log, "", f"cannot be replayed: {error}") from error
+    setup = _setup(flight, log, vehicle)
+    names = setup.numbers()
+    numbers = {name: value for name, value in flight.parameters.items() if name in names}
+    return Replay(flight, record, setup, numbers)
+
+
+def _setup(flight: FlightSamples, log: Path, vehicle: str | None) -> LoopsSetup:
+    info = flight.info
+    try:
+        name, inner_hz, outer_hz = str(info["controller"]), float(info["inner_hz"]), float(info["outer_hz"])
+    except KeyError as error:
+        raise ConfigError(log, "", f"cannot be replayed: it does not say its {error.args[0]}") from error
+    controller = next((known for known in CONTROLLERS if known.name == name), None)
+    if controller is None:
+        raise ConfigError(log, "", f"cannot be replayed: its controller {name} exists in Python alone")
+    return LoopsSetup(
+        _vehicle(flight, log, vehicle),
+        controller,
+        open_gains(DEFAULT_GAINS),  # each of which is a parameter, and the log's values take their places
+        math.radians(flight.parameters.get(_TILT, 45.0)),
+        inner_hz,
+        outer_hz,
+        max(1, round(inner_hz / outer_hz)),
+    )
+
+
+def _vehicle(flight: FlightSamples, log: Path, name: str | None) -> Vehicle:
+    flown = str(flight.info.get("vehicle"))
+    try:
+        vehicle = load_vehicle(flown if name is None else name)
+    except ConfigError:
+        if name is not None:
+            raise
+        raise CliError(f"{log}: was flown by {flown}: give its file with --vehicle", USAGE) from None
+    mass_kg, rotors = flight.info.get("mass_kg", vehicle.mass_kg), flight.info.get("rotor_count")
+    if abs(mass_kg - vehicle.mass_kg) > _MASS_TOLERANCE * vehicle.mass_kg or rotors != len(vehicle.rotors):
+        raise CliError(f"{log}: was flown by another {flown}: give its file with --vehicle", USAGE)
+    return vehicle if "rotor_max_speed_rad_s" in flight.info else vehicle.with_ideal_rotors()
+
+
+def fed(replay: Replay, target: str, folder: Path, console: Console) -> tuple[FloatArray, str]:
+    """Feed the recording to the target, which leaves its record in ``folder``; return outputs and its version.
+
+    Raise ConfigError, and CliError when the target is lost.
+    """
+    names = replay.setup.numbers()
+    try:
+        loops = make_loops(target, replay.setup)
+        assert isinstance(loops, CLoops)
+        with ExitStack() as last:
+            last.callback(finish_loops, loops, folder / LOG_NAME)
+            for name, value in replay.numbers.items():
+                loops.computer.set(name, value)
+            with step_bar(f"replay on {target}", console) as bar:
+                outputs = replayed(replay.record, loops.computer, names.__contains__, bar.show)
+        return outputs, loops.version
+    except TargetError as error:
+        raise CliError(str(error), NO_ANSWER) from error
+    except ValueError as error:  # a number that C refuses
+        raise CliError(f"the log's parameters cannot be replayed: {error}") from error
+
+
+def replay(
+    log: Path, choice: LoopsChoice, target: str, prepared_replay: Replay, folder: Path, console: Console
+) -> Outcome:
+    """Replay a log on a target and compare; raise ConfigError, CliError."""
+    outputs, version = fed(prepared_replay, target, folder, console)
+    record = read_record(folder) if choice.is_target else None
+    facts = {
+        "title": f"{log.stem}: replayed on {target}",
+        "about": f"{len(outputs)} steps of {log.name} · {version}",
+        "meaning": f"Open loop: the inputs that the log holds are fed to the target, step by step, and its outputs "
+        f"compared with the log's. {meaning(choice, replay=True)}",
+        "conditions": _conditions(log, target, prepared_replay),
+    }
+    return judged(prepared_replay, outputs, record, has_same_bits(choice), facts)
+
+
+def _conditions(log: Path, target: str, replay: Replay) -> dict[str, Any]:
+    info = replay.flight.info
+    names = ("vehicle", "controller", "gains", "loops", "ver_loops", "inner_hz", "outer_hz")
+    return {"log": str(log), "target": target, **{name: info[name] for name in names if name in info}}
+
+
+def judged(
+    replay: Replay,
+    outputs: FloatArray,
+    record: TargetRecord | None,
+    same_bits: bool,
+    facts: Mapping[str, Any],
+) -> Outcome:
+    """Compare the outputs with the log's and judge them. Pure."""
+    flight = replay.flight
+    made = as_flight(replay.record, outputs, flight)
+    pair = pair_name(LOG, "target")
+    differences = list(compared(pair, flight, made))
+    flown = str(flight.info.get("loops", PYTHON))
+    exact = same_bits and flown != PYTHON and not flown.startswith(SERIAL)
+    limits: dict[str, float] | float = SAME_BITS_ULPS if exact else OPEN_LOOP_ULPS
+    if not exact and not (flown == PYTHON or same_bits):
+        limits = board_limits(OPEN_LOOP_ULPS)
+    differing, ticks = status_differences(flight, made)
+    checks = [
+        *difference_checks(differences, limits),
+        Check(
+            f"{pair} steps of another status", 0.0 if exact else math.ceil(1e-3 * ticks), float(differing), ""
+        ),
+        *(target_checks(record, len(outputs)) if record is not None else ()),
+    ]
+    result = assembled(differences, checks, record, facts)
+    if not replay.record.tells_targets:
+        result["meaning"] += (
+            " This log does not tell which attitude targets the outer loop made: all were given to the inner loop, "
+            "and the outer loop did not run."
+        )
+    result["tiles"] = [
+        {"name": f"largest difference {pair}", "value": largest_difference(differences)},
+        *target_tiles(record),
+    ]
+    charts = [
+        DeviationChart(BY_NAME[name], {pair: deviation(BY_NAME[name], flight, made)}) for name in _SHOWN
+    ]
+    return Outcome(
+        result, [chart for chart in charts if np.size(chart.pairs[pair].size)], profiles_of(record)
+    )
