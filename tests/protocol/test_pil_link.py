@@ -1,0 +1,262 @@
+"""The link to a target, on a line that loses and changes octets, against the firmware's own application."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from flightstack.contract import LoopFlags, LoopRow, LoopStatus
+from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
+from flightstack.control.attitude_pid import CONTROLLER as PID
+from flightstack.firmware.build import host_library
+from flightstack.firmware.c_loops import CLoops, LoopsSetup
+from flightstack.firmware.errors import TargetError, WrongFirmwareError
+from flightstack.firmware.host_library import HostLoops
+from flightstack.firmware.target_loops import TargetLoops
+from flightstack.firmware.targets import finish_loops
+from flightstack.params.gains_file import open_gains
+from flightstack.params.vehicle import load_vehicle
+from tests.firmware.app_support import SAFE, Target
+from tests.support.lossy_line import FAIR, LossyLine, Weather
+
+HASH = bytes(range(1, 9))
+"""What the application of the tests tells."""
+SPEEDS = np.zeros(8, np.float32)
+WEATHERS = {
+    "fair": FAIR,
+    "loses octets": Weather(loss=5e-4),
+    "changes octets": Weather(change=5e-4),
+    "doubles pieces": Weather(doubling=0.2),
+    "delays beyond the time-out": Weather(delay=0.02),
+    "is noisy": Weather(noise=0.2),
+    "does everything": Weather(2e-4, 2e-4, 0.1, 0.01, 0.3, 0.1),
+}
+
+
+def setup(controller=PID) -> LoopsSetup:
+    tilt = math.radians(45.0)
+    return LoopsSetup(load_vehicle("x_quad"), controller, open_gains("tuned"), tilt, 500.0, 100.0, 5)
+
+
+@pytest.fixture
+def device() -> Iterator[Target]:
+    target = Target()
+    yield target
+    target.close()
+
+
+def connected(line: LossyLine, controller=PID, **options: object) -> CLoops:
+    of = setup(controller)
+    computer = TargetLoops(line, of.numbers(), clock_s=line.clock, expected_hash=HASH, **options)  # type: ignore[arg-type]
+    return CLoops("serial:test", computer, of)
+
+
+def sil(controller=PID) -> CLoops:
+    of = setup(controller)
+    return CLoops("c", HostLoops(host_library(), of.numbers()), of)
+
+
+def drive(loops: CLoops, ticks: int, seed: int = 3) -> np.ndarray:
+    """Step with random inputs, resets, given targets and changes of gains; return the rows with the target."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for tick in range(ticks):
+        state = np.concatenate([rng.normal(size=6), [1.0, 0.0, 0.0, 0.0], rng.normal(size=3) * 0.3])
+        state[6:10] += rng.normal(size=4) * 0.1
+        state[6:10] /= np.linalg.norm(state[6:10])
+        wish = rng.normal(size=11)
+        if rng.random() < 0.01:
+            loops.reset(state)
+        gain = rng.uniform(1.0, 4.0)
+        if rng.random() < 0.02:
+            loops.set_parameter("POS_XY_P", gain)
+            assert loops.get_parameter("POS_XY_P") == np.float32(gain)
+        outer = tick % 5 == 0
+        target = np.array([*state[6:10], 9.0])
+        if outer and rng.random() < 0.2:
+            loops.set_attitude_target(target)
+            outer = False
+        row = np.zeros(LoopRow.SIZE)
+        loops.step(state, wish, SPEEDS, outer, row)
+        rows.append(np.concatenate([row, loops.attitude_target]))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("name", WEATHERS)
+@pytest.mark.parametrize("controller", [PID, BACKSTEPPING], ids=["pid", "backstepping"])
+def test_whatever_the_line_does_the_target_computes_what_c_does_here(device, name, controller) -> None:
+    line = LossyLine(device, WEATHERS[name], seed=7)
+    loops = connected(line, controller)
+    assert np.array_equal(drive(loops, 1000), drive(sil(controller), 1000))
+    loops.close()
+    assert line.is_closed
+    computer = loops.computer
+    assert isinstance(computer, TargetLoops)
+    counters, steps = computer._client.counters, computer.record.steps
+    assert steps["step"].tolist() == list(range(1000))  # none skipped, none twice
+    status = computer.record.status
+    assert status is not None
+    assert status["steps"] == 1000
+    assert (counters.resent > 0) == (name not in ("fair", "doubles pieces"))
+    assert (status["repeats"] + status["out_of_order"] > 0) == (name != "fair")
+
+
+def test_the_same_seed_gives_the_same_link(device) -> None:
+    counted = []
+    for _ in range(2):
+        target = Target()
+        loops = connected(LossyLine(target, WEATHERS["does everything"], seed=5))
+        drive(loops, 300)
+        computer = loops.computer
+        assert isinstance(computer, TargetLoops)
+        counted.append(computer._client.counters)
+        target.close()
+    assert counted[0] == counted[1]
+    assert counted[0].resent > 0
+
+
+def test_all_numbers_are_on_the_target_before_the_first_step(device) -> None:
+    numbers = setup(BACKSTEPPING).numbers()
+    connected(LossyLine(device, WEATHERS["loses octets"], seed=1), BACKSTEPPING)
+    from tests.firmware.app_support import mavlink  # noqa: PLC0415
+
+    told = {}
+    for message in device.ask(mavlink.MAVLink_param_request_list_message(1, 1)):
+        if message.get_type() == "PARAM_VALUE":
+            told[message.param_id] = message.param_value
+    assert len(told) > len(numbers)
+    assert {name: told[name] for name in numbers} == {n: np.float32(v) for n, v in numbers.items()}
+
+
+def test_a_line_that_is_cut_ends_the_flight_with_a_sentence(device) -> None:
+    line = LossyLine(device)
+    loops = connected(line)
+    drive(loops, 10)
+    line.is_cut = True
+    with pytest.raises(TargetError, match=r"on the lossy line did not answer step 10, sent 20 times"):
+        drive(loops, 1)
+    assert line.now_s < 10.0
+    loops.close()
+    assert line.is_closed
+
+
+def test_a_target_that_restarts_in_flight_ends_it_with_a_sentence(device) -> None:
+    class Restarted:
+        def __init__(self) -> None:
+            self.now = device
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self.now, name)
+
+    changing = Restarted()
+    loops = connected(LossyLine(changing))
+    drive(loops, 10)
+    other = Target()
+    changing.now = other
+    with pytest.raises(TargetError, match=r"expects step 0, not 10: it has lost its place"):
+        drive(loops, 1)
+    other.close()
+
+
+def test_bad_input_ends_the_flight_and_the_target_has_stopped_its_rotors(device) -> None:
+    loops = connected(LossyLine(device))
+    drive(loops, 10)
+    state = np.array([math.nan] + [0.0] * 5 + [1.0] + [0.0] * 6)
+    with pytest.raises(TargetError, match=r"stopped its rotors at step 10: it was given bad input"):
+        loops.step(state, np.zeros(11), SPEEDS, True, np.zeros(LoopRow.SIZE))
+    assert device.state == SAFE
+
+
+def test_other_firmware_is_refused_with_both_hashes(device) -> None:
+    of = setup()
+    line = LossyLine(device)
+    with pytest.raises(
+        WrongFirmwareError, match=r"0102030405060708, on test board .*\(ff{15}\): flash it again"
+    ):
+        TargetLoops(line, of.numbers(), clock_s=line.clock, expected_hash=b"\xff" * 8)
+
+
+def test_loops_of_double_are_refused() -> None:
+    target = Target(real="double")
+    line = LossyLine(target)
+    with pytest.raises(WrongFirmwareError, match="compute with 64 bits, not with 32"):
+        TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
+    target.close()
+
+
+def test_a_silent_line_is_no_target() -> None:
+    class Nobody:
+        def give(self, data: bytes) -> None: ...
+
+        def take(self) -> bytes:
+            return b""
+
+        def poll(self, passed_ms: int) -> None: ...
+
+    line = LossyLine(Nobody())
+    with pytest.raises(TargetError, match="did not answer when asked for FS_PIL_IDENTITY, 20 times"):
+        TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
+    assert line.now_s == pytest.approx(5.0)
+
+
+def test_a_line_full_of_noise_is_no_target() -> None:
+    class Noise:
+        def __init__(self) -> None:
+            self._random = np.random.default_rng(2)
+
+        def give(self, data: bytes) -> None: ...
+
+        def take(self) -> bytes:
+            return self._random.bytes(50)
+
+        def poll(self, passed_ms: int) -> None: ...
+
+    line = LossyLine(Noise())
+    with pytest.raises(TargetError, match="did not answer when asked for FS_PIL_IDENTITY"):
+        TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
+    assert line.now_s < 6.0
+
+
+def test_what_is_left_of_a_flight_beside_its_log(device, tmp_path) -> None:
+    loops = connected(LossyLine(device, WEATHERS["does everything"], seed=11))
+    drive(loops, 1)  # the trial at the start
+    loops.reset(np.array([0.0] * 6 + [1.0] + [0.0] * 6))
+    drive(loops, 200)
+    finish_loops(loops, tmp_path / "flight.ulg")
+    told = json.loads((tmp_path / "pil-link.json").read_text())
+    assert told["identity"] == {
+        "board": "test board with a name o",
+        "compiler": ("compiler of " + "many words " * 5)[:47].strip(),
+        "source_hash": HASH.hex(),
+        "cost_unit": "cycles",
+        "clock_hz": 200_000_000,
+        "real_octets": 4,
+        "char_bits": 8,
+    }
+    assert told["steps"] == 200
+    assert told["ending"] is None
+    assert told["status"]["stack_size"] == 4096
+    assert told["status"]["stack_high_water"] == 321
+    assert told["link"]["resent"] > 0
+    assert told["round_trip_s"]["min"] == pytest.approx(0.002)
+    steps = np.load(tmp_path / "pil-steps.npz")["steps"]
+    assert steps["step"].tolist() == list(range(1, 201))
+    assert steps["flags"][0] & LoopFlags.RESET
+    assert steps["attempts"].max() > 1
+
+
+def test_a_result_that_is_not_finite_repeats_the_last_row_as_in_c(device) -> None:
+    """Finite inputs whose squares are not: the target keeps its place and says so."""
+    both = connected(LossyLine(device)), sil()
+    huge = np.array([0.0] * 6 + [1.0, 0.0, 0.0, 0.0] + [3e38] * 3)
+    for loops in both:
+        drive(loops, 6)
+    rows = [np.zeros(LoopRow.SIZE), np.zeros(LoopRow.SIZE)]
+    for loops, row in zip(both, rows, strict=True):
+        loops.step(huge, np.zeros(11), SPEEDS, False, row)
+    assert int(rows[0][LoopRow.STATUS]) & (LoopStatus.OUTPUT_NOT_FINITE | LoopStatus.INPUT_NOT_FINITE)
+    assert np.array_equal(rows[0], rows[1])
