@@ -127,6 +127,44 @@ def replay(
     _judge(outcome, fail_over)
 
 
+@app.command()
+def doctor(
+    port: Annotated[
+        str | None,
+        typer.Option(metavar="DEVICE", help="Serial port, /dev/ttyUSB1 for instance.", show_default=False),
+    ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option(metavar="TARGET", help="In place of --port: host or emulated.", show_default=False),
+    ] = None,
+    baud: Annotated[
+        list[int] | None,
+        typer.Option(help="Rate to try; may be repeated.  [default: 115200 230400 460800 921600]"),
+    ] = None,
+    exchanges: Annotated[int, typer.Option(min=1, max=100_000, help="Steps to measure at each rate.")] = 300,
+    as_json: JsonOption = False,
+) -> None:
+    """Find out how well the link to a target works, and what to change."""
+    from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
+    from gcs_cli.pil import doctor as examination  # noqa: PLC0415
+    from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
+    from gcs_cli.transfer_bar import step_bar  # noqa: PLC0415
+
+    if (port is None) == (target is None):
+        raise CliError("give either --port DEVICE or --target", USAGE)
+    choice = checked_target(f"serial:{port}" if target is None else target)
+    bauds = baud or ([choice.baud] if target is not None else examination.BAUDS)
+    console = FlyConsole(stderr=as_json, highlight=False)
+    with step_bar("exchanges", console) as bar:
+        found = examination.examine(choice, bauds, exchanges, bar.show)
+    result = examination.findings(choice, found)
+    if as_json:
+        print(json.dumps(result), flush=True)
+    else:
+        examination.print_findings(console, result)
+    examination.check_findings(result)
+
+
 def _tell(outcome: Outcome, folder: Path, console: Any, as_json: bool, open_report: bool) -> None:
     from gcs_cli.pil.printed import print_outcome  # noqa: PLC0415
     from gcs_cli.pil.run import HTML_NAME  # noqa: PLC0415

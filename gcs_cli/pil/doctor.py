@@ -1,0 +1,124 @@
+"""``gcs pil doctor``: opens a line to a target at each baud rate and measures it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from flightstack.firmware.build import BuildError
+from flightstack.firmware.choice import SERIAL, LoopsChoice
+from flightstack.firmware.sources import source_hash
+from flightstack.firmware.targets import open_link
+from flightstack.transport.byte_link import LineError
+from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
+from gcs_cli.pil.advice import Port, advice
+from gcs_cli.pil.probe import Measurement, measured
+
+BAUDS = (115_200, 230_400, 460_800, 921_600)
+"""Rates that the F28377S port can be built for, as its divider gives them within half a percent."""
+
+
+def examine(
+    choice: LoopsChoice, bauds: Sequence[int], exchanges: int, progress: Callable[[int, int], None]
+) -> list[Measurement]:
+    """Measure the line at each baud rate; only once if it is not serial. Raise CliError when it cannot be opened."""
+    found = []
+    for baud in bauds if choice.kind == SERIAL else (None,):
+        tried = choice if baud is None else choice._replace(baud=baud)
+        try:
+            link = open_link(tried)
+        except (BuildError, LineError) as error:
+            raise CliError(str(error), USAGE) from None
+        try:
+            found.append(measured(link, baud, exchanges, progress))
+        except OSError as error:  # LineError
+            raise CliError(str(error), NO_ANSWER) from None
+        finally:
+            link.close()
+    return found
+
+
+def port_of(choice: LoopsChoice) -> Port | None:
+    """Return what the system knows of the port; None if the target has none."""
+    if choice.kind != SERIAL:
+        return None
+    path = Path("/sys/class/tty") / Path(choice.device).resolve().name / "device" / "latency_timer"
+    try:
+        return Port(choice.device, float(path.read_text()), str(path))
+    except (OSError, ValueError):
+        return Port(choice.device)
+
+
+def findings(choice: LoopsChoice, found: Sequence[Measurement]) -> dict[str, Any]:
+    """Return all that was found, as JSON holds it."""
+    return {
+        "target": choice.kind if choice.kind != SERIAL else choice.device,
+        "sources_here": source_hash().hex(),
+        "lines": [_line(each) for each in found],
+        "advice": advice(port_of(choice), found, source_hash().hex()),
+    }
+
+
+def _line(each: Measurement) -> dict[str, Any]:
+    median_s, p99_s = each.percentile_s(50.0), each.percentile_s(99.0)
+    return {
+        "baud": each.baud,
+        "answers": each.identity is not None,
+        "identity": each.identity,
+        "problem": each.problem,
+        "exchanges": len(each.round_trips_s),
+        "round_trip_median_ms": _ms(median_s),
+        "round_trip_p99_ms": _ms(p99_s),
+        "time_on_wire_ms": _ms(each.wire_s),
+        "lost": each.lost,
+        "bad": 0 if each.counters is None else each.counters.bad,
+        "target_counted": each.troubles,
+        "steps_per_s": None if each.steps_per_s is None else round(each.steps_per_s, 1),
+    }
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else round(seconds * 1e3, 4)
+
+
+def print_findings(console: Console, result: dict[str, Any]) -> None:
+    """Print who answered, a table of the rates, and what to change."""
+    identity = next((line["identity"] for line in result["lines"] if line["identity"]), None)
+    if identity is not None:
+        words = f"{identity['board']}, {identity['compiler']}, sources {identity['source_hash']}"
+        console.print(words, markup=False, highlight=False, soft_wrap=True)
+        table = Table(box=None, padding=(0, 2, 0, 0), header_style="bright_black")
+        for name in ("baud", "round trip", "p99", "on the wire", "lost", "steps/s"):
+            table.add_column(name, justify="right", no_wrap=True)
+        for line in result["lines"]:
+            table.add_row(*_cells(line))
+        console.print(table)
+    for sentence in result["advice"] or ("Nothing need be changed.",):
+        console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+
+
+def _cells(line: dict[str, Any]) -> tuple[str, ...]:
+    baud = "–" if line["baud"] is None else str(line["baud"])
+    if not line["answers"]:
+        return baud, "no answer", "", "", "", ""
+    times = (line[name] for name in ("round_trip_median_ms", "round_trip_p99_ms", "time_on_wire_ms"))
+    shown = ("–" if value is None else f"{value:.3f} ms" for value in times)
+    lost = f"{line['lost']} of {line['exchanges']}"
+    return (baud, *shown, lost, "–" if line["steps_per_s"] is None else f"{line['steps_per_s']:.0f}")
+
+
+def check_findings(result: dict[str, Any]) -> None:
+    """Raise CliError when nothing answered (no answer), or nothing can fly on what did (failed)."""
+    lines = [line for line in result["lines"] if line["answers"]]
+    if not lines:
+        raise CliError(f"{result['target']}: no target answered", NO_ANSWER)
+    identity = lines[0]["identity"]
+    if identity["source_hash"] != result["sources_here"] or identity["real_octets"] != 4:
+        raise CliError(f"{result['target']}: the wrong firmware runs there", FAILED)
+    problem = next((line["problem"] for line in lines if line["problem"]), None)
+    if problem is not None:
+        raise CliError(f"{result['target']}: the target {problem}", NO_ANSWER)

@@ -1,0 +1,146 @@
+"""How well a line to a target works: who is at its other end, how long an exchange takes, what is lost."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flightstack.contract import LoopFlags
+from flightstack.firmware.target_loops import described
+from flightstack.mavlink.services.pil_client import PilClient, PilCounters, PilTiming
+from flightstack.transport.byte_link import ByteLink
+
+EXCHANGES = 300
+"""Steps that are measured on a line that works."""
+HELLO = PilTiming(timeout_s=0.3, attempts=4)
+STEADY = PilTiming(timeout_s=0.3, attempts=5)
+LEVEL = [0.0] * 6 + [1.0] + [0.0] * 16 + [1e-3]
+"""A vehicle that stands level where it shall stand: each step resets the loops, so that they stay at rest. The last
+number makes the frame as long as those of a flight: zeros at the end are not sent."""
+_MOST_READS = 10_000
+_TROUBLES = ("bad_frames", "skipped_octets", "uart_overruns", "uart_errors")
+
+
+class Measurement(NamedTuple):
+    """What a line showed at one baud rate."""
+
+    baud: int | None
+    """None: not a serial port."""
+    identity: dict[str, Any] | None
+    """Who answered; None: nobody did."""
+    problem: str | None = None
+    """Why the exchanges were given up, as a clause about the target."""
+    round_trips_s: tuple[float, ...] = ()
+    """Of each exchange, from the first sending to the answer."""
+    counters: PilCounters | None = None
+    troubles: dict[str, int] = {}  # noqa: RUF012  # never changed
+    """What the target's own counters counted meanwhile, where it is not zero."""
+
+    @property
+    def steps_per_s(self) -> float | None:
+        """Steps of a flight that the line would carry each second."""
+        return len(self.round_trips_s) / sum(self.round_trips_s) if sum(self.round_trips_s) > 0.0 else None
+
+    @property
+    def lost(self) -> int:
+        """Exchanges that were not answered at the first attempt."""
+        return 0 if self.counters is None else self.counters.resent
+
+    @property
+    def loss(self) -> float:
+        """The share of them."""
+        sent = len(self.round_trips_s) + self.lost
+        return self.lost / sent if sent else 0.0
+
+    @property
+    def wire_s(self) -> float | None:
+        """How long an exchange is on the line, 8N1: no round trip can take less."""
+        if self.baud is None or self.counters is None or not self.round_trips_s:
+            return None
+        octets = self.counters.octets_sent + self.counters.octets_received
+        return octets / len(self.round_trips_s) * 10.0 / self.baud
+
+    def percentile_s(self, share: float) -> float | None:
+        """Return the round trip that this share of the exchanges (0 to 100) does not exceed."""
+        return float(np.percentile(self.round_trips_s, share)) if self.round_trips_s else None
+
+
+class Probe:
+    """Runs single exchanges on a line."""
+
+    def __init__(self, link: ByteLink, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._link, self._clock_s = link, clock_s
+        self._waited_s = 0.0  # on top of the clock: an emulated target waits in no time
+        self.client = PilClient(HELLO)
+
+    @property
+    def _now_s(self) -> float:
+        return self._clock_s() + self._waited_s
+
+    def request(self, name: str) -> Any | None:
+        """Ask for a message; None when it does not come. Raise LineError."""
+        self.client.start_request(name)
+        return self._finished()
+
+    def step(self) -> float | None:
+        """Run a step at rest and return how long it took [s]; None when it was not answered. Raise LineError."""
+        self.client.start_step(LoopFlags.RESET | LoopFlags.OUTER_DUE, LEVEL)
+        began_s = self._now_s
+        return None if self._finished() is None else self._now_s - began_s
+
+    def _finished(self) -> Any | None:
+        client = self.client
+        while client.failure is None and client.result is None:
+            data = client.poll(self._now_s)
+            if data:
+                self._link.write(data)
+            self._listen()
+        return client.result
+
+    def _listen(self) -> None:
+        for _ in range(_MOST_READS):
+            deadline_s = self.client.next_deadline()
+            if deadline_s is None or deadline_s <= self._now_s:
+                return
+            before_s, left_s = self._clock_s(), deadline_s - self._now_s
+            data = self._link.read(left_s)
+            if data:
+                self.client.receive(data, self._now_s)
+            else:
+                self._waited_s += max(0.0, left_s - (self._clock_s() - before_s))
+        self._waited_s += max(0.0, (self.client.next_deadline() or 0.0) - self._now_s)
+
+
+def measured(
+    link: ByteLink, baud: int | None, exchanges: int, progress: Callable[[int, int], None]
+) -> Measurement:
+    """Measure a line; raise LineError when it is gone. Firmware of other sources is measured as well."""
+    probe = Probe(link)
+    identity = probe.request("FS_PIL_IDENTITY")
+    if identity is None:
+        return Measurement(baud, None, probe.client.failure)
+    before = probe.request("FS_PIL_STATUS")
+    probe.client.timing = STEADY
+    probe.client.counters = PilCounters()
+    trips: list[float] = []
+    problem = None
+    for done in range(exchanges):
+        trip_s = probe.step()
+        if trip_s is None:
+            problem = probe.client.failure
+            break
+        trips.append(trip_s)
+        progress(done + 1, exchanges)
+    counters, probe.client.counters = probe.client.counters, PilCounters()
+    after = probe.request("FS_PIL_STATUS")
+    return Measurement(baud, described(identity), problem, tuple(trips), counters, _troubles(before, after))
+
+
+def _troubles(before: Any | None, after: Any | None) -> dict[str, int]:
+    if before is None or after is None:
+        return {}
+    counts = {name: (getattr(after, name) - getattr(before, name)) & 0xFFFF_FFFF for name in _TROUBLES}
+    return {name: count for name, count in counts.items() if count}
