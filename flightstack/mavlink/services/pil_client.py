@@ -120,15 +120,15 @@ class PilClient:
             counters.frames += 1
             if frame.message_id == REPORT_ID:
                 self._take_report(PilReport.of(frame.data))
-                continue
-            message = message_of(self._codec, frame)
-            if message is None:
-                continue
-            if message.get_type() == "STATUSTEXT":
-                self.texts.append((message.severity, message.text))
-            if self._is_under_way and self._operation is not None:
-                self._operation.take_message(message)
-        self._settle()
+            elif (message := message_of(self._codec, frame)) is not None:
+                self._take_message(message)
+            self._settle()
+
+    def _take_message(self, message: Message) -> None:
+        if message.get_type() == "STATUSTEXT":
+            self.texts.append((message.severity, message.text))
+        if self._is_under_way and self._operation is not None:
+            self._operation.take_message(message)
 
     def _take_report(self, report: PilReport) -> None:
         counters, operation = self.counters, self._operation
