@@ -76,11 +76,12 @@ void fs_attitude_reference_step(fs_reference_memory *memory, const fs_quaternion
     keep(memory, reference);
 }
 
-void fs_in_body_frame(fs_attitude_reference *reference, const fs_quaternion *attitude)
+fs_quaternion fs_in_body_frame(fs_attitude_reference *reference, const fs_quaternion *attitude)
 {
     const fs_quaternion inverse = fs_conjugate(attitude);
     const fs_quaternion turn = fs_quaternion_product(&inverse, &reference->attitude);
 
     reference->rates_frd_rad_s = fs_rotate(&turn, &reference->rates_frd_rad_s);
     reference->acceleration_frd_rad_s2 = fs_rotate(&turn, &reference->acceleration_frd_rad_s2);
+    return turn;
 }

@@ -8,7 +8,10 @@
 void fs_attitude_reference_step(fs_reference_memory *memory, const fs_quaternion *target,
                                 const fs_reference_params *params, fs_real dt_s, fs_attitude_reference *reference);
 
-/* Turn the reference's rates and acceleration from its own body frame into that of a vehicle at this attitude. */
-void fs_in_body_frame(fs_attitude_reference *reference, const fs_quaternion *attitude);
+/*
+ * Turn the reference's rates and acceleration from its own body frame into that of a vehicle at this attitude;
+ * return the rotation from the vehicle to the reference.
+ */
+fs_quaternion fs_in_body_frame(fs_attitude_reference *reference, const fs_quaternion *attitude);
 
 #endif

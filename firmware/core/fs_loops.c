@@ -22,42 +22,41 @@ static uint32_t now(fs_clock clock)
     return clock != NULL ? clock() : 0UL;
 }
 
+static fs_real add_vector(fs_real sum, const fs_vector3 *v)
+{
+    return fs_add_magnitude(fs_add_magnitude(fs_add_magnitude(sum, v->x), v->y), v->z);
+}
+
+static fs_real add_quaternion(fs_real sum, const fs_quaternion *q)
+{
+    return fs_add_magnitude(fs_add_magnitude(fs_add_magnitude(fs_add_magnitude(sum, q->w), q->x), q->y), q->z);
+}
+
 static uint16_t state_is_finite(const fs_vehicle_state *state)
 {
-    return (fs_vector_is_finite(&state->position_ned_m) && fs_vector_is_finite(&state->velocity_ned_m_s) &&
-            fs_quaternion_is_finite(&state->attitude) && fs_vector_is_finite(&state->rates_frd_rad_s))
-               ? 1U
-               : 0U;
+    const fs_real place = add_vector(add_vector(FS_LIT(0.0), &state->position_ned_m), &state->velocity_ned_m_s);
+
+    return fs_is_finite(add_vector(add_quaternion(place, &state->attitude), &state->rates_frd_rad_s));
 }
 
 static uint16_t setpoint_is_finite(const fs_position_setpoint *setpoint)
 {
-    return (fs_vector_is_finite(&setpoint->position_ned_m) && fs_vector_is_finite(&setpoint->velocity_ned_m_s) &&
-            fs_vector_is_finite(&setpoint->acceleration_ned_m_s2) && fs_is_finite(setpoint->yaw_rad) &&
-            fs_is_finite(setpoint->yaw_rate_rad_s))
-               ? 1U
-               : 0U;
+    fs_real sum = add_vector(FS_LIT(0.0), &setpoint->position_ned_m);
+
+    sum = add_vector(sum, &setpoint->velocity_ned_m_s);
+    sum = add_vector(sum, &setpoint->acceleration_ned_m_s2);
+    return fs_is_finite(fs_add_magnitude(fs_add_magnitude(sum, setpoint->yaw_rad), setpoint->yaw_rate_rad_s));
 }
 
 static uint16_t target_is_finite(const fs_attitude_target *target)
 {
-    return (fs_quaternion_is_finite(&target->attitude) && fs_is_finite(target->thrust_n)) ? 1U : 0U;
+    return fs_is_finite(fs_add_magnitude(add_quaternion(FS_LIT(0.0), &target->attitude), target->thrust_n));
 }
 
-/*
- * Whether the mixer's sums overflowed nowhere: the wrench achieved follows from the speeds, and is finite when they
- * are.
- */
-static uint16_t speeds_are_finite(const fs_real *rotor_speed_rad_s)
+/* Whether the mixer's sums overflowed nowhere: every rotor's squared speed is in each sum of the wrench achieved. */
+static uint16_t wrench_is_finite(const fs_wrench *achieved)
 {
-    uint16_t i;
-
-    for (i = 0U; i < FS_MAX_ROTORS; i++) {
-        if (!fs_is_finite(rotor_speed_rad_s[i])) {
-            return 0U;
-        }
-    }
-    return 1U;
+    return fs_is_finite(add_vector(fs_add_magnitude(FS_LIT(0.0), achieved->thrust_n), &achieved->torque_frd_n_m));
 }
 
 void fs_loops_init(fs_loops *loops)
@@ -113,6 +112,7 @@ void fs_loops_reset(fs_loops *loops, const fs_vehicle_state *state)
     loops->pid_memory.yaw = FS_LIT(0.0);
     loops->target.attitude = *attitude;
     loops->target.thrust_n = FS_LIT(0.0);
+    loops->is_target_sound = target_is_finite(&loops->target);
     loops->last_target = loops->target;
     loops->fraction = FS_LIT(0.0);
     clear_last(loops);
@@ -140,6 +140,7 @@ static void outer_loop(fs_loops *loops, const fs_loop_input *input, uint16_t sta
     if (target_is_finite(&target)) {
         loops->position_memory = memory;
         loops->target = target;
+        loops->is_target_sound = 1U;
     }
 }
 
@@ -148,7 +149,6 @@ static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *sta
                               fs_loop_output *output)
 {
     const fs_quaternion aim = fs_blend(&loops->last_target.attitude, &loops->target.attitude, loops->fraction);
-    const fs_quaternion inverse = fs_conjugate(&state->attitude);
     fs_attitude_reference *reference = &output->reference;
     fs_vector3 *torque = &output->wrench.torque_frd_n_m;
     fs_attitude_inputs inputs;
@@ -157,22 +157,23 @@ static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *sta
     tick->reference = loops->reference_memory;
     tick->pid = loops->pid_memory;
     fs_attitude_reference_step(&tick->reference, &aim, &loops->reference, loops->rates.inner_dt_s, reference);
-    fs_in_body_frame(reference, &state->attitude);
-    turn = fs_quaternion_product(&inverse, &reference->attitude);
+    turn = fs_in_body_frame(reference, &state->attitude);
     inputs.attitude = state->attitude;
     inputs.rates_frd_rad_s = state->rates_frd_rad_s;
     inputs.reference = *reference;
     inputs.error_rad = fs_rotation_vector(&turn);
-    inputs.relative_rotor_speed_rad_s =
-        fs_relative_rotor_speed(loops->last.rotor_command_rad_s, &loops->mixer, loops->rates.rotors);
+    inputs.relative_rotor_speed_rad_s = FS_LIT(0.0); /* the PID law has no use for it */
     inputs.saturation = loops->saturation.torque;
     if (loops->rates.controller == FS_CONTROLLER_PID) {
         *torque = fs_attitude_pid_step(&tick->pid, &inputs, &loops->pid, loops->rates.inner_dt_s);
     } else {
+        inputs.relative_rotor_speed_rad_s =
+            fs_relative_rotor_speed(loops->last.rotor_command_rad_s, &loops->mixer, loops->rates.rotors);
         *torque = fs_attitude_backstepping_step(&inputs, &loops->backstepping);
     }
     output->wrench.thrust_n = loops->target.thrust_n;
-    return fs_vector_is_finite(torque); /* an integral that is not finite makes a torque that is not */
+    /* an integral that is not finite makes a torque that is not */
+    return fs_is_finite(add_vector(FS_LIT(0.0), torque));
 }
 
 static uint16_t saturation_bits(const fs_saturation *saturation)
@@ -205,7 +206,7 @@ static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint1
 
     cost->inner = 0UL;
     cost->mixer = 0UL;
-    if (!state_is_sound || !target_is_finite(&loops->target)) {
+    if (!state_is_sound || !loops->is_target_sound) {
         return FS_STATUS_INPUT_NOT_FINITE;
     }
     is_sound = attitude_loop(loops, state, &tick, output);
@@ -217,7 +218,7 @@ static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint1
     fs_mix(&output->wrench, &loops->mixer, loops->rates.rotors, output->rotor_command_rad_s, &output->wrench_achieved,
            &tick.saturation);
     cost->mixer = now(clock) - controlled;
-    if (!speeds_are_finite(output->rotor_command_rad_s)) {
+    if (!wrench_is_finite(&output->wrench_achieved)) {
         return FS_STATUS_OUTPUT_NOT_FINITE;
     }
     output->attitude_target = loops->target;
@@ -242,6 +243,7 @@ void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, 
     if ((input->flags & FS_SET_TARGET) != 0U) {
         begin_outer_period(loops);
         loops->target = input->target;
+        loops->is_target_sound = target_is_finite(&loops->target);
     }
     cost->outer = 0UL;
     if ((input->flags & FS_OUTER_DUE) != 0U) {

@@ -64,6 +64,7 @@ typedef struct fs_loops {
     fs_pid_memory pid_memory;
     fs_attitude_target last_target; /* of the outer loop's tick before */
     fs_attitude_target target;
+    uint16_t is_target_sound; /* 1: it is finite */
     fs_real fraction;         /* share of the outer period that has passed */
     fs_saturation saturation; /* of the last tick's mixer */
     fs_loop_output last;      /* of the last sound tick; repeated, with a status bit, when a tick is not sound */

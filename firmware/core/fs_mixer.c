@@ -96,43 +96,76 @@ static fs_thrust_range thrust_range(const fs_real *base, const fs_mixer *mixer, 
     return range;
 }
 
-/* Turn squared speeds into speeds, zero beyond the rotors, and add up the wrench that they make. */
-static fs_wrench speeds_and_wrench(const fs_real *squared, const fs_mixer *mixer, uint16_t rotors,
-                                   fs_real *rotor_speed_rad_s)
+/* The wrench that squared speeds make, and the sum of the magnitudes that they are sums of. */
+typedef struct {
+    fs_wrench wrench;
+    fs_real magnitude;
+} fs_made;
+
+/* Add yaw's part, turn squared speeds into speeds, zero beyond the rotors, and tell what they make. */
+static fs_made speeds_and_wrench(const fs_real *base, const fs_real *yaw, fs_real scale, const fs_mixer *mixer,
+                                 uint16_t rotors, fs_real *rotor_speed_rad_s)
 {
-    fs_real thrust = FS_LIT(0.0), roll = FS_LIT(0.0), pitch = FS_LIT(0.0), heading = FS_LIT(0.0);
-    fs_wrench made;
+    fs_real thrust = FS_LIT(0.0), roll = FS_LIT(0.0), pitch = FS_LIT(0.0), heading = FS_LIT(0.0), sum = FS_LIT(0.0);
+    fs_made made;
     uint16_t i;
 
     for (i = 0U; i < rotors; i++) {
-        const fs_real square = squared[i];
+        const fs_real part = scale * yaw[i];
+        const fs_real square = base[i] + part;
         rotor_speed_rad_s[i] = square >= FS_LIT(0.0) ? fs_sqrt(square) : -fs_sqrt(-square);
         thrust += mixer->effectiveness[0][i] * square;
         roll += mixer->effectiveness[1][i] * square;
         pitch += mixer->effectiveness[2][i] * square;
         heading += mixer->effectiveness[3][i] * square;
+        sum += fs_abs(base[i]) + fs_abs(part);
     }
     for (i = rotors; i < FS_MAX_ROTORS; i++) {
         rotor_speed_rad_s[i] = FS_LIT(0.0);
     }
-    made.thrust_n = thrust;
-    made.torque_frd_n_m.x = roll;
-    made.torque_frd_n_m.y = pitch;
-    made.torque_frd_n_m.z = heading;
+    made.wrench.thrust_n = thrust;
+    made.wrench.torque_frd_n_m.x = roll;
+    made.wrench.torque_frd_n_m.y = pitch;
+    made.wrench.torque_frd_n_m.z = heading;
+    made.magnitude = sum;
     return made;
 }
 
-void fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
-            fs_wrench *achieved, fs_saturation *saturation)
+/*
+ * Write what thrust, roll and pitch ask of each rotor, [rad^2/s^2], and what yaw does; return 1 when that is within
+ * the limits of every rotor, with yaw and without. Then there is nothing to fit: fit() would change nothing, in
+ * three times the time.
+ */
+static uint16_t demand(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real *base, fs_real *yaw)
 {
-    const fs_vector3 *torque = &wrench->torque_frd_n_m, *made = &achieved->torque_frd_n_m;
-    fs_real base[FS_MAX_ROTORS], yaw[FS_MAX_ROTORS], thrust_n, scale, sum = FS_LIT(0.0);
-    fs_thrust_range range;
+    uint16_t fits = 1U;
     uint16_t i;
 
-    for (i = 0U; i < FS_MAX_ROTORS; i++) { /* all places, so that none is ever read unwritten */
+    for (i = 0U; i < rotors; i++) {
+        const fs_real *share = mixer->allocation[i];
+        const fs_real roll_pitch = share[1] * wrench->torque_frd_n_m.x + share[2] * wrench->torque_frd_n_m.y;
+        const fs_real lift = roll_pitch + share[0] * wrench->thrust_n;
+        const fs_real turn = share[3] * wrench->torque_frd_n_m.z;
+        const fs_real all = lift + turn, low = mixer->low[i], high = mixer->high[i];
+        if (!(share[0] > FS_LIT(0.0) && lift >= low && lift <= high && all >= low && all <= high)) {
+            fits = 0U;
+        }
+        base[i] = lift;
+        yaw[i] = turn;
+    }
+    return fits;
+}
+
+/* Bring thrust, roll and pitch between the limits, into base; return the share of yaw that fits beside them. */
+static fs_real fit(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real *base, const fs_real *yaw)
+{
+    const fs_vector3 *torque = &wrench->torque_frd_n_m;
+    fs_thrust_range range;
+    fs_real thrust_n;
+    uint16_t i;
+
+    for (i = 0U; i < rotors; i++) {
         base[i] = mixer->allocation[i][1] * torque->x + mixer->allocation[i][2] * torque->y;
-        yaw[i] = mixer->allocation[i][3] * torque->z;
     }
     range = thrust_range(base, mixer, rotors);
     if (!range.is_sure) {
@@ -143,17 +176,25 @@ void fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_
     for (i = 0U; i < rotors; i++) {
         base[i] = fs_min(fs_max(base[i] + mixer->allocation[i][0] * thrust_n, mixer->low[i]), mixer->high[i]);
     }
-    scale = largest_scale(base, yaw, mixer, rotors);
-    for (i = 0U; i < rotors; i++) {
-        const fs_real part = scale * yaw[i];
-        sum += fs_abs(base[i]) + fs_abs(part);
-        base[i] += part;
+    return largest_scale(base, yaw, mixer, rotors);
+}
+
+void fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
+            fs_wrench *achieved, fs_saturation *saturation)
+{
+    const fs_vector3 *torque = &wrench->torque_frd_n_m, *made = &achieved->torque_frd_n_m;
+    fs_real base[FS_MAX_ROTORS], yaw[FS_MAX_ROTORS], scale = FS_LIT(1.0);
+    fs_made sums;
+
+    if (!demand(wrench, mixer, rotors, base, yaw)) {
+        scale = fit(wrench, mixer, rotors, base, yaw);
     }
-    *achieved = speeds_and_wrench(base, mixer, rotors, rotor_speed_rad_s);
-    saturation->thrust = lag(wrench->thrust_n, achieved->thrust_n, mixer->largest_effect[0] * sum);
-    saturation->torque.x = lag(torque->x, made->x, mixer->largest_effect[1] * sum);
-    saturation->torque.y = lag(torque->y, made->y, mixer->largest_effect[2] * sum);
-    saturation->torque.z = lag(torque->z, made->z, mixer->largest_effect[3] * sum);
+    sums = speeds_and_wrench(base, yaw, scale, mixer, rotors, rotor_speed_rad_s);
+    *achieved = sums.wrench;
+    saturation->thrust = lag(wrench->thrust_n, achieved->thrust_n, mixer->largest_effect[0] * sums.magnitude);
+    saturation->torque.x = lag(torque->x, made->x, mixer->largest_effect[1] * sums.magnitude);
+    saturation->torque.y = lag(torque->y, made->y, mixer->largest_effect[2] * sums.magnitude);
+    saturation->torque.z = lag(torque->z, made->z, mixer->largest_effect[3] * sums.magnitude);
 }
 
 void fs_mixer_derive(fs_mixer *mixer)
