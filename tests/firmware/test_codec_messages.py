@@ -177,7 +177,7 @@ def test_frames_are_pymavlinks(codec: ctypes.CDLL, message_id: int) -> None:
         sender.seq = sequence
         expected = bytes(kind(*(values[name] for name in kind.fieldnames)).pack(sender))
 
-        content, out = (ctypes.c_uint16 * LARGEST_PAYLOAD)(), (ctypes.c_uint16 * LARGEST_FRAME)()
+        content, out = (ctypes.c_uint16 * LARGEST_PAYLOAD)(), rubbish_frame()
         length = getattr(codec, f"{c_name(kind.msgname)}_encode")(
             ctypes.byref(structure(kind, payload)), content
         )
@@ -192,6 +192,11 @@ def test_frames_are_pymavlinks(codec: ctypes.CDLL, message_id: int) -> None:
         assert (read.get_type(), read.get_seq(), read.get_srcSystem()) == (kind.msgname, sequence, system)
         compared += 1
     assert compared >= 15
+
+
+def rubbish_frame() -> Any:
+    """Return room for a frame in which every octet has to be written."""
+    return (ctypes.c_uint16 * LARGEST_FRAME)(*([0xA5A5] * LARGEST_FRAME))
 
 
 def pymavlink_values(kind: Any, payload: bytes) -> dict[str, Any]:
@@ -221,7 +226,7 @@ def test_every_message_id_and_only_those_are_known(codec: ctypes.CDLL) -> None:
 
 @pytest.mark.parametrize(("message_id", "length"), [(0, 256), (0, 65_535), (30, 4), (0x10000, 4)])
 def test_what_cannot_be_a_frame_is_not_written(codec: ctypes.CDLL, message_id: int, length: int) -> None:
-    out = (ctypes.c_uint16 * LARGEST_FRAME)(*([0xA5A5] * LARGEST_FRAME))
+    out = rubbish_frame()
     payload = (ctypes.c_uint16 * LARGEST_PAYLOAD)()
     assert codec.fs_frame_encode(out, ctypes.c_uint32(message_id), 0, 1, 1, payload, length) == 0
     assert set(out) == {0xA5A5}
@@ -230,7 +235,7 @@ def test_what_cannot_be_a_frame_is_not_written(codec: ctypes.CDLL, message_id: i
 @pytest.mark.parametrize("length", [0, 1, 9, 254, 255])
 def test_a_frame_of_any_length_finds_its_way_back(codec: ctypes.CDLL, length: int) -> None:
     payload = bytes(range(1, length + 1))
-    out = (ctypes.c_uint16 * LARGEST_FRAME)()
+    out = rubbish_frame()
     size = codec.fs_frame_encode(out, 0, 9, 8, 7, (ctypes.c_uint16 * LARGEST_PAYLOAD)(*payload), length)
     assert octets(out, size) == sealed(0, payload, sender=b"\x09\x08\x07")
     (found,), summary = parse(codec, octets(out, size))
