@@ -141,14 +141,15 @@ def test_decoded_values_are_those_on_the_wire(codec: ctypes.CDLL, message_id: in
         short = payload[: rng.choice([len(payload), len(trimmed(payload)), rng.randrange(len(payload) + 1)])]
         poisoned = (ctypes.c_uint16 * LARGEST_PAYLOAD)(*(octet | rng.randrange(256) << 8 for octet in short))
         poisoned[len(short) :] = [0xA5A5] * (LARGEST_PAYLOAD - len(short))  # must not be looked at
-        made = c_struct(kind)()
-        ctypes.memset(ctypes.addressof(made), 0x5A, ctypes.sizeof(made))
+        memory = bytearray(b"\x5a" * (ctypes.sizeof(c_struct(kind)) + 16))
+        made = c_struct(kind).from_buffer(memory)
         decode(poisoned, len(short), ctypes.byref(made))
+        assert memory[ctypes.sizeof(made) :] == b"\x5a" * 16  # nothing is written behind the structure
         whole = short + bytes(len(payload) - len(short))
         for name, wire in wire_fields(kind, whole).items():
             field = getattr(type(made), name)
-            memory = ctypes.string_at(ctypes.addressof(made) + field.offset, field.size)
-            assert memory == in_memory(kind, name, wire), (name, short.hex())
+            value = bytes(memory[field.offset : field.offset + field.size])
+            assert value == in_memory(kind, name, wire), (name, short.hex())
 
 
 @pytest.mark.parametrize("message_id", sorted(KINDS), ids=lambda number: KINDS[number].msgname)
