@@ -82,9 +82,11 @@ def compared(
             yield _difference(pair, signal, *matched, first)
 
 
-def deviation(signal: Signal, first: FlightSamples, second: FlightSamples) -> Deviation:
+def deviation(
+    signal: Signal, first: FlightSamples, second: FlightSamples, airborne: bool = False
+) -> Deviation:
     """Return how far a signal is apart over time; of no samples if one flight does not have it."""
-    matched = _matched(signal, first, second, airborne=False)
+    matched = _matched(signal, first, second, airborne)
     if matched is None:
         return Deviation(np.zeros(0), np.zeros(0))
     a, b = matched

@@ -10,7 +10,7 @@ from gcs_cli.pil.profile import STAGE_TITLES, StageProfile
 from gcs_cli.report_svg import Scale, nice_ticks, rectangle, segment, text, tick_text
 
 _WIDTH, _HEIGHT = 470, 190
-_LEFT, _RIGHT, _TOP, _BOTTOM = 56, 12, 26, 36
+_LEFT, _RIGHT, _TOP, _BOTTOM = 56, 22, 26, 36
 _SMALLEST_BAR = 1.5
 """Pixels: a step that came once in ten thousand is seen too."""
 

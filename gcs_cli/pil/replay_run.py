@@ -133,7 +133,7 @@ def replay(
     outputs, version = fed(prepared_replay, target, folder, console)
     record = read_record(folder) if choice.is_target else None
     facts = {
-        "title": f"{log.stem}: replayed on {target}",
+        "title": f"{log.name} replayed: {target}",
         "about": f"{len(outputs)} steps of {log.name} · {version}",
         "meaning": f"Open loop: the inputs that the log holds are fed to the target, step by step, and its outputs "
         f"compared with the log's. {meaning(choice, replay=True)}",

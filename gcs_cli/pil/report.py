@@ -25,8 +25,9 @@ from gcs_cli.report_plots import section
 
 _STYLE_SHEETS = (Path(__file__).parents[1] / "report.css", Path(__file__).with_name("pil.css"))
 _PAIR_STYLES = ("s1 target", "s2 thin", "s4")
-_DECADES = 6.0
+_DECADES = 4.0
 """Of a chart: what is smaller than the largest difference by more is drawn at the bottom."""
+_STRETCHES = 300
 _STAGE_STYLES = {"outer": "s2", "inner": "s1", "mixer": "s3", "whole": "s5"}
 
 
@@ -48,7 +49,7 @@ def render_report(
             _header(title, result),
             _tiles(result),
             checks_section(result["checks"]),
-            differences_section(result["differences"]),
+            differences_section(result["differences"], result["compared"]),
             *_deviations(charts),
             *_profile(result, profiles),
             *_target(result),
@@ -86,23 +87,32 @@ def _tiles(result: Mapping[str, Any]) -> str:
 
 def _deviations(charts: Sequence[DeviationChart]) -> Iterator[str]:
     for signal, pairs in charts:
-        title = f"Difference over time: {signal.title}"
+        unit = "" if signal.unit == "1" else f" [{signal.unit}]"
+        title = f"Difference over time: {signal.title}{unit}"
         lines, same = [], []
-        for (pair, (time_s, size)), style in zip(pairs.items(), _PAIR_STYLES, strict=False):
-            if not len(size):
+        for (pair, apart), style in zip(pairs.items(), _PAIR_STYLES, strict=False):
+            if not len(apart.size):
                 continue
-            if np.any(size > 0.0):
-                lines.append(Line(pair, time_s, np.maximum(size, 10.0**-_DECADES * size.max()), style))
+            if np.any(apart.size > 0.0):
+                time_s, size = _envelope(apart)
+                lines.append(Line(pair, time_s, size, style))
             else:
                 same.append(pair)
         note = f"Not drawn, because no bit differs: {', '.join(same)}." if same else ""
         if not lines:
             yield section(title, f'<p class="none">{escape(note or "No data.")}</p>')
             continue
-        unit = "" if signal.unit == "1" else f" [{signal.unit}]"
-        span = (float(lines[0].x[0]), float(lines[0].x[-1]))
-        chart = time_chart(title, f"|difference|{unit}", lines, span, log=True)
+        span = (0.0, max(float(line.x[-1]) for line in lines))
+        chart = time_chart(title, "", lines, span, log=True, height=200)
         yield section(title, chart, [(line.label, line.style, False) for line in lines], note)
+
+
+def _envelope(apart: Deviation) -> Deviation:
+    """Return the largest difference of each stretch of time: between two samples that differ, many do not at all."""
+    count = len(apart.size)
+    starts = np.unique(np.arange(_STRETCHES) * count // _STRETCHES)
+    size = np.maximum.reduceat(apart.size, starts)
+    return Deviation(apart.time_s[starts], np.maximum(size, 10.0**-_DECADES * size.max()))
 
 
 def _profile(result: Mapping[str, Any], profiles: Sequence[StageProfile]) -> Iterator[str]:
@@ -123,7 +133,8 @@ def _target(result: Mapping[str, Any]) -> Iterator[str]:
     clock = f"{target['clock_hz'] / 1e6:g} MHz" if target["clock_hz"] else "none: emulated, or unknown"
     high_water = "unknown"
     if stack is not None and stack["high_water"]:
-        high_water = f"{stack['high_water']} of {stack['size']} units of {target['char_bits']} bits"
+        unit = "octets" if target["char_bits"] == 8 else f"words of {target['char_bits']} bits"
+        high_water = f"{stack['high_water']} of {stack['size']} {unit}"
     facts = [
         ("board", shown(target["board"])),
         ("compiler", shown(target["compiler"])),
@@ -138,7 +149,9 @@ def _target(result: Mapping[str, Any]) -> Iterator[str]:
 def _link(result: Mapping[str, Any]) -> Iterator[str]:
     link = result["link"]
     if link:
-        facts = [(name.replace("_", " "), shown(value)) for name, value in link.items()]
+        facts = [
+            (name.replace("_us", " [µs]").replace("_", " "), shown(value)) for name, value in link.items()
+        ]
         yield facts_section("Link", facts)
 
 

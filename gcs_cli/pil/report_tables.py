@@ -48,7 +48,7 @@ def _check_row(check: dict[str, Any]) -> str:
     )
 
 
-def differences_section(differences: Sequence[dict[str, Any]]) -> str:
+def differences_section(differences: Sequence[dict[str, Any]], compared: str) -> str:
     """Return signals beside pairs of flights: the largest difference and the root mean square, units and ulps."""
     pairs = list(dict.fromkeys(row["pair"] for row in differences))
     by_signal = {(row["signal"], row["pair"]): row for row in differences}
@@ -56,8 +56,8 @@ def differences_section(differences: Sequence[dict[str, Any]]) -> str:
     under = '<th class="n first">largest</th><th class="n">rms</th>' * len(pairs)
     rows = "".join(_stage_rows(by_signal, pairs))
     note = (
-        "Over the ticks in which the loops of both ran. Under each value: the same in units of the last place of a "
-        "float32 as large as the signal's largest value. “Same bits”: no sample differs."
+        f"{compared} Under each value: the same in units of the last place of a float32 as large as the signal's "
+        "largest value. “Same bits”: no sample differs."
     )
     table = f"<table><tr><th></th>{head}</tr><tr><th>signal</th>{under}</tr>{rows}</table>"
     return section("Differences", table, note=note)

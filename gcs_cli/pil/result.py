@@ -85,7 +85,7 @@ def closed_loop(
         exact = same_bits and MIL not in (a, b)
         differences[pair] = list(compared(pair, first, second, airborne=not exact))
         for name, chart in charts.items():
-            chart.pairs[pair] = deviation(BY_NAME[name], first, second)
+            chart.pairs[pair] = deviation(BY_NAME[name], first, second, airborne=not exact)
     checks = [
         Check("flights that failed", 0.0, _failures(flights), "", _reasons(flights)),
         *_closed_loop_checks(there, differences, same_bits),
@@ -101,6 +101,7 @@ def closed_loop(
         pair_name(a, b): status_differences(first, second)[0]
         for (a, first), (b, second) in combinations(there.items(), 2)
     }
+    result["compared"] = _ABOUT_TICKS + ("every tick in which the loops run." if same_bits else "the same.")
     result["tiles"] = [*_tiles(differences, checks), *target_tiles(record)]
     return Outcome(result, list(charts.values()), profiles_of(record))
 
@@ -124,6 +125,7 @@ def assembled(
         "link": {} if record is None else dict(record.link),
         "target_counters": {} if record is None else dict(record.status),
         "flights": {},
+        "compared": "Every step.",
     }
 
 
@@ -181,6 +183,10 @@ def _profile(record: TargetRecord | None) -> dict[str, Any] | None:
     }
 
 
+_ABOUT_TICKS = (
+    "MIL with SIL and PIL: the ticks in which both fly and touch nothing. A touchdown is an impact, after which flights "
+    "that were a micrometre apart go different ways. SIL with PIL: "
+)
 _ABOUT_UNIT = {
     "cycles": "Processor cycles, counted on the board.",
     "instructions": (

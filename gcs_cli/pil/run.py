@@ -58,10 +58,10 @@ def run(options: FlyOptions, plan: Plan, target: str, out: Path | None, console:
     flights: dict[str, Flown] = {}
     problem = None
     for stage, loops in ((MIL, PYTHON), (SIL, C), (PIL, target)):
-        console.print(f"[bold]{stage}[/]  loops: {loops}", highlight=False)
-        flights[stage], problem = _fly(
-            stage, dataclasses.replace(options, loops=loops), plan, folder, console
-        )
+        console.print(f"[bold]{stage}[/]  loops {loops}", highlight=False)
+        flown = dataclasses.replace(options, loops=loops)
+        flights[stage], problem = _fly(stage, flown, plan, folder, console)
+        console.print(f"     {_words(flights[stage])}", markup=False, highlight=False, soft_wrap=True)
         if problem is not None:
             break
     record = _record(folder) if PIL in flights else None
