@@ -12,7 +12,7 @@ from tests.firmware.step_machines import Costs, first_difference, gcc_image, on_
 from tests.firmware.step_streams import flown_steps, parameter_frame, random_steps
 
 RANDOM_STEPS = 100_000
-MOST_INSTRUCTIONS = 1500
+MEAN_INSTRUCTIONS, MOST_INSTRUCTIONS = 1500, 2200
 
 
 @cache
@@ -54,10 +54,13 @@ def test_a_gain_off_by_one_bit_is_seen(tmp_path: Path) -> None:
 
 
 def test_instruction_counts_repeat_exactly() -> None:
-    assert on_cortex_m4(flown(), zig_image())[1] == flown_costs()
+    stream = b"".join(flown_steps("hop.plan"))
+    assert on_cortex_m4(stream, zig_image())[1] == on_cortex_m4(stream, zig_image())[1]
 
 
 def test_a_step_stays_within_its_instructions() -> None:
-    """The gate: means over a mission; the largest step has outer loop and saturated rotors together."""
+    """The gate. Over the mission zig 0.17.1 takes 1479 on average: inner loop 678, mixer 463, every fifth step outer loop
+    701, and 198 around them. The costliest step, outer loop and saturated rotors in one, takes 2111."""
     costs = flown_costs()
-    assert costs.mean["whole"] < MOST_INSTRUCTIONS, costs
+    assert costs.mean["whole"] < MEAN_INSTRUCTIONS, costs
+    assert costs.most["whole"] < MOST_INSTRUCTIONS, costs
