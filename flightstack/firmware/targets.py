@@ -43,7 +43,7 @@ def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlB
             return CLoops(loops, HostLoops(host_library(), numbers), setup)
         return CLoops(loops, connect(open_link(choice), numbers, timing_of(choice)), setup)
     except (BuildError, LineError, WrongFirmwareError) as error:
-        raise ConfigError("--loops", loops, str(error)) from error
+        raise ConfigError("--loops", loops, str(error).removeprefix(f"{choice.device}: ")) from error
 
 
 def open_link(choice: LoopsChoice) -> ByteLink:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import select
 
 import serial
@@ -63,7 +64,10 @@ class SerialPort:
 
 
 def _reason(error: Exception) -> str:
+    """Return why, in words; pyserial keeps the system's number in the text alone when it sets a port up."""
     number = getattr(error, "errno", None)
+    if number is None and (found := re.search(r"\((\d+), ", str(error))):
+        number = int(found[1])
     if number in _REASONS:
         return _REASONS[number]
-    return str(error).removeprefix("[Errno ").rpartition("] ")[2] or type(error).__name__
+    return str(error) or type(error).__name__

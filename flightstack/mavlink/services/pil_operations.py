@@ -197,7 +197,8 @@ class Request:
 
     def silence(self, attempts: int) -> str:
         """Return why there is no message."""
-        return f"did not answer when asked for {self._name}, {attempts} times"
+        asked = f"did not answer when asked for {self._name}, {attempts} times"
+        return f"{asked}: is the firmware on it, and the baud rate right?"
 
 
 def _is_refusal(message: Message) -> bool:

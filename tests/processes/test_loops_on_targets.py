@@ -1,0 +1,200 @@
+"""``--loops`` with real processes: a host program behind a pseudo-terminal, an emulated Cortex-M4F, and bad ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pyulog import ULog
+
+from tests.support.free_instance import free_instance
+
+LONG_S = 180.0  # a bound for a busy machine that compiles kernels and firmware anew
+HOP = Path(__file__).parents[2] / "missions" / "hop.plan"
+TOPICS = ("attitude_reference", "wrench", "rotor_speeds", "vehicle_attitude_setpoint", "vehicle_attitude")
+
+
+def gcs_fly(out: Path, *flags: str) -> list[str]:
+    fly = [sys.executable, "-m", "gcs_cli", "fly", str(HOP), "--out", str(out)]
+    return [*fly, "--instance", str(free_instance()), *flags]
+
+
+def flown(out: Path, *flags: str) -> ULog:
+    done = subprocess.run(gcs_fly(out, *flags), capture_output=True, text=True, timeout=LONG_S, check=False)
+    assert done.returncode == 0, f"{done.stdout}{done.stderr}{(out / 'flightstack.log').read_text()}"
+    return ULog(str(out / "flight.ulg"))
+
+
+def check(*flags: str) -> tuple[int, str]:
+    """Return exit code and standard error of ``flightstack --check``."""
+    command = [sys.executable, "-m", "flightstack", "--check", *flags]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=LONG_S, check=False)
+    return done.returncode, done.stderr
+
+
+def eventually(look: Callable[[], int | None]) -> int:
+    end_s = time.monotonic() + LONG_S
+    while time.monotonic() < end_s:
+        if (found := look()) is not None:
+            return found
+        time.sleep(0.01)
+    raise AssertionError("it did not happen")
+
+
+def program_below(pid: int) -> int | None:
+    """Return the process id of the host program that a descendant of ``pid`` has started."""
+    parents = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                status = (entry / "stat").read_text()
+            except OSError:  # it ended meanwhile
+                continue
+            name, _, rest = status.partition("(")[2].rpartition(")")
+            parents[int(entry.name)] = (name, int(rest.split()[1]))
+    for child, (name, parent) in parents.items():
+        if name.startswith("fs_host") and parents.get(parent, ("", 0))[1] == pid:
+            return child
+    return None
+
+
+@pytest.fixture(scope="module")
+def in_c(tmp_path_factory: pytest.TempPathFactory) -> ULog:
+    return flown(tmp_path_factory.mktemp("c") / "run", "--loops", "c")
+
+
+@pytest.mark.parametrize(("loops", "unit"), [("host", "ns"), ("emulated", "instructions")])
+def test_a_target_flies_the_bits_of_c_here(tmp_path: Path, in_c: ULog, loops: str, unit: str) -> None:
+    out = tmp_path / "run"
+    log = flown(out, "--loops", loops)
+    for topic in TOPICS:
+        here, there = in_c.get_dataset(topic).data, log.get_dataset(topic).data
+        for name in here:
+            assert np.array_equal(here[name], there[name], equal_nan=True), f"{topic}.{name}"
+    assert log.msg_info_dict["loops"] == loops
+    told = json.loads((out / "pil-link.json").read_text())
+    assert told["ending"] is None
+    assert told["identity"]["cost_unit"] == unit
+    assert told["identity"]["source_hash"] in log.msg_info_dict["ver_loops"]
+    steps = np.load(out / "pil-steps.npz")["steps"]
+    idle = 32
+    assert len(steps) == told["steps"] == np.count_nonzero(log.get_dataset("wrench").data["status"] != idle)
+    assert told["status"]["steps"] == len(steps) + 1  # one to try the loops at the start
+    assert (steps["cost"][:, 3] >= steps["cost"][:, 1]).all()
+    assert json.loads((out / "summary.json").read_text())["loops"] == loops
+
+
+def test_a_target_that_dies_in_flight_ends_it_with_a_sentence(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = subprocess.Popen(
+        gcs_fly(out, "--loops", "host", "--speed", "1"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        program = eventually(lambda: program_below(process.pid))
+        eventually(lambda: 1 if _is_flying(out) else None)
+        os.kill(program, signal.SIGKILL)
+        _, said = process.communicate(timeout=LONG_S)
+    finally:
+        process.kill()
+    assert process.returncode == 3
+    assert "flightstack ended with code 3" in said
+    assert "the line is gone" in (out / "flightstack.log").read_text()
+    assert "the line is gone" in json.loads((out / "pil-link.json").read_text())["ending"]
+
+
+def _is_flying(out: Path) -> bool:
+    try:
+        return (out / "flight.ulg").stat().st_size > 0
+    except OSError:
+        return False
+
+
+def test_who_ends_a_flight_leaves_no_program_behind(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = subprocess.Popen(
+        gcs_fly(out, "--loops", "host", "--speed", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        program = eventually(lambda: program_below(process.pid))
+        process.send_signal(signal.SIGINT)
+        process.wait(LONG_S)
+        eventually(lambda: None if Path(f"/proc/{program}").exists() else 1)
+    finally:
+        process.kill()
+
+
+@pytest.mark.parametrize(
+    ("loops", "sentence"),
+    [
+        ("serial:/dev/no-such-port", "there is no such device"),
+        ("serial:/dev/null:9600", "is no serial port"),
+        ("serial:/", "is a directory"),
+        ("fast", "is none of python, c, host, emulated and serial:DEVICE[:BAUD]"),
+    ],
+)
+def test_what_cannot_fly_is_said_in_one_sentence(loops: str, sentence: str) -> None:
+    assert check("--loops", loops) == (2, f"flightstack: --loops: {loops}: {sentence}\n")
+
+
+def test_a_target_and_real_time_do_not_go_together() -> None:
+    code, said = check("--loops", "host", "--clock", "realtime")
+    assert code == 2
+    assert "fly in lockstep alone" in said
+
+
+def test_a_port_on_which_nobody_answers_is_given_up() -> None:
+    ours, theirs = pty.openpty()
+    try:
+        code, said = check("--loops", f"serial:{os.ttyname(theirs)}:921600")
+    finally:
+        os.close(ours)
+        os.close(theirs)
+    assert code == 3
+    assert "at 921600 baud did not answer when asked for FS_PIL_IDENTITY, 20 times" in said
+    assert said.count("\n") == 1
+
+
+def test_a_port_that_another_program_uses_is_refused() -> None:
+    from flightstack.transport.serial_port import SerialPort  # noqa: PLC0415
+
+    ours, theirs = pty.openpty()
+    name = os.ttyname(theirs)
+    port = SerialPort(name, 115_200)
+    try:
+        code, said = check("--loops", f"serial:{name}")
+    finally:
+        port.close()
+        os.close(ours)
+        os.close(theirs)
+    assert (code, said) == (2, f"flightstack: --loops: serial:{name}: another program uses it\n")
+
+
+def test_the_firmware_behind_a_serial_port_flies(tmp_path: Path, in_c: ULog) -> None:
+    """As a board would: the flight stack opens a device by its name."""
+    from flightstack.firmware.build import host_program  # noqa: PLC0415
+
+    program = subprocess.Popen(
+        [str(host_program())], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert program.stdout is not None
+        device = program.stdout.readline().strip()
+        log = flown(tmp_path / "run", "--loops", f"serial:{device}:921600")
+        assert program.wait(LONG_S) == 0  # it ends when its line is closed
+    finally:
+        program.kill()
+        program.communicate()
+    here, there = (one.get_dataset("rotor_speeds").data for one in (in_c, log))
+    assert all(np.array_equal(here[name], there[name], equal_nan=True) for name in here)
