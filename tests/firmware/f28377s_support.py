@@ -34,16 +34,21 @@ FLAGS = ["-fPIC", "-O2", *WARNINGS, *INCLUDE]
 
 
 @functools.cache
+def workshop() -> tempfile.TemporaryDirectory[str]:
+    """Return a folder for what is built; it goes away with the process."""
+    return tempfile.TemporaryDirectory(prefix="flightstack-f28377s-")
+
+
+@functools.cache
 def portable() -> Path:
     """Compile what all targets have in common into one object, once per run of the tests."""
-    folder = Path(tempfile.mkdtemp(prefix="flightstack-f28377s-"))
-    return compile_c(folder / "portable.o", PORTABLE, "-r", *FLAGS)
+    return compile_c(Path(workshop().name) / "portable.o", PORTABLE, "-r", *FLAGS)
 
 
 @functools.cache
 def built(*options: str) -> Path:
     """Link the port with the fake in place of driverlib into a library, once per set of options; main is left out."""
-    folder = Path(tempfile.mkdtemp(dir=portable().parent))
+    folder = Path(tempfile.mkdtemp(dir=workshop().name))
     sources = [portable(), *PORT_SOURCES, *sorted(FAKE.glob("*.c"))]
     here = [f"-I{FAKE}", '-DF28_BOARD="simulated chip"', *options]
     return compile_c(folder / "port.so", sources, "-shared", *FLAGS, *here)

@@ -16,7 +16,7 @@
 #define int8_t c28x_int8
 #define CAN_H /* passes over can.h, which assigns to intrinsics */
 
-unsigned int __enable_interrupts(void);
-unsigned int __disable_interrupts(void);
+uint16_t __enable_interrupts(void);
+uint16_t __disable_interrupts(void);
 
 #endif
