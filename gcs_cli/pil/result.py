@@ -184,8 +184,8 @@ def _profile(record: TargetRecord | None) -> dict[str, Any] | None:
 
 
 _ABOUT_TICKS = (
-    "MIL with SIL and PIL: the ticks in which both fly and touch nothing. A touchdown is an impact, after which flights "
-    "that were a micrometre apart go different ways. SIL with PIL: "
+    "MIL with SIL and PIL: the ticks in which both fly and touch nothing. A touchdown is an impact, after which "
+    "flights that were a micrometre apart go different ways. SIL with PIL: "
 )
 _ABOUT_UNIT = {
     "cycles": "Processor cycles, counted on the board.",
