@@ -22,7 +22,7 @@ from flightstack.firmware.sources import PORTABLE, c_files, digest, files, firmw
 
 EXACT = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
 """Every operation is rounded as it is written, on every compiler."""
-KEPT_STATES = 8
+KEPT_STATES = 24
 COMPILE_LIMIT_S = 300.0
 
 
@@ -45,10 +45,10 @@ def host_compiler() -> Compiler:
     tried = [shlex.split(named)] if named else []
     tried += [["cc"], ["gcc"], ["clang"]]
     for command in tried:
-        if command and shutil.which(command[0]) is not None and (version := _version(command)):
+        if command and shutil.which(command[0]) is not None and (version := compiler_version(command)):
             return Compiler(tuple(command), version)
     zig = [sys.executable, "-m", "ziglang", "cc"]
-    if version := _version(zig):
+    if version := compiler_version(zig):
         return Compiler((*zig, "-fno-sanitize=all"), f"zig {version}")
     names = ", ".join([*([named] if named else []), "cc", "gcc", "clang"])
     raise BuildError(
@@ -56,7 +56,7 @@ def host_compiler() -> Compiler:
     )
 
 
-def _version(command: Sequence[str]) -> str:
+def compiler_version(command: Sequence[str]) -> str:
     """Return the first line that a compiler says of itself; empty when it cannot be run."""
     try:
         done = subprocess.run(

@@ -11,8 +11,8 @@ from flightstack.firmware.build import (
     EXACT,
     BuildError,
     Compiler,
-    _version,
     cached,
+    compiler_version,
     definitions,
     host_compiler,
     includes,
@@ -36,7 +36,7 @@ _PORT = "ports/cortex_m4"
 def cross_compiler() -> Compiler:
     """Return zig's C compiler, which needs no installation but pip's; raise BuildError."""
     zig = (sys.executable, "-m", "ziglang", "cc")
-    version = _version(zig)
+    version = compiler_version(zig)
     if not version:
         raise BuildError("zig is not installed: pip install 'flightstack[firmware]' brings it")
     return Compiler(zig, f"zig {version}")
