@@ -298,6 +298,38 @@ def test_a_full_outbox_drops_whole_frames_the_least_important_first(target: Targ
     assert target.status().uart_overruns == 80 + 40 + 40 - len(heard)
 
 
+def test_the_outbox_is_full_with_its_last_octet(target: Target) -> None:
+    """16 values of 37 octets and 3 reports of 144 (four rotors; zeros at the end are cut) are 1024."""
+    for index in range(16):
+        target.give(target.pack(read("", index)))
+    for number in range(4):
+        target.give(target.pack(step(number, RESET | OUTER_DUE)))
+    data = target.take()
+    assert len(data) == 1024
+    assert kinds(target.heard(data)) == ["PARAM_VALUE"] * 16 + ["FS_PIL_REPORT"] * 3
+
+
+@pytest.mark.parametrize(
+    ("request_", "answer"),
+    [
+        (mavlink.MAVLink_ping_message(1, 1, 0, 0), "PING"),
+        (command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_FS_PIL_IDENTITY), "FS_PIL_IDENTITY"),
+        (command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_FS_PIL_STATUS), "FS_PIL_STATUS"),
+        (command(mavlink.MAV_CMD_REQUEST_MESSAGE, 148), "AUTOPILOT_VERSION"),
+        (command(4711), "COMMAND_ACK"),
+        (read("POS_XY_P"), "PARAM_VALUE"),
+        (read("NO_SUCH"), "PARAM_ERROR"),
+        (write("POS_XY_P", 1.0), "PARAM_VALUE"),
+    ],
+)
+def test_an_answer_finds_room_where_news_do_not(target: Target, request_: Any, answer: str) -> None:
+    for _ in range(40):
+        target.poll(1_000)
+    waiting = kinds(target.ask(request_))
+    assert waiting.count("HEARTBEAT") < 40
+    assert answer in waiting[-2:]
+
+
 def test_frames_leave_whole_through_any_room(target: Target) -> None:
     rng = random.Random(3)
     for number in range(100):
