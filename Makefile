@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 .DEFAULT_GOAL := help
 
-.PHONY: help setup fly test check lint types imports generated generate bench fuzz fuzz-firmware clean
+.PHONY: help setup fly test check lint types imports generated generate bench fuzz fuzz-firmware firmware-check mutation clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -62,6 +62,13 @@ fuzz: $(READY) ## Coverage-guided fuzz of every link, SECONDS=60 each; needs ath
 
 fuzz-firmware: $(READY) ## Coverage-guided fuzz of the firmware's parser and codec, SECONDS=60; needs clang
 	@$(BIN)/python -m tests.firmware.codec_fuzz $(SECONDS)
+
+firmware-check: $(READY) ## Check the firmware alone: compilers, cppcheck, MISRA, parity, emulation
+	@$(BIN)/python -m pytest tests/firmware tests/parity tests/mutation
+
+MUTANTS ?= 0
+mutation: $(READY) ## Plant faults into core and codec and count those that tests find: a night; MUTANTS=300: half an hour
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.mutation --mutants $(MUTANTS) --least 90
 
 clean: ## Remove the environment and all that was made
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
