@@ -81,8 +81,9 @@ def recording(flight: FlightSamples) -> Recording:
     if not len(steps_us):
         raise UnfitLogError("the loops never ran in it: the vehicle stayed on the ground")
     outer, outer_us = _outer_inputs(flight)
+    steps_us = _with_outer_ticks(steps_us, outer_us)
     at = np.searchsorted(outer_us, steps_us, side="right") - 1
-    if at[0] < 0:
+    if not len(at) or at[0] < 0:
         raise UnfitLogError("it begins without an outer tick")
     inputs = np.empty((len(steps_us), INPUT_SIZE))
     inputs[:] = outer[at]
@@ -93,6 +94,13 @@ def recording(flight: FlightSamples) -> Recording:
     step_flags = np.where(is_outer, flags[at], 0)
     step_flags[_begins(flight, steps_us)] |= LoopFlags.RESET
     return Recording(steps_us, inputs, step_flags, is_outer, _changes(flight, steps_us), tells)
+
+
+def _with_outer_ticks(steps_us: TimeArray, outer_us: TimeArray) -> TimeArray:
+    """Leave out the steps at the end of a log that was cut off before their outer ticks were written."""
+    if len(outer_us) < 2:
+        raise UnfitLogError("it holds no outer ticks")
+    return steps_us[steps_us < outer_us[-1] + np.diff(outer_us).min()]
 
 
 def _outer_inputs(flight: FlightSamples) -> tuple[FloatArray, TimeArray]:
