@@ -12,7 +12,9 @@ from tests.support.vehicle_processes import vehicle
 MISSION = Path(__file__).parents[2] / "missions" / "square.plan"
 
 
-@pytest.mark.parametrize("options", [(), ("--clock", "realtime"), ("--wait-for-start",)], ids=" ".join)
+@pytest.mark.parametrize(
+    "options", [(), ("--clock", "realtime"), ("--wait-for-start",), ("--loops", "host")], ids=" ".join
+)
 def test_a_reboot_keeps_plan_and_parameters(tmp_path: Path, options: tuple[str, ...]) -> None:
     with vehicle(tmp_path, "--log", "flight.ulg", "--params", "none", *options) as there:
 

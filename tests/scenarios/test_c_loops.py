@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -10,11 +12,14 @@ from flightstack.config import StackConfig
 from flightstack.contract import LoopFlags, LoopRow, LoopStatus
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import CLoops
+from flightstack.firmware.errors import TargetError
 from flightstack.firmware.host_library import HostLoops
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.errors import ConfigError
 from gcs_cli.analysis import read_flight
+from tests.firmware.app_support import Target
 from tests.parity.recorded_loops import record
+from tests.support.lossy_line import LossyLine, Weather
 from tests.support.world import World, item
 
 SPEEDS = np.zeros(8, np.float32)
@@ -168,7 +173,7 @@ def test_without_a_compiler_one_sentence_says_what_to_do(monkeypatch) -> None:
     building.host_compiler.cache_clear()
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(building.shutil, "which", lambda _: None)
-    monkeypatch.setattr(building, "_version", lambda _: "")
+    monkeypatch.setattr(building, "compiler_version", lambda _: "")
     with pytest.raises(ConfigError, match="there is no C compiler: tried cc, gcc, clang and zig"):
         build(StackConfig(loops="c"), lambda: None)
     building.host_compiler.cache_clear()
@@ -186,3 +191,76 @@ def test_a_landing_and_a_second_flight_in_c() -> None:
         world.start_mission()
         world.until_disarmed()
     assert len(world.logs) == 2
+
+
+# ------------------------------------------------------------------ on a target
+
+
+@pytest.fixture
+def on_a_bad_line(monkeypatch) -> Iterator[list[LossyLine]]:
+    """Let ``--loops host`` mean the application at the end of a bad line; yield the lines that were opened."""
+    device, lines = Target(), []
+
+    def open_bad_line(_: object) -> LossyLine:
+        lines.append(LossyLine(device, Weather(2e-4, 2e-4, 0.05, 0.002, 0.3, 0.02), seed=4))
+        return lines[-1]
+
+    monkeypatch.setattr("flightstack.firmware.targets.open_link", open_bad_line)
+    monkeypatch.setattr("flightstack.firmware.target_loops.source_hash", lambda: bytes(range(1, 9)))
+    yield lines
+    device.close()
+
+
+def story(loops: str) -> World:
+    """Take off, go somewhere with other gains, fly by a given attitude, and land."""
+    world = World(loops=loops)
+    world.streams["attitude"] = lambda: mavlink.MAVLink_set_attitude_target_message(
+        0, 1, 1, 0b00000111, [0.9997, 0.0247, 0.0, 0.0], 0.0, 0.0, 0.0, 0.5
+    )
+    world.exchange_with_ground()
+    assert world.arm() == 0
+    assert world.takeoff(3.0) == 0
+    world.until(lambda: world.altitude > 2.9)
+    for name, value in (("POS_XY_P", 2.2), ("PID_ROLL_I", 0.01), ("MPC_TILTMAX_AIR", 20.0)):
+        assert world.stack.params.set(name, value) is None
+    world.run(1.0)
+    assert world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 6) == 0
+    world.run(0.5)
+    world.hold()
+    world.run(1.0)
+    world.land()
+    world.until_disarmed()
+    return world
+
+
+def test_a_flight_on_a_target_behind_a_bad_line_is_the_flight_in_c(on_a_bad_line, tmp_path) -> None:
+    from pyulog import ULog  # noqa: PLC0415
+
+    logs = []
+    for loops in ("host", "c"):
+        world = story(loops)
+        log = tmp_path / f"{loops}.ulg"
+        log.write_bytes(world.log)
+        logs.append(ULog(str(log)))
+        if loops == "host":
+            (line,) = on_a_bad_line
+            computer = world.stack.loops.computer
+            world.stack.loops.close()
+            assert line.is_closed
+            assert computer.record.status["repeats"] > 10
+    for there, here in zip(*(log.data_list for log in logs), strict=True):
+        assert there.name == here.name
+        for name in here.data:
+            assert np.array_equal(there.data[name], here.data[name], equal_nan=True), f"{here.name}.{name}"
+    flags = logs[0].get_dataset("vehicle_attitude_setpoint").data["loop_flags"]
+    assert np.count_nonzero(flags == LoopFlags.SET_TARGET) > 40
+
+
+def test_a_mission_ends_with_a_sentence_when_the_line_is_cut(on_a_bad_line) -> None:
+    world = World(loops="host")
+    world.upload("hop.plan")
+    world.start_mission()
+    world.until(lambda: world.altitude > 0.3)
+    on_a_bad_line[0].is_cut = True
+    with pytest.raises(TargetError, match=r"did not answer step \d+, sent 20 times"):
+        world.run(0.1)
