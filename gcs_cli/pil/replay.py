@@ -100,7 +100,8 @@ def _with_outer_ticks(steps_us: TimeArray, outer_us: TimeArray) -> TimeArray:
     """Leave out the steps at the end of a log that was cut off before their outer ticks were written."""
     if len(outer_us) < 2:
         raise UnfitLogError("it holds no outer ticks")
-    return steps_us[steps_us < outer_us[-1] + np.diff(outer_us).min()]
+    whole: TimeArray = steps_us[steps_us < outer_us[-1] + np.diff(outer_us).min()]
+    return whole
 
 
 def _outer_inputs(flight: FlightSamples) -> tuple[FloatArray, TimeArray]:

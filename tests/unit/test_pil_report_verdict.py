@@ -1,0 +1,160 @@
+"""The verdict, ``pil.json`` and ``pil.html`` of three flights, put together without flying."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gcs_cli.pil.report import render_report
+from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
+from gcs_cli.pil.signals import SIGNALS
+from gcs_cli.pil.target_record import TargetRecord, record_of
+from gcs_cli.pil.verdict import CLOSED_LOOP_ULPS, OPEN_LOOP_ULPS, Check, all_passed
+from tests.unit.test_pil_report_compare import changed, flight
+from tests.unit.test_report import parsed
+
+ULP = 2.0**-23
+IDENTITY = {
+    "board": "a <board>",
+    "compiler": "cc & co",
+    "source_hash": "0123456789abcdef",
+    "cost_unit": "instructions",
+    "clock_hz": 0,
+    "real_octets": 4,
+    "char_bits": 8,
+}
+STATUS = {"safe_states": 0, "loop_overruns": 0, "stack_size": 4096, "stack_high_water": 876}
+FACTS: dict[str, Any] = {
+    "title": "<hop>: MIL & PIL",
+    "about": "vehicle x · target emulated",
+    "meaning": "What it shows.",
+    "conditions": {"seed": 1, "plan": "a<b.plan"},
+}
+
+
+def record(steps: int = 9, **status: int) -> TargetRecord:
+    costs = np.array([[700.0 * (row % 5 == 0), 650.0, 430.0, 1200.0 + row] for row in range(steps)])
+    link = {"operations": steps, "resent": 1}
+    trips = {"min": 1e-4, "mean": 2e-4, "median": 2e-4, "p99": 3e-4, "max": 4e-4}
+    content = {"identity": IDENTITY, "link": link, "round_trip_s": trips, "status": {**STATUS, **status}}
+    return record_of({**content, "ending": None}, costs)
+
+
+def three(
+    target: Any = None, same_bits: bool = True, of: TargetRecord | None = None, **outcomes: str
+) -> Outcome:
+    flights = {
+        "MIL": changed(flight(), "torque", 5, 0, 1.0 + 7 * ULP),
+        "SIL": flight(),
+        "PIL": target or flight(),
+    }
+    facts = {"directory": "x", "sim_time_s": 1.0, "wall_time_s": 0.5, "log_sha256": "0"}
+    flown = {
+        stage: Flown(outcomes.get(stage, COMPLETED), samples, {**facts, "directory": stage.lower()})
+        for stage, samples in flights.items()
+    }
+    return closed_loop(flown, record() if of is None else of, same_bits, FACTS)
+
+
+def failed(outcome: Outcome) -> list[str]:
+    return [check["name"] for check in outcome.result["checks"] if not check["passed"]]
+
+
+def test_equal_flights_pass_and_each_check_shows_its_margin() -> None:
+    outcome = three()
+    assert outcome.passed
+    by_name = {check["name"]: check for check in outcome.result["checks"]}
+    wrench = by_name["MIL–SIL wrench"]
+    assert (wrench["measured"], wrench["limit"]) == (7.0, CLOSED_LOOP_ULPS["torque"])
+    assert wrench["margin"] == CLOSED_LOOP_ULPS["torque"] / 7.0
+    assert by_name["SIL–PIL wrench"]["limit"] == 0.0
+
+
+def test_one_bit_on_the_target_fails_the_verdict_unless_it_is_a_board() -> None:
+    target = changed(flight(), "rotor_command", 6, 2, 1.0 + ULP)
+    assert failed(three(target)) == ["SIL–PIL actuators"]
+    assert three(target, same_bits=False).passed
+
+
+@pytest.mark.parametrize("signal", [signal.name for signal in SIGNALS])
+def test_a_difference_over_its_limit_fails_whatever_the_target(signal: str) -> None:
+    target = changed(flight(), signal, 6, 0, 3.0)
+    names = failed(three(target, same_bits=False))
+    stage = next(each.stage for each in SIGNALS if each.name == signal)
+    assert names == [f"MIL–PIL {stage}", f"SIL–PIL {stage}"]
+
+
+def test_every_signal_has_limits() -> None:
+    assert set(CLOSED_LOOP_ULPS) == {signal.name for signal in SIGNALS}
+    assert set(OPEN_LOOP_ULPS) == {signal.name for signal in SIGNALS if signal.stage != "trajectory"}
+
+
+def test_a_target_that_missed_steps_or_failed_fails_the_verdict() -> None:
+    assert failed(three(of=record(steps=8))) == ["steps flown without the target"]
+    assert failed(three(of=record(safe_states=1))) == ["safe states of the target"]
+    assert failed(three(of=record(loop_overruns=2))) == ["steps that overran their period"]
+
+
+def test_a_flight_that_failed_or_was_not_flown_fails_the_verdict() -> None:
+    outcome = three(PIL="the target was lost")
+    assert failed(outcome) == ["flights that failed"]
+    assert "PIL: the target was lost" in outcome.result["checks"][0]["about"]
+    only = closed_loop({"MIL": Flown("interrupted", None, {"directory": "mil"})}, None, True, FACTS)
+    assert not only.passed
+    assert "PIL: not flown" in only.result["checks"][0]["about"]
+
+
+def test_what_is_not_a_number_passes_nothing() -> None:
+    assert not Check("x", 1.0, float("nan"), "").passed
+    assert not Check("x", 1.0, float("inf"), "").passed
+    assert not all_passed([])
+
+
+def test_pil_json_holds_everything_and_nothing_that_json_cannot() -> None:
+    outcome = three(changed(flight(), "thrust", 3, 0, float("nan")))
+    result = json.loads(json.dumps(outcome.result, allow_nan=False))
+    assert result["verdict"] == "failed"
+    assert result["format"] == "flightstack-pil-1"
+    pairs = {(row["pair"], row["signal"]) for row in result["differences"]}
+    assert len(pairs) == 3 * len(SIGNALS)
+    assert result["profile"]["unit"] == "instructions"
+    assert result["profile"]["stages"]["outer"]["count"] == 2
+    assert result["stack"] == {"size": 4096, "high_water": 876}
+    assert result["link"]["round_trip_p99_us"] == 300.0
+    assert result["target"]["source_hash"] == IDENTITY["source_hash"]
+    assert result["flights"]["PIL"]["ticks"] == 9
+
+
+def test_the_report_is_sound_html_that_needs_nothing_else() -> None:
+    outcome = three()
+    html = render_report(outcome.result, outcome.charts, outcome.profiles)
+    page = parsed(html)
+    for words in (
+        "a <board>",
+        "cc & co",
+        "a<b.plan",
+        "<hop>: MIL & PIL",
+        "876 of 4096 octets",
+        "same bits",
+        "passed",
+    ):
+        assert words in page.text, words
+    assert not {"script", "img", "link", "iframe"} & set(page.tags)
+    assert [value for name, value in page.attributes if name == "href"] == [
+        "mil/report.html", "sil/report.html", "pil/report.html",
+    ]  # fmt: skip
+    assert "[instructions]" in page.text
+    assert "no time" in page.text  # instructions are no time
+
+
+def test_the_report_of_a_failed_run_says_so() -> None:
+    outcome = three(changed(flight(), "torque", 4, 1, 2.0), PIL="the target was lost")
+    page = parsed(render_report(outcome.result, outcome.charts, outcome.profiles))
+    assert ("class", "outcome bad") in page.attributes
+    assert "the target was lost" in page.text
+    facts = {"directory": "mil", "sim_time_s": None, "wall_time_s": None}
+    only = closed_loop({"MIL": Flown("interrupted", None, facts)}, None, True, FACTS)
+    parsed(render_report(only.result, only.charts, only.profiles))
