@@ -20,7 +20,7 @@ PORTABLE = [file for part in ("core", "mavlink", "app") for file in sorted((FIRM
 INCLUDE = [f"-I{folder}" for folder in (*(FIRMWARE / part for part in ("core", "mavlink", "app")), PORT)]
 
 CYCLES_PER_S = 200_000_000
-FRAMING, BREAK, PAUSE = 0x100, 0x200, 0x400
+FRAMING, BREAK, PAUSE, OVERRUN = 0x100, 0x200, 0x400, 0x800
 """What the line brings in place of an octet; FRAMING goes with one."""
 LEVEL, EDGE = 0, 1
 POWER_ON, WATCHDOG = 3, 4

@@ -19,6 +19,7 @@ from tests.firmware.f28377s_support import (
     INT_RECEIVED,
     INT_SENT,
     LEVEL,
+    OVERRUN,
     PAUSE,
     PORT,
     Board,
@@ -99,6 +100,15 @@ def test_a_framing_error_costs_no_other_octet(flags: int, tmp_path: Path) -> Non
     board.line([1, 2, 3 | FRAMING, 4, 5])
     assert serviced(board, 8) == [1, 2, 3, 4, 5]  # the checksum of the frame judges the 3
     assert (board.errors, board.overruns) == (1, 0)
+    board.nothing_misused()
+
+
+@BOTH
+def test_an_overrun_before_the_fifo_is_counted_and_cleared(flags: int, tmp_path: Path) -> None:
+    board = Board(tmp_path, flags=flags)
+    board.line([1, OVERRUN, 3, PAUSE, PAUSE, OVERRUN | FRAMING, 4])
+    assert serviced(board, 9) == [1, 3, 4]
+    assert (board.errors, board.overruns) == (0, 2)
     board.nothing_misused()
 
 

@@ -1,5 +1,7 @@
-/* The two LEDs. One beats, twice a second on or off; the other one is lit in the safe state and flickers after a restart
- * by the watchdog. */
+/*
+ * The two LEDs. One beats, on or off for 512 ms; the other one is lit in the safe state, and flickers after a restart
+ * by the watchdog.
+ */
 #ifndef F28_LIGHTS_H
 #define F28_LIGHTS_H
 

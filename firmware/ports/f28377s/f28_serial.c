@@ -105,8 +105,8 @@ void f28_serial_init(void)
 void f28_serial_service(void)
 {
     uint16_t status;
-    const bool were_off = Interrupt_disableGlobal();
 
+    (void)Interrupt_disableGlobal();
     status = SCI_getRxStatus(SCIA_BASE);
     fetch();
     if ((status & (LINE_ERRORS | SCI_RXSTATUS_OVERRUN)) != 0U) {
@@ -120,9 +120,7 @@ void f28_serial_service(void)
          * just being sent is damaged by it; the checksum of its frame tells the other end. */
         SCI_performSoftwareReset(SCIA_BASE);
     }
-    if (!were_off) {
-        (void)Interrupt_enableGlobal();
-    }
+    (void)Interrupt_enableGlobal();
 }
 
 uint16_t f28_serial_take(fs_octet *out, uint16_t room)
@@ -148,12 +146,9 @@ uint16_t f28_serial_give(const fs_octet *octets, uint16_t count)
         n++;
     }
     if (f28_ring_held(&to_send) != 0U) { /* also when nothing was given: an interrupt that was missed costs one pass */
-        const bool were_off = Interrupt_disableGlobal();
-
+        (void)Interrupt_disableGlobal();
         feed();
-        if (!were_off) {
-            (void)Interrupt_enableGlobal();
-        }
+        (void)Interrupt_enableGlobal();
     }
     return n;
 }

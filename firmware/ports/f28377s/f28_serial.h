@@ -1,10 +1,12 @@
 /*
  * SCIA (GPIO 84 out, 85 in: the USB bridge of the LaunchPad) through its FIFOs, interrupts and two rings. 8N1.
  *
- * The receive interrupt comes with every 8th octet, so that a burst costs little and 8 octets of time are left for it
- * while the loops compute. What lies below that level in the FIFO is fetched by the main loop: the SCI has no interrupt
- * for a line that fell silent. Errors are dealt with by the main loop as well, lest a line held low keep the processor in
- * its interrupt. Sending goes on in the transmit interrupt for as long as there is something in the ring.
+ * The receive interrupt comes with every 8th octet: a burst costs little, and the time of 8 octets is left for it.
+ * What lies below that level in the FIFO is fetched by the main loop, since the SCI has no interrupt for a line that
+ * fell silent. Errors are dealt with by the main loop as well, lest a line held low keep the processor in its
+ * interrupt. Sending goes on in the transmit interrupt for as long as there is something in the ring.
+ *
+ * After f28_serial_init all of it is for the main loop, with interrupts enabled.
  */
 #ifndef F28_SERIAL_H
 #define F28_SERIAL_H

@@ -8,9 +8,9 @@
 extern volatile uint16_t f28_stack[];
 
 /*
- * Paint the free part: from F28_STACK_MARGIN words above `top`, a local variable of main, to the end. The pointer leaves
- * its variable, which C does not promise to work; on a C28x, with its one flat stack, it does. Nothing is painted when
- * `top` lies elsewhere.
+ * Paint the free part: from F28_STACK_MARGIN words above `top`, a local variable of main, to the end. The pointer
+ * leaves its variable, which C does not promise to work; on a C28x, with its one flat stack, it does. Nothing is
+ * painted when `top` lies elsewhere.
  */
 void f28_stack_paint(volatile uint16_t *top);
 

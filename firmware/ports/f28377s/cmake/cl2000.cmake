@@ -1,4 +1,5 @@
-# Toolchain file for TI's C2000 compiler (CGT 22.6 LTS): cmake --toolchain cmake/cl2000.cmake -DC2000_CGT_ROOT=/path/to/it
+# Toolchain file for TI's C2000 compiler (CGT 22.6 LTS):
+# cmake --toolchain cmake/cl2000.cmake -DC2000_CGT_ROOT=/path/to/it
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR C28x)
 set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)  # nothing can be linked without a linker command file
@@ -10,7 +11,7 @@ endif()
 find_program(C2000_CL NAMES cl2000 HINTS "${C2000_CGT_ROOT}/bin")
 find_program(C2000_AR NAMES ar2000 HINTS "${C2000_CGT_ROOT}/bin")
 if(NOT C2000_CL OR NOT C2000_AR)
-  message(FATAL_ERROR "cl2000 not found: give -DC2000_CGT_ROOT=/path/to/ti-cgt-c2000_22.6.x.LTS, or set it in the environment")
+  message(FATAL_ERROR "cl2000 not found: give -DC2000_CGT_ROOT=/path/to/ti-cgt-c2000, or set it in the environment")
 endif()
 get_filename_component(C2000_BIN "${C2000_CL}" DIRECTORY)
 get_filename_component(C2000_CGT_ROOT "${C2000_BIN}" DIRECTORY)

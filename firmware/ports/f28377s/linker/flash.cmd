@@ -3,8 +3,8 @@
  * waiting would disturb are copied into RAM by Device_init.
  *
  * Addresses and lengths are in 16-bit words. Only the first bank is used (sectors A to N); its last 16 words are left
- * out, since fetching ahead over their end is an erratum of the chip. Sections begin at multiples of 8, because the flash
- * is programmed and checked in units of 128 bits.
+ * out, since fetching ahead over their end is an erratum of the chip. Sections begin at multiples of 8, because the
+ * flash is programmed and checked in units of 128 bits.
  */
 MEMORY
 {

@@ -1,4 +1,4 @@
-/* Stands in for the board's device.h, as it is with _LAUNCHXL_F28377S: names and values alone, written for the tests. */
+/* Stands in for the board's device.h with _LAUNCHXL_F28377S: names and values alone, written for the tests. */
 #ifndef FAKE_DEVICE_H
 #define FAKE_DEVICE_H
 

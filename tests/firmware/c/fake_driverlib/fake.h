@@ -15,10 +15,12 @@
 #define FAKE_FRAMING 0x100U /* the octet arrives, its stop bit is low */
 #define FAKE_BREAK 0x200U   /* the line is low for longer than an octet: the receiver stops until its software reset */
 #define FAKE_PAUSE 0x400U   /* silence for the time of an octet */
+#define FAKE_OVERRUN 0x800U /* the octet is lost before the FIFO, with the flag OE alone, as users report */
 
 /*
- * How a FIFO interrupt flag behaves, which TI's documents leave open: FAKE_LEVEL: it rises again as soon as it is cleared
- * while its condition holds. FAKE_EDGE: it rises only when the condition begins to hold. The port has to live with both.
+ * How a FIFO interrupt flag behaves, which TI's documents leave open. FAKE_LEVEL: it rises again as soon as it is
+ * cleared while its condition holds. FAKE_EDGE: it rises only when the condition begins to hold. The port has to live
+ * with both.
  */
 #define FAKE_LEVEL 0U
 #define FAKE_EDGE 1U

@@ -7,6 +7,7 @@
 
 #define FIFO 16U
 #define LINE 65536U
+#define WATCHDOG_CYCLES (256U * 512U * (FAKE_SYSCLK / 10000000U)) /* 256 counts of INTOSC1 / 512, unscaled */
 #define SOURCES 3U /* timer 0, SCIA received, SCIA sent: in order of priority */
 
 typedef struct {
@@ -36,7 +37,8 @@ static struct {
     uint64_t bit_eighths; /* BRR + 1 */
     uint32_t lspclk_divider;
     fifo rx, tx;
-    uint16_t rx_level, tx_level, rx_flag, tx_flag, rx_met, tx_met, rx_on, tx_on, status, overflow, deaf, fifo_on, module_on;
+    uint16_t rx_level, tx_level, rx_flag, tx_flag, rx_met, tx_met, rx_on, tx_on;
+    uint16_t status, overflow, deaf, fifo_on, module_on;
     uint16_t shifting, shift_busy, damaged;
     uint64_t shift_done, line_next;
     uint16_t line[LINE], sent[LINE];
@@ -93,6 +95,10 @@ static void receive(uint16_t what)
     if ((what & FAKE_BREAK) != 0U) {
         chip.status |= SCI_RXSTATUS_BREAK | SCI_RXSTATUS_FRAMING | SCI_RXSTATUS_ERROR;
         chip.deaf = 1U;
+        return;
+    }
+    if ((what & FAKE_OVERRUN) != 0U) {
+        chip.status |= SCI_RXSTATUS_OVERRUN | SCI_RXSTATUS_ERROR;
         return;
     }
     if ((what & FAKE_FRAMING) != 0U) {
@@ -160,8 +166,7 @@ static uint32_t advance(uint32_t most)
             t->count -= (uint32_t)step;
         }
     }
-    if (chip.watchdog_on
-        && chip.time - chip.watchdog_since >= 256U * (FAKE_SYSCLK / 10000000U) * 512U << (chip.watchdog_prescale - 1U)) {
+    if (chip.watchdog_on && chip.time - chip.watchdog_since >= (WATCHDOG_CYCLES << (chip.watchdog_prescale - 1U))) {
         chip.bites++;
         chip.watchdog_since = chip.time;
     }
