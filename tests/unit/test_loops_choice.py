@@ -1,0 +1,39 @@
+"""The word behind ``--loops``."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightstack.firmware.choice import LoopsChoice, parse_loops
+from flightstack.params.errors import ConfigError
+
+
+@pytest.mark.parametrize(
+    ("word", "choice", "is_target"),
+    [
+        ("python", LoopsChoice("python"), False),
+        ("c", LoopsChoice("c"), False),
+        ("host", LoopsChoice("host"), True),
+        ("emulated", LoopsChoice("emulated"), True),
+        ("serial:/dev/ttyACM0", LoopsChoice("serial", "/dev/ttyACM0", 115_200), True),
+        ("serial:/dev/ttyUSB1:921600", LoopsChoice("serial", "/dev/ttyUSB1", 921_600), True),
+        (
+            "serial:/dev/serial/by-path/usb-0:1.4:1.0",
+            LoopsChoice("serial", "/dev/serial/by-path/usb-0:1.4:1.0"),
+            True,
+        ),
+        ("serial:loop:name:2500000", LoopsChoice("serial", "loop:name", 2_500_000), True),
+    ],
+)
+def test_a_word_is_read(word: str, choice: LoopsChoice, is_target: bool) -> None:
+    assert parse_loops(word) == choice
+    assert parse_loops(word).is_target is is_target
+
+
+NO_WORDS = "", "C", "python:", "host:/dev/pts/1", "serial", "serial:", "serial::9600", "serial:x:299"
+
+
+@pytest.mark.parametrize("word", [*NO_WORDS, "serial:x:" + "9" * 5000])
+def test_another_word_is_refused(word: str) -> None:
+    with pytest.raises(ConfigError, match=r"^--loops: "):
+        parse_loops(word)
