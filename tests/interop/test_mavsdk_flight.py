@@ -7,7 +7,7 @@ import math
 
 import pytest
 from mavsdk.plugins.action import ActionError
-from mavsdk.plugins.telemetry import VelocityNed
+from mavsdk.plugins.telemetry import PositionVelocityNed, VelocityNed
 
 from tests.interop.client import GROUND, TCP, story
 from tests.interop.drone import Drone
@@ -110,9 +110,12 @@ async def test_kill_stops_the_rotors_in_the_air(drone: Drone) -> None:
     await drone.take_off()
     await drone.action.kill()
     await drone.until_disarmed()
-    await drone.until(
-        "on the ground", drone.telemetry.subscribe_position(), lambda at: abs(at.relative_altitude_m) < 0.1
-    )
+    await drone.until("at rest on the ground", drone.telemetry.subscribe_position_velocity_ned(), rests)
+
+
+def rests(now: PositionVelocityNed) -> bool:
+    """Tell whether a vehicle that fell has stopped jumping."""
+    return abs(now.position.down_m) < 0.1 and abs(now.velocity.down_m_s) < 0.02
 
 
 @story()

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from typing import Any
-
-os.environ.setdefault("MAVLINK20", "1")  # read by mavutil when it is imported
 
 from pymavlink import mavutil
 

@@ -130,7 +130,7 @@ def test_a_mission_is_flown_from_plan_to_report(
 def test_geofence_and_rally_points_of_the_plan_fly_along(tmp_path: Path) -> None:
     result = run(tmp_path / "run", plan="fenced_square.plan")
     assert result.returncode == 0, result.stderr
-    loaded = [line for line in result.stdout.splitlines() if line.endswith("loaded")]
+    loaded = [line for line in result.stdout.splitlines() if " loaded, items: " in line]
     assert [line.split()[2] for line in loaded] == ["Geofence", "List", "Mission"]
 
 
