@@ -22,7 +22,7 @@ from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
 from gcs_cli.pil.target_record import TargetRecord, read_record
-from gcs_cli.pil.targets import checked_target, has_same_bits, meaning
+from gcs_cli.pil.targets import check_there, checked_target, has_same_bits, meaning
 from gcs_cli.pil.verdict import MIL, PIL, SIL
 from gcs_cli.run_directory import LOG_NAME, RUNS, fresh_directory
 
@@ -54,6 +54,7 @@ def run(options: FlyOptions, plan: Plan, target: str, out: Path | None, console:
     A flight that fails ends the run; what was flown until then is compared all the same.
     """
     choice = checked_target(target)
+    check_there(choice)
     folder = make_pil_directory(options.plan_path.stem, out)
     flights: dict[str, Flown] = {}
     problem = None

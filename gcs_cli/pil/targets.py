@@ -1,8 +1,11 @@
-"""The targets that the loops can be checked on: the word behind ``--target``, and what it means."""
+"""The targets that the loops can be checked on: the word behind ``--target``, its meaning, and whether it is there."""
 
 from __future__ import annotations
 
+from flightstack.firmware.build import BuildError
 from flightstack.firmware.choice import EMULATED, HOST, SERIAL, C, LoopsChoice, parse_loops
+from flightstack.firmware.targets import open_link
+from flightstack.transport.byte_link import LineError
 from gcs_cli.errors import USAGE, CliError
 
 MEANINGS = {
@@ -28,6 +31,14 @@ def checked_target(text: str, more: tuple[str, ...] = ()) -> LoopsChoice:
         known = ", ".join([EMULATED, HOST, *more])
         raise CliError(f"--target {text}: expected {known} or serial:DEVICE[:BAUD]", USAGE)
     return parse_loops(text)
+
+
+def check_there(target: LoopsChoice) -> None:
+    """Make sure that the target can be reached before anything flies; raise CliError (usage)."""
+    try:
+        open_link(target).close()
+    except (BuildError, LineError) as error:
+        raise CliError(str(error), USAGE) from None
 
 
 def has_same_bits(target: LoopsChoice) -> bool:

@@ -1,0 +1,201 @@
+"""``gcs pil`` on real targets: the whole C program on this machine, and the firmware on an emulated Cortex-M4F."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flightstack.firmware.build import host_program
+from gcs_cli.errors import DONE, FAILED, NO_ANSWER, USAGE
+from tests.processes.test_gcs_fly import LONG_S, children_of
+from tests.support.free_instance import free_instance
+
+MISSIONS = Path(__file__).parents[2] / "missions"
+INSTANCE = free_instance()
+emulation = pytest.mark.skipif(
+    not all(map(importlib.util.find_spec, ("unicorn", "ziglang"))), reason="unicorn and ziglang are extras"
+)
+
+
+def pil(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "gcs_cli", "pil", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=3 * LONG_S, check=False)
+
+
+def fly(out: Path, target: str, *flags: str, plan: str = "hop.plan") -> subprocess.CompletedProcess[str]:
+    return pil(MISSIONS / plan, "--target", target, "--out", out, "--instance", str(INSTANCE), *flags)
+
+
+def result_of(out: Path) -> dict[str, Any]:
+    return json.loads((out / "pil.json").read_text())
+
+
+def largest(result: dict[str, Any], pair: str) -> float:
+    return max(row["largest"] for row in result["differences"] if row["pair"] == pair)
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The hop, flown as MIL, SIL and PIL on the host program."""
+    out = tmp_path_factory.mktemp("pil") / "hop"
+    done = fly(out, "host", "--fail-over")
+    assert done.returncode == DONE, done.stdout + done.stderr
+    return out
+
+
+def test_three_flights_are_flown_compared_and_reported(flown: Path) -> None:
+    result = result_of(flown)
+    assert result["verdict"] == "passed"
+    assert largest(result, "SIL–PIL") == 0.0
+    assert 0.0 < largest(result, "MIL–PIL") == largest(result, "MIL–SIL")
+    assert [result["flights"][stage]["outcome"] for stage in ("MIL", "SIL", "PIL")] == ["completed"] * 3
+    ticks = result["flights"]["PIL"]["ticks"]
+    assert result["profile"]["stages"]["whole"]["count"] >= ticks > 1000
+    assert result["profile"]["unit"] == "ns"
+    for name in ("pil.html", "mil/report.html", "sil/flight.ulg", "pil/pil-link.json"):
+        assert (flown / name).stat().st_size > 0, name
+
+
+@emulation
+def test_the_emulated_target_counts_instructions_and_makes_the_same_bits(flown: Path, tmp_path: Path) -> None:
+    done = fly(tmp_path / "out", "emulated", "--fail-over", "--json")
+    assert done.returncode == DONE, done.stderr
+    result = result_of(tmp_path / "out")
+    printed = json.loads(done.stdout)
+    assert printed.pop("directory") == str(tmp_path / "out")
+    assert printed == result
+    assert largest(result, "SIL–PIL") == 0.0
+    assert result["profile"]["unit"] == "instructions"
+    assert result["stack"]["high_water"] > 0
+    assert "no board" in result["meaning"]
+    assert "F28377S" not in json.dumps([result["target"], result["profile"], result["title"]])
+    of_host = result_of(flown)
+    assert result["flights"]["SIL"]["log_sha256"] == of_host["flights"]["SIL"]["log_sha256"]
+    assert result["target"]["source_hash"] == of_host["target"]["source_hash"]
+
+
+@pytest.mark.parametrize("target", ["host", "c", pytest.param("emulated", marks=emulation)])
+@pytest.mark.parametrize("stage", ["mil", "pil"])
+def test_a_log_is_replayed_on_a_target(stage: str, target: str, flown: Path, tmp_path: Path) -> None:
+    done = pil(
+        "replay", flown / stage / "flight.ulg", "--target", target, "--out", tmp_path / "out", "--fail-over"
+    )
+    assert done.returncode == DONE, done.stdout + done.stderr
+    result = result_of(tmp_path / "out")
+    assert (largest(result, "log–target") == 0.0) is (stage == "pil")
+
+
+class Board:
+    """The host program, which is found at a serial port as a board is."""
+
+    def __init__(self) -> None:
+        self.process = subprocess.Popen([host_program()], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self.process.stdout is not None
+        self.device = self.process.stdout.readline().decode().strip()
+        self._held = os.open(
+            self.device, os.O_RDWR | os.O_NOCTTY
+        )  # a board does not end when its port is closed
+
+    def remove(self) -> None:
+        """Pull the plug."""
+        self.process.kill()
+        self.process.communicate()
+        if self._held >= 0:
+            os.close(self._held)
+            self._held = -1
+
+
+@pytest.fixture
+def board() -> Iterator[Board]:
+    there = Board()
+    yield there
+    there.remove()
+
+
+def test_a_board_is_examined_and_flown_at_its_serial_port(board: Board, tmp_path: Path) -> None:
+    done = pil("doctor", "--port", board.device, "--baud", "115200", "--exchanges", "50", "--json")
+    assert done.returncode == DONE, done.stdout + done.stderr
+    (line,) = json.loads(done.stdout)["lines"]
+    assert line["exchanges"] == 50
+    assert line["steps_per_s"] > 0
+    done = fly(tmp_path / "out", f"serial:{board.device}:115200", "--fail-over")
+    assert done.returncode == DONE, done.stdout + done.stderr
+    result = result_of(tmp_path / "out")
+    assert largest(result, "SIL–PIL") == 0.0
+    limits = [check["limit"] for check in result["checks"] if check["name"] == "SIL–PIL wrench"]
+    assert limits[0] > 0.0  # of a board nobody asks for the same bits
+
+
+def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(board: Board, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "gcs_cli", "pil", str(MISSIONS / "square.plan"), "--out", str(out)]
+    more = ["--target", f"serial:{board.device}", "--instance", str(INSTANCE)]
+    with subprocess.Popen(
+        [*command, *more], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as run:
+        end_s = time.monotonic() + 3 * LONG_S
+        log = out / "pil" / "flight.ulg"
+        while not (log.exists() and log.stat().st_size > 100_000):
+            assert run.poll() is None, run.communicate()
+            assert time.monotonic() < end_s
+            time.sleep(0.01)
+        board.remove()
+        printed, complaint = run.communicate(timeout=LONG_S)
+        assert children_of(run.pid) == {}
+    assert run.returncode == NO_ANSWER, printed + complaint
+    assert board.device in complaint
+    result = result_of(out)
+    assert result["verdict"] == "failed"
+    assert result["flights"]["SIL"]["outcome"] == "completed"
+    assert largest(result, "SIL–PIL") == 0.0  # as far as it came
+    assert (out / "pil.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["hop.plan", "--target", "python"], "--target python: expected emulated, host"),
+        (["hop.plan", "--target", "serial:/dev/ttyNONE"], "/dev/ttyNONE: there is no such device"),
+        (["none.plan", "--target", "host"], "none.plan"),
+        (["hop.plan", "--target", "host", "--controller", "mine"], "--controller mine"),
+        (["replay", "hop.plan", "--target", "c"], "not a readable flight log"),
+        (["replay", "none.ulg"], "none.ulg"),
+        (["doctor"], "give either --port DEVICE or --target"),
+        (["doctor", "--port", "/dev/ttyNONE"], "there is no such device"),
+    ],
+)
+def test_mistakes_are_answered_with_a_sentence(arguments: list[str], words: str, tmp_path: Path) -> None:
+    paths = [str(MISSIONS / each) if each.endswith((".plan", ".ulg")) else each for each in arguments]
+    out = [] if "doctor" in arguments else ["--out", str(tmp_path / "out")]
+    done = pil(*paths, *out)
+    assert done.returncode == USAGE, done.stdout + done.stderr
+    assert words in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "out" / "mil").exists()
+
+
+def test_results_are_never_overwritten(flown: Path) -> None:
+    done = fly(flown, "host")
+    assert done.returncode == USAGE
+    assert "another run is there" in done.stderr
+
+
+def test_a_verdict_that_is_not_good_fails_when_it_is_asked_for(flown: Path, tmp_path: Path) -> None:
+    """The log says that Python's loops flew it; that they were C's is forged, so that the same bits are expected."""
+    forged = (flown / "mil" / "flight.ulg").read_bytes().replace(b"loopspython", b"loopshost\0\0")
+    log = tmp_path / "flight.ulg"
+    log.write_bytes(forged)
+    for flags, code in (([], DONE), (["--fail-over"], FAILED)):
+        done = pil("replay", log, "--target", "c", "--out", tmp_path / f"out{code}", *flags)
+        assert done.returncode == code, done.stdout + done.stderr
+        assert "verdict  failed" in done.stdout
+    assert "the verdict is not good: log–target attitude target" in done.stderr
