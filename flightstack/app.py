@@ -71,6 +71,7 @@ class App:
                 complain(ended)
             code = ended.code
         except TargetError as error:
+            self.stack.recorder.take_back_row()
             complain(error)
             code = EXIT_TIMEOUT
         except LinkClosedError:

@@ -49,6 +49,11 @@ class FlightRecorder:
         """Return the row that the inner loop fills in this tick."""
         return self._scratch if self._log is None else self._log.inner.append(time_us)
 
+    def take_back_row(self) -> None:
+        """Forget the newest row of ``inner_row``: the loops failed before they filled it."""
+        if self._log is not None and self._log.inner.n:
+            self._log.inner.n -= 1
+
     def outer(
         self,
         time_us: int,
