@@ -40,7 +40,7 @@
 #ifndef F28_STACK_WORDS
 #define F28_STACK_WORDS 0x600U /* 16-bit words; the linker's --stack_size has to be the same number */
 #endif
-#define F28_STACK_MARGIN 64U   /* words above main's variables that its first calls may use while the rest is painted */
+#define F28_STACK_MARGIN 64U   /* words at its beginning that start-up code and main may use before it is painted */
 
 #define F28_LIGHT_HEARTBEAT 12UL /* GPIO of the one LED, which TI's device.h calls LD9; both light at 0 */
 #define F28_LIGHT_SAFE 13UL      /* GPIO of the other one, LD10 */

@@ -85,7 +85,7 @@ void f28_serial_init(void)
     errors = 0UL;
     init_pins();
     SCI_performSoftwareReset(SCIA_BASE);
-    SCI_setConfig(SCIA_BASE, F28_LSPCLK_HZ, F28_BAUD, SCI_CONFIG_WLEN_8 | SCI_CONFIG_STOP_ONE | SCI_CONFIG_PAR_NONE);
+    SCI_setConfig(SCIA_BASE, F28_LSPCLK_HZ, F28_BAUD, SCI_CONFIG_WLEN_8); /* one stop bit, no parity: both are 0 */
     SCI_resetChannels(SCIA_BASE);
     SCI_resetRxFIFO(SCIA_BASE);
     SCI_resetTxFIFO(SCIA_BASE);

@@ -4,13 +4,12 @@
 
 #define PAINT 0xA5A5U
 
-void f28_stack_paint(volatile uint16_t *top)
+void f28_stack_paint(void)
 {
-    volatile uint16_t *at = top + F28_STACK_MARGIN;
+    uint16_t at;
 
-    while (at >= f28_stack && at < f28_stack + F28_STACK_WORDS) {
-        *at = PAINT;
-        at++;
+    for (at = F28_STACK_MARGIN; at < F28_STACK_WORDS; at++) {
+        f28_stack[at] = PAINT;
     }
 }
 

@@ -11,7 +11,6 @@ volatile uint16_t f28_stack[F28_STACK_WORDS]; /* the linker's on the board */
 
 void bench_passes(uint32_t cycles, uint32_t work);
 void bench_run_line(uint32_t work);
-void bench_paint_above(uint16_t word);
 uint32_t bench_stack_size(void);
 
 /* Run the main loop for so many cycles; each pass has `work` cycles of its own besides its calls of driverlib. */
@@ -32,11 +31,6 @@ void bench_run_line(uint32_t work)
         f28_pass();
         fake_run(work);
     }
-}
-
-void bench_paint_above(uint16_t word)
-{
-    f28_stack_paint(f28_stack + word);
 }
 
 uint32_t bench_stack_size(void)

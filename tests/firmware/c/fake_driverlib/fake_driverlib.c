@@ -8,6 +8,7 @@
 #define FIFO 16U
 #define LINE 65536U
 #define WATCHDOG_CYCLES (256U * 512U * (FAKE_SYSCLK / 10000000U)) /* 256 counts of INTOSC1 / 512, unscaled */
+#define STORM 1000U
 #define SOURCES 3U /* timer 0, SCIA received, SCIA sent: in order of priority */
 
 typedef struct {
@@ -176,7 +177,7 @@ static uint32_t advance(uint32_t most)
 
 static void strike(void)
 {
-    uint16_t i;
+    uint16_t i, in_a_row = 0U;
 
     for (i = 0U; i < SOURCES && !chip.in_interrupt && !chip.masked; i++) {
         source *const s = &chip.sources[i];
@@ -187,6 +188,10 @@ static void strike(void)
             chip.ack |= s->group;
             chip.in_interrupt = 1U;
             s->handler();
+            if (++in_a_row > STORM) { /* the processor would get to nothing else any more */
+                misuse("interrupts without an end");
+                return;
+            }
             chip.in_interrupt = 0U;
             if ((chip.ack & s->group) != 0U) {
                 misuse("an interrupt did not acknowledge its group");
