@@ -30,6 +30,16 @@ _DECADES = 4.0
 _STRETCHES = 300
 _STAGE_STYLES = {"outer": "s2", "inner": "s1", "mixer": "s3", "whole": "s5"}
 
+_OF_TARGET = (
+    "steps",
+    "repeats",
+    "out_of_order",
+    "bad_frames",
+    "skipped_octets",
+    "uart_overruns",
+    "uart_errors",
+)
+
 
 class DeviationChart(NamedTuple):
     """How far one signal is apart over time, for each pair of flights."""

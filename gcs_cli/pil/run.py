@@ -54,7 +54,7 @@ def run(options: FlyOptions, plan: Plan, target: str, out: Path | None, console:
     A flight that fails ends the run; what was flown until then is compared all the same.
     """
     choice = checked_target(target)
-    check_there(choice)
+    check_there(choice, options.controller)
     folder = make_pil_directory(options.plan_path.stem, out)
     flights: dict[str, Flown] = {}
     problem = None

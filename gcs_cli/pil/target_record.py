@@ -59,6 +59,7 @@ def record_of(content: Mapping[str, Any], costs: FloatArray) -> TargetRecord:
     """Return the record from the content of its first file, and the costs of the steps."""
     trips = content["round_trip_s"] or {}
     link = dict(content["link"])
+    link["lost"] = max(0, link["resent"] - link["late"])  # in either direction: nothing came of that sending
     for name, seconds in trips.items():
         link[f"round_trip_{name}_us"] = round(seconds * 1e6, 1)
     return TargetRecord(content["identity"], link, content["status"] or {}, costs, content["ending"])

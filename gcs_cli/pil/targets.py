@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from flightstack.firmware.build import BuildError
+from flightstack.firmware.build import BuildError, host_library
 from flightstack.firmware.choice import EMULATED, HOST, SERIAL, C, LoopsChoice, parse_loops
+from flightstack.firmware.numbers import CONTROLLERS
 from flightstack.firmware.targets import open_link
 from flightstack.transport.byte_link import LineError
 from gcs_cli.errors import USAGE, CliError
@@ -33,9 +34,14 @@ def checked_target(text: str, more: tuple[str, ...] = ()) -> LoopsChoice:
     return parse_loops(text)
 
 
-def check_there(target: LoopsChoice) -> None:
-    """Make sure that the target can be reached before anything flies; raise CliError (usage)."""
+def check_there(target: LoopsChoice, controller: str) -> None:
+    """Make sure before anything flies that C can fly it and that the target is there; raise CliError (usage)."""
+    if controller not in (known.name for known in CONTROLLERS):
+        raise CliError(
+            f"--controller {controller}: exists in Python alone, so there is nothing to compare", USAGE
+        )
     try:
+        host_library()
         open_link(target).close()
     except (BuildError, LineError) as error:
         raise CliError(str(error), USAGE) from None

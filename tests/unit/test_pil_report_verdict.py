@@ -26,7 +26,13 @@ IDENTITY = {
     "real_octets": 4,
     "char_bits": 8,
 }
-STATUS = {"safe_states": 0, "loop_overruns": 0, "stack_size": 4096, "stack_high_water": 876}
+STATUS = {
+    "uart_overruns": 77,
+    "safe_states": 0,
+    "loop_overruns": 0,
+    "stack_size": 4096,
+    "stack_high_water": 876,
+}
 FACTS: dict[str, Any] = {
     "title": "<hop>: MIL & PIL",
     "about": "vehicle x · target emulated",
@@ -37,7 +43,7 @@ FACTS: dict[str, Any] = {
 
 def record(steps: int = 9, **status: int) -> TargetRecord:
     costs = np.array([[700.0 * (row % 5 == 0), 650.0, 430.0, 1200.0 + row] for row in range(steps)])
-    link = {"operations": steps, "resent": 1}
+    link = {"operations": steps, "resent": 5, "late": 2}
     trips = {"min": 1e-4, "mean": 2e-4, "median": 2e-4, "p99": 3e-4, "max": 4e-4}
     content = {"identity": IDENTITY, "link": link, "round_trip_s": trips, "status": {**STATUS, **status}}
     return record_of({**content, "ending": None}, costs)
@@ -124,6 +130,7 @@ def test_pil_json_holds_everything_and_nothing_that_json_cannot() -> None:
     assert result["profile"]["stages"]["outer"]["count"] == 2
     assert result["stack"] == {"size": 4096, "high_water": 876}
     assert result["link"]["round_trip_p99_us"] == 300.0
+    assert result["link"]["lost"] == 3
     assert result["target"]["source_hash"] == IDENTITY["source_hash"]
     assert result["flights"]["PIL"]["ticks"] == 9
 
@@ -147,6 +154,7 @@ def test_the_report_is_sound_html_that_needs_nothing_else() -> None:
         "mil/report.html", "sil/report.html", "pil/report.html",
     ]  # fmt: skip
     assert "[instructions]" in page.text
+    assert "target: uart overruns77" in page.text
     assert "no time" in page.text  # instructions are no time
 
 
