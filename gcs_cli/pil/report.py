@@ -162,7 +162,12 @@ def _link(result: Mapping[str, Any]) -> Iterator[str]:
         facts = [
             (name.replace("_us", " [µs]").replace("_", " "), shown(value)) for name, value in link.items()
         ]
-        yield facts_section("Link", facts)
+        told = result["target_counters"]
+        facts += [
+            (f"target: {name.replace('_', ' ')}", shown(told[name])) for name in _OF_TARGET if name in told
+        ]
+        note = "Lost: sendings of which nothing came, in either direction. Target: its own counters, since its start."
+        yield facts_section("Link", facts, note)
 
 
 def _flights(result: Mapping[str, Any]) -> Iterator[str]:
