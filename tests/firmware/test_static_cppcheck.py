@@ -71,19 +71,30 @@ def cppcheck(root: Path, *arguments: str | Path) -> list[Finding]:
     return found
 
 
+LISTED = tomllib.loads((CPPCHECK / "deviations.toml").read_text())
+
+
 @pytest.fixture(scope="module")
-def findings() -> list[Finding]:
-    folders = [FIRMWARE / name for name in CHECKED]
+def findings(tmp_path_factory: pytest.TempPathFactory) -> list[Finding]:
+    """What cppcheck says of a copy: it writes files beside the sources, where two runs would meet."""
+    if (
+        shutil.which("cppcheck")
+        and (version := run(["cppcheck", "--version"]).stdout.split()[-1]) != LISTED["cppcheck"]
+    ):
+        pytest.skip(f"the deviations are listed for cppcheck {LISTED['cppcheck']}, this is {version}")
+    root = tmp_path_factory.mktemp("firmware")
+    for name in CHECKED:
+        shutil.copytree(FIRMWARE / name, root / name, ignore=shutil.ignore_patterns("*.dump", "*.ctu-info"))
+    folders = [root / name for name in CHECKED]
     assert [folder.name for folder in folders if not list(folder.glob("*.c"))] == []
     includes = [f"-I{folder}" for folder in folders]
     not_ours = [f"--suppress=*:{folder}/*" for folder in (FAKE_DRIVERLIB, CPPCHECK / "include")]
-    return cppcheck(FIRMWARE, "--addon=misra", *includes, f"-I{FAKE_DRIVERLIB}", *not_ours, *folders)
+    return cppcheck(root, "--addon=misra", *includes, f"-I{FAKE_DRIVERLIB}", *not_ours, *folders)
 
 
 @pytest.fixture(scope="module")
 def deviations() -> list[Deviation]:
-    listed = tomllib.loads((CPPCHECK / "deviations.toml").read_text())["deviation"]
-    return [Deviation(one["rule"], one.get("files", ["*"]), one["reason"]) for one in listed]
+    return [Deviation(one["rule"], one.get("files", ["*"]), one["reason"]) for one in LISTED["deviation"]]
 
 
 def test_whatever_is_found_is_listed_with_its_reason(

@@ -11,6 +11,7 @@ import random
 import shutil
 import sys
 import tempfile
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -26,7 +27,7 @@ ELSEWHERE = ("fs_constants.h",)
 
 
 def chosen(sources: Path, only: str, number: int, seed: int) -> list[Mutant]:
-    """Return mutants of all files, a sample of ``number`` when that is not 0."""
+    """Return mutants of all files by chance, so many of them when ``number`` is not 0."""
     rng, found = random.Random(seed), []
     for part in TESTS:
         for path in sorted((sources / part).glob("*.[ch]")):
@@ -34,14 +35,16 @@ def chosen(sources: Path, only: str, number: int, seed: int) -> list[Mutant]:
             if path.name in GENERATED:
                 of_file = rng.sample(of_file, min(len(of_file), MOST_OF_A_GENERATED_FILE))
             found += [m for m in of_file if only in f"{part}/{path.name}"]
-    return sorted(rng.sample(found, number)) if 0 < number < len(found) else found
+    rng.shuffle(found)
+    return found[:number] if number else found
 
 
-def judged(sample: list[Mutant], jobs: int, sources: Path, objects: Path) -> list[Verdict]:
-    """Try all mutants, ``jobs`` at a time."""
-    waiting, running, verdicts = list(reversed(sample)), {}, []
-    while waiting or running:
-        if waiting and len(running) < jobs:
+def judged(sample: list[Mutant], jobs: int, minutes: float, sources: Path, objects: Path) -> list[Verdict]:
+    """Try mutants, ``jobs`` at a time, until all are tried or the time is over."""
+    waiting, running, verdicts = list(sample), {}, []
+    end_s = time.monotonic() + 60.0 * minutes
+    while running or (waiting and time.monotonic() < end_s):
+        if waiting and len(running) < jobs and time.monotonic() < end_s:
             mutant, work = waiting.pop(), Path(tempfile.mkdtemp(prefix="mutant-"))
             running[judge.start(mutant, work, sources, objects)] = (mutant, work)
             continue
@@ -76,6 +79,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
     parser.add_argument("--mutants", type=int, default=0, help="so many of them, drawn by chance; 0: all")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--minutes", type=float, default=24.0 * 60.0, help="begin no more of them after this time"
+    )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--only", default="", help="part of a file's name, core/fs_mixer.c for instance")
     parser.add_argument("--least", type=float, default=0.0, help="percent that must be killed")
@@ -87,7 +93,7 @@ def main() -> int:
         sample = chosen(sources, given.only, given.mutants, given.seed)
         print(f"{len(sample)} mutants", flush=True)
         judge.warm_up({judge.part_of(mutant) for mutant in sample}, sources, objects)
-        verdicts = judged(sample, given.jobs, sources, objects)
+        verdicts = judged(sample, given.jobs, given.minutes, sources, objects)
     report(verdicts)
     counted = [v for v in verdicts if v.fate != INVALID]
     killed = sum(v.fate != SURVIVED for v in counted)
