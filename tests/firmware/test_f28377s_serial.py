@@ -197,6 +197,24 @@ def test_both_rings_wrap_many_times_at_full_rate(tmp_path: Path) -> None:
     board.nothing_misused()
 
 
+@BOTH
+def test_an_interrupt_at_any_call_neither_loses_nor_swaps_an_octet(flags: int, tmp_path: Path) -> None:
+    """They strike at every call of the main loop, at every second one, …: where both handle a FIFO, they are masked."""
+    board, rng = Board(tmp_path, flags=flags, options=("-DF28_BAUD=2500000UL",)), random.Random(5)
+    for every in range(1, 9):
+        board.c.fake_strike_every(every)
+        octets = [rng.randrange(256) for _ in range(150)]
+        before = [board.c.fake_interrupts(number) for number in (INT_RECEIVED, INT_SENT)]
+        board.line(octets)
+        assert board.give(octets) == len(octets)
+        assert serviced(board, 180) == octets
+        assert board.sent() == octets
+        after = [board.c.fake_interrupts(number) for number in (INT_RECEIVED, INT_SENT)]
+        assert min(late - early for early, late in zip(before, after, strict=True)) > 500
+    assert (board.overruns, board.errors) == (0, 0)
+    board.nothing_misused()
+
+
 @pytest.mark.parametrize(
     ("baud", "actual"),
     [

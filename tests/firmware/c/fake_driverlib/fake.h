@@ -25,6 +25,13 @@
 #define FAKE_LEVEL 0U
 #define FAKE_EDGE 1U
 
+/*
+ * A moment between two given calls is hit by an interrupt once in hours. fake_strike_every makes that common: whatever
+ * the FIFOs hold, those of SCIA's interrupts that the SCI has enabled strike at every n-th call of the main loop, or
+ * wait there until they are unmasked.
+ */
+void fake_strike_every(uint32_t n); /* 0, as after power on: only when the chip has a reason */
+
 void fake_power_on(uint16_t flags_are, uint32_t reset_cause, uint32_t timer1_begins_at);
 void fake_run(uint32_t cycles); /* the processor is busy with something else; interrupts come through */
 uint64_t fake_time(void);       /* cycles */

@@ -31,6 +31,7 @@ static struct {
     uint16_t flags_are, in_interrupt, masked, eallow, global_once;
     uint64_t masked_since, longest_masked;
     const char *misuse;
+    uint32_t strike_every, calls;
     source sources[SOURCES];
     uint16_t ack; /* groups that wait for their acknowledgement */
     timer timers[2];
@@ -209,8 +210,23 @@ void fake_run(uint32_t cycles)
     }
 }
 
+void fake_strike_every(uint32_t n)
+{
+    chip.strike_every = n;
+    chip.calls = 0U;
+}
+
 static void call(void)
 {
+    if (chip.strike_every > 0U && !chip.in_interrupt && ++chip.calls >= chip.strike_every) {
+        chip.calls = 0U;
+        if (chip.rx_on) {
+            raise(1U);
+        }
+        if (chip.tx_on) {
+            raise(2U);
+        }
+    }
     fake_run(FAKE_CALL);
 }
 
