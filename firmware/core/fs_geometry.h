@@ -88,13 +88,10 @@ static inline fs_quaternion fs_blend(const fs_quaternion *a, const fs_quaternion
     return fs_normalised(&between);
 }
 
-/* Logarithm of a unit quaternion: axis times angle [rad], the angle in [0, pi]. */
+/* Logarithm of a quaternion of any length: axis times angle [rad], the angle in [0, pi]; zero of the zero. */
 fs_vector3 fs_rotation_vector(const fs_quaternion *q);
 
 /* Rotation that constant body rates make in dt_s. */
 fs_quaternion fs_rotation_over(const fs_vector3 *rates_rad_s, fs_real dt_s);
-
-/* Quaternion of yaw, then pitch, then roll (3-2-1). */
-fs_quaternion fs_quaternion_from_euler(fs_real roll_rad, fs_real pitch_rad, fs_real yaw_rad);
 
 #endif

@@ -24,12 +24,12 @@ static uint32_t now(fs_clock clock)
 
 static fs_real add_vector(fs_real sum, const fs_vector3 *v)
 {
-    return fs_add_magnitude(fs_add_magnitude(fs_add_magnitude(sum, v->x), v->y), v->z);
+    return fs_add_part(fs_add_part(fs_add_part(sum, v->x), v->y), v->z);
 }
 
 static fs_real add_quaternion(fs_real sum, const fs_quaternion *q)
 {
-    return fs_add_magnitude(fs_add_magnitude(fs_add_magnitude(fs_add_magnitude(sum, q->w), q->x), q->y), q->z);
+    return fs_add_part(fs_add_part(fs_add_part(fs_add_part(sum, q->w), q->x), q->y), q->z);
 }
 
 static uint16_t state_is_finite(const fs_vehicle_state *state)
@@ -45,18 +45,25 @@ static uint16_t setpoint_is_finite(const fs_position_setpoint *setpoint)
 
     sum = add_vector(sum, &setpoint->velocity_ned_m_s);
     sum = add_vector(sum, &setpoint->acceleration_ned_m_s2);
-    return fs_is_finite(fs_add_magnitude(fs_add_magnitude(sum, setpoint->yaw_rad), setpoint->yaw_rate_rad_s));
+    return fs_is_finite(fs_add_part(fs_add_part(sum, setpoint->yaw_rad), setpoint->yaw_rate_rad_s));
 }
 
 static uint16_t target_is_finite(const fs_attitude_target *target)
 {
-    return fs_is_finite(fs_add_magnitude(add_quaternion(FS_LIT(0.0), &target->attitude), target->thrust_n));
+    return fs_is_finite(fs_add_part(add_quaternion(FS_LIT(0.0), &target->attitude), target->thrust_n));
 }
 
-/* Whether the mixer's sums overflowed nowhere: every rotor's squared speed is in each sum of the wrench achieved. */
-static uint16_t wrench_is_finite(const fs_wrench *achieved)
+/* Whether the mixer's sums overflowed nowhere. */
+static uint16_t mix_is_finite(const fs_loop_output *output, uint16_t rotors)
 {
-    return fs_is_finite(add_vector(fs_add_magnitude(FS_LIT(0.0), achieved->thrust_n), &achieved->torque_frd_n_m));
+    const fs_wrench *achieved = &output->wrench_achieved;
+    fs_real sum = add_vector(fs_add_part(FS_LIT(0.0), achieved->thrust_n), &achieved->torque_frd_n_m);
+    uint16_t i;
+
+    for (i = 0U; i < rotors; i++) {
+        sum = fs_add_part(sum, output->rotor_command_rad_s[i]);
+    }
+    return fs_is_finite(sum);
 }
 
 void fs_loops_init(fs_loops *loops)
@@ -135,8 +142,8 @@ static void outer_loop(fs_loops *loops, const fs_loop_input *input, uint16_t sta
     if (!state_is_sound || !setpoint_is_finite(&input->setpoint)) {
         return;
     }
-    fs_position_pid_step(&memory, &input->state, &input->setpoint, &loops->position, loops->rates.outer_dt_s,
-                         loops->saturation.thrust, &target);
+    fs_position_pid_step(&memory, &input->state, &input->setpoint, &loops->position, loops->rates.tan_max_tilt,
+                         loops->rates.outer_dt_s, loops->saturation.thrust, &target);
     if (target_is_finite(&target)) {
         loops->position_memory = memory;
         loops->target = target;
@@ -172,8 +179,7 @@ static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *sta
         *torque = fs_attitude_backstepping_step(&inputs, &loops->backstepping);
     }
     output->wrench.thrust_n = loops->target.thrust_n;
-    /* an integral that is not finite makes a torque that is not */
-    return fs_is_finite(add_vector(FS_LIT(0.0), torque));
+    return fs_is_finite(add_vector(FS_LIT(0.0), torque)); /* an integral that is not finite makes a torque that is not */
 }
 
 static uint16_t saturation_bits(const fs_saturation *saturation)
@@ -200,7 +206,7 @@ static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint1
                            fs_loop_output *output, fs_loop_cost *cost)
 {
     const uint32_t began = now(clock);
-    uint16_t is_sound;
+    uint16_t is_sound, is_free;
     uint32_t controlled;
     fs_tick tick;
 
@@ -215,14 +221,17 @@ static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint1
     if (!is_sound) {
         return FS_STATUS_OUTPUT_NOT_FINITE;
     }
-    fs_mix(&output->wrench, &loops->mixer, loops->rates.rotors, output->rotor_command_rad_s, &output->wrench_achieved,
-           &tick.saturation);
+    is_free = fs_mix(&output->wrench, &loops->mixer, loops->rates.rotors, output->rotor_command_rad_s,
+                     &output->wrench_achieved, &tick.saturation);
     cost->mixer = now(clock) - controlled;
-    if (!wrench_is_finite(&output->wrench_achieved)) {
-        return FS_STATUS_OUTPUT_NOT_FINITE;
+    output->status = 0U;
+    if (is_free == 0U) {
+        if (!mix_is_finite(output, loops->rates.rotors)) {
+            return FS_STATUS_OUTPUT_NOT_FINITE;
+        }
+        output->status = saturation_bits(&tick.saturation);
     }
     output->attitude_target = loops->target;
-    output->status = saturation_bits(&tick.saturation);
     loops->reference_memory = tick.reference;
     loops->pid_memory = tick.pid;
     loops->saturation = tick.saturation;

@@ -47,6 +47,7 @@ typedef struct {
     uint16_t controller, rotors;
     fs_real inner_dt_s, outer_dt_s;
     fs_real fraction_step; /* share of an outer period that an inner tick is */
+    fs_real tan_max_tilt;
 } fs_loop_rates;
 
 typedef struct fs_loops {

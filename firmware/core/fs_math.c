@@ -14,8 +14,6 @@
 #define HALF_PI_3 7.549790126404332e-8F
 #endif
 
-#define SMALL_ANGLE_RAD FS_LIT(0.78) /* less than pi/4, beyond which there are quarter turns to take off */
-
 /* Taylor's series up to pi/4: the first term left out is below a sixteenth of the rounding. square: of the angle. */
 static fs_real sine_of_small(fs_real angle, fs_real square)
 {
@@ -65,12 +63,6 @@ fs_sine_cosine fs_sin_cos(fs_real angle_rad)
         result.cosine = result.sine;
         return result;
     }
-    if (fs_abs(angle_rad) <= SMALL_ANGLE_RAD) { /* most of the loops' angles: the same result in fewer operations */
-        square = angle_rad * angle_rad;
-        result.sine = sine_of_small(angle_rad, square);
-        result.cosine = cosine_of_small(square);
-        return result;
-    }
     turns = angle_rad * FS_LIT(0.6366197723675814); /* 2/pi */
     turns = turns < FS_LIT(0.0) ? turns - FS_LIT(0.5) : turns + FS_LIT(0.5);
     quadrant = (uint16_t)(int16_t)turns;
@@ -98,62 +90,4 @@ fs_sine_cosine fs_sin_cos(fs_real angle_rad)
         break;
     }
     return result;
-}
-
-/* Arc tangent of a ratio in [0, 1]: tabulated at eighths, and a series for the sixteenth at most that is left. */
-static fs_real atan_of_ratio(fs_real ratio)
-{
-    static const fs_real at_eighths[9] = {
-        FS_LIT(0.0),
-        FS_LIT(0.12435499454676144),
-        FS_LIT(0.24497866312686414),
-        FS_LIT(0.35877067027057225),
-        FS_LIT(0.4636476090008061),
-        FS_LIT(0.5585993153435624),
-        FS_LIT(0.6435011087932844),
-        FS_LIT(0.7188299996216245),
-        FS_LIT(0.7853981633974483),
-    };
-    fs_real rest = ratio, tabulated = FS_LIT(0.0), square, sum;
-
-    if (ratio >= FS_LIT(0.0625)) { /* below, the nearest is 0, and nothing of this changes anything */
-        const int16_t nearest = (int16_t)(ratio * FS_LIT(8.0) + FS_LIT(0.5));
-        const fs_real eighths = (fs_real)nearest * FS_LIT(0.125);
-        rest = (ratio - eighths) / (FS_LIT(1.0) + ratio * eighths);
-        tabulated = at_eighths[nearest];
-    }
-    square = rest * rest;
-#ifdef FS_DOUBLE
-    sum = 1.0 / 13.0;
-    sum = sum * square - 1.0 / 11.0;
-    sum = sum * square + 1.0 / 9.0;
-    sum = sum * square - 1.0 / 7.0;
-    sum = sum * square + 1.0 / 5.0;
-#else
-    sum = 1.0F / 5.0F;
-#endif
-    sum = sum * square - FS_LIT(1.0) / FS_LIT(3.0);
-    return tabulated + (rest + rest * (square * sum));
-}
-
-fs_real fs_atan2(fs_real y, fs_real x)
-{
-    const fs_real along = fs_abs(x), across = fs_abs(y);
-    const fs_real larger = fs_max(along, across), smaller = fs_min(along, across);
-    fs_real angle;
-
-    if (!fs_is_finite(fs_add_magnitude(fs_add_magnitude(FS_LIT(0.0), x), y))) {
-        return (x - x) * (y - y); /* NaN: infinity or NaN less itself */
-    }
-    if (larger == FS_LIT(0.0)) {
-        return FS_LIT(0.0);
-    }
-    angle = atan_of_ratio(smaller / larger);
-    if (across > along) {
-        angle = FS_LIT(0.5) * FS_PI - angle;
-    }
-    if (x < FS_LIT(0.0)) {
-        angle = FS_PI - angle;
-    }
-    return y < FS_LIT(0.0) ? -angle : angle;
 }

@@ -27,12 +27,6 @@ typedef struct {
  */
 fs_sine_cosine fs_sin_cos(fs_real angle_rad);
 
-/*
- * Angle [rad] of the point (x, y), in [-pi, pi]; of the origin 0. Zeros have no sign here. NaN for what is not
- * finite.
- */
-fs_real fs_atan2(fs_real y, fs_real x);
-
 /* Correctly rounded square root; the argument must not be negative. */
 static inline fs_real fs_sqrt(fs_real square)
 {
@@ -64,12 +58,12 @@ static inline uint16_t fs_is_finite(fs_real value)
 
 /*
  * Part of a sum that tells whether any of up to 64 numbers is not finite, for less than a comparison of each would
- * cost: begin with 0, add them, and look whether the sum is finite. A number counts a 64th, so that large ones do
- * not make it infinite.
+ * cost: begin with 0, add them, and look whether the sum is finite. A number counts a 64th, so that large ones do not
+ * make it infinite; infinities of both signs make it NaN.
  */
-static inline fs_real fs_add_magnitude(fs_real sum, fs_real value)
+static inline fs_real fs_add_part(fs_real sum, fs_real value)
 {
-    return sum + FS_LIT(0.015625) * fs_abs(value);
+    return sum + FS_LIT(0.015625) * value;
 }
 
 /* Python's max and min: the first argument unless the second is beyond it, also when one is NaN. */

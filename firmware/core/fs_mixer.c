@@ -36,7 +36,7 @@ static fs_real largest_scale(const fs_real *base, const fs_real *direction, cons
     for (i = 0U; i < rotors; i++) {
         const fs_real step = direction[i];
         const fs_real room = step > FS_LIT(0.0) ? mixer->high[i] - base[i] : mixer->low[i] - base[i];
-        if (step != FS_LIT(0.0) && scale * fs_abs(step) > fs_abs(room)) {
+        if (scale * fs_abs(step) > fs_abs(room)) { /* never where the step is zero */
             scale = fs_max(FS_LIT(0.0), room / step);
         }
     }
@@ -72,132 +72,203 @@ static void fit_roll_pitch(fs_real *speed_squared, const fs_mixer *mixer, uint16
 /* The thrusts [N] that keep every rotor within its limits beside the roll-pitch part. */
 typedef struct {
     fs_real least, most;
-    uint16_t is_sure; /* there are such thrusts, and by more than rounding, so that roll and pitch need no scaling */
 } fs_thrust_range;
 
 static fs_thrust_range thrust_range(const fs_real *base, const fs_mixer *mixer, uint16_t rotors)
 {
     fs_real least = -FS_REAL_MAX, most = FS_REAL_MAX;
-    uint16_t all_lift = 1U, i;
     fs_thrust_range range;
+    uint16_t i;
 
     for (i = 0U; i < rotors; i++) {
         const fs_real per_newton = mixer->allocation[i][0];
         if (per_newton > FS_LIT(0.0)) {
             least = fs_max(least, (mixer->low[i] - base[i]) / per_newton);
             most = fs_min(most, (mixer->high[i] - base[i]) / per_newton);
-        } else {
-            all_lift = 0U;
         }
     }
     range.least = least;
     range.most = most;
-    range.is_sure = (all_lift && most - least > FS_LIT(1e-3) * (fs_abs(most) + fs_abs(least))) ? 1U : 0U;
     return range;
 }
 
-/* The wrench that squared speeds make, and the sum of the magnitudes that they are sums of. */
-typedef struct {
-    fs_wrench wrench;
-    fs_real magnitude;
-} fs_made;
-
-/* Add yaw's part, turn squared speeds into speeds, zero beyond the rotors, and tell what they make. */
-static fs_made speeds_and_wrench(const fs_real *base, const fs_real *yaw, fs_real scale, const fs_mixer *mixer,
-                                 uint16_t rotors, fs_real *rotor_speed_rad_s)
+static fs_real signed_root(fs_real square)
 {
+    return square >= FS_LIT(0.0) ? fs_sqrt(square) : -fs_sqrt(-square);
+}
+
+/* Tell what squared speeds of these two parts make, and how far that falls short. */
+static void judge(const fs_wrench *wrench, const fs_real *base, const fs_real *yaw, const fs_mixer *mixer,
+                  uint16_t rotors, fs_wrench *achieved, fs_saturation *saturation)
+{
+    const fs_vector3 *torque = &wrench->torque_frd_n_m;
     fs_real thrust = FS_LIT(0.0), roll = FS_LIT(0.0), pitch = FS_LIT(0.0), heading = FS_LIT(0.0), sum = FS_LIT(0.0);
-    fs_made made;
     uint16_t i;
 
     for (i = 0U; i < rotors; i++) {
-        const fs_real part = scale * yaw[i];
-        const fs_real square = base[i] + part;
-        rotor_speed_rad_s[i] = square >= FS_LIT(0.0) ? fs_sqrt(square) : -fs_sqrt(-square);
+        const fs_real square = base[i] + yaw[i];
         thrust += mixer->effectiveness[0][i] * square;
         roll += mixer->effectiveness[1][i] * square;
         pitch += mixer->effectiveness[2][i] * square;
         heading += mixer->effectiveness[3][i] * square;
-        sum += fs_abs(base[i]) + fs_abs(part);
+        sum += fs_abs(base[i]) + fs_abs(yaw[i]);
     }
-    for (i = rotors; i < FS_MAX_ROTORS; i++) {
-        rotor_speed_rad_s[i] = FS_LIT(0.0);
-    }
-    made.wrench.thrust_n = thrust;
-    made.wrench.torque_frd_n_m.x = roll;
-    made.wrench.torque_frd_n_m.y = pitch;
-    made.wrench.torque_frd_n_m.z = heading;
-    made.magnitude = sum;
-    return made;
+    achieved->thrust_n = thrust;
+    achieved->torque_frd_n_m.x = roll;
+    achieved->torque_frd_n_m.y = pitch;
+    achieved->torque_frd_n_m.z = heading;
+    saturation->thrust = lag(wrench->thrust_n, thrust, mixer->largest_effect[0] * sum);
+    saturation->torque.x = lag(torque->x, roll, mixer->largest_effect[1] * sum);
+    saturation->torque.y = lag(torque->y, pitch, mixer->largest_effect[2] * sum);
+    saturation->torque.z = lag(torque->z, heading, mixer->largest_effect[3] * sum);
 }
 
 /*
- * Write what thrust, roll and pitch ask of each rotor, [rad^2/s^2], and what yaw does; return 1 when that is within
- * the limits of every rotor, with yaw and without. Then there is nothing to fit: fit() would change nothing, in
- * three times the time.
+ * Mix where roll and pitch fit whole, and by more than rounding, so that thrust and yaw are limited alone; or return 0.
+ * What is made needs no multiplying out there, because effectiveness undoes allocation.
  */
-static uint16_t demand(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real *base, fs_real *yaw)
+static uint16_t fit_thrust_and_yaw(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors,
+                                   fs_real *rotor_speed_rad_s, fs_wrench *achieved, fs_saturation *saturation)
 {
-    uint16_t fits = 1U;
+    const fs_real roll = wrench->torque_frd_n_m.x, pitch = wrench->torque_frd_n_m.y;
+    const fs_real heading = wrench->torque_frd_n_m.z;
+    fs_real base[FS_MAX_ROTORS], scale = FS_LIT(1.0), thrust_n;
+    fs_thrust_range range;
     uint16_t i;
 
     for (i = 0U; i < rotors; i++) {
-        const fs_real *share = mixer->allocation[i];
-        const fs_real roll_pitch = share[1] * wrench->torque_frd_n_m.x + share[2] * wrench->torque_frd_n_m.y;
-        const fs_real lift = roll_pitch + share[0] * wrench->thrust_n;
-        const fs_real turn = share[3] * wrench->torque_frd_n_m.z;
-        const fs_real all = lift + turn, low = mixer->low[i], high = mixer->high[i];
-        if (!(share[0] > FS_LIT(0.0) && lift >= low && lift <= high && all >= low && all <= high)) {
-            fits = 0U;
+        base[i] = mixer->allocation[i][1] * roll + mixer->allocation[i][2] * pitch;
+    }
+    range = thrust_range(base, mixer, rotors);
+    if (!(range.most - range.least > FS_LIT(1e-3) * (fs_abs(range.most) + fs_abs(range.least)))) {
+        return 0U;
+    }
+    thrust_n = fs_max(fs_min(wrench->thrust_n, range.most), range.least);
+    for (i = 0U; i < rotors; i++) {
+        const fs_real low = mixer->low[i], high = mixer->high[i], step = mixer->allocation[i][3] * heading;
+        const fs_real lift = fs_min(fs_max(base[i] + mixer->allocation[i][0] * thrust_n, low), high);
+        const fs_real room = step > FS_LIT(0.0) ? high - lift : lift - low, size = fs_abs(step);
+        if (scale * size > room) {
+            scale = room / size;
         }
         base[i] = lift;
-        yaw[i] = turn;
     }
-    return fits;
+    for (i = 0U; i < rotors; i++) {
+        rotor_speed_rad_s[i] = signed_root(base[i] + scale * (mixer->allocation[i][3] * heading));
+    }
+    *achieved = *wrench;
+    achieved->thrust_n = thrust_n;
+    achieved->torque_frd_n_m.z = scale * heading;
+    saturation->thrust = lag(wrench->thrust_n, thrust_n, mixer->largest_effect[0] * mixer->largest_sum);
+    saturation->torque.x = FS_LIT(0.0);
+    saturation->torque.y = FS_LIT(0.0);
+    saturation->torque.z = lag(heading, achieved->torque_frd_n_m.z, mixer->largest_effect[3] * mixer->largest_sum);
+    return 1U;
 }
 
-/* Bring thrust, roll and pitch between the limits, into base; return the share of yaw that fits beside them. */
-static fs_real fit(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real *base, const fs_real *yaw)
+/* Mix where roll and pitch may have to be scaled, or effectiveness does not undo allocation. */
+static void fit(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real *rotor_speed_rad_s,
+                fs_wrench *achieved, fs_saturation *saturation)
 {
     const fs_vector3 *torque = &wrench->torque_frd_n_m;
+    fs_real base[FS_MAX_ROTORS], yaw[FS_MAX_ROTORS], thrust_n, scale;
     fs_thrust_range range;
-    fs_real thrust_n;
     uint16_t i;
 
     for (i = 0U; i < rotors; i++) {
         base[i] = mixer->allocation[i][1] * torque->x + mixer->allocation[i][2] * torque->y;
+        yaw[i] = mixer->allocation[i][3] * torque->z;
     }
+    fit_roll_pitch(base, mixer, rotors);
     range = thrust_range(base, mixer, rotors);
-    if (!range.is_sure) {
-        fit_roll_pitch(base, mixer, rotors);
-        range = thrust_range(base, mixer, rotors);
-    }
     thrust_n = fs_max(fs_min(wrench->thrust_n, range.most), range.least);
     for (i = 0U; i < rotors; i++) {
         base[i] = fs_min(fs_max(base[i] + mixer->allocation[i][0] * thrust_n, mixer->low[i]), mixer->high[i]);
     }
-    return largest_scale(base, yaw, mixer, rotors);
-}
-
-void fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
-            fs_wrench *achieved, fs_saturation *saturation)
-{
-    const fs_vector3 *torque = &wrench->torque_frd_n_m, *made = &achieved->torque_frd_n_m;
-    fs_real base[FS_MAX_ROTORS], yaw[FS_MAX_ROTORS], scale = FS_LIT(1.0);
-    fs_made sums;
-
-    if (!demand(wrench, mixer, rotors, base, yaw)) {
-        scale = fit(wrench, mixer, rotors, base, yaw);
+    scale = largest_scale(base, yaw, mixer, rotors);
+    for (i = 0U; i < rotors; i++) {
+        yaw[i] *= scale;
+        rotor_speed_rad_s[i] = signed_root(base[i] + yaw[i]);
     }
-    sums = speeds_and_wrench(base, yaw, scale, mixer, rotors, rotor_speed_rad_s);
-    *achieved = sums.wrench;
-    saturation->thrust = lag(wrench->thrust_n, achieved->thrust_n, mixer->largest_effect[0] * sums.magnitude);
-    saturation->torque.x = lag(torque->x, made->x, mixer->largest_effect[1] * sums.magnitude);
-    saturation->torque.y = lag(torque->y, made->y, mixer->largest_effect[2] * sums.magnitude);
-    saturation->torque.z = lag(torque->z, made->z, mixer->largest_effect[3] * sums.magnitude);
+    judge(wrench, base, yaw, mixer, rotors, achieved, saturation);
 }
 
-void fs_mixer_derive(fs_mixer *mixer)
+/* Mix where no rotor comes near a limit, neither with yaw nor without, so that there is nothing to fit; or return 0. */
+static uint16_t mix_freely(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real *rotor_speed_rad_s)
+{
+    const fs_real thrust = wrench->thrust_n, roll = wrench->torque_frd_n_m.x, pitch = wrench->torque_frd_n_m.y;
+    const fs_real heading = wrench->torque_frd_n_m.z;
+    uint16_t i;
+
+    for (i = 0U; i < rotors; i++) {
+        const fs_real *share = mixer->allocation[i];
+        const fs_real lift = share[1] * roll + share[2] * pitch + share[0] * thrust, turn = share[3] * heading;
+        if (!(fs_abs(lift - mixer->middle[i]) + fs_abs(turn) <= mixer->reach[i])) {
+            return 0U;
+        }
+        rotor_speed_rad_s[i] = signed_root(lift + turn);
+    }
+    return 1U;
+}
+
+uint16_t fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors,
+                fs_real rotor_speed_rad_s[FS_MAX_ROTORS], fs_wrench *achieved, fs_saturation *saturation)
+{
+    uint16_t i;
+
+    for (i = rotors; i < FS_MAX_ROTORS; i++) {
+        rotor_speed_rad_s[i] = FS_LIT(0.0);
+    }
+    if (mixer->is_inverse != 0U) {
+        if (mix_freely(wrench, mixer, rotors, rotor_speed_rad_s) != 0U) {
+            *achieved = *wrench;
+            saturation->thrust = FS_LIT(0.0);
+            saturation->torque.x = FS_LIT(0.0);
+            saturation->torque.y = FS_LIT(0.0);
+            saturation->torque.z = FS_LIT(0.0);
+            return 1U;
+        }
+        if (fit_thrust_and_yaw(wrench, mixer, rotors, rotor_speed_rad_s, achieved, saturation) != 0U) {
+            return 0U;
+        }
+    }
+    fit(wrench, mixer, rotors, rotor_speed_rad_s, achieved, saturation);
+    return 0U;
+}
+
+/* Share of the largest that a sum could be that its rounding may be; the numbers' own errors are in it. */
+#ifdef FS_DOUBLE
+#define FS_INVERSE_SHARE (1024.0 * FS_ROUNDING)
+#else
+#define FS_INVERSE_SHARE (16.0F * FS_ROUNDING)
+#endif
+
+/* Whether effectiveness times allocation is the identity but for rounding, and every rotor's share of a newton above 0. */
+static uint16_t is_inverse(const fs_mixer *mixer, uint16_t rotors)
+{
+    uint16_t row, column, i;
+
+    for (i = 0U; i < rotors; i++) {
+        if (!(mixer->allocation[i][0] > FS_LIT(0.0))) {
+            return 0U;
+        }
+    }
+    for (row = 0U; row < 4U; row++) {
+        for (column = 0U; column < 4U; column++) {
+            fs_real sum = row == column ? FS_LIT(-1.0) : FS_LIT(0.0), magnitude = FS_LIT(0.0);
+            for (i = 0U; i < rotors; i++) {
+                sum += mixer->effectiveness[row][i] * mixer->allocation[i][column];
+                magnitude += fs_abs(mixer->allocation[i][column]);
+            }
+            if (!(fs_abs(sum) <= FS_INVERSE_SHARE * mixer->largest_effect[row] * magnitude)) {
+                return 0U;
+            }
+        }
+    }
+    return 1U;
+}
+
+void fs_mixer_derive(fs_mixer *mixer, uint16_t rotors)
 {
     uint16_t axis, i;
 
@@ -208,6 +279,17 @@ void fs_mixer_derive(fs_mixer *mixer)
         }
         mixer->largest_effect[axis] = largest;
     }
+    mixer->largest_sum = FS_LIT(0.0);
+    for (i = 0U; i < FS_MAX_ROTORS; i++) {
+        const fs_real low = mixer->low[i], high = mixer->high[i];
+        mixer->middle[i] = FS_LIT(0.5) * low + FS_LIT(0.5) * high;
+        mixer->reach[i] = (FS_LIT(0.5) * high - FS_LIT(0.5) * low) -
+                          FS_LIT(8.0) * FS_ROUNDING * (fs_abs(low) + fs_abs(high));
+        if (i < rotors) {
+            mixer->largest_sum += fs_max(fs_abs(low), fs_abs(high));
+        }
+    }
+    mixer->is_inverse = is_inverse(mixer, rotors);
 }
 
 fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_mixer *mixer, uint16_t rotors)

@@ -17,7 +17,12 @@ typedef struct {
     fs_real low[FS_MAX_ROTORS];
     fs_real high[FS_MAX_ROTORS];
     fs_real spin[FS_MAX_ROTORS];
-    fs_real largest_effect[4]; /* of any rotor, for each row of effectiveness: see fs_mixer_derive */
+    /* what follows from these, by fs_mixer_derive */
+    fs_real middle[FS_MAX_ROTORS]; /* between low and high */
+    fs_real reach[FS_MAX_ROTORS];  /* from there to either, less some rounding */
+    fs_real largest_effect[4];     /* of any rotor, for each row of effectiveness */
+    fs_real largest_sum;           /* of the rotors' squared speeds */
+    uint16_t is_inverse;           /* 1: effectiveness undoes allocation but for rounding, and every rotor lifts */
 } fs_mixer;
 
 /* Direction in which the mixer could not follow, for thrust and each torque: -1 it made more, +1 less than demanded. */
@@ -32,13 +37,14 @@ typedef struct {
  *
  * Torque about roll and pitch is served first (they keep the vehicle upright), then thrust, then yaw with what is
  * left. With ideal rotors a squared speed may be negative: the speed then carries the sign. Speeds beyond the
- * rotors become zero.
+ * rotors become zero. Return 1 when no rotor came near a limit: then the wrench is made as it was demanded, the
+ * saturation is zero, and finite.
  */
-void fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors, fs_real rotor_speed_rad_s[FS_MAX_ROTORS],
-            fs_wrench *achieved, fs_saturation *saturation);
+uint16_t fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors,
+                fs_real rotor_speed_rad_s[FS_MAX_ROTORS], fs_wrench *achieved, fs_saturation *saturation);
 
-/* Make what follows from the other numbers of a mixer, after one of them was changed. */
-void fs_mixer_derive(fs_mixer *mixer);
+/* Make what follows from the other numbers of a mixer, after one of them or the number of rotors was changed. */
+void fs_mixer_derive(fs_mixer *mixer, uint16_t rotors);
 
 /* Omega_r of the paper: counter-clockwise minus clockwise rotor speeds [rad/s]. */
 fs_real fs_relative_rotor_speed(const fs_real rotor_speed_rad_s[FS_MAX_ROTORS], const fs_mixer *mixer, uint16_t rotors);

@@ -23,6 +23,31 @@ static fs_vector3 horizontal_demand(const fs_position_memory *memory, const fs_v
 }
 
 /*
+ * Roll and pitch that turn the thrust along (forward, right, upward), then the yaw whose half has this sine and cosine.
+ *
+ * With pitch = atan2(-forward, upward) and roll = atan2(right, level), level = sqrt(forward^2 + upward^2), tangents of
+ * the half angles are -forward / (level + upward) and right / (whole + level). upward is positive, so nothing cancels,
+ * and one scale makes sines and cosines of them.
+ */
+static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upward, const fs_sine_cosine *half_yaw)
+{
+    const fs_real level_square = forward * forward + upward * upward;
+    const fs_real level = fs_sqrt(level_square), whole = fs_sqrt(right * right + level_square);
+    const fs_real along = level + upward, across = whole + level;
+    const fs_real scale = FS_LIT(0.5) / (fs_sqrt(level * along) * fs_sqrt(whole * across));
+    const fs_real scaled_across = across * scale, scaled_right = right * scale;
+    const fs_real cos_cos = scaled_across * along, cos_sin = -forward * scaled_across; /* of half roll, half pitch */
+    const fs_real sin_cos = scaled_right * along, sin_sin = -forward * scaled_right;
+    fs_quaternion q;
+
+    q.w = cos_cos * half_yaw->cosine + sin_sin * half_yaw->sine;
+    q.x = sin_cos * half_yaw->cosine - cos_sin * half_yaw->sine;
+    q.y = cos_sin * half_yaw->cosine + sin_cos * half_yaw->sine;
+    q.z = cos_cos * half_yaw->sine - sin_sin * half_yaw->cosine;
+    return q;
+}
+
+/*
  * Attitude and thrust for an acceleration: roll and pitch turn the thrust there, it carries the weight at the
  * present tilt.
  */
@@ -31,27 +56,26 @@ static void target_for(const fs_vector3 *demand, fs_real lift_m_s2, fs_real yaw_
 {
     /* below half the weight the direction of a falling vehicle's thrust would swing about: bound it */
     const fs_real upward = fs_max(lift_m_s2, FS_LIT(0.5) * params->gravity_m_s2);
-    const fs_sine_cosine yaw = fs_sin_cos(yaw_rad);
-    const fs_real forward = yaw.cosine * demand->x + yaw.sine * demand->y;
-    const fs_real right = yaw.cosine * demand->y - yaw.sine * demand->x;
-    const fs_real pitch_rad = fs_atan2(-forward, upward);
-    const fs_real roll_rad = fs_atan2(right, fs_sqrt(forward * forward + upward * upward));
+    const fs_sine_cosine half = fs_sin_cos(FS_LIT(0.5) * yaw_rad);
+    const fs_real cos_yaw = half.cosine * half.cosine - half.sine * half.sine;
+    const fs_real sin_yaw = FS_LIT(2.0) * half.sine * half.cosine;
+    const fs_real forward = cos_yaw * demand->x + sin_yaw * demand->y;
+    const fs_real right = cos_yaw * demand->y - sin_yaw * demand->x;
     const fs_real cos_tilt = FS_LIT(1.0) - FS_LIT(2.0) * (q->x * q->x + q->y * q->y);
     const fs_real thrust_n = params->mass_kg * lift_m_s2 / fs_max(cos_tilt, FS_LIT(0.5));
 
-    target->attitude = fs_quaternion_from_euler(roll_rad, pitch_rad, yaw_rad);
+    target->attitude = attitude_along(forward, right, upward, &half);
     target->thrust_n = fs_min(fs_max(thrust_n, params->min_thrust_n), params->max_thrust_n);
 }
 
 void fs_position_pid_step(fs_position_memory *memory, const fs_vehicle_state *state,
-                          const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,
-                          fs_real thrust_saturation, fs_attitude_target *target)
+                          const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real tan_max_tilt,
+                          fs_real dt_s, fs_real thrust_saturation, fs_attitude_target *target)
 {
     const fs_vector3 *wanted = &setpoint->position_ned_m, *is = &state->position_ned_m;
     const fs_real error_z = wanted->z - is->z;
     const fs_real most = params->max_thrust_n / params->mass_kg, least = params->min_thrust_n / params->mass_kg;
     const fs_real limit = params->max_integral_m_s2;
-    const fs_sine_cosine max_tilt = fs_sin_cos(params->max_tilt_rad);
     fs_vector3 demand = horizontal_demand(memory, state, setpoint, params);
     fs_real lift, tilt_force, norm, gain_xy, step_z;
     uint16_t at_top, at_bottom;
@@ -67,7 +91,7 @@ void fs_position_pid_step(fs_position_memory *memory, const fs_vehicle_state *st
         step_z = FS_LIT(0.0);
     }
     lift = fs_min(fs_max(lift, least), most);
-    tilt_force = max_tilt.sine / max_tilt.cosine * fs_max(lift, FS_LIT(0.5) * params->gravity_m_s2);
+    tilt_force = tan_max_tilt * fs_max(lift, FS_LIT(0.5) * params->gravity_m_s2);
     norm = fs_sqrt(demand.x * demand.x + demand.y * demand.y);
     gain_xy = params->ki_xy * dt_s;
     if (!(norm <= tilt_force)) {

@@ -7,10 +7,11 @@
 /*
  * Write the attitude and the thrust that accelerate the vehicle along the setpoint, and advance the integrals.
  *
+ * tan_max_tilt: tangent of params->max_tilt_rad, which changes too seldom to be computed in every tick.
  * thrust_saturation: -1 the mixer made more, +1 less thrust than demanded in the last tick.
  */
 void fs_position_pid_step(fs_position_memory *memory, const fs_vehicle_state *state,
-                          const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,
-                          fs_real thrust_saturation, fs_attitude_target *target);
+                          const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real tan_max_tilt,
+                          fs_real dt_s, fs_real thrust_saturation, fs_attitude_target *target);
 
 #endif

@@ -68,6 +68,8 @@ def shaken(core: Core) -> dict[str, np.ndarray]:
         )
         if name == "0 8":  # one rotor that makes no thrust by itself
             assert loops.set("FS_ALLOC_00", 0.0) == 0
+        if name == "1 6":  # a rotor whose drag is not what the allocation takes it for
+            assert loops.set("FS_EFF_30", 2.0 * loops.get("FS_EFF_30")) == 0
         rows, status = loops.run(*sequence(3000, 20 + number, 10.0))
         made |= {name: rows, f"{name} status": status}
     return made

@@ -70,7 +70,7 @@ def caught(test: Callable[..., None], *arguments: object) -> bool:
 
 
 def test_a_sign_in_the_mixer(plant: Plant) -> None:
-    right = "mixer->allocation[i][1] * torque->x + mixer->allocation[i][2] * torque->y"
+    right = "share[1] * roll + share[2] * pitch"
     plant("core/fs_mixer.c", right, right.replace(" + ", " - "))
     assert caught(test_c_laws.test_mixer_in_double_has_pythons_bits, "cross")
 

@@ -257,13 +257,12 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
         vehicle
     )  # not narrowed: with float the rounding of these numbers is part of the difference
     c = core(real)
-    flat = np.zeros(8 * 4 + 4 * 8 + 3 * 8 + 4, c.dtype)
+    flat = np.zeros(c.library.drive_sizes(3) // c.dtype.itemsize, c.dtype)
     flat[: 4 * n] = rotors.allocation.ravel()
     for axis in range(4):
         flat[32 + 8 * axis : 32 + 8 * axis + n] = rotors.effectiveness[axis]
     for place, values in enumerate((rotors.low, rotors.high, rotors.spin)):
         flat[64 + 8 * place : 64 + 8 * place + n] = values
-    flat[88:] = np.abs(rotors.effectiveness).max(axis=1)
     speeds, achieved = np.full((count, 8), np.nan, c.dtype), np.zeros((count, 4), c.dtype)
     saturation, relative = np.zeros((count, 4), c.dtype), np.zeros(count, c.dtype)
     c.call("drive_mixer", count, c.array(wrenches), flat, n, speeds, achieved, saturation, relative)
@@ -284,7 +283,11 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
 def test_mixer_in_double_has_pythons_bits(name: str) -> None:
     made = mixed("double", name)
     for quantity, compared in made.quantities.items():
-        assert np.array_equal(compared.c, compared.python), quantity
+        if quantity in ("thrust", "torque"):  # not multiplied out where nothing but thrust and yaw is limited
+            largest = np.abs(compared.python).max()
+            assert np.abs(compared.c - compared.python).max() < 1e-12 * largest, quantity  # measured 5e-15
+        else:
+            assert np.array_equal(compared.c, compared.python), quantity
     assert np.array_equal(made.saturation, made.python_saturation)
     assert not made.beyond.any()
 

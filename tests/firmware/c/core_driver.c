@@ -16,7 +16,8 @@
 
 uint32_t drive_sizes(uint32_t which)
 {
-    const uint32_t sizes[3] = {(uint32_t)sizeof(fs_real), (uint32_t)sizeof(fs_loops), (uint32_t)sizeof(fs_loop_output)};
+    const uint32_t sizes[4] = {(uint32_t)sizeof(fs_real), (uint32_t)sizeof(fs_loops), (uint32_t)sizeof(fs_loop_output),
+                               (uint32_t)sizeof(fs_mixer)};
     return sizes[which];
 }
 
@@ -24,9 +25,10 @@ void drive_math(uint32_t count, const fs_real *y, const fs_real *x, fs_real *sin
 {
     for (uint32_t i = 0; i < count; i++) {
         const fs_sine_cosine both = fs_sin_cos(x[i]);
+        const fs_quaternion q = {x[i], y[i], 0, 0};
         sine[i] = both.sine;
         cosine[i] = both.cosine;
-        angle[i] = fs_atan2(y[i], x[i]);
+        angle[i] = fs_rotation_vector(&q).x;
     }
 }
 
@@ -35,7 +37,9 @@ void drive_position(uint32_t count, fs_position_memory *memory, const fs_vehicle
                     const fs_real *saturation, fs_attitude_target *target)
 {
     for (uint32_t i = 0; i < count; i++) {
-        fs_position_pid_step(&memory[i], &state[i], &setpoint[i], &params[i], dt_s[i], saturation[i], &target[i]);
+        const fs_sine_cosine tilt = fs_sin_cos(params[i].max_tilt_rad);
+        fs_position_pid_step(&memory[i], &state[i], &setpoint[i], &params[i], tilt.sine / tilt.cosine, dt_s[i],
+                             saturation[i], &target[i]);
     }
 }
 
@@ -70,11 +74,12 @@ void drive_backstepping(uint32_t count, const fs_attitude_inputs *inputs, const 
     }
 }
 
-void drive_mixer(uint32_t count, const fs_wrench *wrench, const fs_mixer *mixer, uint32_t rotors, fs_real *speeds,
+void drive_mixer(uint32_t count, const fs_wrench *wrench, fs_mixer *mixer, uint32_t rotors, fs_real *speeds,
                  fs_wrench *achieved, fs_saturation *saturation, fs_real *relative)
 {
+    fs_mixer_derive(mixer, (uint16_t)rotors); /* after what the test has filled in */
     for (uint32_t i = 0; i < count; i++) {
-        fs_mix(&wrench[i], mixer, (uint16_t)rotors, &speeds[i * FS_MAX_ROTORS], &achieved[i], &saturation[i]);
+        (void)fs_mix(&wrench[i], mixer, (uint16_t)rotors, &speeds[i * FS_MAX_ROTORS], &achieved[i], &saturation[i]);
         relative[i] = fs_relative_rotor_speed(&speeds[i * FS_MAX_ROTORS], mixer, (uint16_t)rotors);
     }
 }
