@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 COUNT = 20_000
 """Samples for each law, where the tests in earnest take a million."""
-CPU_LIMIT_S = 90
+CPU_LIMIT_S = 30
 TESTS = {
     "core": [
         *(
