@@ -39,13 +39,15 @@ static uint16_t state_is_finite(const fs_vehicle_state *state)
     return fs_is_finite(add_vector(add_quaternion(place, &state->attitude), &state->rates_frd_rad_s));
 }
 
-static uint16_t setpoint_is_finite(const fs_position_setpoint *setpoint)
+/* Finite, and a yaw that has a sine: a processor without NaN may make a number of what fs_sin_cos gives beyond. */
+static uint16_t setpoint_is_sound(const fs_position_setpoint *setpoint)
 {
     fs_real sum = add_vector(FS_LIT(0.0), &setpoint->position_ned_m);
 
     sum = add_vector(sum, &setpoint->velocity_ned_m_s);
     sum = add_vector(sum, &setpoint->acceleration_ned_m_s2);
-    return fs_is_finite(fs_add_part(fs_add_part(sum, setpoint->yaw_rad), setpoint->yaw_rate_rad_s));
+    sum = fs_add_part(sum, setpoint->yaw_rate_rad_s);
+    return fs_is_finite(sum) && fs_abs(setpoint->yaw_rad) <= FS_LARGEST_ANGLE_RAD ? 1U : 0U;
 }
 
 static uint16_t target_is_finite(const fs_attitude_target *target)
@@ -139,7 +141,7 @@ static void outer_loop(fs_loops *loops, const fs_loop_input *input, uint16_t sta
     fs_position_memory memory = loops->position_memory;
     fs_attitude_target target;
 
-    if (!state_is_sound || !setpoint_is_finite(&input->setpoint)) {
+    if (!state_is_sound || !setpoint_is_sound(&input->setpoint)) {
         return;
     }
     fs_position_pid_step(&memory, &input->state, &input->setpoint, &loops->position, loops->rates.tan_max_tilt,
@@ -179,7 +181,7 @@ static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *sta
         *torque = fs_attitude_backstepping_step(&inputs, &loops->backstepping);
     }
     output->wrench.thrust_n = loops->target.thrust_n;
-    return fs_is_finite(add_vector(FS_LIT(0.0), torque)); /* an integral that is not finite makes a torque that is not */
+    return fs_is_finite(add_vector(FS_LIT(0.0), torque)); /* an unsound integral makes an unsound torque */
 }
 
 static uint16_t saturation_bits(const fs_saturation *saturation)

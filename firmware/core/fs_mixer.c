@@ -243,7 +243,7 @@ uint16_t fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors,
 #define FS_INVERSE_SHARE (16.0F * FS_ROUNDING)
 #endif
 
-/* Whether effectiveness times allocation is the identity but for rounding, and every rotor's share of a newton above 0. */
+/* Whether effectiveness times allocation is the identity but for rounding, and every rotor lifts. */
 static uint16_t is_inverse(const fs_mixer *mixer, uint16_t rotors)
 {
     uint16_t row, column, i;
