@@ -11,9 +11,8 @@ import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import pytest
-
 from flightstack.mavlink.dialect import mavlink
+from tests.support.tools import missing
 
 ROOT = Path(__file__).resolve().parents[2]
 CODEC = ROOT / "firmware" / "mavlink"
@@ -61,7 +60,7 @@ def compiler(wanted: str | None = None) -> list[str]:
             return [sys.executable, "-m", "ziglang", "cc"]
     elif shutil.which(wanted):
         return [wanted]
-    pytest.skip(f"no {wanted or 'C compiler'} on this machine")
+    return missing(f"no {wanted or 'C compiler'} on this machine")
 
 
 def compile_c(output: Path, sources: list[Path], *flags: str, cc: list[str] | None = None) -> Path:

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
+
+from tests.support.tools import missing
 
 ROOT = Path(__file__).resolve().parents[2]
 CORE = ROOT / "firmware" / "core"
@@ -53,7 +54,7 @@ def compiler(*names: str) -> str:
     for name in names or (os.environ.get("CC", ""), "cc", "gcc", "clang"):
         if name and shutil.which(name):
             return name
-    pytest.skip(f"no C compiler: {', '.join(names) or 'cc'}")
+    return missing(f"no C compiler: {', '.join(names) or 'cc'}")
 
 
 def sources() -> list[Path]:

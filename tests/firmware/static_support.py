@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import pytest
+from tests.support.tools import missing
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -56,9 +56,9 @@ def available(target: Target) -> Target:
     """Return the target; skip the test when its compiler is not installed."""
     if target.command == ZIG:
         if importlib.util.find_spec("ziglang") is None:
-            pytest.skip("no ziglang in this environment")
+            missing("no ziglang in this environment")
     elif not shutil.which(target.command[0]):
-        pytest.skip(f"no {target.command[0]} on this machine")
+        missing(f"no {target.command[0]} on this machine")
     return target
 
 

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import pytest
 
 from flightstack.firmware.build import EXACT, cached, host_compiler, includes
 from flightstack.firmware.cortex_m4 import emulated_image, instruction_counter
 from flightstack.firmware.emulator import MAX_RECEIVED, Emulator
 from flightstack.firmware.sources import c_files, firmware_root
+from tests.support.tools import missing
 
 C = Path(__file__).parent / "c"
 LOOPS = [*c_files("core"), *c_files("mavlink")]
@@ -40,10 +40,7 @@ def tool(name: str, package: str) -> str:
     """Return a tool's path; without it the test is skipped, but on CI, which installs it, it fails."""
     found = shutil.which(name)
     if found is None:
-        said = f"{name} is not installed (apt install {package})"
-        if os.environ.get("CI"):
-            pytest.fail(said)
-        pytest.skip(said)
+        missing(f"{name} is not installed (apt install {package})")
     return found
 
 

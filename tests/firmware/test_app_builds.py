@@ -9,10 +9,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from tests.firmware.app_support import FIRMWARE, LIBRARY, PORTABLE, build, sources
 from tests.firmware.codec_support import compiler
+from tests.support.tools import missing
 
 TESTS = [str(Path(__file__).with_name(name)) for name in ("test_app_pil.py", "test_app_services.py")]
 NEEDLESS = "double"
@@ -51,7 +50,7 @@ def test_nothing_undefined_happens_and_no_memory_is_touched_beyond_its_end(tmp_p
 def test_every_line_and_branch_of_the_application_is_run(tmp_path: Path) -> None:
     """No exception is listed: all of firmware/app, both ways of every branch."""
     if not shutil.which("gcov"):
-        pytest.skip("no gcov on this machine")
+        missing("no gcov on this machine")
     run_tests(build(tmp_path / "app.so", "--coverage", "-O0", cc=compiler("gcc")))
     files = [f"app.so-{source.stem}.gcno" for source in sources("app")]
     done = subprocess.run(
@@ -71,7 +70,7 @@ def test_every_line_and_branch_of_the_application_is_run(tmp_path: Path) -> None
 def test_the_application_has_no_memory_of_its_own(tmp_path: Path) -> None:
     """No object has anything in .data or .bss: all state is in the structure that the caller owns."""
     if not shutil.which("size"):
-        pytest.skip("no size on this machine")
+        missing("no size on this machine")
     folders = [f"-I{FIRMWARE / folder}" for folder in PORTABLE]
     for source in sources("app"):
         command = [*compiler(), "-std=c99", "-O2", "-c", *folders, str(source), "-o", "part.o"]

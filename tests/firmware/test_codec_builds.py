@@ -19,6 +19,7 @@ from tests.firmware.codec_support import (
     sealed,
     stream,
 )
+from tests.support.tools import missing
 
 SHIM, DRIVER = HARNESS / "codec_shim.c", HARNESS / "codec_driver.c"
 UNDEFINED = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g"]
@@ -53,7 +54,7 @@ def test_a_fuzzer_finds_nothing(tmp_path: Path) -> None:
 def test_every_line_and_branch_is_run(tmp_path: Path) -> None:
     """No exception is listed: all of firmware/mavlink, both ways of every branch, by one driver."""
     if not shutil.which("gcov"):
-        pytest.skip("no gcov on this machine")
+        missing("no gcov on this machine")
     gcc = compiler("gcc")
     compile_c(tmp_path / "driver", [*SOURCES, SHIM, DRIVER], "--coverage", "-O0", "-std=c99", cc=gcc)
     # silence behind a beginning that waits, and behind an unknown message
@@ -87,7 +88,7 @@ def test_an_avr_agrees_where_an_int_has_16_bits(tmp_path: Path) -> None:
     """400 damaged frames through encoder, parser and decoder; every octet that comes of it is in the number."""
     avr = [*compiler("avr-gcc"), "-mmcu=atmega1284p"]
     if not shutil.which("simavr"):
-        pytest.skip("no simavr on this machine")
+        missing("no simavr on this machine")
     for source in SOURCES:
         compile_c(tmp_path / "part.o", [source], "-c", "-O2", *WARNINGS, cc=avr)
     program = compile_c(tmp_path / "hash.elf", self_hash_sources(), "-O2", "-std=c99", cc=avr)
@@ -107,7 +108,7 @@ def test_a_cortex_m4_agrees(tmp_path: Path) -> None:
     ]
     arm = [*compiler("arm-none-eabi-gcc"), *cpu]
     if not shutil.which("qemu-system-arm"):
-        pytest.skip("no qemu-system-arm on this machine")
+        missing("no qemu-system-arm on this machine")
     program = compile_c(tmp_path / "hash.elf", self_hash_sources(), "-O2", *bare, cc=arm)
     machine = ["-M", "mps2-an386", "-display", "none", "-monitor", "none", "-serial", "none"]
     semihosting = ["-semihosting-config", "enable=on,target=native", "-kernel", str(program)]

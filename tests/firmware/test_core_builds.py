@@ -26,6 +26,7 @@ from tests.firmware.core_support import (
     sources,
 )
 from tests.firmware.core_workout import workout
+from tests.support.tools import missing
 
 REALS = ("float", "double")
 
@@ -58,7 +59,7 @@ def assert_equal(made: dict[str, np.ndarray], expected: dict[str, np.ndarray]) -
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_no_compiler_has_anything_to_warn_of(name: str, real: str, tmp_path: Path) -> None:
     if not shutil.which(name):
-        pytest.skip(f"no {name}")
+        missing(f"no {name}")
     for source in sources():
         run_tool(
             [
@@ -79,7 +80,7 @@ def test_no_compiler_has_anything_to_warn_of(name: str, real: str, tmp_path: Pat
 @pytest.mark.parametrize("name", ["avr-gcc", "arm-none-eabi-gcc"])
 def test_it_compiles_where_int_has_16_bits_and_where_nothing_is_beneath(name: str, tmp_path: Path) -> None:
     if not shutil.which(name):
-        pytest.skip(f"no {name}")
+        missing(f"no {name}")
     machine = (
         ["-mmcu=atmega2560"]
         if name == "avr-gcc"
@@ -96,7 +97,7 @@ def test_it_compiles_where_int_has_16_bits_and_where_nothing_is_beneath(name: st
 )
 def test_every_compiler_and_level_gives_the_same_bits(name: str, level: str, real: str) -> None:
     if not shutil.which(name):
-        pytest.skip(f"no {name}")
+        missing(f"no {name}")
     assert_equal(workout(Core(real, library_path(real, name, (level,)))), made_here(real))
 
 
@@ -106,10 +107,10 @@ SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize
 @pytest.mark.parametrize("real", REALS)
 def test_the_sanitizers_find_nothing(real: str, tmp_path: Path) -> None:
     if not shutil.which("gcc"):
-        pytest.skip("no gcc")
+        missing("no gcc")
     run_time = run_tool(["gcc", "-print-file-name=libasan.so"]).strip()
     if not Path(run_time).is_absolute():
-        pytest.skip("gcc has no address sanitizer here")
+        missing("gcc has no address sanitizer here")
     library = library_path(real, "gcc", SANITIZERS)
     # Python is not built with the sanitizer, whose run time must come first; what Python keeps is no leak of ours
     made = work_out(real, library, tmp_path / "out.npz", LD_PRELOAD=run_time, ASAN_OPTIONS="detect_leaks=0")
@@ -118,7 +119,7 @@ def test_the_sanitizers_find_nothing(real: str, tmp_path: Path) -> None:
 
 def test_the_sanitizers_would_find_something(tmp_path: Path) -> None:
     if not shutil.which("gcc"):
-        pytest.skip("no gcc")
+        missing("no gcc")
     bad = tmp_path / "bad.c"
     bad.write_text(
         "int main(int count, char **words) { float f = 1e10F * (float)count; return (int)f + words[0][0]; }"

@@ -7,15 +7,14 @@ import json
 import shutil
 from pathlib import Path
 
-import pytest
-
 from tests.firmware.core_support import CORE, DRIVER, EXACT, run_tool, sources
 from tests.firmware.test_core_builds import assert_equal, made_here, of_real, work_out
+from tests.support.tools import missing
 
 
 def test_every_line_and_branch_of_the_core_is_run(tmp_path: Path) -> None:
     if not (shutil.which("gcc") and shutil.which("gcov")):
-        pytest.skip("needs gcc and gcov")
+        missing("needs gcc and gcov")
     missed: dict[str, bool] = {}
     for real in ("float", "double"):
         folder = tmp_path / real

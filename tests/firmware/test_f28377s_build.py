@@ -14,6 +14,7 @@ import pytest
 
 from flightstack.firmware.sources import source_hash
 from tests.firmware.f28377s_support import FIRMWARE, PORT, PORTABLE
+from tests.support.tools import missing
 
 STAND_IN = """#!/bin/sh
 printf '%s\\n' "$*" >> "$(dirname "$0")/../commands"
@@ -39,7 +40,7 @@ TI_FILES = (
 def configured(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     """Run CMake with empty files in place of TI's, and a compiler that notes how it is called."""
     if not shutil.which("cmake"):
-        pytest.skip("no cmake on this machine")
+        missing("no cmake on this machine")
     for name in TI_FILES:
         (folder / "c2000ware" / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / "c2000ware" / name).touch()

@@ -19,6 +19,7 @@ from tests.firmware.static_support import (
     code_lines,
     run,
 )
+from tests.support.tools import missing
 
 CHECKED = (*PORTABLE, "ports/f28377s")
 TEMPLATE = "{file}|{line}|{id}|{message}"
@@ -57,7 +58,7 @@ class Deviation(NamedTuple):
 def cppcheck(root: Path, *arguments: str | Path) -> list[Finding]:
     """Run cppcheck; paths of findings are told below ``root``."""
     if not shutil.which("cppcheck"):
-        pytest.skip("no cppcheck on this machine")
+        missing("no cppcheck on this machine")
     done = run(["cppcheck", *BUILD, *CHECKS, *arguments])
     assert done.returncode == 0, done.stdout
     found = []
@@ -81,7 +82,7 @@ def findings(tmp_path_factory: pytest.TempPathFactory) -> list[Finding]:
         shutil.which("cppcheck")
         and (version := run(["cppcheck", "--version"]).stdout.split()[-1]) != LISTED["cppcheck"]
     ):
-        pytest.skip(f"the deviations are listed for cppcheck {LISTED['cppcheck']}, this is {version}")
+        missing(f"the deviations are listed for cppcheck {LISTED['cppcheck']}, this is {version}")
     root = tmp_path_factory.mktemp("firmware")
     for name in CHECKED:
         shutil.copytree(FIRMWARE / name, root / name, ignore=shutil.ignore_patterns("*.dump", "*.ctu-info"))
