@@ -64,6 +64,7 @@ class Autopilot(PlanKeeper):
         self._target_is_given = False  # by guidance, in place of the outer loop's
         self._loops_begin = False  # in this tick
         self._ground = GroundWatch()
+        self._throttle = 0.0
         self._takeoff_altitude_m = behaviour.takeoff_altitude_m
         self.has_state = False  # set once a state has arrived
         idle_row = np.zeros(LoopRow.SIZE)
@@ -236,7 +237,7 @@ class Autopilot(PlanKeeper):
     def arming_refusals(self) -> tuple[str, ...]:
         """Return every reason for which the vehicle would not arm now; empty when it would."""
         known = self.supervisor.arming_facts(self.now.status.mode, self.has_state)
-        return arming_refusals(known, self._behaviour)
+        return arming_refusals(known._replace(throttle=self._throttle), self._behaviour)
 
     def happen(self, event: Event, takeoff_altitude_m: float | None = None) -> str | None:
         """Apply what a user asks for; return why it was refused, or None.
@@ -341,6 +342,7 @@ class Autopilot(PlanKeeper):
 
     def take_sticks(self, sticks: Sticks) -> None:
         """Remember the sticks; they are flown in POSITION and ALTITUDE."""
+        self._throttle = sticks.up
         self._navigator.set_sticks(sticks)
 
     def go_to(

@@ -8,6 +8,9 @@ from flightstack.commander.transitions import TERMINATED, Need
 from flightstack.modes import Mode
 from flightstack.params.behaviour import Behaviour
 
+THROTTLE_CENTRED = 0.2
+"""Largest throttle that counts as not above the centre; PX4's value, below the one that takes off."""
+
 
 class ArmingFacts(NamedTuple):
     """What the checks look at."""
@@ -17,6 +20,7 @@ class ArmingFacts(NamedTuple):
     state_is_fresh: bool
     upright: bool
     gcs_lost: bool
+    gcs_heard: bool
     manual_fresh: bool
     offboard_fresh: bool
     fence_breach: str
@@ -24,6 +28,8 @@ class ArmingFacts(NamedTuple):
     battery_level: int
     """0 enough or unknown, 1 low, 2 critical, 3 emergency."""
     battery_remaining: float
+    throttle: float = 0.0
+    """Throttle stick, −1 to 1; 0 at the centre, and without sticks."""
 
 
 def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]:
@@ -35,7 +41,9 @@ def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]
         return (TERMINATED,)
     b = behaviour
     ordered = b.battery_emergency < b.battery_critical < b.battery_low
-    sticks = facts.manual_fresh or facts.mode not in (Mode.POSITION, Mode.ALTITUDE)
+    flies_sticks = facts.mode in (Mode.POSITION, Mode.ALTITUDE)
+    would_climb = flies_sticks and facts.manual_fresh and facts.throttle > THROTTLE_CENTRED
+    gcs = "the ground station is lost" if facts.gcs_heard else "no ground station was heard"
     checks = (
         (facts.state_is_valid, Need.STATE.value),
         (facts.state_is_fresh or not facts.state_is_valid, "the state is frozen or missing"),
@@ -43,8 +51,9 @@ def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]
         (facts.battery_level == 0, f"the battery is low: {facts.battery_remaining:.0%} left"),
         (ordered, "BAT_EMERGEN_THR, BAT_CRIT_THR and BAT_LOW_THR do not rise in this order"),
         (not facts.fence_breach or not b.fence_action, f"the vehicle {facts.fence_breach}"),
-        (not facts.gcs_lost or not b.gcs_loss_action, "the ground station is lost"),
-        (sticks, Need.MANUAL_STREAM.value),
+        ((facts.gcs_heard and not facts.gcs_lost) or not b.gcs_loss_action, gcs),
+        (facts.manual_fresh or not flies_sticks, Need.MANUAL_STREAM.value),
+        (not would_climb, "the throttle is above the centre"),
         (facts.offboard_fresh or facts.mode is not Mode.OFFBOARD, Need.OFFBOARD_STREAM.value),
     )
     return tuple(sentence for passed, sentence in checks if not passed)

@@ -10,10 +10,13 @@ from typing import Protocol
 class LinkFacts:
     """What the services of the ground links know; each writes its own field.
 
-    A ground station that never spoke is not lost; without a stream there are no setpoints and no sticks.
+    Without a stream there are no setpoints and no sticks.
     """
 
     gcs_lost: bool = False
+    """Silent for too long; if that has an action, also who never spoke."""
+    gcs_heard: bool = False
+    """Whether a ground station has spoken since the vehicle booted."""
     offboard_lost: bool = True
     manual_lost: bool = True
 

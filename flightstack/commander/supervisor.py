@@ -136,6 +136,7 @@ class Supervisor:
             state_is_fresh=not self._stale,
             upright=finite and 1.0 - 2.0 * (qx * qx + qy * qy) >= UPRIGHT_COSINE,
             gcs_lost=self.links.gcs_lost,
+            gcs_heard=self.links.gcs_heard,
             manual_fresh=not self.links.manual_lost,
             offboard_fresh=not self.links.offboard_lost,
             fence_breach=breach,

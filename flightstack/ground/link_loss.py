@@ -13,7 +13,9 @@ from flightstack.mavlink.link import Message
 class LinkLossService:
     """A ground station is lost when none of them sent a heartbeat for COM_DL_LOSS_T.
 
-    Only MAV_TYPE_GCS counts, as with PX4: a companion computer's heartbeat does not keep a link alive.
+    Only MAV_TYPE_GCS counts, as with PX4: a companion computer's heartbeat does not keep a link alive. Who was never
+    heard since the vehicle booted counts as lost too if NAV_DLL_ACT asks for an action, and not otherwise: then
+    scripts may fly the vehicle alone.
     """
 
     handles = frozenset({"HEARTBEAT"})
@@ -26,12 +28,17 @@ class LinkLossService:
         """Take a heartbeat."""
         if message.type == mavlink.MAV_TYPE_GCS:
             self._watch.heard(now_s, self._autopilot.now.time_us)
+            links = self._autopilot.links  # at once: the next message may be the command to arm
+            links.gcs_heard, links.gcs_lost = True, False
 
     def poll(self, now_s: float) -> Iterable[tuple[Hashable | None, Message]]:
         """Tell the autopilot; there is nothing to send."""
         autopilot = self._autopilot
-        limit_s = autopilot.behaviour.gcs_loss_s
-        autopilot.links.gcs_lost = self._watch.lost(now_s, autopilot.now.time_us, limit_s)
+        links, behaviour = autopilot.links, autopilot.behaviour
+        if links.gcs_heard:
+            links.gcs_lost = self._watch.lost(now_s, autopilot.now.time_us, behaviour.gcs_loss_s)
+        else:
+            links.gcs_lost = behaviour.gcs_loss_action > 0
         return ()
 
     def next_deadline(self) -> float | None:

@@ -248,8 +248,8 @@ def test_who_never_spoke_is_silent_but_not_lost() -> None:
 # ---------------------------------------------------------------------- arming
 
 READY = ArmingFacts(
-    mode=Mode.HOLD, state_is_valid=True, state_is_fresh=True, upright=True, gcs_lost=False, manual_fresh=False,
-    offboard_fresh=False, fence_breach="", battery_level=0, battery_remaining=math.nan,
+    mode=Mode.HOLD, state_is_valid=True, state_is_fresh=True, upright=True, gcs_lost=False, gcs_heard=True,
+    manual_fresh=False, offboard_fresh=False, fence_breach="", battery_level=0, battery_remaining=math.nan,
 )  # fmt: skip
 
 
@@ -267,6 +267,12 @@ def test_a_vehicle_that_is_ready_arms() -> None:
         ({}, ["BAT_LOW_THR=0.12", "BAT_CRIT_THR=0.2"], "BAT_EMERGEN_THR, BAT_CRIT_THR and BAT_LOW_THR"),
         ({"fence_breach": "is outside the geofence"}, [], "the vehicle is outside the geofence"),
         ({"gcs_lost": True}, ["NAV_DLL_ACT=1"], "the ground station is lost"),
+        ({"gcs_heard": False}, ["NAV_DLL_ACT=1"], "no ground station was heard"),
+        (
+            {"mode": Mode.ALTITUDE, "manual_fresh": True, "throttle": 0.21},
+            [],
+            "the throttle is above the centre",
+        ),
         ({"mode": Mode.POSITION}, [], Need.MANUAL_STREAM.value),
         ({"mode": Mode.ALTITUDE}, [], Need.MANUAL_STREAM.value),
         ({"mode": Mode.OFFBOARD}, [], Need.OFFBOARD_STREAM.value),
