@@ -33,12 +33,13 @@ often it was sent, and the wall time from the first sending to the report."""
 class PilRecord:
     """Rows of all steps, and what is known of target and link."""
 
-    def __init__(self, target: str, identity: dict[str, Any]) -> None:
-        self._target, self._identity = target, identity
+    def __init__(self, target: str, identity: dict[str, Any], status_at_start: dict[str, Any]) -> None:
+        """``status_at_start``: FS_PIL_STATUS before the first step; its counters go on from one flight to the next."""
+        self._target, self._identity, self._status_at_start = target, identity, status_at_start
         self._rows: np.ndarray[Any, np.dtype[np.void]] = np.zeros(1024, STEP_ROW)
         self._count = 0
         self.status: dict[str, Any] | None = None
-        """The target's last FS_PIL_STATUS; None if there was none."""
+        """The target's FS_PIL_STATUS after the last step; None if it did not tell."""
 
     def add(self, flags: int, report: PilReport, attempts: int, round_trip_s: float) -> None:
         """Note a step. One alone before a reset is no flight: the loops are tried once before the first."""
@@ -63,6 +64,7 @@ class PilRecord:
             "steps": self._count,
             "link": asdict(counters),
             "round_trip_s": _figures(trips) if len(trips) else None,
+            "status_at_start": self._status_at_start,
             "status": self.status,
             "ending": ending,
         }

@@ -21,7 +21,8 @@ from flightstack.transport.byte_link import ByteLink
 NOTHING = (0.0,) * (TARGET_AT - SETPOINT_AT - ATTITUDE_TARGET_SIZE)
 MOST_READS = 100_000
 """Reads of one attempt: a line that never falls silent must not keep a step waiting."""
-FAREWELL = PilTiming(timeout_s=0.2, attempts=2)
+FAREWELL_ATTEMPTS = 6
+"""Times that the target is asked for its counters at the end, each with the line's own time-out."""
 
 
 class TargetLoops:
@@ -46,7 +47,9 @@ class TargetLoops:
         self._link, self._client, self._clock_s = link, PilClient(timing), clock_s
         self._waited_s = 0.0  # on top of the clock: an emulated target waits in no time
         self._numbers: dict[str, float] = {}
-        self._pending: dict[str, float] = {}
+        self._pending: list[
+            tuple[str, float]
+        ] = []  # each in turn, as loops here are set: integrals follow each
         self._is_closed = False
         self.ending: str | None = None
         """Why the target was given up; None: it was not."""
@@ -57,7 +60,7 @@ class TargetLoops:
         if problem is not None:
             raise WrongFirmwareError(f"{link.name}: {problem}")
         self.identity = described(identity)
-        self.record = PilRecord(link.name, self.identity)
+        self.record = PilRecord(link.name, self.identity, self._counters())
         words = (self.identity["board"], f"sources {self.identity['source_hash']}", self.identity["compiler"])
         self.version = f"C, float, {', '.join(words)}"
         for name, value in numbers.items():
@@ -70,7 +73,8 @@ class TargetLoops:
         """Change a number before the next step."""
         value = carried(value) + 0.0  # no -0: not every target's FPU has one
         if self._numbers.get(name) != value:
-            self._numbers[name] = self._pending[name] = value
+            self._numbers[name] = value
+            self._pending.append((name, value))
 
     def get(self, name: str) -> float:
         """Return a number as the target has it, or will have it at the next step; KeyError if it was never set."""
@@ -89,9 +93,13 @@ class TargetLoops:
         client = self._client
         client.start_step(flags, numbers)
         began_s = self._clock_s()
-        report = self._finish()
+        try:
+            self._finish()
+        finally:  # of a step that ended in the safe state there is a report as well
+            report = client.result
+            if isinstance(report, PilReport):
+                self.record.add(flags, report, client.attempts, self._clock_s() - began_s)
         assert isinstance(report, PilReport)
-        self.record.add(flags, report, client.attempts, self._clock_s() - began_s)
         self.output[:-1] = report.outputs
         self.output[-1] = report.status & 0xFFFF
 
@@ -101,7 +109,7 @@ class TargetLoops:
             return
         self._is_closed = True
         try:
-            if self.ending is None:
+            if self.ending is None or isinstance(self._client.result, PilReport):  # it answers
                 self.record.status = self._farewell()
         finally:
             self._link.close()
@@ -161,21 +169,25 @@ class TargetLoops:
 
     def _send_numbers(self) -> None:
         while self._pending:
-            name, value = next(iter(self._pending.items()))
-            self._client.start_set(name, value)
+            self._client.start_set(*self._pending[0])
             self._finish()
-            del self._pending[name]
+            del self._pending[0]
 
     def _farewell(self) -> dict[str, Any] | None:
-        """Return the target's own counters; None when it does not tell them."""
-        self._client.timing = FAREWELL
-        self._client.start_request("FS_PIL_STATUS")
+        """Return the target's own counters; None when it does not tell them, which ends no flight: it is over."""
+        client, ending = self._client, self.ending
+        client.timing = client.timing._replace(attempts=min(client.timing.attempts, FAREWELL_ATTEMPTS))
         try:
-            message = self._finish()
+            return self._counters()
         except TargetError:
-            self.ending = None  # the flight was over
             return None
-        status: dict[str, Any] = message.to_dict()
+        finally:
+            self.ending = ending
+
+    def _counters(self) -> dict[str, Any]:
+        """Ask the target for FS_PIL_STATUS; raise TargetError."""
+        self._client.start_request("FS_PIL_STATUS")
+        status: dict[str, Any] = self._finish().to_dict()
         status.pop("mavpackettype", None)
         return status
 

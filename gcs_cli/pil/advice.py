@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from gcs_cli.pil.probe import Measurement
+from gcs_cli.pil.target_record import RESTARTED, SAFE, state_words
 
 FTDI_LATENCY_MS = 16.0
 """An FTDI bridge, such as the XDS100v2 has, keeps what it received for so long unless it is told otherwise."""
@@ -30,8 +31,15 @@ def advice(port: Port | None, found: Sequence[Measurement], expected_hash: str) 
     answered = [each for each in found if each.identity is not None]
     if not answered:
         return list(_silence(port, found))
-    best = max(answered, key=lambda each: each.steps_per_s or 0.0)
-    return [*_firmware(best, expected_hash), *_latency(port, best), *_losses(answered), *_rate(best)]
+    best = max(answered, key=lambda each: (each.problem is None, each.steps_per_s or 0.0))
+    return [
+        *_state(answered[0]),
+        *_firmware(best, expected_hash),
+        *_problems(answered),
+        *_latency(port, best),
+        *_losses(answered),
+        *_rate(best),
+    ]
 
 
 def _silence(port: Port | None, found: Sequence[Measurement]) -> Iterator[str]:
@@ -46,6 +54,23 @@ def _silence(port: Port | None, found: Sequence[Measurement]) -> Iterator[str]:
     )
 
 
+def _state(first: Measurement) -> Iterator[str]:
+    state = None if first.before is None else state_words(first.before["state"])
+    if state == RESTARTED:
+        yield (
+            "The target was restarted by its watchdog: its program, or an interrupt, hung. Its counters began anew "
+            "then; a flight that was under way has ended."
+        )
+    elif state == SAFE:
+        yield "The target was in its safe state, rotors stopped: its last flight gave it bad input."
+
+
+def _problems(answered: Sequence[Measurement]) -> Iterator[str]:
+    for each in answered:
+        if each.problem is not None:
+            yield f"At {_rate_words(each)} the target {each.problem}: the exchanges ended there."
+
+
 def _firmware(best: Measurement, expected_hash: str) -> Iterator[str]:
     identity = best.identity or {}
     if identity["source_hash"] != expected_hash:
@@ -55,8 +80,6 @@ def _firmware(best: Measurement, expected_hash: str) -> Iterator[str]:
         )
     if identity["real_octets"] != 4:
         yield f"Its loops compute with {8 * identity['real_octets']} bits, not with 32: build it without FS_DOUBLE."
-    if best.problem is not None:
-        yield f"The target {best.problem}: the exchanges ended there."
 
 
 def _latency(port: Port | None, best: Measurement) -> Iterator[str]:

@@ -12,11 +12,12 @@ from rich.table import Table
 from flightstack.firmware.build import BuildError
 from flightstack.firmware.choice import SERIAL, LoopsChoice
 from flightstack.firmware.sources import source_hash
-from flightstack.firmware.targets import open_link
+from flightstack.firmware.targets import open_link, timing_of
 from flightstack.transport.byte_link import LineError
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.pil.advice import Port, advice
 from gcs_cli.pil.probe import Measurement, measured
+from gcs_cli.pil.target_record import status_words
 
 BAUDS = (115_200, 230_400, 460_800, 921_600)
 """Rates that the F28377S port can be built for, as its divider gives them within half a percent."""
@@ -34,7 +35,7 @@ def examine(
         except (BuildError, LineError) as error:
             raise CliError(str(error), USAGE) from None
         try:
-            found.append(measured(link, baud, exchanges, progress))
+            found.append(measured(link, baud, exchanges, progress, timing_of(tried)))
         except OSError as error:  # LineError
             raise CliError(str(error), NO_ANSWER) from None
         finally:
@@ -70,6 +71,7 @@ def _line(each: Measurement) -> dict[str, Any]:
         "answers": each.identity is not None,
         "identity": each.identity,
         "problem": each.problem,
+        "status_before": each.before,
         "exchanges": len(each.round_trips_s),
         "round_trip_median_ms": _ms(median_s),
         "round_trip_p99_ms": _ms(p99_s),
@@ -91,6 +93,9 @@ def print_findings(console: Console, result: dict[str, Any]) -> None:
     if identity is not None:
         words = f"{identity['board']}, {identity['compiler']}, sources {identity['source_hash']}"
         console.print(words, markup=False, highlight=False, soft_wrap=True)
+        status = next((line["status_before"] for line in result["lines"] if line["answers"]), None)
+        words = "its counters are unknown" if status is None else status_words(status)
+        console.print(f"before the first step: {words}", markup=False, highlight=False, soft_wrap=True)
         table = Table(box=None, padding=(0, 2, 0, 0), header_style="bright_black")
         for name in ("baud", "round trip", "p99", "on the wire", "lost", "steps/s"):
             table.add_column(name, justify="right", no_wrap=True)
@@ -112,13 +117,19 @@ def _cells(line: dict[str, Any]) -> tuple[str, ...]:
 
 
 def check_findings(result: dict[str, Any]) -> None:
-    """Raise CliError when nothing answered (no answer), or nothing can fly on what did (failed)."""
+    """Raise CliError when nothing answered (no answer), or nothing can fly on what did (failed).
+
+    One rate that works is enough: the advice tells of the others.
+    """
     lines = [line for line in result["lines"] if line["answers"]]
     if not lines:
         raise CliError(f"{result['target']}: no target answered", NO_ANSWER)
-    identity = lines[0]["identity"]
-    if identity["source_hash"] != result["sources_here"] or identity["real_octets"] != 4:
+    fit = [line for line in lines if _is_ours(line["identity"], result["sources_here"])]
+    if not fit:
         raise CliError(f"{result['target']}: the wrong firmware runs there", FAILED)
-    problem = next((line["problem"] for line in lines if line["problem"]), None)
-    if problem is not None:
-        raise CliError(f"{result['target']}: the target {problem}", NO_ANSWER)
+    if all(line["problem"] for line in fit):
+        raise CliError(f"{result['target']}: the target {fit[0]['problem']}", NO_ANSWER)
+
+
+def _is_ours(identity: dict[str, Any], sources_here: str) -> bool:
+    return bool(identity["source_hash"] == sources_here and identity["real_octets"] == 4)

@@ -10,18 +10,18 @@ import numpy as np
 
 from flightstack.contract import LoopFlags
 from flightstack.firmware.target_loops import described
-from flightstack.mavlink.services.pil_client import PilClient, PilCounters, PilTiming
+from flightstack.mavlink.services.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
 from flightstack.transport.byte_link import ByteLink
 
 EXCHANGES = 300
 """Steps that are measured on a line that works."""
-HELLO = PilTiming(timeout_s=0.3, attempts=4)
-STEADY = PilTiming(timeout_s=0.3, attempts=5)
+HELLO_ATTEMPTS, STEADY_ATTEMPTS = 4, 5
+"""Fewer than in flight: a line that loses so much is found out sooner."""
 LEVEL = [0.0] * 6 + [1.0] + [0.0] * 16 + [1e-3]
 """A vehicle that stands level where it shall stand: each step resets the loops, so that they stay at rest. The last
 number makes the frame as long as those of a flight: zeros at the end are not sent."""
 _MOST_READS = 10_000
-_TROUBLES = ("bad_frames", "skipped_octets", "uart_overruns", "uart_errors")
+_TROUBLES = ("bad_frames", "skipped_octets", "uart_overruns", "uart_errors", "dropped_frames")
 
 
 class Measurement(NamedTuple):
@@ -38,6 +38,8 @@ class Measurement(NamedTuple):
     counters: PilCounters | None = None
     troubles: dict[str, int] = {}  # noqa: RUF012  # never changed
     """What the target's own counters counted meanwhile, where it is not zero."""
+    before: dict[str, Any] | None = None
+    """The target's FS_PIL_STATUS before its first step: only there it can be seen that its watchdog restarted it."""
 
     @property
     def steps_per_s(self) -> float | None:
@@ -71,10 +73,13 @@ class Measurement(NamedTuple):
 class Probe:
     """Runs single exchanges on a line."""
 
-    def __init__(self, link: ByteLink, clock_s: Callable[[], float] = time.monotonic) -> None:
-        self._link, self._clock_s = link, clock_s
+    def __init__(
+        self, link: ByteLink, timing: PilTiming, clock_s: Callable[[], float] = time.monotonic
+    ) -> None:
+        """``timing``: that of flights on this line; see ``targets.timing_of``."""
+        self._link, self._timing, self._clock_s = link, timing, clock_s
         self._waited_s = 0.0  # on top of the clock: an emulated target waits in no time
-        self.client = PilClient(HELLO)
+        self.client = PilClient(timing._replace(attempts=HELLO_ATTEMPTS))
 
     @property
     def _now_s(self) -> float:
@@ -82,11 +87,13 @@ class Probe:
 
     def request(self, name: str) -> Any | None:
         """Ask for a message; None when it does not come. Raise LineError."""
+        self.client.timing = self._timing._replace(attempts=HELLO_ATTEMPTS)
         self.client.start_request(name)
         return self._finished()
 
     def step(self) -> float | None:
         """Run a step at rest and return how long it took [s]; None when it was not answered. Raise LineError."""
+        self.client.timing = self._timing._replace(attempts=STEADY_ATTEMPTS)
         self.client.start_step(LoopFlags.RESET | LoopFlags.OUTER_DUE, LEVEL)
         began_s = self._now_s
         return None if self._finished() is None else self._now_s - began_s
@@ -115,15 +122,19 @@ class Probe:
 
 
 def measured(
-    link: ByteLink, baud: int | None, exchanges: int, progress: Callable[[int, int], None]
+    link: ByteLink,
+    baud: int | None,
+    exchanges: int,
+    progress: Callable[[int, int], None],
+    timing: PilTiming = DEFAULT_TIMING,
+    clock_s: Callable[[], float] = time.monotonic,
 ) -> Measurement:
     """Measure a line; raise LineError when it is gone. Firmware of other sources is measured as well."""
-    probe = Probe(link)
+    probe = Probe(link, timing, clock_s)
     identity = probe.request("FS_PIL_IDENTITY")
     if identity is None:
         return Measurement(baud, None, probe.client.failure)
     before = probe.request("FS_PIL_STATUS")
-    probe.client.timing = STEADY
     probe.client.counters = PilCounters()
     trips: list[float] = []
     problem = None
@@ -136,7 +147,14 @@ def measured(
         progress(done + 1, exchanges)
     counters, probe.client.counters = probe.client.counters, PilCounters()
     after = probe.request("FS_PIL_STATUS")
-    return Measurement(baud, described(identity), problem, tuple(trips), counters, _troubles(before, after))
+    troubles = _troubles(before, after)
+    return Measurement(baud, described(identity), problem, tuple(trips), counters, troubles, _fields(before))
+
+
+def _fields(status: Any | None) -> dict[str, Any] | None:
+    if status is None:
+        return None
+    return {name: value for name, value in status.to_dict().items() if name != "mavpackettype"}
 
 
 def _troubles(before: Any | None, after: Any | None) -> dict[str, int]:

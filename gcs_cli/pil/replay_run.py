@@ -21,7 +21,7 @@ from flightstack.params.errors import ConfigError
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError
-from gcs_cli.pil.compare import compared, deviation, status_differences
+from gcs_cli.pil.compare import compared, deviation
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import Recording, UnfitLogError, as_flight, recording, replayed
 from gcs_cli.pil.report import DeviationChart
@@ -31,13 +31,14 @@ from gcs_cli.pil.result import (
     largest_difference,
     pair_name,
     profiles_of,
+    status_check,
     target_checks,
     target_tiles,
 )
-from gcs_cli.pil.signals import BY_NAME
+from gcs_cli.pil.signals import BY_NAME, TARGET
 from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import has_same_bits, meaning
-from gcs_cli.pil.verdict import OPEN_LOOP_ULPS, SAME_BITS_ULPS, Check, board_limits, difference_checks
+from gcs_cli.pil.verdict import OPEN_LOOP_ULPS, board_limits, difference_checks, same_bits_limits
 from gcs_cli.run_directory import LOG_NAME
 from gcs_cli.transfer_bar import step_bar
 
@@ -162,15 +163,12 @@ def judged(
     differences = list(compared(pair, flight, made))
     flown = str(flight.info.get("loops", PYTHON))
     exact = same_bits and flown != PYTHON and not flown.startswith(SERIAL)
-    limits: dict[str, float] | float = SAME_BITS_ULPS if exact else OPEN_LOOP_ULPS
+    limits = same_bits_limits(OPEN_LOOP_ULPS) if exact else OPEN_LOOP_ULPS
     if not exact and not (flown == PYTHON or same_bits):
         limits = board_limits(OPEN_LOOP_ULPS)
-    differing, ticks = status_differences(flight, made)
     checks = [
-        *difference_checks(differences, limits),
-        Check(
-            f"{pair} steps of another status", 0.0 if exact else math.ceil(1e-3 * ticks), float(differing), ""
-        ),
+        *difference_checks(pair, differences, limits, None if replay.record.tells_targets else TARGET),
+        status_check(f"{pair} steps of another status", flight, made, exact),
         *(target_checks(record, len(outputs)) if record is not None else ()),
     ]
     result = assembled(differences, checks, record, facts)

@@ -20,6 +20,7 @@ from gcs_cli.pil.report_tables import (
     shown,
 )
 from gcs_cli.pil.signals import Signal
+from gcs_cli.pil.target_record import status_words
 from gcs_cli.report_chart import Line, time_chart
 from gcs_cli.report_plots import section
 
@@ -38,6 +39,7 @@ _OF_TARGET = (
     "skipped_octets",
     "uart_overruns",
     "uart_errors",
+    "dropped_frames",
 )
 
 
@@ -152,6 +154,7 @@ def _target(result: Mapping[str, Any]) -> Iterator[str]:
         ("clock", clock),
         ("arithmetic", f"{8 * target['real_octets']}-bit floating point"),
         ("stack high water", escape(high_water)),
+        ("before the flight", escape(status_words(result["target_status_before"]))),
     ]
     yield facts_section("Target", facts, "The firmware is named by the first octets of its sources' SHA-256.")
 
@@ -166,7 +169,10 @@ def _link(result: Mapping[str, Any]) -> Iterator[str]:
         facts += [
             (f"target: {name.replace('_', ' ')}", shown(told[name])) for name in _OF_TARGET if name in told
         ]
-        note = "Lost: sendings of which nothing came, in either direction. Target: its own counters, since its start."
+        note = (
+            "Lost: sendings of which nothing came, in either direction. Target: what its own counters counted in this "
+            f"flight{'' if told else '; it did not tell them in the end'}."
+        )
         yield facts_section("Link", facts, note)
 
 

@@ -23,12 +23,12 @@ from gcs_cli.pil.verdict import (
     CLOSED_LOOP_ULPS,
     MIL,
     PIL,
-    SAME_BITS_ULPS,
     SIL,
     Check,
     all_passed,
     board_limits,
     difference_checks,
+    same_bits_limits,
 )
 
 FORMAT = "flightstack-pil-1"
@@ -89,7 +89,7 @@ def closed_loop(
     checks = [
         Check("flights that failed", 0.0, _failures(flights), "", _reasons(flights)),
         *_closed_loop_checks(there, differences, same_bits),
-        *(target_checks(record, len(there[PIL].flown_us)) if record is not None and PIL in there else ()),
+        *(target_checks(record, len(there[PIL].flown_us)) if PIL in there else ()),
     ]
     listed = [difference for pair in differences.values() for difference in pair]
     result = assembled(listed, checks, record, facts)
@@ -123,20 +123,26 @@ def assembled(
         "target": None if record is None else dict(record.identity),
         "stack": _stack(record),
         "link": {} if record is None else dict(record.link),
-        "target_counters": {} if record is None else dict(record.status),
+        "target_counters": {} if record is None else record.counted,
+        "target_status_before": None if record is None else dict(record.at_start),
+        "target_status_after": None if record is None else dict(record.status) or None,
         "flights": {},
         "compared": "Every step.",
     }
 
 
 def _failures(flights: Mapping[str, Flown]) -> float:
-    done = sum(flown.outcome == COMPLETED for flown in flights.values())
+    done = sum(flown.outcome == COMPLETED and flown.samples is not None for flown in flights.values())
     return float(len((MIL, SIL, PIL)) - done)
 
 
 def _reasons(flights: Mapping[str, Flown]) -> str:
     reasons = [f"{stage}: {flown.outcome}" for stage, flown in flights.items() if flown.outcome != COMPLETED]
+    blank = [
+        stage for stage, flown in flights.items() if flown.outcome == COMPLETED and flown.samples is None
+    ]
     missing = [stage for stage in (MIL, SIL, PIL) if stage not in flights]
+    reasons += [f"{stage}: its log is not readable" for stage in blank]
     return "; ".join([*reasons, *(f"{stage}: not flown" for stage in missing)])
 
 
@@ -149,23 +155,38 @@ def _closed_loop_checks(
         apart = float(ticks_apart(first, second))
         yield Check(f"{pair} ticks flown by one alone", 0.0 if exact else _LANDING_TICKS, apart, "")
         if MIL not in (a, b):
-            differing, ticks = status_differences(first, second)
-            limit = 0.0 if exact else math.ceil(_SHARE_OF_STATUS * ticks)
-            yield Check(f"{pair} ticks of another status", limit, float(differing), "")
-        limits: dict[str, float] | float = CLOSED_LOOP_ULPS
+            yield status_check(f"{pair} ticks of another status", first, second, exact)
+        limits: Mapping[str, float] = CLOSED_LOOP_ULPS
         if MIL not in (a, b):
-            limits = SAME_BITS_ULPS if exact else board_limits(CLOSED_LOOP_ULPS)
-        yield from difference_checks(differences[pair], limits)
+            limits = same_bits_limits(limits) if exact else board_limits(limits)
+        yield from difference_checks(pair, differences[pair], limits)
 
 
-def target_checks(record: TargetRecord, ticks: int) -> Iterator[Check]:
-    """Yield what must hold of a target that ``ticks`` ticks were flown on."""
-    yield Check(
-        "steps flown without the target", 0.0, float(max(0, ticks - record.steps)), "", record.ending or ""
-    )
-    if record.status:
-        yield Check("safe states of the target", 0.0, float(record.status["safe_states"]), "")
-        yield Check("steps that overran their period", 0.0, float(record.status["loop_overruns"]), "")
+def status_check(name: str, first: FlightSamples, second: FlightSamples, exact: bool) -> Check:
+    """Return the check of the loops' status; of no tick that both logs have, it fails."""
+    differing, ticks = status_differences(first, second)
+    if not ticks:
+        return Check(name, 0.0, math.nan, "", "no ticks to compare")
+    return Check(name, 0.0 if exact else math.ceil(_SHARE_OF_STATUS * ticks), float(differing), "")
+
+
+def target_checks(record: TargetRecord | None, ticks: int) -> Iterator[Check]:
+    """Yield what must hold of a target that ``ticks`` ticks were flown on; ``record`` None: it left none.
+
+    Safe states and overruns stand in the reports of the steps, and in the target's own counters, which also know of
+    what happened between steps. Where the two differ, the larger one counts.
+    """
+    name, counted = "steps flown without the target", {} if record is None else record.counted
+    if record is None:
+        yield Check(name, 0.0, float(max(1, ticks)), "", "no record of the target is there")
+        return
+    yield Check(name, 0.0, float(max(0, ticks - record.steps)), "", record.ending or "")
+    told = "" if record.status else "FS_PIL_STATUS was asked for in vain after the last step"
+    yield Check("counters that the target did not tell", 0.0, float(not record.status), "", told)
+    safe_states = max(record.bad_inputs, counted.get("safe_states", 0))
+    overruns = max(record.overruns, counted.get("loop_overruns", 0))
+    yield Check("safe states of the target", 0.0, float(safe_states), "")
+    yield Check("steps that overran their period", 0.0, float(overruns), "")
 
 
 def profiles_of(record: TargetRecord | None) -> list[StageProfile]:

@@ -6,13 +6,21 @@ import json
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from flightstack.contract import FloatArray
 from flightstack.firmware.pil_record import COST_UNITS, LINK_FILE, STEPS_FILE
+from flightstack.mavlink.services.pil_operations import BAD_INPUT, OVERRUN
 from flightstack.params.errors import ConfigError
+
+StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
+NO_COUNTERS = ("time_boot_ms", "stack_size", "stack_high_water", "state")
+"""Fields of FS_PIL_STATUS that count nothing."""
+SAFE, RESTARTED = "safe state", "restarted by its watchdog"
+STATES = ("ready", "stepping", SAFE, RESTARTED)
+"""FS_PIL_STATUS.state in words."""
 
 
 class TargetRecord(NamedTuple):
@@ -21,12 +29,27 @@ class TargetRecord(NamedTuple):
     identity: Mapping[str, Any]
     link: Mapping[str, Any]
     """Counters of the link, and the round trips' figures."""
+    at_start: Mapping[str, Any]
+    """The target's FS_PIL_STATUS before the first step. It counts since its start, over all flights."""
     status: Mapping[str, Any]
-    """The target's own counters; empty if it did not tell them."""
+    """Its FS_PIL_STATUS after the last step; empty if it did not tell."""
     costs: FloatArray
     """Outer loop, inner loop, mixer and whole step of each step, (steps, 4), in ``identity``'s cost unit."""
+    overruns: int
+    """Steps whose report says that they took longer than their period."""
+    bad_inputs: int
+    """Steps whose report says that the target stopped its rotors."""
     ending: str | None = None
     """Why the target was given up; None: it was not."""
+
+    @property
+    def counted(self) -> dict[str, int]:
+        """What the target's own counters counted in this flight; empty if it did not tell them in the end."""
+        return {
+            name: (value - self.at_start[name]) & 0xFFFF_FFFF
+            for name, value in self.status.items()
+            if name not in NO_COUNTERS
+        }
 
     @property
     def steps(self) -> int:
@@ -40,6 +63,22 @@ class TargetRecord(NamedTuple):
         return "" if unit == COST_UNITS[0] else unit
 
 
+def state_words(state: int) -> str:
+    """Say what FS_PIL_STATUS.state means."""
+    return STATES[state] if state < len(STATES) else f"state {state}"
+
+
+def status_words(status: Mapping[str, Any]) -> str:
+    """Say what a target tells of itself: its state, since when it runs, and what it has counted."""
+    counted = [
+        f"{name.replace('_', ' ')} {value}"
+        for name, value in status.items()
+        if name not in NO_COUNTERS and value
+    ]
+    state, up_s = state_words(status["state"]), status["time_boot_ms"] / 1e3
+    return f"{state}, up for {up_s:.1f} s; {', '.join(counted) or 'nothing counted'}"
+
+
 def read_record(folder: Path) -> TargetRecord:
     """Read both files; raise ConfigError when one is missing or damaged."""
     path = folder / LINK_FILE
@@ -47,19 +86,29 @@ def read_record(folder: Path) -> TargetRecord:
         content = json.loads(path.read_text(encoding="utf-8"))
         path = folder / STEPS_FILE
         with np.load(path) as file:
-            costs = file["steps"]["cost"].astype(np.float64)
-        return record_of(content, costs)
+            steps = file["steps"]
+        return record_of(content, steps["cost"].astype(np.float64), steps["status"].astype(np.int64))
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, zipfile.BadZipFile) as error:
         raise ConfigError(path, "", f"is not the record of a target: {error}") from error
 
 
-def record_of(content: Mapping[str, Any], costs: FloatArray) -> TargetRecord:
-    """Return the record from the content of its first file, and the costs of the steps."""
+def record_of(content: Mapping[str, Any], costs: FloatArray, statuses: StatusArray) -> TargetRecord:
+    """Return the record from the content of its first file, and the costs and FS_PIL_REPORT.status of the steps."""
     trips = content["round_trip_s"] or {}
     link = dict(content["link"])
     link["lost"] = max(0, link["resent"] - link["late"])  # in either direction: nothing came of that sending
     for name, seconds in trips.items():
         link[f"round_trip_{name}_us"] = round(seconds * 1e6, 1)
-    return TargetRecord(content["identity"], link, content["status"] or {}, costs, content["ending"])
+    overruns, bad_inputs = (int(np.count_nonzero(statuses & bit)) for bit in (OVERRUN, BAD_INPUT))
+    return TargetRecord(
+        content["identity"],
+        link,
+        content["status_at_start"],
+        content["status"] or {},
+        costs,
+        overruns,
+        bad_inputs,
+        content["ending"],
+    )

@@ -12,8 +12,8 @@ from gcs_cli.errors import USAGE, CliError
 MEANINGS = {
     C: "The target is the C core inside this program, compiled for this machine.",
     HOST: (
-        "PIL: the whole C program, with its protocol, as a process of its own on this machine behind a pseudo "
-        "terminal. It checks program and protocol, on no other processor than this one."
+        "The third flight is no PIL of a board here, but SIL across a process: the whole C program, with its protocol, "
+        "on this machine behind a pseudo terminal. It checks program and protocol, on no other processor than this one."
     ),
     EMULATED: (
         "PIL: the whole firmware, cross-compiled for a Cortex-M4F and executed by an emulator, instruction by "

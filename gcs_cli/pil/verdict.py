@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from gcs_cli.pil.compare import Difference
@@ -51,7 +51,12 @@ OPEN_LOOP_ULPS = {
 """The same for the same inputs, replayed from the logs of those flights of Python's loops, on the ground as well."""
 
 
-def board_limits(limits_ulps: dict[str, float]) -> dict[str, float]:
+def same_bits_limits(limits_ulps: Mapping[str, float]) -> dict[str, float]:
+    """Return the limits of the same signals where not a bit may differ."""
+    return dict.fromkeys(limits_ulps, SAME_BITS_ULPS)
+
+
+def board_limits(limits_ulps: Mapping[str, float]) -> dict[str, float]:
     """Return the limits between the host and a board."""
     return {name: BOARD_FACTOR * limit for name, limit in limits_ulps.items()}
 
@@ -89,22 +94,31 @@ class Check(NamedTuple):
 
 
 def difference_checks(
-    differences: Iterable[Difference], limits_ulps: dict[str, float] | float
+    pair: str,
+    differences: Iterable[Difference],
+    limits_ulps: Mapping[str, float],
+    left_out: str | None = None,
 ) -> Iterator[Check]:
     """Yield a check of each stage: of its signals, the one that comes nearest to its limit, or exceeds it most.
 
-    ``limits_ulps`` is one limit for every signal or one for each; signals without one are not judged.
+    Every signal that has a limit must have been compared: one that was not, or in no tick, fails its stage.
+    ``left_out``: a stage that is not judged.
     """
-    listed = list(differences)
+    there = {found.signal: found for found in differences}
     for stage in STAGES:
         checks = [
-            Check(f"{found.pair} {stage}", limit, found.ulps, "ulp", _about(found))
-            for found in listed
-            if BY_NAME[found.signal].stage == stage
-            and (limit := _limit(limits_ulps, found.signal)) is not None
+            _difference_check(f"{pair} {stage}", limit, signal, there.get(signal))
+            for signal, limit in limits_ulps.items()
+            if BY_NAME[signal].stage == stage != left_out
         ]
         if checks:
             yield max(checks, key=_closeness)
+
+
+def _difference_check(name: str, limit: float, signal: str, found: Difference | None) -> Check:
+    if found is None or not found.samples:
+        return Check(name, limit, math.nan, "ulp", f"{BY_NAME[signal].title}: no samples to compare")
+    return Check(name, limit, found.ulps, "ulp", _about(found))
 
 
 def _about(found: Difference) -> str:
@@ -113,10 +127,6 @@ def _about(found: Difference) -> str:
         return "same bits"
     unit = "" if signal.unit == "1" else f" {signal.unit}"
     return f"{signal.title}: {found.largest:.3g}{unit}"
-
-
-def _limit(limits: dict[str, float] | float, signal: str) -> float | None:
-    return limits.get(signal) if isinstance(limits, dict) else limits
 
 
 def _closeness(check: Check) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,10 +17,13 @@ from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.errors import TargetError, WrongFirmwareError
 from flightstack.firmware.host_library import HostLoops
-from flightstack.firmware.target_loops import TargetLoops
+from flightstack.firmware.target_loops import FAREWELL_ATTEMPTS, TargetLoops
 from flightstack.firmware.targets import finish_loops
+from flightstack.mavlink.services.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
+from gcs_cli.pil.result import target_checks
+from gcs_cli.pil.target_record import STATES, read_record
 from tests.firmware.app_support import SAFE, Target
 from tests.support.lossy_line import FAIR, LossyLine, Weather
 
@@ -169,6 +173,65 @@ def test_bad_input_ends_the_flight_and_the_target_has_stopped_its_rotors(device)
     with pytest.raises(TargetError, match=r"stopped its rotors at step 10: it was given bad input"):
         loops.step(state, np.zeros(11), SPEEDS, True, np.zeros(LoopRow.SIZE))
     assert device.state == SAFE
+
+
+def checks_of(loops: CLoops, folder: Path, ticks: int) -> list[str]:
+    """End a flight; return what its verdict holds against the target."""
+    finish_loops(loops, folder / "flight.ulg")
+    return [check.name for check in target_checks(read_record(folder), ticks) if not check.passed]
+
+
+def test_each_flight_is_judged_by_what_happened_in_it(device, tmp_path) -> None:
+    loops = connected(LossyLine(device))
+    drive(loops, 10)
+    bad = np.array([math.nan] + [0.0] * 5 + [1.0] + [0.0] * 6)
+    with pytest.raises(TargetError, match="bad input"):
+        loops.step(bad, np.zeros(11), SPEEDS, True, np.zeros(LoopRow.SIZE))
+    assert checks_of(loops, tmp_path / "first", 10) == ["safe states of the target"]
+    first = read_record(tmp_path / "first")
+    assert (first.steps, first.bad_inputs, first.counted["safe_states"]) == (11, 1, 1)
+    assert first.ending is not None
+    assert "bad input" in first.ending
+    loops = connected(LossyLine(device))
+    drive(loops, 20)
+    assert checks_of(loops, tmp_path / "second", 20) == []
+    second = read_record(tmp_path / "second")
+    assert (second.counted["safe_states"], second.counted["steps"]) == (0, 20)
+    assert (second.at_start["safe_states"], second.at_start["steps"]) == (1, first.status["steps"])
+    assert STATES[second.at_start["state"]] == "safe state"
+
+
+def test_a_target_that_is_lost_after_the_last_step_is_not_trusted(tmp_path) -> None:
+    late = Target(
+        ticks=(index * 3_000_000 for index in range(10_000))
+    )  # of 200 MHz: a step takes longer than 2 ms
+    line = LossyLine(late)
+    loops = connected(line)
+    drive(loops, 10)
+    line.is_cut = True
+    began_s = line.now_s
+    failed = checks_of(loops, tmp_path, 10)
+    assert failed == ["counters that the target did not tell", "steps that overran their period"]
+    assert read_record(tmp_path).ending is None
+    assert line.now_s - began_s == pytest.approx(FAREWELL_ATTEMPTS * DEFAULT_TIMING.timeout_s)
+    late.close()
+
+
+def test_the_farewell_outlasts_a_line_that_loses_much(device, tmp_path) -> None:
+    for seed in range(20):
+        line = LossyLine(device, seed=seed)
+        loops = connected(line)
+        drive(loops, 3)
+        line.weather = Weather(loss=0.005)  # a third of all exchanges
+        assert checks_of(loops, tmp_path / str(seed), 3) == []
+
+
+def test_a_slow_line_has_its_own_time_for_the_farewell(device, tmp_path) -> None:
+    line = LossyLine(device)
+    loops = connected(line, timing=PilTiming(2.0, 20))
+    drive(loops, 3)
+    line.weather = Weather(delay=1.0, delay_s=0.9)
+    assert checks_of(loops, tmp_path, 3) == []
 
 
 def test_other_firmware_is_refused_with_both_hashes(device) -> None:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from flightstack.firmware.choice import LoopsChoice
 from flightstack.firmware.sources import source_hash
-from flightstack.firmware.targets import open_link
+from flightstack.firmware.targets import open_link, timing_of
 from flightstack.mavlink.services.pil_client import PilCounters
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
+from gcs_cli.pil import doctor
 from gcs_cli.pil.advice import Port, advice
-from gcs_cli.pil.doctor import check_findings, examine, findings
+from gcs_cli.pil.doctor import check_findings, examine, findings, print_findings
 from gcs_cli.pil.probe import Measurement, measured
+from tests.firmware.app_support import RESTARTED, STEPPING, Target
 
 HERE = source_hash().hex()
 IDENTITY = {
@@ -65,6 +69,44 @@ class SilentLine:
 
     def close(self) -> None:
         """Nothing is held open."""
+
+
+class SlowLine:
+    """A line to the firmware's application that takes the octets' time, on a clock of its own."""
+
+    name = "a slow line"
+
+    def __init__(self, device: Target, baud: int) -> None:
+        self._device, self._octet_s = device, 10.0 / baud
+        self._coming: list[tuple[float, bytes]] = []
+        self.now_s = 0.0
+
+    def clock(self) -> float:
+        return self.now_s
+
+    def write(self, data: bytes) -> None:
+        self._device.give(data)
+        answer = self._device.take()
+        from_s = self._coming[-1][0] if self._coming else self.now_s
+        self._coming.append((from_s + (len(data) + len(answer)) * self._octet_s, answer))
+
+    def read(self, timeout_s: float) -> bytes:
+        if not self._coming or self._coming[0][0] > self.now_s + timeout_s:
+            self.now_s += timeout_s
+            return b""
+        at_s, data = self._coming.pop(0)
+        self.now_s = max(self.now_s, at_s)
+        return data
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+@pytest.fixture
+def device() -> Iterator[Target]:
+    target = Target(was_watchdog=True)
+    yield target
+    target.close()
 
 
 def of_counters(baud: int | None, trip_s: float, resent: int = 0, **more: Any) -> Measurement:
@@ -136,6 +178,65 @@ def test_wrong_firmware_is_measured_named_and_fails() -> None:
 def test_what_the_target_counted_is_told() -> None:
     found = of_counters(460_800, 0.001, resent=3, troubles={"uart_overruns": 3})
     assert any("uart overruns 3" in sentence for sentence in advice(None, [found], HERE))
+
+
+def test_a_slow_line_is_waited_for_as_in_flight(device: Target) -> None:
+    line = SlowLine(device, 2400)
+    found = measured(line, 2400, 20, quiet, timing_of(LoopsChoice("serial", "/dev/x", 2400)), line.clock)
+    assert (found.problem, found.lost, len(found.round_trips_s)) == (None, 0, 20)
+    assert min(found.round_trips_s) > 0.3
+
+
+def test_each_rate_is_given_the_time_that_flights_give_it(monkeypatch) -> None:
+    given = []
+
+    def noted(*arguments: Any) -> Measurement:
+        given.append(arguments[-1])
+        return of_counters(115_200, 0.03)
+
+    monkeypatch.setattr(doctor, "open_link", lambda _choice: SilentLine())
+    monkeypatch.setattr(doctor, "measured", noted)
+    choice = LoopsChoice("serial", "/dev/x")
+    examine(choice, [9600, 115_200], 5, quiet)
+    assert given == [timing_of(choice._replace(baud=baud)) for baud in (9600, 115_200)]
+
+
+def test_one_rate_that_works_is_enough_and_the_others_are_told() -> None:
+    good = of_counters(115_200, 0.03)
+    bad = of_counters(921_600, 0.003)._replace(problem="did not answer step 3, sent 5 times")
+    serial = LoopsChoice("serial", "/dev/x")
+    for found in ([good, bad], [bad, good]):
+        result = findings(serial, found)
+        check_findings(result)
+        assert (
+            "At 921600 baud the target did not answer step 3, sent 5 times: the exchanges ended there."
+            in (result["advice"])
+        )
+        assert any("33 steps/s" in sentence for sentence in result["advice"])  # of the rate that works
+    with pytest.raises(CliError, match="did not answer step 3") as error:
+        check_findings(findings(serial, [bad, of_counters(9600, 1.0)._replace(identity=None)]))
+    assert error.value.exit_code == NO_ANSWER
+
+
+def test_state_and_counters_before_the_first_step_are_told(device: Target) -> None:
+    line = SlowLine(device, 115_200)
+    timing = timing_of(LoopsChoice("serial", "/dev/x"))
+    first, second = (measured(line, 115_200, 5, quiet, timing, line.clock) for _ in range(2))
+    assert first.before is not None
+    assert second.before is not None
+    assert (first.before["state"], second.before["state"]) == (RESTARTED, STEPPING)
+    assert second.before["steps"] == 5
+    sentence = advice(None, [first, second], HERE)[0]
+    assert "restarted by its watchdog" in sentence
+    console = Console(record=True, width=200)
+    print_findings(console, findings(LoopsChoice("host"), [first, second]))
+    assert "before the first step: restarted by its watchdog, up for 0.0 s; frames 2" in console.export_text()
+
+
+def test_a_target_in_its_safe_state_says_so() -> None:
+    states = [advice(None, [of_counters(None, 0.03, before={"state": state})], HERE) for state in range(5)]
+    assert [len(sentences) for sentences in states] == [0, 0, 1, 1, 0]
+    assert "safe state" in states[2][0]
 
 
 def test_a_port_that_is_not_there_is_a_mistake_of_the_user() -> None:

@@ -142,6 +142,8 @@ def test_an_older_log_gives_its_targets_to_the_inner_loop(log: Any, tmp_path: Pa
     assert differing(outcome) == set()
     assert "target_attitude" not in {row["signal"] for row in outcome.result["differences"]}
     assert "does not tell" in outcome.result["meaning"]
+    assert outcome.passed
+    assert "log–target attitude target" not in {check["name"] for check in outcome.result["checks"]}
 
 
 def test_the_verdict_of_a_board_is_not_asked_for_the_same_bits(log: Any, tmp_path: Path) -> None:
@@ -151,6 +153,18 @@ def test_the_verdict_of_a_board_is_not_asked_for_the_same_bits(log: Any, tmp_pat
     assert not judged(replay, shaken, None, True, FACTS).passed
     assert judged(replay, shaken, None, False, FACTS).passed
     assert not judged(replay, outputs * 1.01, None, False, FACTS).passed
+
+
+def test_a_replay_that_compares_nothing_passes_nothing(log: Any, tmp_path: Path) -> None:
+    replay = prepared(log(flown("c")), None)
+    outputs, _ = fed(replay, "c", tmp_path, Console(quiet=True))
+    deaf = replay._replace(flight=without(replay.flight, "rotor_command"))
+    (failed,) = [c for c in judged(deaf, outputs, None, True, FACTS).result["checks"] if not c["passed"]]
+    assert failed["name"] == "log–target actuators"
+    assert failed["about"] == "rotor speed commands: no samples to compare"
+    shifted = replay.record._replace(time_us=replay.record.time_us + 1)
+    checks = judged(replay._replace(record=shifted), outputs, None, True, FACTS).result["checks"]
+    assert not any(check["passed"] for check in checks)
 
 
 def without(flight: FlightSamples, name: str) -> FlightSamples:

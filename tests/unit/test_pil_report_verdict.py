@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flightstack.mavlink.services.pil_operations import BAD_INPUT, OVERRUN, REPEATED
 from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
-from gcs_cli.pil.signals import SIGNALS
+from gcs_cli.pil.signals import SIGNALS, STAGES
 from gcs_cli.pil.target_record import TargetRecord, record_of
 from gcs_cli.pil.verdict import CLOSED_LOOP_ULPS, OPEN_LOOP_ULPS, Check, all_passed
 from tests.unit.test_pil_report_compare import changed, flight
@@ -27,12 +28,16 @@ IDENTITY = {
     "char_bits": 8,
 }
 STATUS = {
+    "time_boot_ms": 90_000,
+    "steps": 2,
     "uart_overruns": 77,
     "safe_states": 0,
     "loop_overruns": 0,
     "stack_size": 4096,
     "stack_high_water": 876,
+    "state": 0,
 }
+"""Before the flight: of the flights before."""
 FACTS: dict[str, Any] = {
     "title": "<hop>: MIL & PIL",
     "about": "vehicle x · target emulated",
@@ -41,12 +46,15 @@ FACTS: dict[str, Any] = {
 }
 
 
-def record(steps: int = 9, **status: int) -> TargetRecord:
+def record(steps: int = 9, told: bool = True, statuses: tuple[int, ...] = (), **counted: int) -> TargetRecord:
+    """``counted`` in the flight; ``statuses`` of the first steps, 0 of the others."""
     costs = np.array([[700.0 * (row % 5 == 0), 650.0, 430.0, 1200.0 + row] for row in range(steps)])
     link = {"operations": steps, "resent": 5, "late": 2}
     trips = {"min": 1e-4, "mean": 2e-4, "median": 2e-4, "p99": 3e-4, "max": 4e-4}
-    content = {"identity": IDENTITY, "link": link, "round_trip_s": trips, "status": {**STATUS, **status}}
-    return record_of({**content, "ending": None}, costs)
+    after = {name: (value + counted.get(name, 0)) % 2**32 for name, value in STATUS.items()}
+    content = {"identity": IDENTITY, "link": link, "round_trip_s": trips, "status_at_start": STATUS}
+    flags = np.array([*statuses, *[0] * steps][:steps])
+    return record_of({**content, "status": after if told else None, "ending": None}, costs, flags)
 
 
 def three(
@@ -104,6 +112,75 @@ def test_a_target_that_missed_steps_or_failed_fails_the_verdict() -> None:
     assert failed(three(of=record(loop_overruns=2))) == ["steps that overran their period"]
 
 
+@pytest.mark.parametrize("before", [3, 2**32 - 1], ids=["some", "about to wrap"])
+def test_what_a_target_counted_in_earlier_flights_is_not_held_against_this_one(
+    before: int, monkeypatch
+) -> None:
+    for name in ("safe_states", "loop_overruns", "uart_overruns"):
+        monkeypatch.setitem(STATUS, name, before)
+    outcome = three()
+    assert outcome.passed
+    assert outcome.result["target_counters"]["uart_overruns"] == 0
+    assert outcome.result["target_status_before"]["uart_overruns"] == before
+    outcome = three(of=record(safe_states=1, uart_overruns=2))
+    assert failed(outcome) == ["safe states of the target"]
+    assert outcome.result["target_counters"]["uart_overruns"] == 2
+
+
+def test_a_target_that_does_not_tell_its_counters_fails_and_the_steps_are_judged_all_the_same() -> None:
+    untold = "counters that the target did not tell"
+    assert failed(three(of=record(told=False))) == [untold]
+    overran = record(told=False, statuses=(0, OVERRUN | REPEATED, OVERRUN))
+    assert failed(three(of=overran)) == [untold, "steps that overran their period"]
+    stopped = record(told=False, statuses=(BAD_INPUT,))
+    assert failed(three(of=stopped)) == [untold, "safe states of the target"]
+    outcome = three(
+        of=record(statuses=(OVERRUN, OVERRUN), loop_overruns=1)
+    )  # a report that came twice counts once
+    assert [
+        c["measured"] for c in outcome.result["checks"] if c["name"] == "steps that overran their period"
+    ] == [2]
+    page = parsed(render_report(three(of=record(told=False)).result, [], []))
+    assert "did not tell them in the end" in page.text
+
+
+def test_a_target_without_a_record_passes_nothing() -> None:
+    facts = {"directory": "x", "sim_time_s": 1.0, "wall_time_s": 0.5, "log_sha256": "0"}
+    flown = {stage: Flown(COMPLETED, flight(), facts) for stage in ("MIL", "SIL", "PIL")}
+    assert failed(closed_loop(flown, None, True, FACTS)) == ["steps flown without the target"]
+
+
+def test_flights_that_have_no_tick_in_common_are_not_the_same() -> None:
+    names = failed(three(flight(start_us=9_000_000)))
+    for pair in ("MIL–PIL", "SIL–PIL"):
+        assert {f"{pair} {stage}" for stage in STAGES} <= set(names)
+    assert "SIL–PIL ticks of another status" in names
+    assert not any(name.startswith("MIL–SIL") for name in names)
+
+
+@pytest.mark.parametrize("signal", [signal.name for signal in SIGNALS])
+@pytest.mark.parametrize("same_bits", [True, False])
+def test_a_signal_that_is_not_there_fails_its_stage(signal: str, same_bits: bool) -> None:
+    """Without its position, nobody knows whether a vehicle is in the air: nothing can be compared with MIL then."""
+    target = flight()
+    target = target._replace(signals={name: s for name, s in target.signals.items() if name != signal})
+    outcome = three(target, same_bits)
+    stage = next(each.stage for each in SIGNALS if each.name == signal)
+    assert {f"MIL–PIL {stage}", f"SIL–PIL {stage}"} <= set(failed(outcome))
+    about = [check["about"] for check in outcome.result["checks"] if check["name"] == f"SIL–PIL {stage}"]
+    assert "no samples to compare" in about[0]
+    json.dumps(outcome.result, allow_nan=False)
+
+
+def test_a_flight_whose_log_cannot_be_read_fails_the_verdict() -> None:
+    facts = {"directory": "x", "sim_time_s": 1.0, "wall_time_s": 0.5}
+    flown = {stage: Flown(COMPLETED, flight(), facts) for stage in ("MIL", "SIL", "PIL")}
+    flown["PIL"] = flown["PIL"]._replace(samples=None)
+    outcome = closed_loop(flown, record(), True, FACTS)
+    assert failed(outcome) == ["flights that failed"]
+    assert "PIL: its log is not readable" in outcome.result["checks"][0]["about"]
+
+
 def test_a_flight_that_failed_or_was_not_flown_fails_the_verdict() -> None:
     outcome = three(PIL="the target was lost")
     assert failed(outcome) == ["flights that failed"]
@@ -154,7 +231,8 @@ def test_the_report_is_sound_html_that_needs_nothing_else() -> None:
         "mil/report.html", "sil/report.html", "pil/report.html",
     ]  # fmt: skip
     assert "[instructions]" in page.text
-    assert "target: uart overruns77" in page.text
+    assert "target: uart overruns0" in page.text  # those before the flight are not this flight's
+    assert "ready, up for 90.0 s; steps 2, uart overruns 77" in page.text
     assert "no time" in page.text  # instructions are no time
 
 

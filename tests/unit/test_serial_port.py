@@ -53,6 +53,12 @@ def test_what_came_before_it_was_opened_is_dropped() -> None:
     os.close(theirs)
 
 
+@pytest.mark.parametrize("path", ["/dev/null", "/dev/zero", __file__])
+def test_what_is_no_serial_port_says_so(path: str) -> None:
+    with pytest.raises(LineError, match=f"^{path}: is no serial port$"):
+        SerialPort(path, 115_200)
+
+
 def test_a_line_whose_other_end_is_gone_says_so(line: tuple[int, SerialPort]) -> None:
     ours, port = line
     os.close(ours)

@@ -115,6 +115,7 @@ class Step:
             return False
         if report.status & BAD_INPUT:
             self.failure = f"stopped its rotors at step {self._number}: it was given bad input"
+            self.result = report  # what it says of the step is kept
             return True
         self.result = report
         return True
@@ -201,11 +202,18 @@ class Request:
         return f"{asked}: is the firmware on it, and the baud rate right?"
 
 
+_NOT_REFUSED = (
+    mavlink.MAV_RESULT_ACCEPTED,
+    mavlink.MAV_RESULT_IN_PROGRESS,
+    mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
+)
+
+
 def _is_refusal(message: Message) -> bool:
-    """Tell whether a message says that the one asked for does not exist."""
+    """Tell whether a message says that the one asked for does not exist; who has no room for it is asked again."""
     if message.get_type() != "COMMAND_ACK" or message.command != mavlink.MAV_CMD_REQUEST_MESSAGE:
         return False
-    return message.result not in (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
+    return message.result not in _NOT_REFUSED
 
 
 def message_of(codec: Link, frame: Frame) -> Message | None:
