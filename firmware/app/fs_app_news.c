@@ -47,8 +47,9 @@ void fs_app_send_status(fs_app *app, uint16_t reserve)
     message.frames = app->parser.good;
     message.bad_frames = app->parser.bad + app->parser.unknown;
     message.skipped_octets = app->parser.skipped;
-    message.uart_overruns = app->uart_overruns + app->outbox.dropped;
+    message.uart_overruns = app->uart_overruns;
     message.uart_errors = app->uart_errors;
+    message.dropped_frames = app->outbox.dropped;
     message.loop_overruns = app->loop_overruns;
     message.safe_states = app->safe_states;
     message.stack_size = app->port->stack_size;

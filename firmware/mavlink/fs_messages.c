@@ -60,7 +60,7 @@ uint16_t fs_message_kind_of(uint32_t id, fs_message_kind *kind)
         break;
     case FS_PIL_STATUS_ID:
         kind->length = FS_PIL_STATUS_LENGTH;
-        kind->crc_extra = 197U;
+        kind->crc_extra = 36U;
         break;
     case FS_PIL_IDENTITY_ID:
         kind->length = FS_PIL_IDENTITY_LENGTH;
@@ -352,12 +352,13 @@ uint16_t fs_pil_status_encode(const fs_pil_status *m, fs_octet *payload)
     fs_put_u32(&payload[20], m->bad_frames);
     fs_put_u32(&payload[24], m->skipped_octets);
     fs_put_u32(&payload[28], m->uart_overruns);
-    fs_put_u32(&payload[32], m->uart_errors);
-    fs_put_u32(&payload[36], m->loop_overruns);
-    fs_put_u32(&payload[40], m->safe_states);
-    fs_put_u32(&payload[44], m->stack_size);
-    fs_put_u32(&payload[48], m->stack_high_water);
-    fs_put_octet(&payload[52], m->state);
+    fs_put_u32(&payload[32], m->dropped_frames);
+    fs_put_u32(&payload[36], m->uart_errors);
+    fs_put_u32(&payload[40], m->loop_overruns);
+    fs_put_u32(&payload[44], m->safe_states);
+    fs_put_u32(&payload[48], m->stack_size);
+    fs_put_u32(&payload[52], m->stack_high_water);
+    fs_put_octet(&payload[56], m->state);
     return fs_trimmed(payload, FS_PIL_STATUS_LENGTH);
 }
 
@@ -371,12 +372,13 @@ void fs_pil_status_decode(const fs_octet *payload, uint16_t length, fs_pil_statu
     m->bad_frames = fs_get_u32(payload, length, 20U);
     m->skipped_octets = fs_get_u32(payload, length, 24U);
     m->uart_overruns = fs_get_u32(payload, length, 28U);
-    m->uart_errors = fs_get_u32(payload, length, 32U);
-    m->loop_overruns = fs_get_u32(payload, length, 36U);
-    m->safe_states = fs_get_u32(payload, length, 40U);
-    m->stack_size = fs_get_u32(payload, length, 44U);
-    m->stack_high_water = fs_get_u32(payload, length, 48U);
-    m->state = fs_get_octet(payload, length, 52U);
+    m->dropped_frames = fs_get_u32(payload, length, 32U);
+    m->uart_errors = fs_get_u32(payload, length, 36U);
+    m->loop_overruns = fs_get_u32(payload, length, 40U);
+    m->safe_states = fs_get_u32(payload, length, 44U);
+    m->stack_size = fs_get_u32(payload, length, 48U);
+    m->stack_high_water = fs_get_u32(payload, length, 52U);
+    m->state = fs_get_octet(payload, length, 56U);
 }
 
 uint16_t fs_pil_identity_encode(const fs_pil_identity *m, fs_octet *payload)

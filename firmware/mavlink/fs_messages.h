@@ -204,7 +204,7 @@ void fs_pil_report_decode(const fs_octet *payload, uint16_t length, fs_pil_repor
 
 /* FS_PIL_STATUS */
 #define FS_PIL_STATUS_ID 53012U
-#define FS_PIL_STATUS_LENGTH 53U
+#define FS_PIL_STATUS_LENGTH 57U
 typedef struct {
     uint32_t time_boot_ms; /* ms */
     uint32_t steps;
@@ -214,6 +214,7 @@ typedef struct {
     uint32_t bad_frames;
     uint32_t skipped_octets;
     uint32_t uart_overruns;
+    uint32_t dropped_frames;
     uint32_t uart_errors;
     uint32_t loop_overruns;
     uint32_t safe_states;

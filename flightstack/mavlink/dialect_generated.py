@@ -182,7 +182,7 @@ LAYOUTS = (
     Layout(
         53012,
         "FS_PIL_STATUS",
-        197,
+        36,
         (
             Field("time_boot_ms", "I", 1, False, "uint32_t", "ms", 0),
             Field("steps", "I", 1, False, "uint32_t", "", 1),
@@ -192,12 +192,13 @@ LAYOUTS = (
             Field("bad_frames", "I", 1, False, "uint32_t", "", 5),
             Field("skipped_octets", "I", 1, False, "uint32_t", "", 6),
             Field("uart_overruns", "I", 1, False, "uint32_t", "", 7),
-            Field("uart_errors", "I", 1, False, "uint32_t", "", 8),
-            Field("loop_overruns", "I", 1, False, "uint32_t", "", 9),
-            Field("safe_states", "I", 1, False, "uint32_t", "", 10),
-            Field("stack_size", "I", 1, False, "uint32_t", "", 11),
-            Field("stack_high_water", "I", 1, False, "uint32_t", "", 12),
-            Field("state", "B", 1, False, "uint8_t", "", 13),
+            Field("dropped_frames", "I", 1, False, "uint32_t", "", 8),
+            Field("uart_errors", "I", 1, False, "uint32_t", "", 9),
+            Field("loop_overruns", "I", 1, False, "uint32_t", "", 10),
+            Field("safe_states", "I", 1, False, "uint32_t", "", 11),
+            Field("stack_size", "I", 1, False, "uint32_t", "", 12),
+            Field("stack_high_water", "I", 1, False, "uint32_t", "", 13),
+            Field("state", "B", 1, False, "uint8_t", "", 14),
         ),
     ),
     Layout(
