@@ -25,10 +25,14 @@ void fs_app_init(fs_app *app, const fs_port *port)
     app->uart_overruns = 0UL;
     app->uart_errors = 0UL;
     app->told_overruns = 0UL;
+    app->alarm = NULL;
+    app->alarm_severity = 0U;
     app->next_listed = fs_param_count();
     fs_app_forget_flight(app);
+    app->state = FS_APP_READY;
     if (port->was_watchdog != 0U) {
         app->state = FS_APP_RESTARTED;
+        fs_app_raise_alarm(app, FS_MAV_SEVERITY_CRITICAL, "Restarted by the watchdog: parameters are lost");
     }
 }
 
@@ -111,18 +115,16 @@ static uint16_t is_due(const fs_app *app, uint32_t *last_ms)
 
 static void tell_news(fs_app *app)
 {
-    if ((app->is_polled == 0U) && (app->state == FS_APP_RESTARTED)) {
-        fs_app_send_text(app, FS_MAV_SEVERITY_CRITICAL, "Restarted by the watchdog: parameters are lost");
-    }
+    fs_app_tell_alarm(app);
     if (is_due(app, &app->last_heartbeat_ms) != 0U) {
-        fs_app_send_heartbeat(app);
+        (void)fs_app_send_heartbeat(app, (fs_app_is_stopped(app) != 0U) ? FS_OUTBOX_ALARM : FS_OUTBOX_NEWS);
     }
     if (is_due(app, &app->last_status_ms) != 0U) {
-        fs_app_send_status(app, FS_OUTBOX_NEWS);
+        (void)fs_app_send_status(app, FS_OUTBOX_NEWS);
     }
     if ((app->uart_overruns != app->told_overruns) && (is_due(app, &app->last_complaint_ms) != 0U)) {
         app->told_overruns = app->uart_overruns;
-        fs_app_send_text(app, FS_MAV_SEVERITY_WARNING, "Serial port overrun: octets were lost");
+        (void)fs_app_send_text(app, FS_MAV_SEVERITY_WARNING, "Serial port overrun: octets were lost", FS_OUTBOX_NEWS);
     }
 }
 
@@ -158,6 +160,9 @@ uint32_t fs_app_wait_ms(const fs_app *app)
     }
     if (app->state == FS_APP_STEPPING) {
         wait_at_most(app, app->last_step_ms, FS_APP_STEP_TIMEOUT_MS, &wait_ms);
+    }
+    if (app->alarm != NULL) { /* the outbox may have room soon */
+        wait_at_most(app, app->now_ms, FS_APP_SILENCE_MS, &wait_ms);
     }
     return wait_ms;
 }

@@ -79,6 +79,8 @@ typedef struct {
     uint32_t steps, repeats, out_of_order, loop_overruns, safe_states;
 
     uint32_t uart_overruns, uart_errors, told_overruns; /* the last: of those that were complained about */
+    const char *alarm;                                  /* a text that waits for room in the outbox; NULL: none */
+    uint16_t alarm_severity;
     uint16_t next_listed;                               /* index of the next parameter of a list; the count: no list */
 } fs_app;
 

@@ -14,7 +14,7 @@
 #define LAST_MESSAGE_ID 16777215.0F /* ids have 24 bits */
 #define REBOOT 1.0F
 
-static void send_identity(fs_app *app)
+static uint16_t send_identity(fs_app *app)
 {
     fs_pil_identity message;
     uint16_t length;
@@ -28,10 +28,10 @@ static void send_identity(fs_app *app)
     fs_text_put(message.compiler, COMPILER_SIZE, app->port->compiler);
     message.compiler[COMPILER_SIZE - 1U] = 0U; /* a cut version must not look whole to who wants a NUL */
     length = fs_pil_identity_encode(&message, app->payload);
-    (void)fs_outbox_put(&app->outbox, FS_PIL_IDENTITY_ID, app->payload, length, FS_OUTBOX_ANSWER);
+    return fs_outbox_put(&app->outbox, FS_PIL_IDENTITY_ID, app->payload, length, FS_OUTBOX_ANSWER);
 }
 
-static void send_version(fs_app *app)
+static uint16_t send_version(fs_app *app)
 {
     static const fs_autopilot_version blank = {0};
     fs_autopilot_version message = blank;
@@ -40,38 +40,54 @@ static void send_version(fs_app *app)
     message.capabilities.low = FS_MAV_PROTOCOL_CAPABILITY_MAVLINK2 | FS_MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST;
     fs_put_octets(message.flight_custom_version, app->port->source_hash, HASH_SIZE);
     length = fs_autopilot_version_encode(&message, app->payload);
-    (void)fs_outbox_put(&app->outbox, FS_AUTOPILOT_VERSION_ID, app->payload, length, FS_OUTBOX_ANSWER);
+    return fs_outbox_put(&app->outbox, FS_AUTOPILOT_VERSION_ID, app->payload, length, FS_OUTBOX_ANSWER);
 }
 
 /* Send the message of this id; returns the result to acknowledge. */
 static uint16_t request_message(fs_app *app, float id)
 {
-    uint16_t result = FS_MAV_RESULT_ACCEPTED;
+    uint16_t result = FS_MAV_RESULT_ACCEPTED, is_sent = 1U;
 
     if (!((id >= 0.0F) && (id <= LAST_MESSAGE_ID))) { /* also when it is NaN */
         return FS_MAV_RESULT_DENIED;
     }
     switch ((uint32_t)id) {
     case FS_HEARTBEAT_ID:
-        fs_app_send_heartbeat(app);
+        is_sent = fs_app_send_heartbeat(app, FS_OUTBOX_ANSWER);
         break;
     case FS_AUTOPILOT_VERSION_ID:
-        send_version(app);
+        is_sent = send_version(app);
         break;
     case FS_PIL_STATUS_ID:
-        fs_app_send_status(app, FS_OUTBOX_ANSWER);
+        is_sent = fs_app_send_status(app, FS_OUTBOX_ANSWER);
         break;
     case FS_PIL_IDENTITY_ID:
-        send_identity(app);
+        is_sent = send_identity(app);
         break;
     default:
         result = FS_MAV_RESULT_UNSUPPORTED;
         break;
     }
+    if (is_sent == 0U) { /* there was no room: the client asks again */
+        result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
+    }
     return result;
 }
 
-/* Begin anew as after power-up, but for the counters: parameters at their defaults, no flight. */
+static void tell_reboot(fs_app *app)
+{
+    if (fs_app_is_stopped(app) != 0U) {
+        fs_app_raise_alarm(app, FS_MAV_SEVERITY_CRITICAL, "Parameters at defaults; stopped until RESET");
+    } else {
+        (void)fs_app_send_text(app, FS_MAV_SEVERITY_NOTICE, "Loops restarted: parameters at their defaults",
+                               FS_OUTBOX_ANSWER);
+    }
+}
+
+/*
+ * Begin anew as after power-up, but for the counters: parameters at their defaults, no flight. A target that was
+ * stopped stays so: only a host that knows of it, and says RESET, lets it fly again.
+ */
 static uint16_t reboot(fs_app *app, float what)
 {
     uint16_t result = FS_MAV_RESULT_ACCEPTED;
@@ -82,7 +98,7 @@ static uint16_t reboot(fs_app *app, float what)
         result = FS_MAV_RESULT_TEMPORARILY_REJECTED;
     } else {
         fs_app_forget_flight(app);
-        fs_app_send_text(app, FS_MAV_SEVERITY_NOTICE, "Loops restarted: parameters at their defaults");
+        tell_reboot(app);
     }
     return result;
 }

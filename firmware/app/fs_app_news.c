@@ -3,6 +3,7 @@
 
 #define MAVLINK_VERSION 3U
 #define TEXT_SIZE 50U
+#define ALARM_ROOM 96U /* octets: a text's frame has 66 at most, a heartbeat's 21 */
 
 static uint16_t system_status(uint16_t state)
 {
@@ -20,7 +21,7 @@ static uint16_t system_status(uint16_t state)
     return status;
 }
 
-void fs_app_send_heartbeat(fs_app *app)
+uint16_t fs_app_send_heartbeat(fs_app *app, uint16_t reserve)
 {
     fs_heartbeat message;
     uint16_t length;
@@ -32,10 +33,10 @@ void fs_app_send_heartbeat(fs_app *app)
     message.system_status = system_status(app->state);
     message.mavlink_version = MAVLINK_VERSION;
     length = fs_heartbeat_encode(&message, app->payload);
-    (void)fs_outbox_put(&app->outbox, FS_HEARTBEAT_ID, app->payload, length, FS_OUTBOX_NEWS);
+    return fs_outbox_put(&app->outbox, FS_HEARTBEAT_ID, app->payload, length, reserve);
 }
 
-void fs_app_send_status(fs_app *app, uint16_t reserve)
+uint16_t fs_app_send_status(fs_app *app, uint16_t reserve)
 {
     fs_pil_status message;
     uint16_t length;
@@ -56,10 +57,10 @@ void fs_app_send_status(fs_app *app, uint16_t reserve)
     message.stack_high_water = (app->port->stack_high_water != NULL) ? app->port->stack_high_water() : 0UL;
     message.state = app->state;
     length = fs_pil_status_encode(&message, app->payload);
-    (void)fs_outbox_put(&app->outbox, FS_PIL_STATUS_ID, app->payload, length, reserve);
+    return fs_outbox_put(&app->outbox, FS_PIL_STATUS_ID, app->payload, length, reserve);
 }
 
-void fs_app_send_text(fs_app *app, uint16_t severity, const char *text)
+uint16_t fs_app_send_text(fs_app *app, uint16_t severity, const char *text, uint16_t reserve)
 {
     fs_statustext message;
     uint16_t length;
@@ -69,5 +70,21 @@ void fs_app_send_text(fs_app *app, uint16_t severity, const char *text)
     message.id = 0U;
     message.chunk_seq = 0U;
     length = fs_statustext_encode(&message, app->payload);
-    (void)fs_outbox_put(&app->outbox, FS_STATUSTEXT_ID, app->payload, length, FS_OUTBOX_NEWS);
+    return fs_outbox_put(&app->outbox, FS_STATUSTEXT_ID, app->payload, length, reserve);
+}
+
+void fs_app_raise_alarm(fs_app *app, uint16_t severity, const char *text)
+{
+    app->alarm = text;
+    app->alarm_severity = severity;
+    fs_app_tell_alarm(app);
+}
+
+void fs_app_tell_alarm(fs_app *app)
+{
+    if ((app->alarm != NULL) && (fs_outbox_room(&app->outbox) >= ALARM_ROOM)) {
+        (void)fs_app_send_text(app, app->alarm_severity, app->alarm, FS_OUTBOX_ALARM);
+        (void)fs_app_send_heartbeat(app, FS_OUTBOX_ALARM);
+        app->alarm = NULL;
+    }
 }

@@ -7,15 +7,28 @@
 /* Tell whether a message with these targets is for this target; 0 is everybody. */
 uint16_t fs_app_is_target(fs_octet system, fs_octet component);
 
-/* fs_app_news.c: what a target says by itself. They are dropped, and counted, when the line is busy. */
-void fs_app_send_heartbeat(fs_app *app);
-void fs_app_send_status(fs_app *app, uint16_t reserve);
-void fs_app_send_text(fs_app *app, uint16_t severity, const char *text);
+/* Tell whether no step is taken until one with RESET: in the safe state, and after a restart by the watchdog. */
+uint16_t fs_app_is_stopped(const fs_app *app);
+
+/*
+ * fs_app_news.c: what a target says by itself. When less than `reserve` octets would stay free in the outbox, a message
+ * is dropped and counted, and 0 returned.
+ */
+uint16_t fs_app_send_heartbeat(fs_app *app, uint16_t reserve);
+uint16_t fs_app_send_status(fs_app *app, uint16_t reserve);
+uint16_t fs_app_send_text(fs_app *app, uint16_t severity, const char *text, uint16_t reserve);
+
+/*
+ * An alarm is a text with a heartbeat behind it, which need no reserve. It waits until both have room; of two that wait
+ * the newer one is told. The text must last.
+ */
+void fs_app_raise_alarm(fs_app *app, uint16_t severity, const char *text);
+void fs_app_tell_alarm(fs_app *app); /* if there is one, and room */
 
 /* fs_app_pil.c: steps of the loops */
 void fs_app_on_step(fs_app *app);
 void fs_app_on_new_numbers(fs_app *app);
-void fs_app_forget_flight(fs_app *app); /* step 0 or one with RESET is expected next */
+void fs_app_forget_flight(fs_app *app); /* step 0 or one with RESET is expected next; the state stays */
 
 /* fs_app_params.c */
 void fs_app_on_param_list(fs_app *app);

@@ -7,9 +7,13 @@
 void fs_app_forget_flight(fs_app *app)
 {
     fs_loops_init(&app->loops);
-    app->state = FS_APP_READY;
     app->expected = 0UL;
     app->has_stepped = 0U;
+}
+
+uint16_t fs_app_is_stopped(const fs_app *app)
+{
+    return ((app->state == FS_APP_SAFE) || (app->state == FS_APP_RESTARTED)) ? 1U : 0U;
 }
 
 /* A flight that begins as the last one did, but with other numbers, is another one: its first step is not a repeated one. */
@@ -84,8 +88,7 @@ static void stop_rotors(fs_app *app, const fs_pil_step *step, const char *fault)
         app->state = FS_APP_SAFE;
         app->has_stepped = 0U;
         app->safe_states++;
-        fs_app_send_text(app, FS_MAV_SEVERITY_EMERGENCY, fault);
-        fs_app_send_heartbeat(app);
+        fs_app_raise_alarm(app, FS_MAV_SEVERITY_EMERGENCY, fault);
     }
 }
 

@@ -29,6 +29,11 @@ uint16_t fs_outbox_put(fs_outbox *box, uint32_t id, const fs_octet *payload, uin
     return 1U;
 }
 
+uint16_t fs_outbox_room(const fs_outbox *box)
+{
+    return (uint16_t)(FS_OUTBOX_SIZE - box->count);
+}
+
 uint16_t fs_outbox_take(fs_outbox *box, fs_octet *out, uint16_t room)
 {
     uint16_t i, taken = (box->count < room) ? box->count : room;

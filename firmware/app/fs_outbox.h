@@ -12,6 +12,7 @@
 #define FS_OUTBOX_SIZE 1024U /* octets: 89 ms at 115200 baud */
 
 /* Reserves, in octets that must stay free. A report's frame has 160. */
+#define FS_OUTBOX_ALARM 0U   /* why the rotors are stopped: whoever listens has to know */
 #define FS_OUTBOX_REPORT 0U  /* reports of steps: what a host waits for in each step */
 #define FS_OUTBOX_ANSWER 320U /* answers to requests, which are asked again when they are lost */
 #define FS_OUTBOX_NEWS 640U  /* heartbeat, status, texts: nobody waits for one of them */
@@ -28,6 +29,9 @@ void fs_outbox_init(fs_outbox *box);
 
 /* Put a frame from this system's autopilot; 0, and counted, when more than `reserve` octets would not stay free. */
 uint16_t fs_outbox_put(fs_outbox *box, uint32_t id, const fs_octet *payload, uint16_t length, uint16_t reserve);
+
+/* Return how many octets are free. */
+uint16_t fs_outbox_room(const fs_outbox *box);
 
 /* Take at most `room` octets, in order; returns how many. */
 uint16_t fs_outbox_take(fs_outbox *box, fs_octet *out, uint16_t room);

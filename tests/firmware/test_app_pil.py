@@ -256,6 +256,85 @@ def test_the_text_is_said_once(target: Target) -> None:
     assert first.count("STATUSTEXT") == 1
 
 
+def is_alarm(messages: list[object]) -> bool:
+    """Tell whether an EMERGENCY text and heartbeat are among messages."""
+    texts = [m.text for m in messages if m.get_type() == "STATUSTEXT" and m.severity == EMERGENCY]  # type: ignore[attr-defined]
+    beats = [m for m in messages if m.get_type() == "HEARTBEAT" and m.system_status == IN_EMERGENCY]  # type: ignore[attr-defined]
+    return texts == ["State is not finite: rotors stopped"] and len(beats) >= 1
+
+
+@pytest.mark.parametrize("news", [0, 40])
+@pytest.mark.parametrize("answers", range(0, 14))
+def test_an_alarm_needs_no_room_that_others_may_not_take(target: Target, news: int, answers: int) -> None:
+    """News and answers have filled what they may fill of the outbox when the bad input comes."""
+    target.step(0, RESET)
+    for _ in range(news):
+        target.poll(1_000)
+    for _ in range(4 * answers):
+        target.give(target.pack(mavlink.MAVLink_ping_message(1, 1, 0, 0)))
+    target.give(target.pack(step(1, 0, [math.nan] * 13)))
+    assert is_alarm(target.heard())
+
+
+def test_an_alarm_waits_for_room_and_is_told_once(target: Target) -> None:
+    """Reports have filled the outbox to the last octet."""
+    target.poll()
+    target.step(0, RESET)
+    for _ in range(20):
+        target.give(target.pack(step(0, RESET)))
+    target.give(target.pack(step(1, 0, [math.nan] * 13)))
+    assert target.state == SAFE
+    dropped = "FS_PIL_REPORT"
+    for _ in range(5):
+        target.poll(1)
+    assert target.wait_ms == 20
+    assert set(kinds(target.heard())) == {dropped}
+    counted = target.status().dropped_frames
+    target.poll(1)
+    assert is_alarm(target.heard())
+    assert target.wait_ms > 20
+    target.poll(1)
+    assert target.heard() == []
+    assert target.status().dropped_frames == counted  # an alarm that waits is none of them
+
+
+def test_the_heartbeat_of_the_safe_state_needs_no_room_that_others_may_not_take(target: Target) -> None:
+    target.step(0, RESET)
+    target.step(1, 0, [math.nan] * 13)
+    for _ in range(40):
+        target.give(target.pack(mavlink.MAVLink_ping_message(1, 1, 0, 0)))
+    target.poll(1_000)
+    assert "HEARTBEAT" in kinds(target.heard())
+
+
+def test_a_reboot_does_not_end_the_safe_state(target: Target) -> None:
+    """The parameters are at their defaults, and everybody is told; only a sound step with RESET flies again."""
+    target.ask(mavlink.MAVLink_param_set_message(1, 1, b"POS_Z_P", 3.0, 9))
+    target.step(0, RESET)
+    target.step(1, 0, [math.nan] * 13)
+    text, heartbeat, ack = target.ask(command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1))
+    assert (text.severity, text.text) == (2, "Parameters at defaults; stopped until RESET")
+    assert heartbeat.system_status == IN_EMERGENCY
+    assert ack.result == mavlink.MAV_RESULT_ACCEPTED
+    assert target.state == SAFE
+    assert target.step(0).status == BAD_INPUT
+    fresh = Target()
+    assert numbers(target.step(0, RESET | OUTER_DUE)) == numbers(fresh.step(0, RESET | OUTER_DUE))
+    assert target.state == STEPPING
+    fresh.close()
+
+
+def test_a_reboot_does_not_hide_a_restart_by_the_watchdog() -> None:
+    target = Target(was_watchdog=True)
+    target.poll()
+    target.heard()
+    assert kinds(target.ask(command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1)))[0] == "STATUSTEXT"
+    assert target.state == RESTARTED
+    assert target.step(0).status == OUT_OF_ORDER
+    assert target.step(0, RESET).status & OUT_OF_ORDER == 0
+    target.close()
+
+
 def test_finite_input_beyond_all_sense_is_the_loops_business(target: Target) -> None:
     """They repeat their last output and say so, as in Python; nothing not finite leaves the target."""
     target.step(0, RESET | OUTER_DUE)
