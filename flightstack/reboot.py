@@ -22,6 +22,7 @@ def carry_over(old: Stack, new: Stack) -> None:
         new.ground.add_peer(address, permanent)
     new.autopilot.set_home(old.autopilot.home, old.autopilot.places.home_is_chosen)
     new.ground.adopt_plans(old.ground)
+    new.ground.last_heard_s = old.ground.last_heard_s
     new.simulator.resume(old.simulator)
     new.autopilot.has_state = old.autopilot.has_state
     new.autopilot.now.time_us = old.autopilot.now.time_us

@@ -45,7 +45,8 @@ class GroundHub:
         self._facts = facts
         self._own = Address(system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._peers: dict[PeerAddress, Peer] = {}
-        self._services = make_services(self._own, vehicle, facts, self._peer_at)
+        self._setup = signing_setup(self._own, vehicle.autopilot)
+        self._services = [*make_services(self._own, vehicle, facts, self._peer_at), self._setup]
         self._by_type: dict[str, list[Service]] = {}
         for service in self._services:
             for kind in service.handles:
@@ -56,6 +57,8 @@ class GroundHub:
         self._router: Router[PeerAddress] = Router(self._own)
         self._to_forward: deque[tuple[PeerAddress, bytes]] = deque(maxlen=MAX_TO_FORWARD)
         self._forget_due_s = -math.inf
+        self.last_heard_s = -math.inf
+        """When any peer was last heard, forgotten ones too; −inf if none ever was."""
         self._made: dict[int, tuple[Message, ...]] = {}
 
     def use_signing(self, signing: Signing, store: Callable[[bytes], None]) -> None:
@@ -64,9 +67,7 @@ class GroundHub:
         A new key that a ground station of this machine sends is kept by ``store``, which may raise OSError.
         """
         self._signing = signing
-        setup = signing_setup(self._own, self._autopilot, signing, store)
-        for kind in setup.handles:
-            self._by_type[kind] = [setup]
+        self._setup.use(signing, store)
 
     # ------------------------------------------------------------------ peers
 
@@ -103,11 +104,6 @@ class GroundHub:
         assert isinstance(address, PeerAddress)
         return self._peers[address]
 
-    @property
-    def last_heard_s(self) -> float:
-        """When any peer was last heard; −inf if none ever was."""
-        return max((peer.heard_s for peer in self._peers.values()), default=-math.inf)
-
     def _forget_silent(self, now_s: float) -> None:
         if now_s < self._forget_due_s:
             return
@@ -141,7 +137,7 @@ class GroundHub:
             return
         for message in peer.link.decode(data):
             if not is_unknown(message):
-                peer.heard_s = now_s
+                peer.heard_s = self.last_heard_s = now_s
             route = self._router.route(message, address, now_s)
             if route.forward and message.get_type() not in NEVER_FORWARDED:
                 frame = bytes(message.get_msgbuf())

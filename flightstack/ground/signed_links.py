@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 
 from flightstack.autopilot import Autopilot
 from flightstack.ground.peer import API, GROUND, PeerAddress
@@ -25,16 +25,12 @@ def link_signing(signing: Signing | None, address: PeerAddress) -> LinkSigning |
     return LinkSigning(signing, _LINK_IDS.get(address.channel, _OTHER_LINK_ID))
 
 
-def signing_setup(
-    own: Address, autopilot: Autopilot, signing: Signing, store: Callable[[bytes], None]
-) -> SigningSetup:
-    """Return the service that takes new keys, from this machine and while disarmed."""
+def signing_setup(own: Address, autopilot: Autopilot) -> SigningSetup:
+    """Return the service that refuses new keys until it is to ``use`` a signing, from this machine then."""
     return SigningSetup(
         own,
-        signing,
         lambda: autopilot.now.status.armed,
         _is_on_this_machine,
-        store,
         lambda text: autopilot.say(NOTICE, text),
     )
 

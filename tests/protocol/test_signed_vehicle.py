@@ -124,6 +124,25 @@ def test_a_key_from_a_network_is_refused(vehicle: SignedVehicle) -> None:
     assert vehicle.signing.is_on
 
 
+def test_a_router_on_this_machine_brings_no_key(vehicle: SignedVehicle) -> None:
+    """Where unsigned messages are taken, a new key still needs the old one."""
+    vehicle.signing.allow_unsigned = True
+    message = common.MAVLink_setup_signing_message(1, 1, list(NO_KEY), 0)
+    answers = of_type(Station(vehicle, None).ask(message), "STATUSTEXT")
+    assert "".join(text.text for text in answers) == (
+        "Signing key refused: the message is not signed with the present key"
+    )
+    assert vehicle.signing.is_on
+    assert vehicle.stored == []
+
+
+def test_a_vehicle_without_a_key_file_says_that_it_takes_none() -> None:
+    world = World()
+    world.send(common.MAVLink_setup_signing_message(1, 1, list(KEY), 0))
+    world.run(0.1)
+    assert world.texts == ["Signing key refused: flightstack was started without --signing-key"]
+
+
 def test_a_key_for_another_vehicle_is_not_passed_on(vehicle: SignedVehicle) -> None:
     other = Station(vehicle, KEY, system=2)
     other.ask(common.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import random
 
 import pytest
 
-from flightstack.ground.hub import FORWARDED_A_POLL, GIVES_WAY_S, MAX_PEERS
+from flightstack.assembly import build
+from flightstack.config import StackConfig
+from flightstack.ground.hub import FORWARDED_A_POLL, GIVES_WAY_S, MAX_PEERS, PEER_FORGOTTEN_S
 from flightstack.ground.peer import GROUND, PeerAddress
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
+from flightstack.reboot import carry_over
 from tests.unit.test_ground_hub import ALICE, BOB, Net
 
 CAMERA = PeerAddress("tcp", "camera", 3)
@@ -137,3 +141,21 @@ def test_a_peer_may_go_in_the_middle_of_a_poll(net: Net) -> None:
     other = BOB if where == ALICE else ALICE
     net.hub.drop_peer(other)
     assert other not in [where for where, _ in poll]
+
+
+def test_who_is_forgotten_or_has_gone_was_heard_nevertheless(net: Net) -> None:
+    assert net.hub.last_heard_s == -math.inf
+    net.join(ALICE)
+    heard_s = net.now_s
+    net.run(2.0 * PEER_FORGOTTEN_S, step_s=0.1)
+    assert net.hub._peers == {}
+    assert net.hub.last_heard_s == heard_s
+    net.hub.receive(BOB, b"noise", net.now_s)
+    assert net.hub.last_heard_s == heard_s
+
+
+def test_a_reboot_does_not_forget_when_somebody_was_heard() -> None:
+    old, new = (build(StackConfig(), lambda: None) for _ in range(2))
+    old.ground.last_heard_s = 12.0
+    carry_over(old, new)
+    assert new.ground.last_heard_s == 12.0

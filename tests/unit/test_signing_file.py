@@ -116,9 +116,9 @@ class Setup:
         self.key_file = key_file
         self.armed = False
         self.said: list[str] = []
-        self.service = SigningSetup(
-            Address(1, 1), self.signing, lambda: self.armed, self.is_secure, self.store, self.said.append
-        )
+        self.service = SigningSetup(Address(1, 1), lambda: self.armed, self.is_secure, self.said.append)
+        if self.signing is not None:
+            self.service.use(self.signing, self.store)
 
     @staticmethod
     def is_secure(peer: Hashable) -> bool:
@@ -129,10 +129,17 @@ class Setup:
         replace_key(self.key_file, key)
 
     def send(
-        self, key: bytes, timestamp: int = 0, peer: str = "loopback", target: tuple[int, int] = (1, 1)
+        self,
+        key: bytes,
+        timestamp: int = 0,
+        peer: str = "loopback",
+        target: tuple[int, int] = (1, 1),
+        signed: bool = True,
     ) -> list[str]:
         self.said.clear()
-        self.service.receive(mavlink.MAVLink_setup_signing_message(*target, list(key), timestamp), peer, 0.0)
+        message = mavlink.MAVLink_setup_signing_message(*target, list(key), timestamp)
+        message._header.incompat_flags = mavlink.MAVLINK_IFLAG_SIGNED if signed else 0
+        self.service.receive(message, peer, 0.0)
         assert self.service.poll(0.0) == []
         assert self.service.next_deadline() is None
         return self.said
@@ -167,6 +174,15 @@ def test_a_key_from_a_network_is_refused(key_file: Path) -> None:
     setup = Setup(key_file)
     assert setup.send(OTHER_KEY, peer="192.0.2.1") == ["Signing key refused: the link is not local"]
     assert load_key(key_file) == KEY
+
+
+def test_a_key_is_changed_by_who_has_it_alone(key_file: Path) -> None:
+    setup = Setup(key_file)
+    refusal = "Signing key refused: the message is not signed with the present key"
+    assert setup.send(OTHER_KEY, signed=False) == [refusal]
+    assert load_key(key_file) == KEY
+    assert setup.send(NO_KEY) == ["Signing is off"]
+    assert setup.send(OTHER_KEY, signed=False) == ["Signing is on: a new key is in use"]  # the first one
 
 
 @pytest.mark.parametrize("target", [(0, 0), (0, 1), (2, 1), (1, 2)])

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
+from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address, is_for
 from flightstack.mavlink.signing import NO_KEY, Signing
 
 
 class SigningSetup:
-    """Changes the key of ``signing``, if the vehicle is disarmed and the message came over a secure link.
+    """Changes the key, if the vehicle is disarmed and the message came over a secure link.
 
-    ``is_secure`` tells so of a peer: whoever listens on the link learns the key. ``store`` keeps the key for the
-    next start and may raise OSError; then the old one stays. Without ``signing`` every key is refused. The message
+    ``is_secure`` tells so of a peer: whoever listens on the link learns the key. While there is a key, a new one is
+    taken from who has the old one alone, also where unsigned messages are taken else: a router on this machine
+    makes what comes from elsewhere look as if it came from here. Before ``use`` every key is refused. The message
     has no answer: ``say`` gets a text.
     """
 
@@ -22,18 +24,24 @@ class SigningSetup:
     def __init__(
         self,
         own: Address,
-        signing: Signing | None,
         is_armed: Callable[[], bool],
         is_secure: Callable[[Hashable], bool],
-        store: Callable[[bytes], None],
         say: Callable[[str], None],
     ) -> None:
         self._own = own
-        self._signing = signing
+        self._signing: Signing | None = None
         self._is_armed = is_armed
         self._is_secure = is_secure
-        self._store = store
+        self._store: Callable[[bytes], None] = lambda _key: None
         self._say = say
+
+    def use(self, signing: Signing, store: Callable[[bytes], None]) -> None:
+        """Change the key of ``signing`` from now on, which has checked what ``receive`` gets.
+
+        ``store`` keeps the key for the next start and may raise OSError; then the old one stays.
+        """
+        self._signing = signing
+        self._store = store
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a SETUP_SIGNING that is meant for this vehicle alone: the key must never be broadcast."""
@@ -44,20 +52,27 @@ class SigningSetup:
         ):
             return
         key = bytes(message.secret_key)
-        reason = self._change(key, message.initial_timestamp, peer)
+        reason = self._refusal(message, peer) or self._change(key, message.initial_timestamp)
         if reason:
             self._say(f"Signing key refused: {reason}")
         else:
             self._say("Signing is off" if key == NO_KEY else "Signing is on: a new key is in use")
 
-    def _change(self, key: bytes, initial_timestamp: int, peer: Hashable) -> str:
-        """Use the key; return why not, empty if done."""
+    def _refusal(self, message: Message, peer: Hashable) -> str:
+        """Return why the message may not change the key; empty if it may."""
         if self._signing is None:
             return "flightstack was started without --signing-key"
         if self._is_armed():
             return "the vehicle is armed"
         if not self._is_secure(peer):
             return "the link is not local"
+        if self._signing.is_on and not message.get_header().incompat_flags & mavlink.MAVLINK_IFLAG_SIGNED:
+            return "the message is not signed with the present key"
+        return ""
+
+    def _change(self, key: bytes, initial_timestamp: int) -> str:
+        """Use the key; return why not, empty if done."""
+        assert self._signing is not None
         try:
             self._store(key)
         except OSError as error:
