@@ -28,14 +28,15 @@ from tests.firmware.f28377s_support import (
 BOTH = pytest.mark.parametrize("flags", [LEVEL, EDGE], ids=["level", "edge"])
 
 
-def serviced(board: Board, octets: float) -> list[int]:
-    """Run the port's serial part alone for a time, as the main loop does; return what it received."""
+def serviced(board: Board, octets: float, pause: float = 0.0) -> list[int]:
+    """Run the port's serial part alone for a time, as a main loop does whose passes take ``pause`` octets more."""
     got: list[int] = []
     end = board.c.fake_time() + octets * board.c.fake_octet_cycles()
     while board.c.fake_time() < end:
         board.c.f28_serial_service()
         got += board.take()
         board.give([])
+        board.idle(octets=pause)
     return got
 
 
@@ -95,31 +96,96 @@ def test_a_fifo_that_overflows_is_counted_and_goes_on(flags: int, tmp_path: Path
 
 
 @BOTH
-def test_a_framing_error_costs_no_other_octet(flags: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("pause", [0.0, 0.37, 0.73, 3.1])
+def test_a_framing_error_costs_no_other_octet(flags: int, pause: float, tmp_path: Path) -> None:
+    """Back to back, and seen while any bit of a later octet is on the line, whose receiver must not begin anew."""
     board = Board(tmp_path, flags=flags)
-    board.line([1, 2, 3 | FRAMING, 4, 5])
-    assert serviced(board, 8) == [1, 2, 3, 4, 5]  # the checksum of the frame judges the 3
-    assert (board.errors, board.overruns) == (1, 0)
+    for first in range(0, 240, 6):
+        octets = [*range(first, first + 3), (first + 3) | FRAMING, *range(first + 4, first + 7)]
+        board.line(octets)
+        assert serviced(board, 14, pause) == [
+            octet & 0xFF for octet in octets
+        ]  # the frame's checksum judges the 4th
+    assert (board.errors, board.overruns) == (40, 0)
     board.nothing_misused()
 
 
 @BOTH
-def test_an_overrun_before_the_fifo_is_counted_and_cleared(flags: int, tmp_path: Path) -> None:
+def test_every_damaged_octet_is_counted(flags: int, tmp_path: Path) -> None:
+    """Also several between two looks of the main loop, which find one flag in the status."""
     board = Board(tmp_path, flags=flags)
-    board.line([1, OVERRUN, 3, PAUSE, PAUSE, OVERRUN | FRAMING, 4])
-    assert serviced(board, 9) == [1, 3, 4]
+    board.line([n | FRAMING for n in range(40)])
+    board.idle(octets=42)
+    assert serviced(board, 2) == list(range(40))
+    assert (board.errors, board.overruns) == (40, 0)
+    board.nothing_misused()
+
+
+@BOTH
+def test_an_overrun_before_the_fifo_is_counted_and_cleared_in_silence(flags: int, tmp_path: Path) -> None:
+    """Only a software reset lowers the flag, and would cost the next octet: while the line is busy it stays up."""
+    board = Board(tmp_path, flags=flags)
+    for start in (0, 100):
+        octets = list(range(start, start + 60))
+        board.line([*octets[:20], OVERRUN, *octets[20:40], OVERRUN | FRAMING, *octets[40:]])
+        assert serviced(board, 65, 0.37) == octets
+        assert board.overruns == (1 if start == 0 else 2)  # two losses under one flag count as one
+        board.idle(ms=4)
+        assert serviced(board, 50) == []  # 4 ms of silence: it falls
     assert (board.errors, board.overruns) == (0, 2)
     board.nothing_misused()
 
 
 @BOTH
-def test_the_receiver_comes_back_after_a_break(flags: int, tmp_path: Path) -> None:
-    """After a break the SCI receives nothing until its software reset; octets from before it are kept."""
+def test_a_reset_for_an_overrun_waits_for_what_is_sent(flags: int, tmp_path: Path) -> None:
     board = Board(tmp_path, flags=flags)
-    board.line([1, 2, BREAK, PAUSE, 3, 4])
-    assert serviced(board, 9) == [1, 2, 3, 4]
-    assert board.errors == 1
+    board.line([OVERRUN])
+    octets = [n % 256 for n in range(500)]
+    assert board.give(octets) == 500
+    assert serviced(board, 520) == []
+    assert board.sent() == octets
+    serviced(board, 60)
+    board.line([OVERRUN])
+    serviced(board, 3)
+    assert board.overruns == 2  # so the flag was down again
     board.nothing_misused()
+
+
+@BOTH
+def test_the_receiver_comes_back_after_a_break(flags: int, tmp_path: Path) -> None:
+    """It begins as an octet 0 without a stop bit; then nothing comes until the reset. What came before is kept."""
+    board = Board(tmp_path, flags=flags)
+    board.line([1, 2, 0 | FRAMING, BREAK, PAUSE, 3, 4])
+    assert serviced(board, 10) == [1, 2, 0, 3, 4]
+    assert (board.errors, board.overruns) == (2, 0)
+    board.nothing_misused()
+
+
+def test_a_reset_amid_an_octet_would_cost_more_than_it(tmp_path: Path) -> None:
+    """The simulated receiver loses it and reads false octets until a pause: else the tests above could not fail."""
+    board, octets = Board(tmp_path), [0x55, 0x0F, 0xA3, 0x11, 0x80, 0x7E, 0x20, 0x31]
+    board.line([*octets, PAUSE, 0x41])
+    board.idle(octets=2.45)
+    assert serviced(board, 0.01) == octets[:2]
+    board.c.SCI_performSoftwareReset(0x7200)
+    got = serviced(board, 12)
+    assert got[-1] == 0x41
+    assert got[:-1] != octets[3:]
+    assert board.errors > 0
+    assert octets[2] not in got
+
+
+@BOTH
+def test_a_break_amid_octets_costs_at_most_what_follows_at_once(flags: int, tmp_path: Path) -> None:
+    """A main loop that is late resets while octets come again: after the next pause all of them arrive."""
+    for late in (1.2, 1.5, 2.7):
+        board = Board(tmp_path, flags=flags)
+        board.line([1, 2, BREAK, 5, 6, 7, 8, PAUSE, PAUSE, 3, 4])
+        board.idle(octets=3 + late)
+        got = serviced(board, 12)
+        assert got[:2] == [1, 2]
+        assert got[-2:] == [3, 4]
+        board.nothing_misused()
 
 
 @BOTH

@@ -5,14 +5,18 @@
 
 #include "f28_board.h"
 #include "f28_ring.h"
+#include "f28_time.h"
 
 #define FIFO_DEPTH 16U
-#define LINE_ERRORS (SCI_RXSTATUS_FRAMING | SCI_RXSTATUS_PARITY | SCI_RXSTATUS_BREAK)
+#define DAMAGED (SCI_RXBUF_SCIFFFE | SCI_RXBUF_SCIFFPE) /* what the FIFO keeps beside an octet */
+#define SILENCE_MS (2UL + 20000UL / F28_BAUD)           /* two octets at least, whatever the millisecond's phase */
 
 static volatile fs_octet receive_octets[F28_RECEIVE_RING], send_octets[F28_SEND_RING];
 static f28_ring received, to_send;
-static volatile uint32_t overruns;
-static uint32_t errors;
+static volatile uint32_t overruns, errors;
+static volatile uint16_t heard; /* 1: octets came since the main loop last looked */
+static uint16_t overrun_told;   /* 1: the flag OE is up and counted */
+static uint32_t active_ms;      /* when the line was last seen busy, while OE is up */
 
 /* Empty the receive FIFO into the ring; called by its interrupt, or with interrupts off. */
 static void fetch(void)
@@ -21,7 +25,14 @@ static void fetch(void)
 
     /* bounded by what the FIFO can hold: a line that never pauses keeps nobody here */
     for (n = 0U; n < FIFO_DEPTH && SCI_getRxFIFOStatus(SCIA_BASE) != SCI_FIFO_RX0; n++) {
-        if (f28_ring_put(&received, SCI_readCharNonBlocking(SCIA_BASE)) == 0U) {
+        /* driverlib's own reads drop the two bits that belong to this octet, and the flags of SCIRXST to none */
+        const uint16_t word = HWREGH(SCIA_BASE + SCI_O_RXBUF);
+
+        heard = 1U;
+        if ((word & DAMAGED) != 0U) {
+            errors = errors + 1UL;
+        }
+        if (f28_ring_put(&received, word & 0xFFU) == 0U) {
             overruns = overruns + 1UL;
         }
     }
@@ -83,6 +94,9 @@ void f28_serial_init(void)
     f28_ring_init(&to_send, send_octets, F28_SEND_RING);
     overruns = 0UL;
     errors = 0UL;
+    heard = 0U;
+    overrun_told = 0U;
+    active_ms = 0UL;
     init_pins();
     SCI_performSoftwareReset(SCIA_BASE);
     SCI_setConfig(SCIA_BASE, F28_LSPCLK_HZ, F28_BAUD, SCI_CONFIG_WLEN_8); /* one stop bit, no parity: both are 0 */
@@ -102,23 +116,45 @@ void f28_serial_init(void)
     Interrupt_enable(INT_SCIA_TX);
 }
 
+/* Count an overrun when its flag rises; return 1 if only a reset lowers it and both directions have been silent. */
+static uint16_t overrun_may_be_cleared(uint16_t status, uint32_t now_ms)
+{
+    if ((status & SCI_RXSTATUS_OVERRUN) == 0U) {
+        overrun_told = 0U;
+        return 0U;
+    }
+    if (overrun_told == 0U) {
+        overrun_told = 1U;
+        overruns = overruns + 1UL;
+        active_ms = now_ms;
+    }
+    if (heard != 0U || f28_ring_held(&to_send) != 0U || SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX0) {
+        heard = 0U;
+        active_ms = now_ms;
+    }
+    return (now_ms - active_ms >= SILENCE_MS) ? 1U : 0U;
+}
+
+/*
+ * A software reset begins the receiver anew in the midst of whatever is on the line: it loses the octet in flight, may
+ * take a data bit of the next one for a start bit, and damages an octet that is just being sent. So a framing error
+ * gets none: the SCI goes on by itself, and the FIFO tells which octet it was. After a break the SCI receives nothing
+ * more until its reset. An overrun's flag falls by a reset alone too, but does no harm: it waits for silence.
+ */
 void f28_serial_service(void)
 {
+    const uint32_t now_ms = f28_now_ms();
     uint16_t status;
 
     (void)Interrupt_disableGlobal();
     status = SCI_getRxStatus(SCIA_BASE);
     fetch();
-    if ((status & (LINE_ERRORS | SCI_RXSTATUS_OVERRUN)) != 0U) {
-        if ((status & LINE_ERRORS) != 0U) {
-            errors++;
-        }
-        if ((status & SCI_RXSTATUS_OVERRUN) != 0U) {
-            overruns = overruns + 1UL;
-        }
-        /* After a break the SCI receives nothing more until this reset, which also clears the flags. An octet that is
-         * just being sent is damaged by it; the checksum of its frame tells the other end. */
+    if ((status & SCI_RXSTATUS_BREAK) != 0U) {
+        errors = errors + 1UL;
+    }
+    if (overrun_may_be_cleared(status, now_ms) != 0U || (status & SCI_RXSTATUS_BREAK) != 0U) {
         SCI_performSoftwareReset(SCIA_BASE);
+        overrun_told = 0U;
     }
     (void)Interrupt_enableGlobal();
 }
@@ -166,5 +202,11 @@ uint32_t f28_serial_overruns(void)
 
 uint32_t f28_serial_errors(void)
 {
-    return errors;
+    uint32_t first, second;
+
+    do { /* as above */
+        first = errors;
+        second = errors;
+    } while (first != second);
+    return first;
 }

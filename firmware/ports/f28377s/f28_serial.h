@@ -3,8 +3,8 @@
  *
  * The receive interrupt comes with every 8th octet: a burst costs little, and the time of 8 octets is left for it.
  * What lies below that level in the FIFO is fetched by the main loop, since the SCI has no interrupt for a line that
- * fell silent. Errors are dealt with by the main loop as well, lest a line held low keep the processor in its
- * interrupt. Sending goes on in the transmit interrupt for as long as there is something in the ring.
+ * fell silent. A damaged octet is counted and kept: the checksum of its frame judges it. Breaks are dealt with by the
+ * main loop, lest a line held low keep the processor in its interrupt. Sending goes on in the transmit interrupt for as long as there is something in the ring.
  *
  * After f28_serial_init all of it is for the main loop, with interrupts enabled.
  */
@@ -15,7 +15,7 @@
 
 void f28_serial_init(void); /* before interrupts are enabled */
 
-/* From every pass of the main loop: fetch what no interrupt brought, and bring the receiver back after an error. */
+/* From every pass of the main loop: fetch what no interrupt brought, and bring the receiver back after a break. */
 void f28_serial_service(void);
 
 /* Take at most `room` received octets; returns how many. */
@@ -28,7 +28,7 @@ uint16_t f28_serial_room(void);
 uint16_t f28_serial_give(const fs_octet *octets, uint16_t count);
 
 /* Totals since the start, modulo 2^32. */
-uint32_t f28_serial_overruns(void); /* octets lost because the ring was full, and times when the hardware lost some */
-uint32_t f28_serial_errors(void);   /* times when a framing, parity or break error was found */
+uint32_t f28_serial_overruns(void); /* octets lost because the ring was full, and times when the hardware told a loss */
+uint32_t f28_serial_errors(void);   /* octets with a framing error (parity has none here), and breaks */
 
 #endif

@@ -13,9 +13,15 @@
 
 /* What the line brings: an octet in the low 8 bits, or with one of these. */
 #define FAKE_FRAMING 0x100U /* the octet arrives, its stop bit is low */
-#define FAKE_BREAK 0x200U   /* the line is low for longer than an octet: the receiver stops until its software reset */
+#define FAKE_BREAK 0x200U   /* the line stays low after an octet that ended so: deaf until the software reset */
 #define FAKE_PAUSE 0x400U   /* silence for the time of an octet */
 #define FAKE_OVERRUN 0x800U /* the octet is lost before the FIFO, with the flag OE alone, as users report */
+
+/*
+ * A software reset in the midst of an octet loses it. The receiver then waits for the next low bit, takes it for a start
+ * bit, and reads a false octet across the border to the next one; and so on, until a stop bit or a pause meets it in
+ * step. In the start bit itself a reset costs nothing. An octet that is just being sent is damaged.
+ */
 
 /*
  * How a FIFO interrupt flag behaves, which TI's documents leave open. FAKE_LEVEL: it rises again as soon as it is

@@ -41,6 +41,9 @@ static struct {
     fifo rx, tx;
     uint16_t rx_level, tx_level, rx_flag, tx_flag, rx_met, tx_met, rx_on, tx_on;
     uint16_t status, overflow, deaf, fifo_on, module_on;
+    uint16_t astray; /* bit of the octet before in which the receiver found a false start; 0: it is in step */
+    uint16_t before; /* that octet, as the line brought it */
+    uint16_t cut, cut_at; /* 1: a software reset hit the octet that is on the line, in this bit */
     uint16_t shifting, shift_busy, damaged;
     uint64_t shift_done, line_next;
     uint16_t line[LINE], sent[LINE];
@@ -89,14 +92,65 @@ uint64_t fake_octet_cycles(void)
     return 10U * 8U * chip.bit_eighths * chip.lspclk_divider;
 }
 
+/* Return a bit of what the line brings: 0 the start bit, 1 to 8 the data, 9 the stop bit. */
+static uint16_t line_bit(uint16_t what, uint32_t bit)
+{
+    if ((what & FAKE_PAUSE) != 0U) {
+        return 1U;
+    }
+    if (bit == 0U) {
+        return 0U;
+    }
+    if (bit == 9U) {
+        return (what & FAKE_FRAMING) == 0U;
+    }
+    return (uint16_t)(what >> (bit - 1U)) & 1U;
+}
+
+/* The receiver looks for a start bit from this bit on; what it finds inside an octet leads it astray. */
+static void look_for_start(uint16_t what, uint32_t bit)
+{
+    while (bit < 10U && line_bit(what, bit) != 0U) {
+        bit++;
+    }
+    chip.astray = (bit < 10U) ? (uint16_t)bit : 0U;
+    chip.before = what;
+}
+
+/* Return what a receiver that is astray makes of the octet before and this one, and let it look for the next start. */
+static uint16_t false_octet(uint16_t what)
+{
+    const uint32_t start = chip.astray;
+    uint32_t i, at, octet = 0U;
+
+    for (i = 0U; i < 8U; i++) {
+        at = start + 1U + i;
+        octet |= (uint32_t)(at < 10U ? line_bit(chip.before, at) : line_bit(what, at - 10U)) << i;
+    }
+    if (line_bit(what, start - 1U) == 0U) {
+        octet |= FAKE_FRAMING;
+    }
+    look_for_start(what, start);
+    return (uint16_t)octet;
+}
+
 static void receive(uint16_t what)
 {
+    if (chip.cut) {
+        chip.cut = 0U;
+        look_for_start(what, chip.cut_at);
+        return;
+    }
+    if (chip.astray != 0U && (what & FAKE_BREAK) == 0U) {
+        what = false_octet(what);
+    }
     if ((what & FAKE_PAUSE) != 0U || chip.deaf || !chip.module_on) {
         return;
     }
     if ((what & FAKE_BREAK) != 0U) {
         chip.status |= SCI_RXSTATUS_BREAK | SCI_RXSTATUS_FRAMING | SCI_RXSTATUS_ERROR;
         chip.deaf = 1U;
+        chip.astray = 0U;
         return;
     }
     if ((what & FAKE_OVERRUN) != 0U) {
@@ -111,7 +165,7 @@ static void receive(uint16_t what)
         memmove(&chip.rx.octets[0], &chip.rx.octets[1], (FIFO - 1U) * sizeof chip.rx.octets[0]);
         chip.rx.held--;
     }
-    chip.rx.octets[chip.rx.held++] = what & 0xFFU;
+    chip.rx.octets[chip.rx.held++] = (what & 0xFFU) | ((what & FAKE_FRAMING) != 0U ? SCI_RXBUF_SCIFFFE : 0U);
 }
 
 static void move_octets(void)
@@ -421,9 +475,24 @@ void SCI_resetTxFIFO(uint32_t base)
     chip.tx.held = 0U;
 }
 
+/* What a reset does to the octet on the line: nothing while it has brought but its start bit. */
+static void cut_short(void)
+{
+    const uint64_t began = chip.line_next - fake_octet_cycles();
+    const uint16_t what = chip.line[chip.line_first % LINE];
+
+    if (chip.line_first == chip.line_end || chip.time < began || (what & (FAKE_PAUSE | FAKE_BREAK)) != 0U) {
+        return;
+    }
+    chip.cut_at = (uint16_t)((chip.time - began) * 10U / fake_octet_cycles());
+    chip.cut = chip.cut_at > 0U;
+}
+
 void SCI_performSoftwareReset(uint32_t base)
 {
     is_scia(base);
+    chip.astray = 0U;
+    cut_short();
     chip.status = 0U;
     chip.deaf = 0U;
     chip.damaged = chip.shift_busy;
@@ -490,11 +559,15 @@ uint16_t SCI_getRxStatus(uint32_t base)
     return chip.status;
 }
 
-uint16_t SCI_readCharNonBlocking(uint32_t base)
+uint16_t fake_register(uint32_t address)
 {
     uint16_t octet;
 
-    is_scia(base);
+    call();
+    if (address != SCIA_BASE + SCI_O_RXBUF) {
+        misuse("a register that the fake has not got");
+        return 0U;
+    }
     if (chip.rx.held == 0U) {
         misuse("read from an empty FIFO");
         return 0U;
