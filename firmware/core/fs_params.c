@@ -100,6 +100,9 @@ uint16_t fs_param_set(fs_loops *loops, uint16_t index, fs_real value)
     if (spec->is_whole && value != (fs_real)(uint16_t)value) {
         return FS_PARAM_REFUSED;
     }
+    if (value == *place) { /* said again by who heard no answer: integral * gain / gain may be another integral */
+        return FS_PARAM_DONE;
+    }
     if (integral != NULL) {
         *integral = carried_over(*integral, *place, value);
     }

@@ -99,10 +99,13 @@ class LoopParameters:
         """Change a parameter, which the next tick uses; raise KeyError for an unknown name.
 
         An integral that its gain multiplies is scaled, so that the product stays; one that holds its output already
-        (the position loop's) needs nothing. A proportional gain or a damping acts at once on the present error.
+        (the position loop's) needs nothing. A proportional gain or a damping acts at once on the present error. To
+        set the value that stands changes no bit: whoever hears no answer sets again.
         """
         slot = self._slots[name]
         number = math.radians(value) if name == TILT else float(value)
+        if number == float(slot.values[slot.at]):
+            return
         if slot.integral is not None:
             slot.integral[0] = _carried_over(float(slot.integral[0]), float(slot.values[slot.at]), number)
         slot.values[slot.at] = number

@@ -103,6 +103,28 @@ def test_a_changed_gain_keeps_what_its_integral_gives() -> None:
     assert_same(c.run(*ticks)[0], run_python(python, ticks)[0])
 
 
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_a_gain_that_is_set_again_changes_no_bit(real: str) -> None:
+    """A host that hears no answer sets again; integral * gain / gain is often another integral."""
+    python, c = both("pid", load_vehicle("paper_quad"), real)
+    ticks = level(200, OUTER_DUE)
+    run_python(python, ticks)
+    c.run(*ticks)
+    memory = python._controller_memory
+    for gain in np.random.default_rng(2).uniform(1.0, 100.0, 200).tolist():
+        for name in ("PID_ROLL_I", "PID_PITCH_I", "PID_YAW_I"):
+            python.set_parameter(name, gain)
+            assert c.set(name, gain) == 0
+        before, of_python = c.integrals, memory.tolist()
+        for name in ("PID_ROLL_I", "PID_PITCH_I", "PID_YAW_I"):
+            python.set_parameter(name, gain)
+            assert c.set(name, gain) == 0
+        assert c.integrals == before
+        assert memory.tolist() == of_python
+    assert all(before)
+    assert all(of_python[:3])
+
+
 def test_an_integral_too_large_to_be_carried_over_is_dropped() -> None:
     _, c = both("pid", load_vehicle("paper_quad"))
     c.core.call("drive_set_integral", c.memory, c.core.c_real(1e308))

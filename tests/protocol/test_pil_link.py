@@ -68,6 +68,9 @@ def drive(loops: CLoops, ticks: int, seed: int = 3) -> np.ndarray:
     """Step with random inputs, resets, given targets and changes of gains; return the rows with the target."""
     rng = np.random.default_rng(seed)
     rows = []
+    names = [spec.name for spec in loops.parameter_specs]
+    integral_gains = [name for name in names if name.startswith("PID_") and name.endswith("_I")]
+    assert len(integral_gains) in (0, 3)
     for tick in range(ticks):
         state = np.concatenate([rng.normal(size=6), [1.0, 0.0, 0.0, 0.0], rng.normal(size=3) * 0.3])
         state[6:10] += rng.normal(size=4) * 0.1
@@ -79,6 +82,10 @@ def drive(loops: CLoops, ticks: int, seed: int = 3) -> np.ndarray:
         if rng.random() < 0.02:
             loops.set_parameter("POS_XY_P", gain)
             assert loops.get_parameter("POS_XY_P") == np.float32(gain)
+        if rng.random() < 0.05:  # one after another, as a slider does: each scales what is summed
+            for name in integral_gains:
+                for number in rng.uniform(1.0, 50.0, 3):
+                    loops.set_parameter(name, number)
         outer = tick % 5 == 0
         target = np.array([*state[6:10], 9.0])
         if outer and rng.random() < 0.2:
