@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,20 @@ from flightstack.firmware.numbers import target_numbers
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from tests.firmware.core_samples import Sequence, sequence
-from tests.firmware.core_support import OUTER_DUE, PARTS, RESET, SET_TARGET, Core, Loops
+from tests.firmware.core_support import (
+    CORE,
+    DRIVER,
+    EXACT,
+    OUTER_DUE,
+    PARTS,
+    RESET,
+    SET_TARGET,
+    Core,
+    Loops,
+    compiler,
+    run_tool,
+    sources,
+)
 from tests.support.rotor_sets import ring
 
 INNER_HZ, DIVISOR, TILT_RAD = 500.0, 5, math.radians(35.0)
@@ -161,9 +175,40 @@ def test_an_unsound_tick_repeats_the_last_sound_one(real: str) -> None:
 def test_a_setpoint_that_is_no_number_keeps_the_target() -> None:
     _, c = both("pid", load_vehicle("x_quad"))
     ticks = level(6, OUTER_DUE)
-    ticks.setpoints[3, 9] = 2.1e4  # no sine of its half: more than 3183 turns
+    ticks.setpoints[3, 9] = np.nan
     ticks.setpoints[4, 0] = np.inf
     made, status = c.run(*ticks)
     assert not (status & LoopStatus.INPUT_NOT_FINITE).any()
     assert np.array_equal(made[3, :5], made[2, :5])
     assert np.array_equal(made[4, :5], made[2, :5])
+
+
+@pytest.fixture
+def without_nan(tmp_path: Path, request: pytest.FixtureRequest) -> Core:
+    """Return the core for a processor on which sine and cosine are numbers for any angle."""
+    real: str = request.param
+    define = ["-DFS_DOUBLE"] if real == "double" else []
+    files = [path for path in sources() if path.name != "fs_math.c"]
+    own = DRIVER.with_name("math_without_nan.c")
+    flags = ["-O1", f"-I{CORE}", "-shared", "-fPIC", "-fno-math-errno"]
+    library = tmp_path / "core.so"
+    run_tool([compiler(), *EXACT, *define, *flags, *files, own, DRIVER, "-lm", "-o", library])
+    return Core(real, library)
+
+
+@pytest.mark.parametrize("without_nan", ["float", "double"], indirect=True)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_yaw_without_a_sine_keeps_the_target_also_without_nan(without_nan: Core, sign: float) -> None:
+    """Beyond 10^4 rad; up to there it is flown, and Python, whose sine has no such limit, flies on."""
+    vehicle, law = load_vehicle("x_quad"), load_controller("pid")
+    numbers = target_numbers(vehicle, law, open_gains("tuned"), TILT_RAD, INNER_HZ, DIVISOR)
+    python, _ = both("pid", vehicle)
+    ticks = level(6, OUTER_DUE)
+    largest = np.finfo(without_nan.dtype).max
+    ticks.setpoints[:, 9] = sign * np.array([0.0, 1e4, 10_000.1, 2.1e4, 3e4, largest])
+    made, status = Loops(without_nan, numbers).run(*ticks)
+    assert not (status & (LoopStatus.INPUT_NOT_FINITE | LoopStatus.OUTPUT_NOT_FINITE)).any()
+    assert not np.array_equal(made[1, :5], made[0, :5])
+    assert all(np.array_equal(row, made[1, :5]) for row in made[2:, :5])
+    flown, _ = run_python(python, ticks)
+    assert not np.array_equal(flown[4, :5], flown[3, :5])
