@@ -8,6 +8,8 @@ from flightstack.params.errors import ConfigError
 
 PYTHON, C, HOST, EMULATED, SERIAL = "python", "c", "host", "emulated", "serial"
 DEFAULT_BAUD = 115_200
+SLOWEST_BAUD = 1_200
+"""Slower, the octets of a frame come so far apart that a target takes the pauses for its end."""
 _KNOWN = f"{PYTHON}, {C}, {HOST}, {EMULATED} and {SERIAL}:DEVICE[:BAUD]"
 
 
@@ -37,6 +39,8 @@ def parse_loops(text: str) -> LoopsChoice:
     if not device:
         raise ConfigError("--loops", text, "names no device: serial:/dev/ttyACM0 for instance")
     baud = int(ending[:12])
-    if not 300 <= baud <= 20_000_000:
-        raise ConfigError("--loops", text, "has a baud rate that no port has: 300 to 20000000")
+    if baud < SLOWEST_BAUD:
+        raise ConfigError("--loops", text, f"has a baud rate too slow for a target: {SLOWEST_BAUD} at least")
+    if baud > 20_000_000:
+        raise ConfigError("--loops", text, "has a baud rate that no port has: 20000000 at most")
     return LoopsChoice(SERIAL, device, baud)

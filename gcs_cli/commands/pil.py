@@ -139,7 +139,7 @@ def doctor(
     ] = None,
     baud: Annotated[
         list[int] | None,
-        typer.Option(help="Rate to try; may be repeated.  [default: 115200 230400 460800 921600]"),
+        typer.Option(min=1_200, help="Rate to try; may be repeated.  [default: 115200 230400 460800 921600]"),
     ] = None,
     exchanges: Annotated[int, typer.Option(min=1, max=100_000, help="Steps to measure at each rate.")] = 300,
     as_json: JsonOption = False,

@@ -22,6 +22,7 @@ from flightstack.params.errors import ConfigError
             LoopsChoice("serial", "/dev/serial/by-path/usb-0:1.4:1.0"),
             True,
         ),
+        ("serial:x:1200", LoopsChoice("serial", "x", 1_200), True),
         ("serial:loop:name:2500000", LoopsChoice("serial", "loop:name", 2_500_000), True),
     ],
 )
@@ -30,10 +31,10 @@ def test_a_word_is_read(word: str, choice: LoopsChoice, is_target: bool) -> None
     assert parse_loops(word).is_target is is_target
 
 
-NO_WORDS = "", "C", "python:", "host:/dev/pts/1", "serial", "serial:", "serial::9600", "serial:x:299"
+NO_WORDS = "", "C", "python:", "host:/dev/pts/1", "serial", "serial:", "serial::9600", "serial:x:1199"
 
 
-@pytest.mark.parametrize("word", [*NO_WORDS, "serial:x:" + "9" * 5000])
+@pytest.mark.parametrize("word", [*NO_WORDS, "serial:x:20000001", "serial:x:" + "9" * 5000])
 def test_another_word_is_refused(word: str) -> None:
     with pytest.raises(ConfigError, match=r"^--loops: "):
         parse_loops(word)

@@ -27,7 +27,9 @@
 #define F28_SCI_EIGHTS (F28_LSPCLK_HZ / (8UL * F28_BAUD))
 #define F28_SCI_REST (F28_LSPCLK_HZ - F28_SCI_EIGHTS * 8UL * F28_BAUD)
 
-#if F28_SCI_EIGHTS < 2UL || F28_SCI_EIGHTS > 65536UL
+#if F28_BAUD < 1200UL
+#error "F28_BAUD: below 1200 baud the pause between two octets passes for the end of a frame (FS_APP_SILENCE_MS)"
+#elif F28_SCI_EIGHTS < 2UL || F28_SCI_EIGHTS > 65536UL
 #error "F28_BAUD: the SCI's divisor has 16 bits and is 1 at least: 382 baud to 12.5 Mbaud"
 #elif F28_SCI_REST > (F28_LSPCLK_HZ - F28_SCI_REST) / 50UL
 #error "F28_BAUD: the SCI misses this rate by more than 2 %; it can make 115200, 460800, 921600, 1000000, 2500000"
