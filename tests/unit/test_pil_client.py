@@ -198,6 +198,19 @@ def test_a_message_is_asked_for_and_refused() -> None:
     assert client.failure == "does not know FS_PIL_STATUS: other firmware runs there"
 
 
+def test_a_message_that_has_no_room_yet_is_asked_for_again() -> None:
+    """The target acknowledges, but its line is full: TEMPORARILY_REJECTED."""
+    client = PilClient()
+    client.start_request("FS_PIL_STATUS")
+    client.poll(0.0)
+    client.receive(packed(mavlink.MAVLink_command_ack_message(512, 1)), 0.1)
+    assert client.failure is None
+    deadline_s = client.next_deadline()
+    assert deadline_s is not None
+    (message,) = mavlink.MAVLink(None, 1, 1).parse_buffer(client.poll(deadline_s))
+    assert message.get_type() == "COMMAND_LONG"
+
+
 def test_texts_of_the_target_are_kept() -> None:
     client = PilClient()
     client.receive(packed(mavlink.MAVLink_statustext_message(2, b"Bad input")), 0.0)
