@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import re
 import shutil
 import subprocess
@@ -68,6 +69,11 @@ def commands(folder: Path, *options: str) -> list[str]:
     return (folder / "cgt" / "commands").read_text().splitlines()
 
 
+def hash_in(header: Path) -> bytes:
+    """Return the hash that a header gives to the compiler."""
+    return bytes(int(octet, 16) for octet in re.findall(r"0x(\w\w)U", header.read_text()))
+
+
 def test_every_source_is_compiled_as_the_core_demands(tmp_path: Path) -> None:
     calls = commands(tmp_path)
     for source in [*PORTABLE, *PORT.glob("*.c")]:
@@ -82,8 +88,7 @@ def test_every_source_is_compiled_as_the_core_demands(tmp_path: Path) -> None:
             assert option in call
         assert "-D_LAUNCHXL_F28377S" in call
     (run,) = [call for call in calls if "/f28_run.c " in call]
-    hash_file = Path(re.findall(r"--preinclude=(\S+)", run)[0])
-    assert bytes(int(octet, 16) for octet in re.findall(r"0x(\w\w)U", hash_file.read_text())) == source_hash()
+    assert hash_in(Path(re.findall(r"--preinclude=(\S+)", run)[0])) == source_hash()
 
 
 @pytest.mark.parametrize("memory", ["flash", "ram"])
@@ -158,3 +163,45 @@ def test_the_ccs_project_lists_the_sources_and_options_of_cmake() -> None:
         assert ("--define=_FLASH" in words) == (configuration.get("name") == "FLASH")
         assert "--stack_size=1536" in configuration.get("linkerBuildOptions", "")
         assert "--define=F28_STACK_WORDS=1536U" in words
+
+
+def pre_build_step() -> str:
+    """Return the CCS project's step as a shell gets it: its path variable resolved."""
+    root = ET.parse(PORT / "ccs" / "flightstack_f28377s.projectspec").getroot()
+    steps = {configuration.get("preBuildStep", "") for configuration in root.iter("configuration")}
+    assert len(steps) == 1
+    (variable,) = [v for v in root.iter("pathVariable") if v.get("name") == "FLIGHTSTACK_FIRMWARE"]
+    firmware = (PORT / "ccs" / variable.get("path", "")).resolve()
+    assert firmware == FIRMWARE
+    return steps.pop().replace("${FLIGHTSTACK_FIRMWARE}", str(firmware))
+
+
+@pytest.mark.parametrize("name", ["python3", "python"])
+def test_the_ccs_project_writes_the_hash_before_it_builds(name: str, tmp_path: Path) -> None:
+    """By whichever name Python goes; every file is given the header, from the folder in which make runs."""
+    tools, build = tmp_path / "bin", tmp_path / "FLASH"
+    tools.mkdir()
+    build.mkdir()
+    (tools / name).symlink_to(sys.executable)
+    done = subprocess.run(
+        ["/bin/sh", "-c", pre_build_step()], cwd=build, env={"PATH": str(tools)}, check=False, timeout=60
+    )
+    assert done.returncode == 0
+    assert hash_in(build / "source_hash.h") == source_hash()
+    root = ET.parse(PORT / "ccs" / "flightstack_f28377s.projectspec").getroot()
+    for configuration in root.iter("configuration"):
+        words = configuration.get("compilerBuildOptions", "").split()
+        assert "--preinclude=source_hash.h" in words
+        assert "-I." in words
+
+
+def test_a_header_that_is_right_is_left_alone_and_a_wrong_one_is_not(tmp_path: Path) -> None:
+    """What includes it is compiled anew only when the sources changed."""
+    script, header = PORT / "tools" / "write_source_hash.py", tmp_path / "source_hash.h"
+    subprocess.run([sys.executable, script, header], check=True, timeout=60)
+    os.utime(header, ns=(1, 1))
+    subprocess.run([sys.executable, script, header], check=True, timeout=60)
+    assert header.stat().st_mtime_ns == 1
+    header.write_text("#define FS_SOURCE_HASH 0U\n")
+    subprocess.run([sys.executable, script, header], check=True, timeout=60)
+    assert hash_in(header) == source_hash()
