@@ -121,22 +121,20 @@ def test_a_changed_gain_keeps_what_its_integral_gives() -> None:
 def test_a_gain_that_is_set_again_changes_no_bit(real: str) -> None:
     """A host that hears no answer sets again; integral * gain / gain is often another integral."""
     python, c = both("pid", load_vehicle("paper_quad"), real)
-    ticks = level(200, OUTER_DUE)
-    run_python(python, ticks)
-    c.run(*ticks)
+    gains = [f"PID_{axis}_I" for axis in ("ROLL", "PITCH", "YAW")]
     memory = python._controller_memory
-    for gain in np.random.default_rng(2).uniform(1.0, 100.0, 200).tolist():
-        for name in ("PID_ROLL_I", "PID_PITCH_I", "PID_YAW_I"):
-            python.set_parameter(name, gain)
-            assert c.set(name, gain) == 0
-        before, of_python = c.integrals, memory.tolist()
-        for name in ("PID_ROLL_I", "PID_PITCH_I", "PID_YAW_I"):
-            python.set_parameter(name, gain)
-            assert c.set(name, gain) == 0
-        assert c.integrals == before
-        assert memory.tolist() == of_python
-    assert all(before)
-    assert all(of_python[:3])
+    for value in np.random.default_rng(2).uniform(1.0, 100.0, 50).tolist():
+        for name in gains:
+            python.set_parameter(name, value)
+            assert c.set(name, value) == 0
+        run_python(python, level(3, OUTER_DUE))
+        c.run(*level(3, OUTER_DUE))
+        before = [*c.integrals[:2], *memory.tolist()]
+        for name in gains:
+            python.set_parameter(name, value)
+            assert c.set(name, value) == 0
+        assert [*c.integrals[:2], *memory.tolist()] == before
+    assert all(before[:2])  # the integrals of roll and pitch have grown
 
 
 def test_an_integral_too_large_to_be_carried_over_is_dropped() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,7 @@ from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.pil.result import target_checks
 from gcs_cli.pil.target_record import STATES, read_record
-from tests.firmware.app_support import SAFE, Target
+from tests.firmware.app_support import SAFE, Target, mavlink
 from tests.support.lossy_line import FAIR, LossyLine, Weather
 
 HASH = bytes(range(1, 9))
@@ -64,7 +64,9 @@ def sil(controller=PID) -> CLoops:
     return CLoops("c", HostLoops(host_library(), of.numbers()), of)
 
 
-def drive(loops: CLoops, ticks: int, seed: int = 3) -> np.ndarray:
+def drive(
+    loops: CLoops, ticks: int, seed: int = 3, each_tick: Callable[[], object] = lambda: None
+) -> np.ndarray:
     """Step with random inputs, resets, given targets and changes of gains; return the rows with the target."""
     rng = np.random.default_rng(seed)
     rows = []
@@ -91,6 +93,7 @@ def drive(loops: CLoops, ticks: int, seed: int = 3) -> np.ndarray:
         if outer and rng.random() < 0.2:
             loops.set_attitude_target(target)
             outer = False
+        each_tick()
         row = np.zeros(LoopRow.SIZE)
         loops.step(state, wish, SPEEDS, outer, row)
         rows.append(np.concatenate([row, loops.attitude_target]))
@@ -116,6 +119,18 @@ def test_whatever_the_line_does_the_target_computes_what_c_does_here(device, nam
     assert (status["repeats"] + status["out_of_order"] > 0) == (name != "fair")
 
 
+def test_a_gain_that_is_set_again_in_flight_changes_no_bit(device) -> None:
+    """A late copy of the host's own, or a ground station that writes all parameters back."""
+    flown = connected(LossyLine(device))
+
+    def again() -> None:
+        for name in ("PID_ROLL_I", "PID_PITCH_I", "PID_YAW_I"):
+            value = flown.get_parameter(name)
+            device.ask(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
+
+    assert np.array_equal(drive(flown, 200, each_tick=again), drive(sil(), 200))
+
+
 def test_the_same_seed_gives_the_same_link(device) -> None:
     counted = []
     for _ in range(2):
@@ -133,14 +148,21 @@ def test_the_same_seed_gives_the_same_link(device) -> None:
 def test_all_numbers_are_on_the_target_before_the_first_step(device) -> None:
     numbers = setup(BACKSTEPPING).numbers()
     connected(LossyLine(device, WEATHERS["loses octets"], seed=1), BACKSTEPPING)
-    from tests.firmware.app_support import mavlink  # noqa: PLC0415
-
     told = {}
     for message in device.ask(mavlink.MAVLink_param_request_list_message(1, 1)):
         if message.get_type() == "PARAM_VALUE":
             told[message.param_id] = message.param_value
     assert len(told) > len(numbers)
     assert {name: told[name] for name in numbers} == {n: np.float32(v) for n, v in numbers.items()}
+
+
+@pytest.mark.parametrize("name", ["paper_quad", "x_quad"])
+def test_any_vehicle_takes_the_place_of_the_one_built_in(device, name) -> None:
+    """Of whose numbers some are -0: they are 0 afterwards."""
+    numbers = setup()._replace(vehicle=load_vehicle(name)).numbers()
+    line = LossyLine(device)
+    computer = TargetLoops(line, numbers, clock_s=line.clock, expected_hash=HASH)
+    assert computer.get("FS_MASS") == np.float32(numbers["FS_MASS"])
 
 
 def test_a_line_that_is_cut_ends_the_flight_with_a_sentence(device) -> None:
