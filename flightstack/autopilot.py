@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from flightstack.commander.arming_checks import arming_refusals
 from flightstack.commander.conditions import LinkFacts, StateSource
-from flightstack.commander.failsafe import Action, Decision, Failsafe
+from flightstack.commander.failsafe import PHASE_OF_MODE, Action, Decision, Failsafe, Phase
 from flightstack.commander.ground_watch import GroundWatch
 from flightstack.commander.supervisor import EVENTS_OF_ACTION, Supervisor
-from flightstack.commander.transitions import Event, Facts, Need, Outcome, Status, transition
+from flightstack.commander.transitions import RULES, Event, Facts, Need, Outcome, Status, transition
 from flightstack.contract import FloatArray, LoopFlags, LoopRow, LoopStatus
 from flightstack.control.backend import ControlBackend
 from flightstack.geodesy import GeoPoint
@@ -28,7 +30,12 @@ AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
 STREAM_MODES = (Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
 """Modes in which a stream from the ground says where to fly, and whether to leave the ground."""
 
-USERS_CHOICES = frozenset(event for event in Event if event.name.startswith("SELECT_"))
+USERS_CHOICES: dict[Event, Phase] = {
+    rule.event: PHASE_OF_MODE[rule.mode]
+    for rule in RULES
+    if rule.mode is not None and rule.event.name.startswith("SELECT_")
+}
+"""What a user selects, and the phase of flight that it begins."""
 
 
 class Autopilot(PlanKeeper):
@@ -144,7 +151,8 @@ class Autopilot(PlanKeeper):
         flies_attitude = self._navigator.flies_attitude(now.status.mode)
         supervisor.position_is_controlled = self._flying and not flies_attitude
         acted = supervisor.decision
-        for severity, text in supervisor.step(time_us, now.status, now.landed, now.setpoint, now.row):
+        goes = self._navigator.goes_elsewhere
+        for severity, text in supervisor.step(time_us, now.status, now.landed, now.setpoint, now.row, goes):
             self.say(severity, text)
         decision: Decision = supervisor.decision
         if decision.action <= Action.WARN:
@@ -155,6 +163,7 @@ class Autopilot(PlanKeeper):
             self._navigator.take_up(self._state)
         for event in EVENTS_OF_ACTION.get(decision.action, ()):
             if self._apply(event) is None:
+                supervisor.took_over()
                 break
 
     def _watch_ground(self, time_us: int) -> None:
@@ -242,15 +251,22 @@ class Autopilot(PlanKeeper):
     def happen(self, event: Event, takeoff_altitude_m: float | None = None) -> str | None:
         """Apply what a user asks for; return why it was refused, or None.
 
-        Arming is refused with all reasons at once. A mode that a user selects overrides the failsafes of the moment.
+        Arming is refused with all reasons at once. A mode that a user selects overrides the failsafes of the moment,
+        where they can be overridden.
         """
+        if event in USERS_CHOICES:
+            return self._select(event, USERS_CHOICES[event], takeoff_altitude_m)
         if event is Event.ARM:
             reasons = self.arming_refusals()
             if reasons:
                 return "; ".join(reasons)
-        refusal = self._apply(event, takeoff_altitude_m)
-        if refusal is None and event in USERS_CHOICES:
-            self.supervisor.override()
+        return self._apply(event)
+
+    def _select(self, event: Event, phase: Phase, takeoff_altitude_m: float | None = None) -> str | None:
+        """Let a user begin ``phase`` by ``event``; return why not, or None."""
+        refusal = self.supervisor.refusal(phase) or self._apply(event, takeoff_altitude_m)
+        if refusal is None:
+            self.supervisor.override(phase)
         return refusal
 
     def terminate(self, reason: str) -> None:
@@ -325,7 +341,7 @@ class Autopilot(PlanKeeper):
 
     def _mission_is_gone(self) -> None:
         if self.now.status.mode is Mode.MISSION:
-            self.happen(Event.SELECT_HOLD)
+            self._apply(Event.SELECT_HOLD)  # nobody chose a mode: failsafes are not overridden
 
     def _rises(self) -> bool:
         """Tell whether the mode makes a standing vehicle leave the ground."""
@@ -351,7 +367,8 @@ class Autopilot(PlanKeeper):
         """Hold at a place [m NED]; NaN leaves what is. Return why not, or None."""
         if not self.now.status.armed or self.now.landed:
             return Need.IN_AIR.value
-        refusal = self.happen(Event.SELECT_HOLD)
+        goes = math.isfinite(north_m) or math.isfinite(down_m)
+        refusal = self._select(Event.SELECT_HOLD, Phase.GOTO if goes else Phase.HOLD)
         if refusal is None:
             self._navigator.reposition(north_m, east_m, down_m, yaw_rad, speed_m_s)
         return refusal

@@ -58,6 +58,8 @@ class Phase(Enum):
     TAKEOFF = auto()
     MISSION = auto()
     HOLD = auto()
+    GOTO = auto()
+    """In hold mode, on the way to another place that was named."""
     MANUAL = auto()
     OFFBOARD = auto()
     RETURN = auto()
@@ -77,10 +79,12 @@ PHASE_OF_MODE: Mapping[Mode, Phase] = {
 }
 
 
-def phase_of(armed: bool, landed: bool, mode: Mode) -> Phase:
-    """Return the phase of flight."""
+def phase_of(armed: bool, landed: bool, mode: Mode, goes: bool = False) -> Phase:
+    """Return the phase of flight; ``goes``: in hold mode, on the way to another place."""
     if not armed:
         return Phase.DISARMED
+    if goes and mode is Mode.HOLD and not landed:
+        return Phase.GOTO
     return Phase.STANDING if landed else PHASE_OF_MODE[mode]
 
 
@@ -123,8 +127,9 @@ class Rule(NamedTuple):
     """One row of the table.
 
     ``parameter`` is the field of ``Behaviour`` whose value chooses from ``actions``. With ``holds_first`` a
-    return or a landing begins after COM_FAIL_ACT_T in hold, so that a user can take over. ``phases`` are those
-    in which the failsafe counts.
+    return or a landing begins after COM_FAIL_ACT_T in hold, so that a user can take over. ``user_may``: whether a
+    user may override it by selecting a mode; what stops the rotors is never overridden. ``phases`` are those in
+    which the failsafe counts.
     """
 
     failsafe: Failsafe
@@ -133,36 +138,38 @@ class Rule(NamedTuple):
     parameter: str
     actions: Mapping[int, Action]
     holds_first: bool
+    user_may: bool
     phases: frozenset[Phase]
 
 
 F, NOW, DELAYED = Failsafe, False, True
+NOBODY, USER = False, True
 # fmt: off
 RULES = (
     Rule(F.NOT_FINITE, "State or controller output is not finite", "State and controller output are finite again",
-         "", {0: Action.BLIND}, NOW, FLIGHT),
+         "", {0: Action.BLIND}, NOW, NOBODY, FLIGHT),
     Rule(F.STATE_STALE, "State is frozen or missing", "State is fresh again",
-         "", {0: Action.BLIND}, NOW, FLIGHT),
+         "", {0: Action.BLIND}, NOW, NOBODY, FLIGHT),
     Rule(F.ATTITUDE, "Attitude is beyond its limits", "Attitude is within its limits again",
-         "attitude_failure_action", FAULT_ACTIONS, NOW, FLIGHT),
+         "attitude_failure_action", FAULT_ACTIONS, NOW, NOBODY, FLIGHT),
     Rule(F.ROTOR, "A rotor does not follow its command", "All rotors follow their commands again",
-         "rotor_failure_action", FAULT_ACTIONS, NOW, FLIGHT),
+         "rotor_failure_action", FAULT_ACTIONS, NOW, USER, FLIGHT),
     Rule(F.BATTERY_EMERGENCY, "Battery level is dangerously low", "Battery level has left emergency",
-         "low_battery_action", EMERGENCY_ACTIONS, DELAYED, FLIGHT),
+         "low_battery_action", EMERGENCY_ACTIONS, DELAYED, NOBODY, FLIGHT),
     Rule(F.FENCE, "Geofence breached", "Inside the geofence again",
-         "fence_action", FENCE_ACTIONS, DELAYED, FLIGHT),
+         "fence_action", FENCE_ACTIONS, DELAYED, USER, FLIGHT),
     Rule(F.POSITION_ERROR, "Position is far from its setpoint", "Position follows its setpoint again",
-         "position_error_action", FAULT_ACTIONS, NOW, FLIGHT),
+         "position_error_action", FAULT_ACTIONS, NOW, USER, FLIGHT),
     Rule(F.BATTERY_CRITICAL, "Battery level is critical", "Battery level is no longer critical",
-         "low_battery_action", CRITICAL_ACTIONS, DELAYED, FLIGHT),
+         "low_battery_action", CRITICAL_ACTIONS, DELAYED, USER, FLIGHT),
     Rule(F.MANUAL_LOST, "Manual control lost", "Manual control is back",
-         "manual_loss_action", LINK_ACTIONS, DELAYED, LANDING_GOES_ON),
+         "manual_loss_action", LINK_ACTIONS, DELAYED, USER, LANDING_GOES_ON),
     Rule(F.OFFBOARD_LOST, "Offboard setpoints lost", "Offboard setpoints are back",
-         "offboard_loss_action", OFFBOARD_ACTIONS, NOW, LANDING_GOES_ON),
+         "offboard_loss_action", OFFBOARD_ACTIONS, NOW, USER, LANDING_GOES_ON),
     Rule(F.GCS_LOST, "Ground station lost", "Ground station is back",
-         "gcs_loss_action", LINK_ACTIONS, DELAYED, LANDING_GOES_ON),
+         "gcs_loss_action", LINK_ACTIONS, DELAYED, USER, LANDING_GOES_ON),
     Rule(F.BATTERY_LOW, "Battery level is low", "Battery level is no longer low",
-         "", WARN_ONLY, NOW, FLIGHT),
+         "", WARN_ONLY, NOW, USER, FLIGHT),
 )
 # fmt: on
 RULE_OF: Mapping[Failsafe, Rule] = {rule.failsafe: rule for rule in RULES}
@@ -176,6 +183,10 @@ DOES_ALREADY: Mapping[Phase, Action] = {
 }
 """What a phase amounts to: a failsafe that asks for no more changes nothing, so that actions only escalate."""
 
+STEERS = frozenset({Action.POSITION, Action.ALTITUDE, Action.HOLD, Action.RETURN, Action.LAND})
+"""Actions that fly in a mode of their own."""
+LINK_FAILSAFES = frozenset({Failsafe.MANUAL_LOST, Failsafe.OFFBOARD_LOST, Failsafe.GCS_LOST})
+
 BEYOND_REACH: Mapping[Failsafe, frozenset[Action]] = {
     Failsafe.POSITION_ERROR: frozenset({Action.POSITION, Action.HOLD, Action.RETURN}),
 }
@@ -187,6 +198,15 @@ def action_of(failsafe: Failsafe, behaviour: Behaviour) -> Action:
     rule = RULE_OF[failsafe]
     value = int(getattr(behaviour, rule.parameter)) if rule.parameter else 0
     return rule.actions.get(value, Action.WARN)
+
+
+def opposes(failsafe: Failsafe, phase: Phase, behaviour: Behaviour) -> bool:
+    """Tell whether a failsafe, once it acts, would end a flight in ``phase`` to fly in another mode."""
+    action = action_of(failsafe, behaviour)
+    if action in BEYOND_REACH.get(failsafe, frozenset()):
+        action = Action.LAND
+    counts = phase in RULE_OF[failsafe].phases
+    return counts and action in STEERS and action > DOES_ALREADY.get(phase, Action.NONE)
 
 
 class Demand(NamedTuple):

@@ -2,12 +2,13 @@
 
 A failsafe begins with its condition and ends with it. The end of a condition is announced and undoes nothing: the
 vehicle goes on with what the failsafe chose until a user selects a mode, or it is disarmed. A user who selects
-a mode overrides what is active; whatever begins after that acts again.
+a mode overrides what stands against it, if the table allows that (``takeover`` judges who is a user); whatever begins
+after that acts again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from flightstack.commander.failsafe import (
@@ -27,7 +28,7 @@ from flightstack.params.behaviour import Behaviour
 
 EMERGENCY, _ALERT, CRITICAL, _ERROR, WARNING, NOTICE = range(6)
 
-CAN_WAIT = (Phase.TAKEOFF, Phase.MISSION, Phase.HOLD, Phase.MANUAL, Phase.OFFBOARD)
+CAN_WAIT = (Phase.TAKEOFF, Phase.MISSION, Phase.HOLD, Phase.GOTO, Phase.MANUAL, Phase.OFFBOARD)
 """Phases in which a person or a plan flies, and may be given time to react."""
 
 VERB: Mapping[Action, str] = {
@@ -142,10 +143,18 @@ def _announce(
     return Announcement(EMERGENCY if decision.action >= Action.BLIND else CRITICAL, text)
 
 
-def override(memory: Memory) -> Memory:
-    """Return the memory after a user has selected a mode: what is active now acts no more."""
-    entries = {failsafe: entry._replace(overridden=True) for failsafe, entry in memory.entries.items()}
+def override(memory: Memory, overridden: Collection[Failsafe]) -> Memory:
+    """Return the memory after a user has selected a mode: what stood against it acts no more until it begins anew."""
+    entries = {
+        failsafe: entry._replace(overridden=entry.overridden or failsafe in overridden)
+        for failsafe, entry in memory.entries.items()
+    }
     return Memory(entries, Decision(Action.WARN, None) if entries else NOTHING)
+
+
+def renew(memory: Memory, failsafe: Failsafe) -> Memory:
+    """Return the memory without a failsafe: if its condition still holds, it begins anew."""
+    return memory._replace(entries={f: entry for f, entry in memory.entries.items() if f is not failsafe})
 
 
 def active(memory: Memory) -> tuple[Failsafe, ...]:

@@ -25,7 +25,7 @@ from flightstack.commander.detectors import (
     follow_rotors,
     rotor_params,
 )
-from flightstack.commander.failsafe import Action, Decision, Failsafe, phase_of
+from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase, phase_of
 from flightstack.commander.failsafe_step import (
     IDLE,
     Announcement,
@@ -33,7 +33,9 @@ from flightstack.commander.failsafe_step import (
     active,
     failsafe_step,
     override,
+    renew,
 )
+from flightstack.commander.takeover import Takeovers, opponents
 from flightstack.commander.transitions import Event, Status
 from flightstack.contract import SETPOINT_SIZE, FloatArray
 from flightstack.guidance.fence import NO_FENCE, Fence, FenceMonitor
@@ -62,6 +64,8 @@ EVENTS_OF_ACTION: dict[Action, tuple[Event, ...]] = {
     Action.TERMINATE: (Event.TERMINATE,),
 }
 """What a failsafe's action means to the commander: the first event that is not refused."""
+BREACH_GROWS_M = 5.0
+"""So much farther out, a fence that a user has overridden acts again."""
 NO_CONDITION: frozenset[Failsafe] = frozenset()
 
 
@@ -96,6 +100,10 @@ class Supervisor:
         self._rotors = np.zeros(ROTOR_MEMORY_SIZE)
         self._nowhere = np.zeros(SETPOINT_SIZE)
         self._memory = IDLE
+        self._takeovers = Takeovers()
+        self._phase = Phase.DISARMED
+        self._time_us = 0
+        self._overridden_margin_m = math.inf
         self._found = 0
         self._stale = False
         self.holds_rotors = False
@@ -123,6 +131,11 @@ class Supervisor:
     def decision(self) -> Decision:
         """What the failsafes ask for, and the cause."""
         return self._memory.decision
+
+    @property
+    def state_is_stale(self) -> bool:
+        """Whether the newest state is too old, or frozen though its own speeds say that it must change."""
+        return self._stale
 
     def arming_facts(self, mode: Mode, has_state: bool) -> ArmingFacts:
         """Return what the arming checks look at."""
@@ -175,22 +188,44 @@ class Supervisor:
         self._detector[:] = 0.0
         self._rotors[:] = 0.0
         self._found = 0
+        self._takeovers.forget()
 
     def follow_rotors(self, row: FloatArray) -> None:
         """Take the newest row of the inner loop, shape (48,), once per inner tick."""
         follow_rotors(row, self._rotors, self._rotor_params)
 
-    def override(self) -> None:
-        """A user has selected a mode: what is active now acts no more."""
-        self._memory = override(self._memory)
+    def refusal(self, phase: Phase) -> str | None:
+        """Return why a user may not fly in ``phase`` for a failsafe's sake, or None; once for each request."""
+        return self._takeovers.refusal(self._memory, phase, self._time_us, self._behaviour)
+
+    def override(self, phase: Phase) -> None:
+        """A user flies in ``phase`` from now on: the failsafes that stood against it act no more."""
+        against = opponents(self._memory, phase, self._behaviour)
+        if Failsafe.FENCE in against:
+            self._overridden_margin_m = self.fence.margin_m
+        self._memory = override(self._memory, against)
+        self._takeovers.granted()
+
+    def took_over(self) -> None:
+        """The decision was carried out, and has ended the phase of flight of the last step."""
+        if self.decision.cause is not None:
+            self._takeovers.took(self._phase, self.decision.cause)
 
     def step(
-        self, time_us: int, status: Status, landed: bool, setpoint: FloatArray, row: FloatArray
+        self,
+        time_us: int,
+        status: Status,
+        landed: bool,
+        setpoint: FloatArray,
+        row: FloatArray,
+        goes: bool = False,
     ) -> tuple[Announcement, ...]:
         """Advance by one outer tick; ``decision`` is what to do then.
 
-        ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop.
+        ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop; ``goes``: in hold mode,
+        on the way to another place.
         """
+        self._time_us = time_us
         self._watch_battery()
         self._watch_state(time_us, in_air=status.armed and not landed)
         if not status.armed:
@@ -206,8 +241,9 @@ class Supervisor:
         conditions = self._conditions(self._found, status.mode)
         if not conditions and not self._memory.entries:
             return ()
-        phase = phase_of(status.armed, landed, status.mode)
-        situation = Situation(time_us, phase, not self.links.manual_lost)
+        self._watch_overridden_fence()
+        self._phase = phase_of(status.armed, landed, status.mode, goes)
+        situation = Situation(time_us, self._phase, not self.links.manual_lost)
         self._memory, said = failsafe_step(self._memory, conditions, situation, self._behaviour)
         return said
 
@@ -233,6 +269,13 @@ class Supervisor:
         present = {failsafe for failsafe, holds in conditions.items() if holds}
         present.update(failsafe for bit, failsafe in FAULTS if found & bit)
         return frozenset(present.union(BATTERY_FAILSAFES[: self.battery_level]))
+
+    def _watch_overridden_fence(self) -> None:
+        """Let a fence that was overridden act again when the vehicle leaves it farther behind."""
+        entry = self._memory.entries.get(Failsafe.FENCE)
+        grows = self.fence.margin_m < self._overridden_margin_m - BREACH_GROWS_M
+        if entry is not None and entry.overridden and grows:
+            self._memory = renew(self._memory, Failsafe.FENCE)
 
     def _watch_state(self, time_us: int, in_air: bool) -> None:
         """Find out whether the state is too old, or does not change although its own speeds say that it must.

@@ -70,6 +70,8 @@ from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.guidance.trajectory import BRAKING, Trajectory, setpoint_of
 from flightstack.modes import Mode
 
+ARRIVED_M = 0.5
+"""So near to the place it was sent to, a vehicle holds."""
 STREAM_MODES = (Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
 """Modes in which guidance follows what is streamed to the vehicle."""
 _STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)  # found faster than members of an enumeration
@@ -96,6 +98,7 @@ class Navigator:
         self._trajectory = np.zeros(TRAJECTORY_SIZE)
         self._mission = np.zeros(MISSION_MEMORY_SIZE)
         self._reported = 0
+        self._repositions = False
         self._aim = np.zeros(AIM_SIZE)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0))
         self._stream = empty_stream()
@@ -216,6 +219,7 @@ class Navigator:
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
         """Aim for ``mode`` from where the reference is now."""
         t, aim, p = self._trajectory, self._aim, self.params
+        self._repositions = False
         aim[A_X], aim[A_Y], aim[A_Z], aim[A_YAW], aim[A_SPEED] = t[0], t[1], t[2], t[T_YAW], 0.0
         if mode == Mode.TAKEOFF:
             aim[A_Z] = -takeoff_altitude_m
@@ -248,6 +252,7 @@ class Navigator:
         Call it after entering HOLD.
         """
         t, aim = self._trajectory, self._aim
+        self._repositions = True
         if math.isfinite(north_m) and math.isfinite(east_m):
             aim[A_X], aim[A_Y] = north_m, east_m
             away_m = math.hypot(north_m - t[0], east_m - t[1])
@@ -259,6 +264,12 @@ class Navigator:
             aim[A_YAW] = yaw_rad
         if speed_m_s > 0.0:
             aim[A_SPEED] = min(speed_m_s, self.params.max_speed_m_s)
+
+    @property
+    def goes_elsewhere(self) -> bool:
+        """Whether HOLD is on its way to a place that ``reposition`` named."""
+        t, aim = self._trajectory, self._aim
+        return self._repositions and math.dist(t[:3], (aim[A_X], aim[A_Y], aim[A_Z])) > ARRIVED_M
 
     def _enter_mission(self) -> None:
         """Begin the current item anew from here, at the speed and with the heading set by those before it.

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from flightstack.commander.failsafe import Failsafe, Phase
+from flightstack.contract import Vector3
 from flightstack.geodesy import LocalFrame
 from flightstack.guidance.fence import Fence
 from flightstack.mavlink.dialect import mavlink
@@ -91,6 +92,16 @@ def hold(world: World, before: Callable[[], None]) -> None:
     world.run(0.2)
 
 
+def goto(world: World, before: Callable[[], None]) -> None:
+    _hover(world)
+    before()
+    place = LocalFrame(world.config.home).to_geo(Vector3(200.0, 0.0, -HEIGHT))
+    reposition = mavlink.MAV_CMD_DO_REPOSITION
+    assert world.command(reposition, -1, 1, 0, math.nan, *place) == 0, world.texts
+    world.run(1.0)
+    assert world.velocity[0] > 1.0
+
+
 def manual(world: World, before: Callable[[], None]) -> None:
     _hover(world)
     world.streams["sticks"] = sticks
@@ -129,6 +140,7 @@ ENTER: dict[Phase, Callable[[World, Callable[[], None]], None]] = {
     P.TAKEOFF: takeoff,
     P.MISSION: mission,
     P.HOLD: hold,
+    P.GOTO: goto,
     P.MANUAL: manual,
     P.OFFBOARD: offboard,
     P.RETURN: returning,
@@ -138,6 +150,7 @@ MODE_IN: dict[Phase, Mode] = {
     P.TAKEOFF: Mode.TAKEOFF,
     P.MISSION: Mode.MISSION,
     P.HOLD: Mode.HOLD,
+    P.GOTO: Mode.HOLD,
     P.MANUAL: Mode.POSITION,
     P.OFFBOARD: Mode.OFFBOARD,
     P.RETURN: Mode.RETURN,
@@ -350,22 +363,33 @@ def said(world: World, case: Case) -> bool:
     return sum(case.says in text and "again" not in text for text in world.texts) == 1
 
 
-PHASES = (P.DISARMED, P.STANDING, P.TAKEOFF, P.MISSION, P.HOLD, P.MANUAL, P.OFFBOARD, P.RETURN, P.LAND)
+PHASES = (
+    P.DISARMED,
+    P.STANDING,
+    P.TAKEOFF,
+    P.MISSION,
+    P.HOLD,
+    P.GOTO,
+    P.MANUAL,
+    P.OFFBOARD,
+    P.RETURN,
+    P.LAND,
+)
 # fmt: off
 TABLE = {
-    #                     disarmed  standing  takeoff   mission   hold      manual    offboard  return    land
-    F.NOT_FINITE:        (refused,  disarms,  ends,     ends,     ends,     ends,     ends,     ends,     ends),
-    F.STATE_STALE:       (refused,  disarms,  ends,     ends,     ends,     ends,     ends,     ends,     ends),
-    F.ATTITUDE:          (refused,  disarms,  ends,     ends,     ends,     ends,     ends,     ends,     ends),
-    F.ROTOR:             (arms,     disarms,  ends,     ends,     ends,     ends,     ends,     ends,     ends),
-    F.BATTERY_EMERGENCY: (refused,  disarms,  lands,    lands,    lands,    lands,    lands,    lands,    warns),
-    F.FENCE:             (refused,  disarms,  returns,  returns,  returns,  returns,  returns,  warns,    warns),
-    F.POSITION_ERROR:    (arms,     goes_on,  lands,    lands,    lands,    goes_on,  lands,    lands,    warns),
-    F.BATTERY_CRITICAL:  (refused,  disarms,  returns,  returns,  returns,  returns,  returns,  warns,    warns),
-    F.MANUAL_LOST:       (refused,  disarms,  goes_on,  goes_on,  goes_on,  lands,    goes_on,  goes_on,  goes_on),
-    F.OFFBOARD_LOST:     (refused,  disarms,  goes_on,  goes_on,  goes_on,  goes_on,  lands,    goes_on,  goes_on),
-    F.GCS_LOST:          (refused,  disarms,  returns,  returns,  returns,  returns,  returns,  warns,    goes_on),
-    F.BATTERY_LOW:       (refused,  warns,    warns,    warns,    warns,    warns,    warns,    warns,    warns),
+    #                     disarmed standing takeoff  mission  hold     goto     manual   offboard return   land
+    F.NOT_FINITE:        (refused, disarms, ends,    ends,    ends,    ends,    ends,    ends,    ends,    ends),
+    F.STATE_STALE:       (refused, disarms, ends,    ends,    ends,    ends,    ends,    ends,    ends,    ends),
+    F.ATTITUDE:          (refused, disarms, ends,    ends,    ends,    ends,    ends,    ends,    ends,    ends),
+    F.ROTOR:             (arms,    disarms, ends,    ends,    ends,    ends,    ends,    ends,    ends,    ends),
+    F.BATTERY_EMERGENCY: (refused, disarms, lands,   lands,   lands,   lands,   lands,   lands,   lands,   warns),
+    F.FENCE:             (refused, disarms, returns, returns, returns, returns, returns, returns, warns,   warns),
+    F.POSITION_ERROR:    (arms,    goes_on, lands,   lands,   lands,   lands,   goes_on, lands,   lands,   warns),
+    F.BATTERY_CRITICAL:  (refused, disarms, returns, returns, returns, returns, returns, returns, warns,   warns),
+    F.MANUAL_LOST:       (refused, disarms, goes_on, goes_on, goes_on, goes_on, lands,   goes_on, goes_on, goes_on),
+    F.OFFBOARD_LOST:     (refused, disarms, goes_on, goes_on, goes_on, goes_on, goes_on, lands,   goes_on, goes_on),
+    F.GCS_LOST:          (refused, disarms, returns, returns, returns, returns, returns, returns, warns,   goes_on),
+    F.BATTERY_LOW:       (refused, warns,   warns,   warns,   warns,   warns,   warns,   warns,   warns,   warns),
 }
 # fmt: on
 

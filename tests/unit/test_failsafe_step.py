@@ -90,7 +90,7 @@ def test_a_second_failsafe_escalates_and_names_itself() -> None:
 def test_a_user_overrides_what_is_active_but_not_what_comes_after() -> None:
     flight = Flight("NAV_DLL_ACT=2", "COM_LOW_BAT_ACT=3", "COM_FAIL_ACT_T=0")
     assert flight.run(0.1, Failsafe.GCS_LOST) is Action.RETURN
-    flight.memory = override(flight.memory)  # the user selects the mission again
+    flight.memory = override(flight.memory, active(flight.memory))  # the user selects the mission again
     assert flight.run(20.0, Failsafe.GCS_LOST) is Action.NONE
     assert active(flight.memory) == (Failsafe.GCS_LOST,)
     assert flight.run(0.1, Failsafe.GCS_LOST, Failsafe.BATTERY_CRITICAL) is Action.RETURN
@@ -99,7 +99,7 @@ def test_a_user_overrides_what_is_active_but_not_what_comes_after() -> None:
 def test_after_an_override_the_same_failsafe_acts_when_it_begins_again() -> None:
     flight = Flight("NAV_DLL_ACT=2", "COM_FAIL_ACT_T=0")
     flight.run(1.0, Failsafe.GCS_LOST)
-    flight.memory = override(flight.memory)
+    flight.memory = override(flight.memory, active(flight.memory))
     flight.run(1.0)
     assert flight.run(0.1, Failsafe.GCS_LOST) is Action.RETURN
 

@@ -187,5 +187,9 @@ def test_lost_links_do_not_end_a_landing() -> None:
 def test_phases() -> None:
     assert {phase_of(False, landed, mode) for landed in (True, False) for mode in Mode} == {Phase.DISARMED}
     assert {phase_of(True, True, mode) for mode in Mode} == {Phase.STANDING}
-    assert {phase_of(True, False, mode) for mode in Mode} == {*AIRBORNE, Phase.DISARMED}
+    assert {phase_of(True, False, mode) for mode in Mode} == {*AIRBORNE, Phase.DISARMED} - {Phase.GOTO}
+    assert {phase_of(True, False, mode, goes=True) for mode in Mode} == {*AIRBORNE, Phase.DISARMED} - {
+        Phase.HOLD
+    }
+    assert phase_of(True, True, Mode.HOLD, goes=True) is Phase.STANDING
     assert phase_of(True, False, Mode.ALTITUDE) is phase_of(True, False, Mode.POSITION) is Phase.MANUAL
