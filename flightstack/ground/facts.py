@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from flightstack.autopilot import Autopilot
 from flightstack.commander.failsafe import Action
 from flightstack.contract import FloatArray
 from flightstack.geodesy import GeoPoint
+from flightstack.guidance.fence import FenceBreach
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.mavlink.telemetry.facts import BatteryView, FlightTimes, PlanIds
+from flightstack.mavlink.telemetry.facts import BatteryView, FenceBreaches, FlightTimes, PlanIds
 from flightstack.modes import Mode
 from flightstack.params.vehicle import Vehicle
 
@@ -38,6 +41,8 @@ class AutopilotFacts:
         self.frame = autopilot.places.frame
         self.top_speed_rad_s = [min(rotor.max_speed_rad_s, 1e6) for rotor in vehicle.rotors]
         self._battery = battery
+        self.fence_breaches = FenceBreaches()
+        self._fence_was_breached = False
         self.state: FloatArray = self._now.state
         self.setpoint: FloatArray = self._now.setpoint
         self.attitude_target: FloatArray = self._now.attitude_target
@@ -142,10 +147,29 @@ class AutopilotFacts:
         """Whether the vehicle is outside its fence."""
         return bool(self._autopilot.supervisor.fence.flags)
 
+    def watch_fence(self) -> None:
+        """Count the breaches of the fence; call it often."""
+        flags = self._autopilot.supervisor.fence.flags
+        if flags:
+            # where both are broken, it is more urgent to come back
+            high = flags is FenceBreach.TOO_HIGH
+            kind = int(mavlink.FENCE_BREACH_MAXALT if high else mavlink.FENCE_BREACH_BOUNDARY)
+            if self._fence_was_breached:
+                self.fence_breaches = self.fence_breaches._replace(kind=kind)
+            else:
+                self.fence_breaches = FenceBreaches(self.fence_breaches.number + 1, self.time_us, kind)
+        self._fence_was_breached = bool(flags)
+
     @property
-    def has_state(self) -> bool:
-        """Whether the simulator has sent a state."""
-        return self._autopilot.has_state
+    def state_is_good(self) -> bool:
+        """Whether the newest state is one to fly by: it has arrived, is finite, and neither too old nor frozen."""
+        stale = self._autopilot.supervisor.state_is_stale
+        return self._autopilot.has_state and not stale and bool(np.isfinite(self.state).all())
+
+    @property
+    def battery_level(self) -> int:
+        """How low the battery is: 0 enough or unknown, 1 low, 2 critical, 3 emergency."""
+        return self._autopilot.supervisor.battery_level
 
     @property
     def can_arm(self) -> bool:

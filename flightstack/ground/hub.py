@@ -201,6 +201,7 @@ class GroundHub:
     def _note_changes(self) -> bool:
         """Announce reached items and another home; tell whether mode or arming changed."""
         facts = self._facts
+        facts.watch_fence()
         reached = self._autopilot.now.reached
         for seq in reached:
             self._to_all(mavlink.MAVLink_mission_item_reached_message(seq))

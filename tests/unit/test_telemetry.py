@@ -17,7 +17,7 @@ from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, FsLoopTimi
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
 from flightstack.mavlink.telemetry import MAKERS, autopilot_version, heartbeat, messages, status_texts
-from flightstack.mavlink.telemetry.facts import FlightTimes, NoBattery, PlanIds
+from flightstack.mavlink.telemetry.facts import FenceBreaches, FlightTimes, NoBattery, PlanIds
 from flightstack.modes import CUSTOM_MODE, Mode
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
@@ -40,7 +40,8 @@ def facts(**changes: object) -> SimpleNamespace:
         "armed": True, "mode": Mode.MISSION, "landed": False, "climbing": False, "descending": False,
         "is_generic": False, "system_status": 4, "top_speed_rad_s": [600.0] * 4, "battery": NoBattery(),
         "flight": FlightTimes(), "plan_ids": PlanIds(), "fence_breached": False, "fence_acts": True,
-        "mission_current": 2, "mission_count": 5, "mission_state": 3, "can_arm": True, "has_state": True,
+        "mission_current": 2, "mission_count": 5, "mission_state": 3, "can_arm": True,
+        "state_is_good": True, "battery_level": 0, "fence_breaches": FenceBreaches(),
         "loop_timing": lambda: FsLoopTiming(1, 2, 0, 0, 500.0, 100.0, 30.0, *[1.0] * 6, 0),
     }  # fmt: skip
     return SimpleNamespace(**{**values, **changes})
@@ -151,7 +152,9 @@ def test_status_says_whether_it_can_arm_and_that_there_is_no_battery() -> None:
     refused = on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, can_arm=False)
     assert not refused.onboard_control_sensors_health & prearm
     assert refused.onboard_control_sensors_health
-    assert not on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, has_state=False).onboard_control_sensors_health
+    assert not on_the_wire(
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS, state_is_good=False
+    ).onboard_control_sensors_health
 
 
 def test_home_and_origin() -> None:
@@ -171,7 +174,7 @@ def test_gps_altitude_and_battery_say_what_is_known() -> None:
     assert (gps.fix_type, gps.satellites_visible, gps.alt) == (3, 255, 518_000)
     assert gps.vel == round(math.hypot(1.0, -2.0) * 100)
     assert gps.cog == round(math.degrees(math.atan2(-2, 1)) % 360 * 100)
-    assert on_the_wire(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, has_state=False).fix_type == 1
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, state_is_good=False).fix_type == 1
     lower_home = GeoPoint(HOME.latitude_deg, HOME.longitude_deg, HOME.altitude_m - 8.0)
     altitude = on_the_wire(mavlink.MAVLINK_MSG_ID_ALTITUDE, home=lower_home)
     assert (altitude.altitude_amsl, altitude.altitude_local, altitude.altitude_relative) == (
@@ -203,6 +206,35 @@ def test_a_breached_fence_is_ill() -> None:
     assert not ill.onboard_control_sensors_health & fence
     assert ill.onboard_control_sensors_enabled & fence
     assert on_the_wire(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, fence_breached=True).breach_status == 1
+
+
+def test_a_breach_is_told_with_its_kind_number_and_time() -> None:
+    breaches = FenceBreaches(3, 1_234_567, mavlink.FENCE_BREACH_MAXALT)
+    for broken in (True, False):  # the latest is told after its end too
+        m = on_the_wire(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, fence_breached=broken, fence_breaches=breaches)
+        assert (m.breach_status, m.breach_count, m.breach_type, m.breach_time) == (broken, 3, 2, 1234)
+
+
+@pytest.mark.parametrize(
+    ("level", "state"),
+    [
+        (0, mavlink.MAV_BATTERY_CHARGE_STATE_OK),
+        (1, mavlink.MAV_BATTERY_CHARGE_STATE_LOW),
+        (2, mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL),
+        (3, mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY),
+    ],
+)
+def test_the_charge_has_a_state_where_it_is_known(level: int, state: int) -> None:
+    kind = mavlink.MAVLINK_MSG_ID_BATTERY_STATUS
+    pack = SimpleNamespace(voltage_v=11.7, current_a=8.5, remaining=0.1, valid=True)
+    assert on_the_wire(kind, battery=pack, battery_level=level).charge_state == state
+    assert on_the_wire(kind, battery_level=level).charge_state == mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
+
+
+def test_nothing_is_estimated_from_a_state_that_is_not_good() -> None:
+    kind = mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS
+    assert on_the_wire(kind).flags
+    assert on_the_wire(kind, state_is_good=False).flags == 0
 
 
 def test_a_fence_without_action_is_not_enabled() -> None:

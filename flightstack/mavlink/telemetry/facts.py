@@ -53,6 +53,16 @@ class FlightTimes(NamedTuple):
     landing_us: int = 0
 
 
+class FenceBreaches(NamedTuple):
+    """Breaches of the geofence since the vehicle booted."""
+
+    number: int = 0
+    latest_us: int = 0
+    """When the latest began, on the vehicle's clock."""
+    kind: int = 0
+    """FENCE_BREACH of the latest."""
+
+
 class PlanIds(NamedTuple):
     """Identifiers of the stored plans, as the mission protocol's opaque ids; 0 for an empty one."""
 
@@ -145,13 +155,18 @@ class VehicleFacts(Protocol):
         ...
 
     @property
-    def has_state(self) -> bool:
-        """Whether a state has ever arrived."""
+    def state_is_good(self) -> bool:
+        """Whether the newest state is one to fly by: it has arrived, is finite, and neither too old nor frozen."""
         ...
 
     @property
     def battery(self) -> BatteryView:
         """The battery."""
+        ...
+
+    @property
+    def battery_level(self) -> int:
+        """How low the battery is: 0 enough or unknown, 1 low, 2 critical, 3 emergency."""
         ...
 
     @property
@@ -162,6 +177,11 @@ class VehicleFacts(Protocol):
     @property
     def fence_breached(self) -> bool:
         """Whether the vehicle is outside its fence."""
+        ...
+
+    @property
+    def fence_breaches(self) -> FenceBreaches:
+        """Breaches of the fence so far."""
         ...
 
     @property

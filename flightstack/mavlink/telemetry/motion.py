@@ -81,10 +81,10 @@ def global_position(f: VehicleFacts) -> Message:
 
 
 def gps_raw(f: VehicleFacts) -> Message:
-    """GPS_RAW_INT from the true position: a 3D fix as soon as there is a state; no satellites are simulated."""
+    """GPS_RAW_INT from the true position: a 3D fix while there are good states; no satellites are simulated."""
     x = floats(f.state)
     point = f.frame.to_geo(Vector3(*x[:3]))
-    fix = mavlink.GPS_FIX_TYPE_3D_FIX if f.has_state else mavlink.GPS_FIX_TYPE_NO_FIX
+    fix = mavlink.GPS_FIX_TYPE_3D_FIX if f.state_is_good else mavlink.GPS_FIX_TYPE_NO_FIX
     course = math.degrees(math.atan2(x[4], x[3])) % 360.0 if math.isfinite(x[3] + x[4]) else 0.0
     altitude_mm = int32(point.altitude_m * 1e3)
     return mavlink.MAVLink_gps_raw_int_message(

@@ -75,7 +75,7 @@ SENSORS = (
 def sys_status(f: VehicleFacts) -> Message:
     """SYS_STATUS: the health bits by which MAVSDK and QGroundControl judge a vehicle."""
     present = SENSORS | mavlink.MAV_SYS_STATUS_GEOFENCE | mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    healthy = present if f.has_state else 0
+    healthy = present if f.state_is_good else 0
     if not f.can_arm:
         healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
     if f.fence_breached:
@@ -99,12 +99,23 @@ def _battery_fields(f: VehicleFacts) -> tuple[int, int, int]:
     return voltage, current, whole(b.remaining * 100.0, 0, 100) if math.isfinite(b.remaining) else -1
 
 
+CHARGE_STATES = (
+    mavlink.MAV_BATTERY_CHARGE_STATE_OK,
+    mavlink.MAV_BATTERY_CHARGE_STATE_LOW,
+    mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL,
+    mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY,
+)
+"""By the level that arming and failsafes go by."""
+
+
 def battery_status(f: VehicleFacts) -> Message:
     """BATTERY_STATUS: one pack, its cells not told apart."""
     voltage, current, remaining = _battery_fields(f)
+    known = f.battery.valid and math.isfinite(f.battery.remaining)
+    charge = CHARGE_STATES[f.battery_level] if known else mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
     return mavlink.MAVLink_battery_status_message(
         0, mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_TYPE_LIPO, 0x7FFF,
-        [voltage, *[0xFFFF] * 9], current, -1, -1, remaining, 0, mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED,
+        [voltage, *[0xFFFF] * 9], current, -1, -1, remaining, 0, charge,
     )  # fmt: skip
 
 
@@ -140,7 +151,7 @@ def estimator_status(f: VehicleFacts) -> Message:
         | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
     )  # fmt: skip
     return mavlink.MAVLink_estimator_status_message(
-        f.time_us, flags if f.has_state else 0, 0.0, 0.0, 0.0, 0.0, NAN, NAN, 0.0, 0.0
+        f.time_us, flags if f.state_is_good else 0, 0.0, 0.0, 0.0, 0.0, NAN, NAN, 0.0, 0.0
     )
 
 
@@ -153,9 +164,10 @@ def flight_information(f: VehicleFacts) -> Message:
 
 
 def fence_status(f: VehicleFacts) -> Message:
-    """FENCE_STATUS."""
-    kind = mavlink.FENCE_BREACH_BOUNDARY if f.fence_breached else mavlink.FENCE_BREACH_NONE
-    return mavlink.MAVLink_fence_status_message(int(f.fence_breached), 0, kind, 0)
+    """FENCE_STATUS: whether the fence is broken now; the number of breaches, and kind and time of the latest."""
+    number, latest_us, kind = f.fence_breaches
+    began_ms = latest_us // 1000 & 0xFFFFFFFF
+    return mavlink.MAVLink_fence_status_message(int(f.fence_breached), min(number, 0xFFFF), kind, began_ms)
 
 
 CAPABILITIES = (

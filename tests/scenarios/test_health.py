@@ -1,0 +1,98 @@
+"""What ground stations are told of the vehicle's health while it goes wrong."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.modes import Mode
+from tests.support.world import World
+
+SYS_STATUS, GPS_RAW_INT, ESTIMATOR_STATUS, FENCE_STATUS, BATTERY_STATUS = (
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+    mavlink.MAVLINK_MSG_ID_FENCE_STATUS,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
+)
+SENSORS = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_AHRS
+LASTING = ["FS_STALE_T=0.1", "FS_BLIND_T=5"]
+
+
+def asked(world: World, message_id: int) -> Message:
+    """The message as it is now."""
+    assert world.command(mavlink.MAV_CMD_REQUEST_MESSAGE, message_id) == 0
+    return world.received[mavlink.mavlink_map[message_id].msgname]
+
+
+def flying(*params: str, height_m: float = 3.0) -> World:
+    world = World(vehicle="x_quad", params=params)
+    assert world.arm() == 0
+    assert world.takeoff(height_m) == 0
+    world.until(lambda: world.mode is Mode.HOLD, 20.0)
+    return world
+
+
+def seems_healthy(world: World) -> bool:
+    """Tell so, if all three messages agree."""
+    healthy = asked(world, SYS_STATUS).onboard_control_sensors_health & SENSORS == SENSORS
+    assert (asked(world, GPS_RAW_INT).fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX) is healthy
+    assert bool(asked(world, ESTIMATOR_STATUS).flags) is healthy
+    return healthy
+
+
+@pytest.mark.parametrize("fault", ["state:freeze", "state:nan"])
+def test_a_state_that_is_not_to_be_flown_by_is_ill_as_long_as_it_lasts(fault: str) -> None:
+    world = flying(*LASTING)
+    assert seems_healthy(world)
+    now_s = world.simulator.time_us * 1e-6
+    world.inject(f"{fault}@{now_s:.3f}-{now_s + 0.4:.3f}")
+    world.run(0.3)
+    assert not seems_healthy(world)
+    world.run(0.3)
+    assert seems_healthy(world)
+
+
+def test_a_simulator_that_is_silent_is_ill_on_the_ground_too() -> None:
+    world = World(vehicle="x_quad", params=LASTING)
+    world.run(0.1)
+    assert seems_healthy(world)
+    world.loses_states = True
+    world.run(0.3)
+    assert not seems_healthy(world)
+
+
+def test_each_breach_of_the_fence_is_told_with_its_kind_and_time() -> None:
+    world = flying("GF_ACTION=1", "GF_PREDICT=0", "GF_MAX_VER_DIST=3.5")
+    before = asked(world, FENCE_STATUS)
+    assert (before.breach_status, before.breach_count, before.breach_type) == (0, 0, 0)
+    assert world.stack.params.set("GF_MAX_VER_DIST", 2.0) is None
+    began_ms = world.time_s * 1e3
+    world.run(0.1)
+    high = asked(world, FENCE_STATUS)
+    assert (high.breach_status, high.breach_count, high.breach_type) == (1, 1, mavlink.FENCE_BREACH_MAXALT)
+    assert began_ms <= high.breach_time <= began_ms + 20.0
+    assert world.stack.params.set("GF_MAX_VER_DIST", 0.0) is None
+    world.run(0.5)
+    over = asked(world, FENCE_STATUS)
+    assert (over.breach_status, over.breach_count, over.breach_time) == (0, 1, high.breach_time)
+    assert world.stack.params.set("GF_MAX_HOR_DIST", 1.0) is None
+    velocity = mavlink.MAVLink_set_position_target_local_ned_message
+    world.streams["setpoint"] = lambda: velocity(0, 1, 1, 1, 0xDC7, 0, 0, 0, 2.0, 0, 0, 0, 0, 0, 0, 0)
+    world.run(0.2)
+    assert world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 6) == 0
+    world.until(lambda: asked(world, FENCE_STATUS).breach_status == 1, 5.0)
+    assert world.position[0] > 1.0
+    far = asked(world, FENCE_STATUS)
+    assert (far.breach_count, far.breach_type) == (2, mavlink.FENCE_BREACH_BOUNDARY)
+
+
+def test_the_battery_has_the_state_that_the_failsafes_go_by() -> None:
+    world = World(vehicle="x_quad")
+    told = []
+    for level in (0.5, 0.13, 0.06, 0.04):
+        world.inject(f"battery:level={level}")
+        world.run(0.3)
+        told.append(asked(world, BATTERY_STATUS).charge_state)
+    assert told == [1, 2, 3, 4]
