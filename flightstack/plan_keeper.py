@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from flightstack.commander.supervisor import Supervisor
@@ -10,11 +11,16 @@ from flightstack.geodesy import GeoPoint
 from flightstack.guidance.mission import LAND, NAV_DELAY, RETURN_TO_LAUNCH
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.plan_table import plan_table
-from flightstack.guidance.safe_places import SafePlaces, plan_limits
+from flightstack.guidance.rally import ReturnPlace
+from flightstack.guidance.safe_places import HOME_SPREAD_M, SafePlaces, plan_limits
+from flightstack.modes import Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.plan import MissionItem, Rejection
 from flightstack.plan.check import Limits
 from flightstack.snapshot import Recorder, Snapshot
+
+CEILING_MARGIN_M = 1.0
+"""So far below GF_MAX_VER_DIST a return stays: where a breach of it ends (``fence.HYSTERESIS_M``)."""
 
 
 class PlanKeeper:
@@ -30,6 +36,7 @@ class PlanKeeper:
     def __init__(self, home: GeoPoint) -> None:
         self.items: tuple[MissionItem, ...] = ()
         self.places = SafePlaces(home)
+        self._ground_m = 0.0  # above the origin
 
     def _mission_is_gone(self) -> None:
         """Act when the mission that may be flown was cleared."""
@@ -48,14 +55,49 @@ class PlanKeeper:
     def set_home(self, point: GeoPoint, chosen: bool = True) -> str | None:
         """Move home; return why not, or None. A mission's relative altitudes follow, and the fence's limits.
 
-        A home that was ``chosen`` stays when the vehicle arms elsewhere.
+        A home that was ``chosen`` stays when the vehicle arms elsewhere. None is taken that a return could not go
+        to, or that would spoil what is being flown.
         """
+        return self._home_refusal(point) or self._move_home(point, chosen)
+
+    def _home_refusal(self, point: GeoPoint) -> str | None:
+        """Tell why home may not be there: because of the geofence, the mission in flight or the vehicle's place."""
+        places = self.places
+        there = places.frame.to_ned(point)
+        if not all(math.isfinite(number) for number in there):
+            return None  # no place at all, as ``SafePlaces.set_home`` says
+        if not places.fence.shape.allows(there.x, there.y):
+            return "home would be outside the geofence"
+        if not self.now.status.armed:
+            return None
+        spoils = self._spoils_mission(point) if self.now.status.mode is Mode.MISSION else None
+        if spoils is not None:
+            return spoils
+        farthest_m = self._behaviour.fence_max_distance_m
+        away_m = math.hypot(self._state[0] - there.x, self._state[1] - there.y)
+        if 0.0 < farthest_m < away_m and not self.now.landed and self._behaviour.fence_action > 0.0:
+            return f"home would be more than {farthest_m:g} m from the vehicle (GF_MAX_HOR_DIST)"
+        return None
+
+    def _spoils_mission(self, home: GeoPoint) -> str | None:
+        """Tell what another home would do to the mission in flight.
+
+        Its height must stay: a mission's relative altitudes would follow it at once, into the ground if need be.
+        """
+        steps_m = abs(home.altitude_m - self.home.altitude_m)
+        if steps_m > HOME_SPREAD_M and any(item.altitude_is_relative for item in self.items):
+            return "altitudes of the mission in flight count from home: pause it first"
+        rejection = self.places.check_mission(self.items, self.limits, home)
+        return None if rejection is None else f"the mission in flight would not do: {rejection.reason}"
+
+    def _move_home(self, point: GeoPoint, chosen: bool) -> str | None:
         refusal = self.places.set_home(point, chosen)
         if refusal is None:
             home = self.places.home
             home_ned_m = Vector3(home.north_m, home.east_m, -home.altitude_m)
             self._navigator.change_plan(*self._plan_table())
             self.supervisor.set_home(home_ned_m)
+            self._set_bounds()
             self._recorder.home(self.now.time_us, point, home_ned_m)
         return refusal
 
@@ -65,11 +107,49 @@ class PlanKeeper:
         before_m = places.home.altitude_m
         follows = self._behaviour.home_follows and not places.home_is_chosen
         if follows and places.has_left_home(here):
-            self.set_home(places.frame.to_geo(here), chosen=False)
+            self._move_home(places.frame.to_geo(here), chosen=False)
         return places.home.altitude_m - before_m
+
+    def _find_ground(self, return_place: ReturnPlace | None) -> None:
+        """Say where the ground is taken to be as a mode begins.
+
+        It is that of home; of the place of a return; in a landing, that of the nearest place known.
+        """
+        places, mode = self.places, self.now.status.mode
+        self._ground_m = places.home.altitude_m
+        if return_place is not None:
+            self._ground_m = return_place.altitude_m
+        elif mode is Mode.LAND:
+            self._ground_m = places.ground_m(float(self._state[0]), float(self._state[1]))
+        self._set_bounds()
+
+    def _set_bounds(self) -> None:
+        """Tell guidance where the ground is, and how high it may climb where no plan says so."""
+        home_m, limit_m = self.places.home.altitude_m, self._behaviour.fence_max_altitude_m
+        if self.now.status.mode not in (Mode.RETURN, Mode.LAND):  # they end where they were going to
+            self._ground_m = home_m
+        below_m = max(limit_m - CEILING_MARGIN_M, 0.5 * limit_m)
+        ceiling_m = home_m + below_m if limit_m > 0.0 else math.inf
+        self._navigator.set_bounds(-self._ground_m, -ceiling_m)
+
+    def _return_place(self) -> ReturnPlace | None:
+        """Return where a return from here goes, or None if all places are outside the geofence."""
+        north_m, east_m = float(self._state[0]), float(self._state[1])
+        return self.places.return_place(north_m, east_m, self._behaviour.return_type, self._may_be_at)
+
+    def _may_be_at(self, place: ReturnPlace) -> bool:
+        if self._behaviour.fence_action == 0.0:
+            return True
+        above_home_m = place.altitude_m - self.places.home.altitude_m
+        return self.supervisor.fence.refusal(place.north_m, place.east_m, above_home_m) is None
 
     def _plan_table(self) -> tuple[FloatArray, FloatArray]:
         return plan_table(self.items, self.places.frame, self.home.altitude_m)
+
+    def _mission_refusal(self) -> str | None:
+        """Tell why the mission would be refused by now: home, limits or geofence may have changed since it came."""
+        rejection = self.check_mission(self.items) if self.items else None
+        return None if rejection is None else rejection.reason
 
     def check_mission(self, items: Sequence[MissionItem]) -> Rejection | None:
         """Tell why the vehicle would refuse a mission, or None."""
@@ -102,11 +182,16 @@ class PlanKeeper:
 
     def set_current_item(self, seq: int) -> str | None:
         """Make ``seq`` the current item; return why not, or None."""
-        if not 0 <= seq < len(self.items):
-            return f"there is no mission item {seq}"
+        refusal = self.item_refusal(seq)
+        if refusal is not None:
+            return refusal
         self._navigator.set_current(seq)
         self._mission_changed()
         return None
+
+    def item_refusal(self, seq: int) -> str | None:
+        """Return why ``seq`` cannot be the current item, or None."""
+        return None if 0 <= seq < len(self.items) else f"there is no mission item {seq}"
 
     def restart_mission(self) -> None:
         """Begin the mission anew: its first item is the current one, jumps count from zero."""

@@ -18,6 +18,11 @@ REJECTED = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 DENIED = int(mavlink.MAV_RESULT_DENIED)
 UNSUPPORTED = int(mavlink.MAV_RESULT_UNSUPPORTED)
 FAILED = int(mavlink.MAV_RESULT_FAILED)
+UNSUPPORTED_FRAME = 9
+"""MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, which pymavlink's dialect lacks."""
+RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+ABSOLUTE_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, None)
+"""Of altitudes above home and above the sea; a COMMAND_LONG has no frame."""
 
 
 class Answer(NamedTuple):
@@ -30,6 +35,13 @@ class Answer(NamedTuple):
 def answer_to(refusal: str | None) -> Answer:
     """Return the answer of an event that may be refused for the moment."""
     return Answer(ACCEPTED) if refusal is None else Answer(REJECTED, refusal)
+
+
+def frame_answer(command: Command) -> Answer | None:
+    """Return the answer to a command whose place is in a frame that is not known here, or None."""
+    if command.frame in RELATIVE_FRAMES or command.frame in ABSOLUTE_FRAMES:
+        return None
+    return Answer(UNSUPPORTED_FRAME, f"frame {command.frame} is not supported")
 
 
 class FailureLink(Protocol):

@@ -9,19 +9,18 @@ from flightstack.commands.context import (
     ACCEPTED,
     DENIED,
     REJECTED,
+    RELATIVE_FRAMES,
     Answer,
     Handler,
     VehicleContext,
     answer_to,
+    frame_answer,
 )
 from flightstack.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.services.command_server import Command
 from flightstack.modes import Mode
 
-UNSUPPORTED_FRAME = 9  # MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, which pymavlink's dialect lacks
-_RELATIVE = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
-_ABSOLUTE = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, None)  # None: a COMMAND_LONG
 CHANGE_MODE, RELATIVE_YAW = 1, 2
 """Bits of DO_REPOSITION's second parameter."""
 NO_CHANGE, DEFAULT = -1.0, -2.0
@@ -35,15 +34,19 @@ def above_home_m(vehicle: VehicleContext, command: Command) -> float:
     It is above sea level, as PX4 takes it, unless a COMMAND_INT's frame says that it is above home.
     """
     altitude_m = command.params[6]
-    return altitude_m if command.frame in _RELATIVE else altitude_m - vehicle.autopilot.home.altitude_m
+    return altitude_m if command.frame in RELATIVE_FRAMES else altitude_m - vehicle.autopilot.home.altitude_m
 
 
 def take_off(vehicle: VehicleContext, command: Command) -> Answer:
     """NAV_TAKEOFF: parameter 7 is the altitude; NaN means MIS_TAKEOFF_ALT. The place is where the vehicle stands.
 
-    A generic autopilot's is above home, as clients that do not know PX4 mean it.
+    A generic autopilot's is above home, as clients that do not know PX4 mean it, unless a frame says otherwise.
     """
-    altitude_m = command.params[6] if vehicle.is_generic else above_home_m(vehicle, command)
+    unsupported = frame_answer(command)
+    if unsupported is not None:
+        return unsupported
+    is_plain = vehicle.is_generic and command.frame is None
+    altitude_m = command.params[6] if is_plain else above_home_m(vehicle, command)
     if math.isinf(altitude_m):
         return Answer(DENIED, "the takeoff altitude is not a number")
     wanted = None if math.isnan(altitude_m) else altitude_m
@@ -63,8 +66,9 @@ def reposition(vehicle: VehicleContext, command: Command) -> Answer:
     """
     autopilot = vehicle.autopilot
     speed, flags, _, yaw_rad, latitude, longitude, _ = command.params
-    if command.frame not in (*_RELATIVE, *_ABSOLUTE):
-        return Answer(UNSUPPORTED_FRAME, f"frame {command.frame} is not supported")
+    unsupported = frame_answer(command)
+    if unsupported is not None:
+        return unsupported
     bits = int(flags) if math.isfinite(flags) and 0.0 <= flags < 256.0 else 0
     if not bits & CHANGE_MODE and autopilot.now.status.mode is not Mode.HOLD:
         return Answer(REJECTED, "the vehicle is not in hold mode")
@@ -74,7 +78,8 @@ def reposition(vehicle: VehicleContext, command: Command) -> Answer:
         return Answer(DENIED, refusal)
     home = autopilot.home
     place = autopilot.places.frame.to_ned(GeoPoint(latitude, longitude, home.altitude_m + altitude_m))
-    refusal = _too_far(vehicle, place.x, place.y, altitude_m)
+    is_pause = math.isnan(latitude) and math.isnan(altitude_m)
+    refusal = None if is_pause else _too_far(vehicle, place.x, place.y, altitude_m)
     if refusal is not None:
         return Answer(DENIED, refusal)
     if bits & RELATIVE_YAW:
@@ -108,7 +113,8 @@ def _too_far(vehicle: VehicleContext, north_m: float, east_m: float, altitude_m:
         north_m, east_m = x, y
     if math.isnan(altitude_m):
         altitude_m = -z - autopilot.places.home.altitude_m
-    refusal = autopilot.supervisor.fence.refusal(north_m, east_m, altitude_m)
+    here = (x, y, -z - autopilot.places.home.altitude_m)
+    refusal = autopilot.supervisor.fence.way_refusal(here, (north_m, east_m, altitude_m))
     return None if refusal is None else f"the place {refusal}"
 
 

@@ -11,13 +11,21 @@ from flightstack.mavlink.services.command_server import Command
 
 
 def start_mission(vehicle: VehicleContext, command: Command) -> Answer:
-    """MISSION_START: selects the mode and arms, as PX4 does; parameter 1 is the first item."""
+    """MISSION_START: selects the mode and arms, as PX4 does; parameter 1 is the first item.
+
+    Nothing changes unless all of it can be done.
+    """
     autopilot = vehicle.autopilot
     first = command.params[0]
-    if math.isfinite(first) and first > 0.0:
-        refusal = autopilot.set_current_item(int(first))
-        if refusal is not None:
-            return Answer(DENIED, refusal)
+    begins_there = math.isfinite(first) and first > 0.0
+    refusal = autopilot.item_refusal(int(first)) if begins_there else None
+    if refusal is not None:
+        return Answer(DENIED, refusal)
+    refusal = autopilot.mission_start_refusal()
+    if refusal is not None:
+        return answer_to(refusal)
+    if begins_there:
+        autopilot.set_current_item(int(first))
     refusal = autopilot.happen(Event.SELECT_MISSION)
     if refusal is None and not autopilot.now.status.armed:
         refusal = autopilot.happen(Event.ARM)
@@ -25,17 +33,24 @@ def start_mission(vehicle: VehicleContext, command: Command) -> Answer:
 
 
 def set_current(vehicle: VehicleContext, command: Command) -> Answer:
-    """DO_SET_MISSION_CURRENT: parameter 1 is the item (-1: leave it), parameter 2 restarts the mission."""
+    """DO_SET_MISSION_CURRENT: parameter 1 is the item (-1: leave it), parameter 2 restarts the mission.
+
+    A command that is denied changes nothing.
+    """
     autopilot = vehicle.autopilot
     seq, reset = command.params[0], command.params[1]
+    names_item = not math.isnan(seq) and seq != -1.0
+    if names_item:
+        if not math.isfinite(seq) or seq != int(seq):
+            return Answer(DENIED, "the item is not a whole number")
+        refusal = autopilot.item_refusal(int(seq))
+        if refusal is not None:
+            return Answer(DENIED, refusal)
     if reset == 1.0:
         autopilot.restart_mission()
-    if math.isnan(seq) or seq == -1.0:
-        return Answer(ACCEPTED)
-    if not math.isfinite(seq) or seq != int(seq):
-        return Answer(DENIED, "the item is not a whole number")
-    refusal = autopilot.set_current_item(int(seq))
-    return Answer(ACCEPTED) if refusal is None else Answer(DENIED, refusal)
+    if names_item:
+        autopilot.set_current_item(int(seq))
+    return Answer(ACCEPTED)
 
 
 HANDLERS: dict[int, Handler] = {

@@ -6,11 +6,13 @@ from flightstack.commander.transitions import Need
 from flightstack.commands.context import (
     ACCEPTED,
     DENIED,
+    RELATIVE_FRAMES,
     UNSUPPORTED,
     Answer,
     Handler,
     VehicleContext,
     answer_to,
+    frame_answer,
 )
 from flightstack.contract import Vector3
 from flightstack.geodesy import GeoPoint
@@ -19,7 +21,6 @@ from flightstack.mavlink.services.command_server import Command
 from flightstack.snapshot import NOTICE
 
 DO_NOTHING, REBOOT, SHUT_DOWN = 0.0, 1.0, 2.0
-RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
 
 def reboot_or_shut_down(vehicle: VehicleContext, command: Command) -> Answer:
@@ -60,6 +61,9 @@ def set_home(vehicle: VehicleContext, command: Command) -> Answer:
         position = Vector3(*autopilot.now.state[:3].tolist())
         refusal = autopilot.set_home(autopilot.places.frame.to_geo(position), chosen=False)
     else:
+        unsupported = frame_answer(command)
+        if unsupported is not None:
+            return unsupported
         latitude, longitude, altitude = command.params[4:7]
         if command.frame in RELATIVE_FRAMES:
             altitude += autopilot.home.altitude_m

@@ -40,5 +40,5 @@ def aim_goal(mode: int, aim: FloatArray, state: VehicleState, params: GuidancePa
         climb = params.takeoff_speed_m_s
     elif mode == LAND or (mode == RETURN and aim[A_PHASE] == DESCENDING):
         z = params.far_below_m
-        descent = landing_speed(state.position_ned_m.z - aim[A_HOME_Z], params)
+        descent = landing_speed(state.position_ned_m.z, params)
     return Goal(aim[A_X], aim[A_Y], z, aim[A_YAW], speed, climb, descent, params.yaw_rate_rad_s, 0.0)

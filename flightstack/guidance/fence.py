@@ -217,14 +217,41 @@ class FenceMonitor:
 
         For arming, takeoff and goto: "the vehicle" or "the target" " is outside the geofence".
         """
+        memory = self._look_at(north_m, east_m, altitude_m)
+        if memory is None:
+            return "is nowhere"
+        return self.text(int(memory[F_FLAGS])) or None
+
+    def way_refusal(self, here: tuple[float, float, float], there: tuple[float, float, float]) -> str | None:
+        """Return why the vehicle may not go straight to a place (north, east, altitude above home), or None.
+
+        Who is outside a limit already may go where it is no farther outside: out of a breach there must be a way.
+        """
+        present, wanted = self._look_at(*here), self._look_at(*there)
+        if present is None or wanted is None:
+            return "is nowhere"
+        no_worse = wanted[F_INCLUSION_M:] >= present[F_INCLUSION_M:]
+        broken = int(wanted[F_FLAGS])
+        for limit in range(4):
+            if broken & int(present[F_FLAGS]) & 1 << limit and no_worse[limit]:
+                broken &= ~(1 << limit)
+        if broken:
+            return self.text(broken)
+        if int(present[F_FLAGS]) & (FenceBreach.OUTSIDE | FenceBreach.EXCLUDED):
+            return None
+        ways_out = self.fence.shape.ways_out(np.array([here[:2]]), np.array([there[:2]]))
+        return "is beyond an edge of the geofence" if ways_out else None
+
+    def _look_at(self, north_m: float, east_m: float, altitude_m: float) -> FloatArray | None:
+        """Return flags and margins of a place, as ``fence_step`` writes them; None if it is nowhere."""
         probe, memory = np.zeros(13), np.zeros(FENCE_MEMORY_SIZE)
         limits = self._limits.copy()
         limits[[L_DECELERATION, L_VERTICAL]] = 0.0
         probe[:3] = north_m, east_m, limits[L_HOME_DOWN] - altitude_m
         if not np.isfinite(probe).all():
-            return "is nowhere"
+            return None
         fence_step(self._areas, self._vertices, self._groups, limits, probe, memory)
-        return self.text(int(memory[F_FLAGS])) or None
+        return memory
 
     def text(self, flags: int) -> str:
         """Return what ``flags`` mean, as the end of a sentence: "is outside the geofence"; empty for none."""

@@ -125,7 +125,8 @@ def _begin_position_item(
     m[M_YAW_IS_COUNTED] = 0.0
     m[M_X], m[M_Y] = x, y
     m[M_YAW_RATE] = params.yaw_rate_rad_s
-    m[M_RISE_Z] = min(m[M_Z], state.position_ned_m.z - params.takeoff_altitude_m)
+    rise_z = max(state.position_ned_m.z - params.takeoff_altitude_m, params.ceiling_down_m)
+    m[M_RISE_Z] = min(m[M_Z], rise_z)
     m[M_PHASE] = RISE if landed and command not in (TAKEOFF, LAND) else TRAVEL
 
 
@@ -306,5 +307,6 @@ def mission_goal(
 
 @compiled
 def landing_speed(down_m: float, params: GuidanceParams) -> float:
-    """Descent speed of a landing at this height above home."""
-    return params.descent_speed_m_s if -down_m > params.land_slow_altitude_m else params.land_speed_m_s
+    """Descent speed of a landing at ``down_m``: slower near the ground."""
+    height_m = params.ground_down_m - down_m
+    return params.descent_speed_m_s if height_m > params.land_slow_altitude_m else params.land_speed_m_s

@@ -115,8 +115,10 @@ class Navigator:
 
         A mission flies at the new speed too, unless one of its items has set another.
         """
-        self._given_params = params
-        before, self.params = self.params, self._speeds.applied_to(params)
+        self._given_params = params._replace(
+            ground_down_m=self.params.ground_down_m, ceiling_down_m=self.params.ceiling_down_m
+        )
+        before, self.params = self.params, self._speeds.applied_to(self._given_params)
         self._params_array[:] = self.params
         m = self._mission
         if m[M_SPEED] == before.cruise_speed_m_s:
@@ -131,6 +133,12 @@ class Navigator:
         self._speeds = speeds
         self.set_params(self._given_params)
         self._mission[M_SPEED] = self.params.cruise_speed_m_s
+
+    def set_bounds(self, ground_down_m: float, ceiling_down_m: float) -> None:
+        """Take the ground to be there, and climb no higher than the ceiling, where no plan asks for it [m NED]."""
+        bounds = {"ground_down_m": ground_down_m, "ceiling_down_m": ceiling_down_m}
+        self.params = self.params._replace(**bounds)
+        self.set_params(self._given_params)
 
     @property
     def speeds(self) -> SpeedOverrides:
@@ -234,11 +242,15 @@ class Navigator:
             self._enter_mission()
 
     def _enter_return(self) -> None:
-        """Climb to the return altitude above the place of the return, unless it is near or the vehicle higher."""
+        """Climb to the return altitude above the place of the return, unless it is near or the vehicle higher.
+
+        The ceiling comes first: a return does not break the fence that it may have been called by.
+        """
         t, aim, p = self._trajectory, self._aim, self.params
         aim[A_PHASE] = CLIMBING
         if np.hypot(t[0] - aim[A_HOME_X], t[1] - aim[A_HOME_Y]) > p.return_min_distance_m:
             aim[A_Z] = min(t[2], aim[A_HOME_Z] - p.return_altitude_m)
+        aim[A_Z] = max(aim[A_Z], p.ceiling_down_m)
 
     def return_to(self, north_m: float, east_m: float, ground_down_m: float) -> None:
         """Let the next return end at this place [m NED]: home, or a rally point."""

@@ -42,6 +42,10 @@ class GuidanceParams(NamedTuple):
     stick_xy_expo: float
     stick_z_expo: float
     stick_yaw_expo: float
+    ground_down_m: float = 0.0
+    """Where the ground is taken to be: landings, and sticks that descend, slow down near it."""
+    ceiling_down_m: float = -math.inf
+    """Above this, guidance climbs nowhere by itself: below GF_MAX_VER_DIST."""
 
 
 def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:

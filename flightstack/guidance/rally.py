@@ -18,7 +18,7 @@ PX4's other values need a landing pattern in the mission.
 
 
 class ReturnPlace(NamedTuple):
-    """A place to return to and land at: north, east and altitude above home [m].
+    """A place to return to and land at: north, east and altitude above the local frame's origin [m].
 
     The altitude is that of the ground. As with PX4, a return to a rally point flies RTL_RETURN_ALT above it.
     """
@@ -31,13 +31,14 @@ class ReturnPlace(NamedTuple):
 HOME = ReturnPlace(0.0, 0.0, 0.0)
 
 
-def rally_points(items: Iterable[MissionItem], frame: LocalFrame) -> tuple[ReturnPlace, ...]:
-    """Return the places of rally points that ``plan.check_rally`` accepted, seen from the frame's origin."""
+def rally_points(items: Iterable[MissionItem], frame: LocalFrame, home: GeoPoint) -> tuple[ReturnPlace, ...]:
+    """Return the places of rally points that ``plan.check_rally`` accepted; relative altitudes count from home."""
+    home_m = home.altitude_m - frame.origin.altitude_m
     points = []
     for item in items:
         if item.position_deg is not None:
             local = frame.to_ned(GeoPoint(*item.position_deg, frame.origin.altitude_m))
-            points.append(ReturnPlace(local.x, local.y, rally_altitude_m(item, frame.origin)))
+            points.append(ReturnPlace(local.x, local.y, home_m + rally_altitude_m(item, home)))
     return tuple(points)
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from flightstack.contract import Vector3
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.fence import NO_FENCE, Fence
-from flightstack.guidance.rally import HOME, ReturnPlace, choose, rally_points
+from flightstack.guidance.rally import HOME, RALLY_FIRST, ReturnPlace, choose, rally_points
 from flightstack.params.behaviour import Behaviour
 from flightstack.plan import (
     DEFAULT_LIMITS,
@@ -19,7 +19,6 @@ from flightstack.plan import (
     check_mission,
     check_rally,
 )
-from flightstack.plan.legs import leg_rejection
 
 
 def plan_limits(b: Behaviour) -> Limits:
@@ -34,6 +33,8 @@ def plan_limits(b: Behaviour) -> Limits:
 
 FARTHEST_HOME_M = 100_000.0
 """Beyond this a home is a mistake: the local frame is flat."""
+GREATEST_HOME_STEP_M = 1_000.0
+"""So far above or below the origin home may be: missions and returns measure their heights from it."""
 HOME_SPREAD_M = 0.05
 """So far a vehicle may stand from home and be there: the ground gives by less, and home need not follow that."""
 
@@ -51,6 +52,7 @@ class SafePlaces:
         self.home_is_chosen = False
         """Whether somebody named the place: then it does not follow the vehicle."""
         self.points: tuple[ReturnPlace, ...] = ()
+        self._rally_items: tuple[MissionItem, ...] = ()
         self.ids: tuple[int, int, int] = (0, 0, 0)
         """Opaque ids of mission, geofence and rally points; the owner of the stores keeps them."""
 
@@ -61,10 +63,13 @@ class SafePlaces:
         if abs(point.latitude_deg) > 90.0 or abs(point.longitude_deg) > 180.0:
             return "home is not a place on earth"
         local = self.frame.to_ned(point)
-        if math.hypot(local.x, local.y) > FARTHEST_HOME_M or abs(local.z) > FARTHEST_HOME_M:
+        if math.hypot(local.x, local.y) > FARTHEST_HOME_M:
             return f"home is more than {FARTHEST_HOME_M / 1e3:g} km from where the vehicle started"
+        if abs(local.z) > GREATEST_HOME_STEP_M:
+            return f"home is more than {GREATEST_HOME_STEP_M:g} m above or below where the vehicle started"
         self.home_point, self.home_is_chosen = point, chosen
         self.home = ReturnPlace(local.x, local.y, -local.z)
+        self.set_rally(self._rally_items)
         return None
 
     def has_left_home(self, position_ned_m: Vector3) -> bool:
@@ -72,9 +77,11 @@ class SafePlaces:
         home = self.home
         return math.dist(position_ned_m, (home.north_m, home.east_m, -home.altitude_m)) > HOME_SPREAD_M
 
-    def check_mission(self, items: Sequence[MissionItem], limits: Limits) -> Rejection | None:
-        """Return why a mission is refused: by itself, by the limits or by the geofence."""
-        return check_mission(items, self.home_point, limits, self.fence.shape)
+    def check_mission(
+        self, items: Sequence[MissionItem], limits: Limits, home: GeoPoint | None = None
+    ) -> Rejection | None:
+        """Return why a mission is refused, by itself, by the limits or by the geofence; as seen from ``home``."""
+        return check_mission(items, home or self.home_point, limits, self.fence.shape)
 
     def check_fence(
         self, items: Sequence[MissionItem], vehicle_ne_m: tuple[float, float] | None
@@ -95,14 +102,18 @@ class SafePlaces:
 
     def set_rally(self, items: Sequence[MissionItem]) -> None:
         """Take rally points that were checked."""
-        self.points = rally_points(items, self.frame)
+        self._rally_items = tuple(items)
+        self.points = rally_points(items, self.frame, self.home_point)
 
-    def way_out(self, items: Sequence[MissionItem]) -> str | None:
-        """Return where a stored mission leaves the geofence: one may have been loaded after it."""
-        rejection = leg_rejection(items, self.home_point, self.fence.shape)
-        return None if rejection is None else rejection.reason
+    def return_place(
+        self, north_m: float, east_m: float, return_type: float, allows: Callable[[ReturnPlace], bool]
+    ) -> ReturnPlace | None:
+        """Return where a return from here goes (RTL_TYPE), of the places that the geofence ``allows``, or None."""
+        points = [point for point in self.points if allows(point)]
+        if allows(self.home):
+            return choose((north_m, east_m), self.home, points, return_type)
+        return choose((north_m, east_m), self.home, points, RALLY_FIRST) if points else None
 
-    def return_place(self, north_m: float, east_m: float, return_type: float) -> ReturnPlace:
-        """Return where a return from here goes (RTL_TYPE); a rally point outside the geofence is none."""
-        inside = [point for point in self.points if self.fence.shape.allows(point.north_m, point.east_m)]
-        return choose((north_m, east_m), self.home, inside, return_type)
+    def ground_m(self, north_m: float, east_m: float) -> float:
+        """Return how high the ground is taken to be here, above the origin: as at the nearest place known."""
+        return choose((north_m, east_m), self.home, self.points, 0.0).altitude_m

@@ -12,6 +12,7 @@ from flightstack.contract import Vector3
 from flightstack.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.modes import Mode
+from tests.support.fences import circle
 from tests.support.streams import select, sticks, stream
 from tests.support.world import World
 
@@ -190,6 +191,34 @@ def test_a_generic_autopilot_takes_off_to_an_altitude_above_home() -> None:
     assert world.altitude == pytest.approx(6.0, abs=0.4)
 
 
+def take_off_int(world: World, frame: int, altitude_m: float) -> int:
+    """NAV_TAKEOFF as a COMMAND_INT; return its result."""
+    command = mavlink.MAV_CMD_NAV_TAKEOFF
+    world.send(
+        mavlink.MAVLink_command_int_message(1, 1, frame, command, 0, 0, 0, 0, 0, NAN, 0, 0, altitude_m)
+    )
+    world.run(0.02)
+    return int(world.received["COMMAND_ACK"].result)
+
+
+@pytest.mark.parametrize(("frame", "altitude_m"), [(0, 494.0), (5, 494.0), (3, 6.0), (6, 6.0)])
+def test_a_generic_autopilot_takes_an_altitude_as_its_frame_says(frame: int, altitude_m: float) -> None:
+    world = World(params=["FS_AUTOPILOT=1"])
+    world.arm()
+    assert take_off_int(world, frame, altitude_m) == ACCEPTED
+    world.until(lambda: world.mode is Mode.HOLD)
+    assert world.altitude == pytest.approx(6.0, abs=0.4)
+
+
+@pytest.mark.parametrize("generic", [0, 1])
+@pytest.mark.parametrize("frame", [1, 2, 8, 10, 11])
+def test_a_takeoff_in_terrain_or_local_frames_is_not_supported(frame: int, generic: int) -> None:
+    world = World(params=[f"FS_AUTOPILOT={generic}"])
+    world.arm()
+    assert take_off_int(world, frame, 6.0) == UNSUPPORTED_FRAME
+    assert world.mode is Mode.HOLD
+
+
 def test_a_goto_out_of_the_geofence_is_refused() -> None:
     world = World(params=["GF_MAX_HOR_DIST=20", "GF_MAX_VER_DIST=15"])
     world.arm()
@@ -200,6 +229,39 @@ def test_a_goto_out_of_the_geofence_is_refused() -> None:
     assert any("the place is more than 20 m from home" in text for text in world.texts), world.texts
     assert go_to(world, altitude=16.0) == DENIED
     assert go_to(world, 15.0, 0.0, 12.0) == ACCEPTED
+
+
+def test_who_is_outside_the_geofence_may_pause_and_come_nearer_but_not_go_farther() -> None:
+    world = World(params=["GF_ACTION=1"])
+    world.arm()
+    world.takeoff(5.0)
+    world.until(lambda: world.mode is Mode.HOLD)
+    assert go_to(world, 30.0, 0.0) == ACCEPTED
+    world.run(14.0)
+    world.upload("square.plan")
+    world.resume_mission()
+    world.stack.params.set("GF_MAX_HOR_DIST", 20.0)
+    world.stack.params.set("GF_MAX_VER_DIST", 15.0)
+    assert world.stack.autopilot.supervisor.fence.refusal(*world.position[:2]) is not None
+    assert go_to(world) == ACCEPTED
+    assert world.mode is Mode.HOLD
+    assert go_to(world, 35.0, 0.0) == DENIED
+    assert go_to(world, 25.0, 0.0, 16.0) == DENIED  # no farther, but too high
+    assert go_to(world, 25.0, 0.0) == ACCEPTED
+    world.run(6.0)
+    assert world.position[0] == pytest.approx(25.0, abs=0.6)
+
+
+def test_a_goto_across_an_exclusion_area_is_refused() -> None:
+    world = World()
+    world.stack.autopilot.set_fence([circle((15.0, 0.0), 5.0, inclusion=False)])
+    world.arm()
+    world.takeoff(5.0)
+    world.until(lambda: world.mode is Mode.HOLD)
+    assert go_to(world, 30.0, 0.0) == DENIED
+    world.run(0.02)
+    assert any("beyond an edge of the geofence" in text for text in world.texts), world.texts
+    assert go_to(world, 15.0, 12.0) == ACCEPTED
 
 
 # ---------------------------------------------------------------------- sticks

@@ -83,7 +83,7 @@ def test_home_is_set_to_where_the_vehicle_is(net: Net) -> None:
         ((91.0, 8.5, 488.0), "not a place on earth"),
         ((47.4, -181.0, 488.0), "not a place on earth"),
         ((48.5, 8.5, 488.0), "more than 100 km"),
-        ((47.4, 8.5, 3e38), "more than 100 km"),
+        ((47.4, 8.5, 3e38), "more than 1000 m"),
     ],
 )
 def test_a_home_that_cannot_be_is_denied_and_the_old_one_stays(

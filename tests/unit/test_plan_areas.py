@@ -181,7 +181,7 @@ def test_where_a_return_goes() -> None:
         rally_point((100, 0), 3.0),
         replace(rally_point((0, 100)), frame=Frame.GLOBAL, z=HOME.altitude_m + 7.0),
     ]
-    points = rally_points(items, LocalFrame(HOME))
+    points = rally_points(items, LocalFrame(HOME), HOME)
     assert points[0] == pytest.approx((100.0, 0.0, 3.0), abs=0.01)
     assert points[1] == pytest.approx((0.0, 100.0, 7.0), abs=0.01)
     assert choose((10.0, 0.0), AT_HOME, points, NEAREST) == AT_HOME
