@@ -141,7 +141,7 @@ async def test_a_mission_that_cannot_be_flown_is_refused_and_the_old_one_stays(d
 
 
 @story(links=(API, TCP))
-async def test_a_geofence_keeps_the_vehicle_inside(drone: Drone) -> None:
+async def test_places_beyond_the_geofence_are_denied(drone: Drone) -> None:
     home = await drone.until("home", drone.telemetry.subscribe_home())
     north, east = home.latitude_deg, home.longitude_deg
     corner = 40.0 / METRES_A_DEGREE
