@@ -77,6 +77,7 @@ class Autopilot(PlanKeeper):
         idle_row = np.zeros(LoopRow.SIZE)
         self._good_row = idle_row.copy()
         self.now = Snapshot(state, self._navigator.setpoint, backend.attitude_target, idle_row)
+        self._set_bounds()
 
     # ------------------------------------------------------------------ the tick
 
@@ -243,9 +244,9 @@ class Autopilot(PlanKeeper):
             offboard_fresh=known.offboard_fresh,
         )
 
-    def arming_refusals(self) -> tuple[str, ...]:
-        """Return every reason for which the vehicle would not arm now; empty when it would."""
-        known = self.supervisor.arming_facts(self.now.status.mode, self.has_state)
+    def arming_refusals(self, mode: Mode | None = None) -> tuple[str, ...]:
+        """Return every reason for which the vehicle would not arm now, or in ``mode``; empty when it would."""
+        known = self.supervisor.arming_facts(self.now.status.mode if mode is None else mode, self.has_state)
         return arming_refusals(known._replace(throttle=self._throttle), self._behaviour)
 
     def happen(self, event: Event, takeoff_altitude_m: float | None = None) -> str | None:
@@ -260,7 +261,10 @@ class Autopilot(PlanKeeper):
             reasons = self.arming_refusals()
             if reasons:
                 return "; ".join(reasons)
-        return self._apply(event)
+        refusal = self._apply(event)
+        if refusal is None and event is Event.ARM:
+            self._check_mission_anew()  # home has come along
+        return refusal
 
     def _select(self, event: Event, phase: Phase, takeoff_altitude_m: float | None = None) -> str | None:
         """Let a user begin ``phase`` by ``event``; return why not, or None."""
@@ -287,11 +291,37 @@ class Autopilot(PlanKeeper):
                 return f"takeoff altitude {altitude:g} m is above {self.limits.max_altitude_m:g} m"
             self._takeoff_altitude_m = altitude + self.places.home.altitude_m
         if event is Event.SELECT_MISSION:
-            way_out = self.places.way_out(self.items)
-            if way_out is not None:
-                return way_out
+            refusal = self._mission_refusal()
+            if refusal is not None:
+                return refusal
+        if self._begins_return(before, outcome.status) and self._return_place() is None:
+            if before.mode is not Mode.LAND:
+                self.say(WARNING, "No place to return to is inside the geofence: landing")
+            return self._apply(Event.SELECT_LAND)
         self._adopt(before, outcome.status, event)
         return None
+
+    def _begins_return(self, before: Status, after: Status) -> bool:
+        return after.mode is Mode.RETURN and before.mode is not Mode.RETURN and not self.now.landed
+
+    def mission_start_refusal(self) -> str | None:
+        """Return why the mission could not be started and, where need be, the vehicle armed; nothing changes."""
+        refusal = (
+            self.supervisor.refusal(USERS_CHOICES[Event.SELECT_MISSION])
+            or transition(self.now.status, self.facts, Event.SELECT_MISSION).refusal
+            or self._mission_refusal()
+        )
+        if refusal is None and not self.now.status.armed:
+            return "; ".join(self.arming_refusals(Mode.MISSION)) or None
+        return refusal
+
+    def _check_mission_anew(self) -> None:
+        """Hold instead of flying a mission that home or limits have made one to refuse."""
+        status = self.now.status
+        refusal = self._mission_refusal() if status.armed and status.mode is Mode.MISSION else None
+        if refusal is not None:
+            self.say(WARNING, f"Mission held: {refusal}")
+            self._apply(Event.SELECT_HOLD)
 
     def _adopt(self, before: Status, after: Status, event: Event) -> None:
         self.now.status = after
@@ -331,10 +361,11 @@ class Autopilot(PlanKeeper):
             self._backend.reset(self._state)
             self._loops_begin = True
             self._navigator.rest_at(self._state)
-        if status.mode is Mode.RETURN and entering:
-            north_m, east_m = float(self._state[0]), float(self._state[1])
-            place = self.places.return_place(north_m, east_m, self.behaviour.return_type)
-            self._navigator.return_to(place.north_m, place.east_m, -place.altitude_m)
+        if entering:
+            place = (self._return_place() or self.places.home) if status.mode is Mode.RETURN else None
+            if place is not None:
+                self._navigator.return_to(place.north_m, place.east_m, -place.altitude_m)
+            self._find_ground(place)
         if starting or (flying and entering):
             self._navigator.enter(status.mode, self._takeoff_altitude_m)
         self._flying = flying
@@ -384,9 +415,12 @@ class Autopilot(PlanKeeper):
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Fly by other parameters, from the next outer tick on."""
-        self._behaviour = behaviour
+        limits, self._behaviour = self.limits, behaviour
         self._navigator.set_params(guidance_params(behaviour, self._vehicle.weight_n))
         self.supervisor.set_behaviour(behaviour)
+        self._set_bounds()
+        if self.limits != limits:
+            self._check_mission_anew()
 
     # ------------------------------------------------------------------ texts
 
