@@ -111,6 +111,19 @@ def test_a_framing_error_costs_no_other_octet(flags: int, pause: float, tmp_path
 
 
 @BOTH
+def test_a_receiver_that_stops_at_a_framing_error_comes_back_in_silence(flags: int, tmp_path: Path) -> None:
+    """TI's manual says that it goes on; a chip that does not would else be deaf until the next break."""
+    board = Board(tmp_path, flags=flags)
+    board.c.fake_stop_at_errors()
+    for _ in range(3):
+        board.line([1, 2 | FRAMING, 3, 4, *[PAUSE] * 40, 5, 6])
+        assert serviced(board, 55) == [1, 2, 5, 6]
+        assert serviced(board, 40) == []
+    assert (board.errors, board.overruns) == (3, 0)
+    board.nothing_misused()
+
+
+@BOTH
 def test_every_damaged_octet_is_counted(flags: int, tmp_path: Path) -> None:
     """Also several between two looks of the main loop, which find one flag in the status."""
     board = Board(tmp_path, flags=flags)

@@ -9,14 +9,15 @@
 
 #define FIFO_DEPTH 16U
 #define DAMAGED (SCI_RXBUF_SCIFFFE | SCI_RXBUF_SCIFFPE) /* what the FIFO keeps beside an octet */
+#define LASTING (SCI_RXSTATUS_FRAMING | SCI_RXSTATUS_PARITY | SCI_RXSTATUS_OVERRUN) /* up until a software reset */
 #define SILENCE_MS (2UL + 20000UL / F28_BAUD)           /* two octets at least, whatever the millisecond's phase */
 
 static volatile fs_octet receive_octets[F28_RECEIVE_RING], send_octets[F28_SEND_RING];
 static f28_ring received, to_send;
 static volatile uint32_t overruns, errors;
 static volatile uint16_t heard; /* 1: octets came since the main loop last looked */
-static uint16_t overrun_told;   /* 1: the flag OE is up and counted */
-static uint32_t active_ms;      /* when the line was last seen busy, while OE is up */
+static uint16_t flags_seen;     /* the LASTING ones that were up when the main loop last looked */
+static uint32_t active_ms;      /* when the line was last seen busy, while one of them is up */
 
 /* Empty the receive FIFO into the ring; called by its interrupt, or with interrupts off. */
 static void fetch(void)
@@ -95,7 +96,7 @@ void f28_serial_init(void)
     overruns = 0UL;
     errors = 0UL;
     heard = 0U;
-    overrun_told = 0U;
+    flags_seen = 0U;
     active_ms = 0UL;
     init_pins();
     SCI_performSoftwareReset(SCIA_BASE);
@@ -116,17 +117,18 @@ void f28_serial_init(void)
     Interrupt_enable(INT_SCIA_TX);
 }
 
-/* Count an overrun when its flag rises; return 1 if only a reset lowers it and both directions have been silent. */
-static uint16_t overrun_may_be_cleared(uint16_t status, uint32_t now_ms)
+/* Count an overrun when its flag rises; return 1 if a flag is up, and both directions have been silent since. */
+static uint16_t flags_may_be_lowered(uint16_t status, uint32_t now_ms)
 {
-    if ((status & SCI_RXSTATUS_OVERRUN) == 0U) {
-        overrun_told = 0U;
-        return 0U;
-    }
-    if (overrun_told == 0U) {
-        overrun_told = 1U;
+    if ((status & SCI_RXSTATUS_OVERRUN) != 0U && (flags_seen & SCI_RXSTATUS_OVERRUN) == 0U) {
         overruns = overruns + 1UL;
+    }
+    if (flags_seen == 0U) {
         active_ms = now_ms;
+    }
+    flags_seen = status & LASTING;
+    if (flags_seen == 0U) {
+        return 0U;
     }
     if (heard != 0U || f28_ring_held(&to_send) != 0U || SCI_getTxFIFOStatus(SCIA_BASE) != SCI_FIFO_TX0) {
         heard = 0U;
@@ -137,9 +139,10 @@ static uint16_t overrun_may_be_cleared(uint16_t status, uint32_t now_ms)
 
 /*
  * A software reset begins the receiver anew in the midst of whatever is on the line: it loses the octet in flight, may
- * take a data bit of the next one for a start bit, and damages an octet that is just being sent. So a framing error
- * gets none: the SCI goes on by itself, and the FIFO tells which octet it was. After a break the SCI receives nothing
- * more until its reset. An overrun's flag falls by a reset alone too, but does no harm: it waits for silence.
+ * take a data bit of the next one for a start bit, and damages an octet that is just being sent. It is done at once
+ * after a break, since the SCI receives nothing more until then. The flags of other errors are lowered by it alone as
+ * well, but the SCI goes on under them, and the FIFO tells which octets are damaged: they wait for silence. Should a
+ * chip stop there against what its manual says, there is silence soon.
  */
 void f28_serial_service(void)
 {
@@ -152,9 +155,9 @@ void f28_serial_service(void)
     if ((status & SCI_RXSTATUS_BREAK) != 0U) {
         errors = errors + 1UL;
     }
-    if (overrun_may_be_cleared(status, now_ms) != 0U || (status & SCI_RXSTATUS_BREAK) != 0U) {
+    if (flags_may_be_lowered(status, now_ms) != 0U || (status & SCI_RXSTATUS_BREAK) != 0U) {
         SCI_performSoftwareReset(SCIA_BASE);
-        overrun_told = 0U;
+        flags_seen = 0U;
     }
     (void)Interrupt_enableGlobal();
 }

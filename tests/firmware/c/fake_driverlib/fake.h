@@ -38,6 +38,12 @@
  */
 void fake_strike_every(uint32_t n); /* 0, as after power on: only when the chip has a reason */
 
+/*
+ * TI's manual says that the receiver stops after a break, and nothing of the kind of other errors. fake_stop_at_errors
+ * makes it stop after an octet with a framing error too: the port has to come back from that.
+ */
+void fake_stop_at_errors(void);
+
 void fake_power_on(uint16_t flags_are, uint32_t reset_cause, uint32_t timer1_begins_at);
 void fake_run(uint32_t cycles); /* the processor is busy with something else; interrupts come through */
 uint64_t fake_time(void);       /* cycles */

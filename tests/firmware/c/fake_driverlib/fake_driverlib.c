@@ -41,6 +41,7 @@ static struct {
     fifo rx, tx;
     uint16_t rx_level, tx_level, rx_flag, tx_flag, rx_met, tx_met, rx_on, tx_on;
     uint16_t status, overflow, deaf, fifo_on, module_on;
+    uint16_t stop_at_errors;
     uint16_t astray; /* bit of the octet before in which the receiver found a false start; 0: it is in step */
     uint16_t before; /* that octet, as the line brought it */
     uint16_t cut, cut_at; /* 1: a software reset hit the octet that is on the line, in this bit */
@@ -166,6 +167,10 @@ static void receive(uint16_t what)
         chip.rx.held--;
     }
     chip.rx.octets[chip.rx.held++] = (what & 0xFFU) | ((what & FAKE_FRAMING) != 0U ? SCI_RXBUF_SCIFFFE : 0U);
+    if ((what & FAKE_FRAMING) != 0U && chip.stop_at_errors) {
+        chip.deaf = 1U;
+        chip.astray = 0U;
+    }
 }
 
 static void move_octets(void)
@@ -262,6 +267,11 @@ void fake_run(uint32_t cycles)
         cycles -= advance(cycles);
         strike();
     }
+}
+
+void fake_stop_at_errors(void)
+{
+    chip.stop_at_errors = 1U;
 }
 
 void fake_strike_every(uint32_t n)
