@@ -304,16 +304,25 @@ class Autopilot(PlanKeeper):
     def _begins_return(self, before: Status, after: Status) -> bool:
         return after.mode is Mode.RETURN and before.mode is not Mode.RETURN and not self.now.landed
 
-    def mission_start_refusal(self) -> str | None:
-        """Return why the mission could not be started and, where need be, the vehicle armed; nothing changes."""
-        refusal = (
-            self.supervisor.refusal(USERS_CHOICES[Event.SELECT_MISSION])
-            or transition(self.now.status, self.facts, Event.SELECT_MISSION).refusal
-            or self._mission_refusal()
-        )
-        if refusal is None and not self.now.status.armed:
-            return "; ".join(self.arming_refusals(Mode.MISSION)) or None
-        return refusal
+    def start_mission(self, first: int | None) -> str | None:
+        """Select the mission, from item ``first`` if it is given, and arm where need be; return why not, or None.
+
+        A start that is refused changes nothing: everything is asked first.
+        """
+        phase = USERS_CHOICES[Event.SELECT_MISSION]
+        arms = not self.now.status.armed
+        refusal = transition(self.now.status, self.facts, Event.SELECT_MISSION).refusal
+        refusal = refusal or self._mission_refusal()
+        if refusal is None and arms:
+            refusal = "; ".join(self.arming_refusals(Mode.MISSION)) or None
+        refusal = refusal or self.supervisor.refusal(phase)
+        if refusal is not None:
+            return refusal
+        if first is not None:
+            self.set_current_item(first)
+        refusal = self._apply(Event.SELECT_MISSION)
+        self.supervisor.override(phase)
+        return self.happen(Event.ARM) if arms and refusal is None else refusal
 
     def _check_mission_anew(self) -> None:
         """Hold instead of flying a mission that home or limits have made one to refuse."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from flightstack.commander.transitions import Event
 from flightstack.commands.context import ACCEPTED, DENIED, Answer, Handler, VehicleContext, answer_to
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.services.command_server import Command
@@ -21,15 +20,7 @@ def start_mission(vehicle: VehicleContext, command: Command) -> Answer:
     refusal = autopilot.item_refusal(int(first)) if begins_there else None
     if refusal is not None:
         return Answer(DENIED, refusal)
-    refusal = autopilot.mission_start_refusal()
-    if refusal is not None:
-        return answer_to(refusal)
-    if begins_there:
-        autopilot.set_current_item(int(first))
-    refusal = autopilot.happen(Event.SELECT_MISSION)
-    if refusal is None and not autopilot.now.status.armed:
-        refusal = autopilot.happen(Event.ARM)
-    return answer_to(refusal)
+    return answer_to(autopilot.start_mission(int(first) if begins_there else None))
 
 
 def set_current(vehicle: VehicleContext, command: Command) -> Answer:
