@@ -191,7 +191,7 @@ def begin_sticks(world: World) -> None:
 
 def breach_fence(world: World) -> None:
     """Fence in a place where the vehicle is not; home is inside, unless the vehicle is there."""
-    north = -14.0 if world.position[0] > 6.5 else -100.0
+    north = float(world.position[0]) - 20.5 if world.position[0] > 0.9 else -100.0
     far = item(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, north=north, p1=20.0)
     frame = LocalFrame(world.config.home)
     world.stack.autopilot.supervisor.set_fence(Fence.from_items([far], frame))
