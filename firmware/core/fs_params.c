@@ -100,7 +100,7 @@ uint16_t fs_param_set(fs_loops *loops, uint16_t index, fs_real value)
     if (spec->is_whole && value != (fs_real)(uint16_t)value) {
         return FS_PARAM_REFUSED;
     }
-    if (integral != NULL && value != *place) { /* the same, said again, keeps it: integral * gain / gain may differ */
+    if (integral != NULL && (value < *place || value > *place)) { /* x * gain / gain may differ from x */
         *integral = carried_over(*integral, *place, value);
     }
     *place = value; /* also 0 in place of -0, which are equal: what is read back shall be what was set */
