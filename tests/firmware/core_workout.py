@@ -135,6 +135,7 @@ def parameters(core: Core) -> dict[str, np.ndarray]:
         core.call("drive_set_integral", loops.memory, core.c_real(integral))
         for gain in (1e-3, 0.0):
             results.append(loops.set("PID_ROLL_I", gain))
+            results.append(loops.set("PID_ROLL_I", gain))  # said again
             values += loops.integrals
     same = library.fs_param_same_name
     assert [same(*pair) & 1 for pair in NAMES] == [1, 1, 1, 0, 0, 0]
