@@ -321,8 +321,10 @@ class Autopilot(PlanKeeper):
         if first is not None:
             self.set_current_item(first)
         refusal = self._apply(Event.SELECT_MISSION)
+        if refusal is not None:
+            return refusal
         self.supervisor.override(phase)
-        return self.happen(Event.ARM) if arms and refusal is None else refusal
+        return self.happen(Event.ARM) if arms else None
 
     def _check_mission_anew(self) -> None:
         """Hold instead of flying a mission that home or limits have made one to refuse."""
