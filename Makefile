@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+# test processes side by side; more would wait for each other, as a flight has processes of its own
+WORKERS ?= 2
 .DEFAULT_GOAL := help
 
 .PHONY: help setup fly test check lint types imports generated generate bench fuzz fuzz-firmware firmware-check mutation clean
@@ -27,7 +29,7 @@ fly: $(READY) ## Fly missions/square.plan: simulator, flight stack and ground st
 	@$(BIN)/gcs fly missions/square.plan
 
 test: $(READY) ## Run every test
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --durations 15
 
 check: lint types imports generated test ## Everything that CI checks
 

@@ -10,12 +10,16 @@ from gcs_cli.errors import CliError
 from gcs_cli.fly_options import FlyOptions, check_ports
 
 FIRST, COUNT = 60, 40
+WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+"""Test processes side by side: each has instances of its own, so that none takes what another has just found free."""
 
 
 def free_instance() -> int:
     """Return an instance with free ports; test runs side by side begin to search at different ones."""
-    for offset in range(COUNT):
-        options = FlyOptions(Path(), instance=FIRST + (os.getpid() + offset) % COUNT)
+    own = range(FIRST + WORKER, FIRST + COUNT, WORKERS)
+    for offset in range(len(own)):
+        options = FlyOptions(Path(), instance=own[(os.getpid() + offset) % len(own)])
         try:
             check_ports(options)
             UdpSocket("127.0.0.1", options.gcs_port).close()
