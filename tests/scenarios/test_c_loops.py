@@ -151,7 +151,8 @@ def test_a_number_that_c_refuses_is_named() -> None:
         ("c:", "is none of"),
         ("serial", "names no device"),
         ("serial:", "names no device"),
-        ("serial:/dev/ttyS9:5", "baud rate that no port has"),
+        ("serial:/dev/ttyS9:5", "baud rate too slow for a target: 1200 at least"),
+        ("serial:/dev/ttyS9:20000001", "baud rate that no port has"),
     ],
 )
 def test_other_loops_are_refused_in_one_sentence(word: str, sentence: str) -> None:
