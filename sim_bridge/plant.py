@@ -51,6 +51,10 @@ class Plant(Protocol):
         """Choose the fixed step of the integration."""
         ...
 
+    def set_rotor_speeds(self, speeds_rad_s: tuple[float, ...]) -> None:
+        """Put the rotors at once at these speeds."""
+        ...
+
     def advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         """Advance with the rotor speed commands held; ``flags`` as in FS_ACTUATORS.
 

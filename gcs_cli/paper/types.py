@@ -39,6 +39,8 @@ class Case(NamedTuple):
     """Of the plant only, as the mass."""
     delay_steps: int = 0
     """Further inner steps between a state and the actuators that answer it."""
+    scale: float = 1.0
+    """Of all displacements of the trajectory."""
     vehicle: str = "paper_quad"
 
 
@@ -49,7 +51,7 @@ class Recording(NamedTuple):
     time_s: FloatArray
     """Shape (n,)."""
     reference: FloatArray
-    """Shape (n, 4): north, east, down [m], yaw [rad]."""
+    """Shape (n, 4): north, east, down [m], yaw [rad]; NaN for a position that the trajectory does not steer."""
     position_ned_m: FloatArray
     """Shape (n, 3)."""
     velocity_ned_m_s: FloatArray

@@ -36,7 +36,7 @@ def without(table: str) -> str:
 @pytest.mark.parametrize("controller", [PID, BACKSTEPPING], ids=lambda controller: controller.name)
 @pytest.mark.parametrize("name", built_in_gains())
 def test_built_in_gains_fit_both_controllers(name: str, controller) -> None:
-    assert built_in_gains() == ["paper", "tuned"]
+    assert built_in_gains() == ["backstepping_poles", "paper", "tuned"]
     assert make(name, controller).name == "python"
 
 

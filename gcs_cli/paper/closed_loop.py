@@ -1,0 +1,219 @@
+"""Fly one case: plant and control loops in this process, exchanged as in lockstep, without links.
+
+The one module of the ground station that joins the two (docs/decisions.md): an experiment of the paper is a hundred
+flights of half a minute, which cannot each start three processes. The loops are the flight stack's, the plants the
+simulator's, and a tick is the lockstep's: state to the loops, rotor commands back, held for one period. A test holds
+a case equal, bit for bit, to the same flight through the links.
+
+The vehicle starts in the air, in hover, and there is no ground: the paper has none.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from flightstack.contract import ATTITUDE_TARGET_SIZE, MAX_ROTORS, FloatArray, LoopRow
+from flightstack.control.controller_loading import load_controller
+from flightstack.control.loops import PythonLoops
+from flightstack.geometry import quaternion_from_euler
+from flightstack.geometry_bulk import euler_from_quaternions
+from flightstack.params.behaviour import Behaviour
+from flightstack.params.gains_file import open_gains
+from flightstack.params.vehicle import Vehicle, load_vehicle
+from gcs_cli.paper.trajectory import ATTITUDE, Trajectory, load_trajectory, sample, setpoints
+from gcs_cli.paper.types import Case, Recording
+from sim_bridge.disturbance import Disturbance
+from sim_bridge.layout import DIVERGED, OUTPUT
+from sim_bridge.plant import Plant, PlantOptions
+from sim_bridge.simulator import Simulator
+
+PHYSICS_HZ = 1000.0
+"""A plant's step is at most its inverse, as in the simulator."""
+FARTHEST_M = 10.0
+"""A vehicle so far from its reference has lost its way: the flight counts as crashed."""
+_ARMED = 2  # FS_ACTUATORS
+_UPRIGHT = 0.0  # least cosine of the tilt: a vehicle on its side has turned over
+
+
+class Rows(NamedTuple):
+    """What passed between plant and loops, n inner ticks; row k of ``loops`` answers row k of ``targets``."""
+
+    loops: FloatArray
+    """Shape (n, 48): rows of the inner loop."""
+    targets: FloatArray
+    """Shape (n, 5): the attitude target in each tick, array form of ``AttitudeTarget``."""
+    diverged: bool
+    """The plant's numbers ran away in the last tick."""
+
+
+def controlled_vehicle(case: Case) -> Vehicle:
+    """Return the vehicle that the loops know: Table I, with or without limits of the rotor speeds."""
+    vehicle = load_vehicle(case.vehicle)
+    return vehicle if case.limits else vehicle.with_ideal_rotors()
+
+
+def flown_vehicle(case: Case) -> Vehicle:
+    """Return the vehicle that the plant is: with the case's mass, inertia and motor lag."""
+    vehicle = load_vehicle(case.vehicle)
+    ix, iy, iz = (case.inertia_factor * value for value in vehicle.inertia_kg_m2)
+    rotors = vehicle.rotors
+    if case.lag_s is not None:
+        rotors = tuple(replace(rotor, lag_s=case.lag_s) for rotor in rotors)
+    return replace(
+        vehicle, mass_kg=case.mass_factor * vehicle.mass_kg, inertia_kg_m2=(ix, iy, iz), rotors=rotors
+    )
+
+
+def make_loops(case: Case) -> PythonLoops:
+    """Return the loops of the case as the flight stack makes them; raise ConfigError."""
+    return PythonLoops(
+        controlled_vehicle(case),
+        load_controller(case.controller),
+        open_gains(case.gains),
+        case.inner_hz,
+        case.outer_hz,
+        math.radians(Behaviour().max_tilt_deg),
+    )
+
+
+def make_plant(case: Case) -> tuple[Plant, int]:
+    """Return the plant in hover, and how many of its steps make an inner period."""
+    options = PlantOptions(
+        disturbance=Disturbance(force_ned_n=case.force_ned_n, torque_frd_n_m=case.torque_frd_n_m),
+        ground=False,
+        limits=case.limits,
+        battery=None,
+    )
+    plant = Simulator(flown_vehicle(case), case.plant, options).plant
+    steps = max(1, math.ceil(PHYSICS_HZ / case.inner_hz - 1e-9))
+    plant.set_step(1.0 / case.inner_hz / steps)
+    plant.set_rotor_speeds(hover_speeds(case))
+    plant.output = np.zeros(1, OUTPUT)
+    plant.show()
+    return plant, steps
+
+
+def hover_speeds(case: Case) -> tuple[float, ...]:
+    """Return the rotor speeds [rad/s] that carry Table I's vehicle in hover."""
+    vehicle = load_vehicle(case.vehicle)
+    squared = np.linalg.pinv(vehicle.effectiveness()) @ np.array([vehicle.weight_n, 0.0, 0.0, 0.0])
+    return tuple(np.sqrt(squared).tolist())
+
+
+def fly(case: Case) -> Recording:
+    """Fly the case and return what it recorded: the same bits for the same case; raise ConfigError.
+
+    A crash ends a recording and is no error: ``ended_s`` and ``ended_why`` tell of it.
+    """
+    trajectory = load_trajectory(case.trajectory)
+    return _recording(case, trajectory, fly_rows(case, trajectory))
+
+
+def fly_rows(case: Case, trajectory: Trajectory) -> Rows:
+    """Fly the case to the trajectory's end, or until the plant's numbers run away; raise ConfigError."""
+    loops, (plant, steps) = make_loops(case), make_plant(case)
+    divisor = _divisor(case)
+    count = round(trajectory.duration_s * case.inner_hz)
+    wanted = _wanted(case, trajectory, np.arange(0, count, divisor) / case.inner_hz)
+    attitude_only = trajectory.kind == ATTITUDE
+    rows, targets = np.zeros((count, LoopRow.SIZE)), np.zeros((count, ATTITUDE_TARGET_SIZE))
+    state, speeds = plant.output[0]["state"], plant.output[0]["rotor_speed"]
+    loops.reset(state)
+    waiting = [_padded(hover_speeds(case)) for _ in range(case.delay_steps)]
+    for tick in range(count):
+        row, aim = rows[tick], wanted[tick // divisor]
+        outer_due = tick % divisor == 0
+        if attitude_only and outer_due:
+            loops.set_attitude_target(aim)
+        loops.step(state, aim, speeds, outer_due and not attitude_only, row)
+        targets[tick] = loops.attitude_target
+        waiting.append(row[LoopRow.ROTOR_COMMAND])
+        if plant.advance(waiting.pop(0), _ARMED, steps) & DIVERGED:
+            return Rows(rows[: tick + 1], targets[: tick + 1], True)
+    return Rows(rows, targets, False)
+
+
+def _divisor(case: Case) -> int:
+    if case.inner_hz % case.outer_hz:
+        raise ValueError(
+            f"an outer rate of {case.outer_hz} Hz does not divide the inner rate {case.inner_hz}"
+        )
+    return case.inner_hz // case.outer_hz
+
+
+def _padded(speeds: tuple[float, ...]) -> FloatArray:
+    command = np.zeros(MAX_ROTORS)
+    command[: len(speeds)] = speeds
+    return command
+
+
+def _wanted(case: Case, trajectory: Trajectory, time_s: FloatArray) -> FloatArray:
+    """What the loops are asked at each outer tick: setpoints (n, 11), or attitude targets (n, 5)."""
+    if trajectory.kind != ATTITUDE:
+        return setpoints(trajectory, time_s, case.scale)
+    weight_n = load_vehicle(case.vehicle).weight_n
+    rows = np.zeros((len(time_s), ATTITUDE_TARGET_SIZE))
+    for row, (roll, pitch, yaw) in zip(
+        rows, sample(trajectory, time_s, case.scale).value.tolist(), strict=True
+    ):
+        row[:4] = quaternion_from_euler(roll, pitch, yaw)
+        row[4] = weight_n / (math.cos(roll) * math.cos(pitch))
+    return rows
+
+
+def _recording(case: Case, trajectory: Trajectory, rows: Rows) -> Recording:
+    flown = rows.loops
+    time_s = np.arange(len(flown)) / case.inner_hz
+    reference = _reference(case, trajectory, time_s)
+    count, ended_why = _end(flown, reference, rows.diverged)
+    state = flown[:count, LoopRow.STATE]
+    rotors = len(load_vehicle(case.vehicle).rotors)
+    speed_at = LoopRow.ROTOR_SPEED.start
+    return Recording(
+        case,
+        time_s[:count],
+        reference[:count],
+        state[:, 0:3],
+        state[:, 3:6],
+        _euler(state[:, 6:10]),
+        _euler(rows.targets[:count, :4]),
+        state[:, 10:13],
+        flown[:count, LoopRow.WRENCH],
+        flown[:count, LoopRow.WRENCH_ACHIEVED],
+        flown[:count, speed_at : speed_at + rotors],
+        flown[:count, LoopRow.STATUS].astype(np.int64),
+        None if not ended_why else count / case.inner_hz,
+        ended_why,
+    )
+
+
+def _reference(case: Case, trajectory: Trajectory, time_s: FloatArray) -> FloatArray:
+    """Reference at the inner ticks, shape (n, 4); position is NaN where the trajectory does not steer it."""
+    value = sample(trajectory, time_s, case.scale).value
+    if trajectory.kind != ATTITUDE:
+        return value
+    reference = np.full((len(time_s), 4), math.nan)
+    reference[:, 3] = value[:, 2]
+    return reference
+
+
+def _end(flown: FloatArray, reference: FloatArray, diverged: bool) -> tuple[int, str]:
+    """Return how many ticks count, and why the flight ended before its time, or nothing."""
+    count, why = len(flown), "the numbers of the plant ran away" if diverged else ""
+    x, y = flown[:, 7], flown[:, 8]
+    upset = np.flatnonzero(1.0 - 2.0 * (x * x + y * y) < _UPRIGHT)
+    lost = np.flatnonzero(np.linalg.norm(flown[:, :3] - reference[:, :3], axis=1) > FARTHEST_M)
+    for ticks, reason in ((upset, "turned over"), (lost, f"{FARTHEST_M:g} m away from its reference")):
+        if len(ticks) and ticks[0] < count:
+            count, why = int(ticks[0]), reason
+    return count, why
+
+
+def _euler(quaternions: FloatArray) -> FloatArray:
+    euler = euler_from_quaternions(quaternions)
+    euler[:, 2] = np.unwrap(euler[:, 2])
+    return euler
