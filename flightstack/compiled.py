@@ -27,7 +27,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _KEPT_CACHES = 4
 _OWN_PACKAGES = ("flightstack", "sim_bridge")
-_WITHOUT_KERNELS = ("services", "logging", "transport", "plan", "firmware", "ground", "commands")
+_WITHOUT_KERNELS = (
+    "services", "logging", "transport", "plan", "firmware", "ground", "commands", "multibody",
+)  # fmt: skip
 """Packages that neither hold compiled code nor are used by it."""
 
 

@@ -70,6 +70,13 @@ class Table:
             raise self.error(key, f"{value!r} is not a string")
         return value
 
+    def flag(self, key: str, default: bool) -> bool:
+        """Return true or false."""
+        value = self._get(key, default)
+        if not isinstance(value, bool):
+            raise self.error(key, f"{value!r} is neither true nor false")
+        return value
+
     def choice(self, key: str, choices: tuple[str, ...]) -> str:
         """Return one of ``choices``."""
         value = self.text(key)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from flightstack.contract import MAX_ROTORS, FloatArray
+from flightstack.params.assembly import Part, read_parts
 from flightstack.params.battery import Battery, read_battery
 from flightstack.params.errors import ConfigError
 from flightstack.params.toml_reader import Table, read_toml
@@ -45,6 +46,10 @@ class Vehicle:
     rotors: tuple[Rotor, ...]
     ideal_rotors: bool = False
     battery: Battery | None = None
+    parts: tuple[Part, ...] = ()
+    """What the file says of the parts that the multibody plant is made of."""
+    default_parts: bool = True
+    """The parts of a usual multirotor are added where ``parts`` has none of their names."""
 
     @property
     def weight_n(self) -> float:
@@ -108,6 +113,8 @@ def _vehicle(top: Table) -> Vehicle:
         leg_height_m=body.number("leg_height_m", 0.0, 10.0, 0.1),
         rotors=_rotors(top, rotor_type, mass_kg),
         battery=read_battery(top),
+        parts=read_parts(top),
+        default_parts=top.flag("default_parts", True),
     )
     for table in (top, body, rotor_type):
         table.finish()
