@@ -74,7 +74,8 @@ def decimated(x: FloatArray, y: FloatArray, buckets: int = _BUCKETS) -> tuple[Fl
     return x[index], y[index]
 
 
-def _finite_runs(x: FloatArray, y: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+def finite_runs(x: FloatArray, y: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield the stretches in which both are finite; x and y have shape (n,)."""
     finite = np.isfinite(x) & np.isfinite(y)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], finite, [False]))))
     for start, end in zip(edges[::2], edges[1::2], strict=True):
@@ -129,7 +130,7 @@ def time_chart(
 
 def _curve(line: Line, x: Scale, y: Scale) -> Iterator[str]:
     yield f"<g><title>{escape(line.label)}</title>"
-    for run_x, run_y in _finite_runs(line.x, line.y):
+    for run_x, run_y in finite_runs(line.x, line.y):
         kept_x, kept_y = decimated(run_x, run_y)
         px, py = x.pixels(kept_x), y.pixels(kept_y)
         yield polyline(px, py, line.style)

@@ -1,0 +1,166 @@
+"""The paper's processor in the loop (Fig. 15): both controllers fly a mission with their loops on a target.
+
+What ``gcs pil`` does, for each controller with the paper's gains at the paper's rates, on a mission whose waypoints are
+the ends of the desired trajectory's moves. What is returned holds no wall-clock time, so that it repeats bit for bit.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from flightstack.contract import Vector3
+from flightstack.geodesy import LocalFrame
+from flightstack.plan import Command, Frame, MissionItem, Plan, save_plan
+from flightstack.transport.udp import PortBusyError, UdpSocket
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.fly_options import DEFAULT_HOME, MOST_INSTANCES, FlyOptions, check_ports, checked_plan
+from gcs_cli.paper.trajectory import Trajectory, load_trajectory, sample
+from gcs_cli.pil.run import JSON_NAME, Finished
+from gcs_cli.pil.run import run as run_pil
+from gcs_cli.pil.targets import check_there, checked_target, meaning
+
+EMULATED = "emulated"
+CONTROLLERS = ("pid", "backstepping")
+GAINS, INNER_HZ, OUTER_HZ = "paper", 1000.0, 250.0
+PLANT = "paper"
+"""The paper's own. On the rigid body, whose rotors react when they spin up, Table II's yaw loop oscillates on the
+ground before takeoff, and flights that were one rounding apart rise at different times."""
+TRAJECTORY = "desired"
+_FIRST_INSTANCE = 90
+_LEAST_LEG_M = 0.3
+_LEAST_HEIGHT_M = 1.0
+_PARTS = ("verdict", "checks", "differences", "compared", "profile", "target", "stack")
+_OF_FLIGHT = ("outcome", "loops", "ticks", "airborne_ticks", "sim_time_s")
+
+
+def left_out(why: str, target: str = EMULATED) -> dict[str, Any]:
+    """Return what stands in ``results.json`` in place of the section, with the sentence why."""
+    return {"target": target, "why_left_out": why, "meaning": "", "mission": "", "controllers": {}}
+
+
+def problem(target: str = EMULATED) -> str | None:
+    """Say why nothing can be flown on the target; None if it is there. Raise CliError when its name is wrong."""
+    choice = checked_target(target)
+    try:
+        for controller in CONTROLLERS:
+            check_there(choice, controller)
+    except CliError as error:
+        return str(error)
+    return None
+
+
+def run(
+    folder: Path,
+    target: str = EMULATED,
+    tell: Callable[[str], None] | None = None,
+    instance: int | None = None,
+) -> dict[str, Any]:
+    """Fly MIL, SIL and PIL with both controllers; leave each comparison in ``folder/pil-<controller>``.
+
+    Without the tools of the emulated target the section is left out and says why; a board that was asked for and is
+    not there raises CliError. ``tell`` hears what is done next; ``instance``: of the ports, None for one that is free.
+    """
+    why = problem(target)
+    if why is not None:
+        if target != EMULATED:
+            raise CliError(why, USAGE)
+        return left_out(why, target)
+    plan = mission_along(load_trajectory(TRAJECTORY))
+    controllers = {}
+    for controller in CONTROLLERS:
+        if tell is not None:
+            tell(f"processor in the loop: {controller}")
+        finished = _fly(folder, controller, target, plan, instance)
+        if finished.problem is not None and finished.problem.exit_code == USAGE:
+            raise finished.problem
+        controllers[controller] = _repeatable(finished.outcome.result)
+    return {
+        "target": target,
+        "why_left_out": None,
+        "meaning": meaning(checked_target(target)),
+        "mission": _about(plan),
+        "gains": GAINS,
+        "plant": PLANT,
+        "inner_hz": INNER_HZ,
+        "outer_hz": OUTER_HZ,
+        "controllers": controllers,
+    }
+
+
+def mission_along(trajectory: Trajectory) -> Plan:
+    """Return a mission with a takeoff, a waypoint and heading wherever a move of the trajectory ends, and a landing."""
+    ends = sorted({move.at_s + move.over_s for move in trajectory.moves})
+    at = sample(trajectory, np.array([*ends, trajectory.duration_s])).value
+    corners: list[tuple[float, float, float, float]] = []
+    for north, east, due_down, yaw in at.tolist():
+        down = min(due_down, -_LEAST_HEIGHT_M)
+        if not corners or math.dist(corners[-1][:3], (north, east, down)) >= _LEAST_LEG_M:
+            corners.append((north, east, down, yaw))
+    north, east, down, yaw = corners[-1]
+    items = [_item(Command.NAV_TAKEOFF, (0.0, 0.0, corners[0][2], math.nan))]
+    items += [_item(Command.NAV_WAYPOINT, corner) for corner in corners]
+    items.append(_item(Command.NAV_LAND, (north, east, 0.0, math.nan)))
+    return Plan(tuple(items), DEFAULT_HOME)
+
+
+def _item(command: Command, place: tuple[float, float, float, float]) -> MissionItem:
+    north, east, down, yaw = place
+    there = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, down))
+    x, y = round(there.latitude_deg * 1e7), round(there.longitude_deg * 1e7)
+    yaw_deg = math.degrees(yaw) % 360.0 if math.isfinite(yaw) else math.nan
+    return MissionItem(command, Frame.GLOBAL_RELATIVE_ALT, 0.0, 0.0, 0.0, yaw_deg, x, y, -down)
+
+
+def _about(plan: Plan) -> str:
+    corners = sum(item.command == Command.NAV_WAYPOINT for item in plan.items)
+    return f"takeoff, {corners} waypoints where a move of the desired trajectory ends, landing"
+
+
+def _fly(folder: Path, controller: str, target: str, plan: Plan, instance: int | None) -> Finished:
+    """Fly beside the results of a run before, and replace them when all is there."""
+    kept = folder / f"pil-{controller}"
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".pil-") as workshop:
+        path = Path(workshop) / f"{TRAJECTORY}.plan"
+        save_plan(path, plan)
+        options = FlyOptions(
+            path, controller, GAINS, PLANT, inner_hz=INNER_HZ, outer_hz=OUTER_HZ,
+            instance=_free_instance() if instance is None else instance,
+        )  # fmt: skip
+        console = Console(file=io.StringIO())
+        finished = run_pil(options, checked_plan(options), target, Path(workshop) / "flights", console)
+        if (kept / JSON_NAME).exists():
+            shutil.rmtree(kept)
+        if not kept.exists():
+            finished.folder.rename(kept)
+    return finished
+
+
+def _free_instance() -> int:
+    """Return an instance whose ports nobody uses: no flight of the user's is disturbed."""
+    for instance in range(_FIRST_INSTANCE, MOST_INSTANCES):
+        options = FlyOptions(Path(), instance=instance)
+        try:
+            check_ports(options)
+            UdpSocket("127.0.0.1", options.gcs_port).close()
+        except (CliError, PortBusyError):
+            continue
+        return instance
+    raise CliError("the ports of ten instances are all in use: end the programs that use them", USAGE)
+
+
+def _repeatable(result: dict[str, Any]) -> dict[str, Any]:
+    """Return what two runs agree on: neither times of this machine nor counters of the link."""
+    flights = {
+        stage: {name: flight[name] for name in _OF_FLIGHT} for stage, flight in result["flights"].items()
+    }
+    return {**{name: result[name] for name in _PARTS}, "flights": flights}
