@@ -1,0 +1,128 @@
+"""Pictures of a flight, made off screen: one moment in, one array of pixels out."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+from xml.etree.ElementTree import tostring
+
+import mujoco
+import numpy as np
+
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.errors import UsageProblemError
+from sim_bridge.multibody import looks
+from sim_bridge.multibody.cameras import view
+from sim_bridge.multibody.frames import flip_quaternion, flip_vector
+from sim_bridge.multibody.marks import MOST_TRAIL, Marks, RotorLooks
+from sim_bridge.multibody.offscreen import make_context
+from sim_bridge.multibody.paint import paint
+from sim_bridge.multibody.poses import FlightPath, Moment
+from sim_bridge.multibody.scene import decorate
+
+Picture: TypeAlias = np.ndarray[Any, np.dtype[np.uint8]]
+"""Shape (height, width, 3), red, green, blue."""
+
+_MARKS = 3 * MOST_TRAIL
+
+
+class Stage:
+    """A vehicle in its place, compiled and painted, that can be put anywhere; it has no dynamics."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        root = looks.bare_model(vehicle)
+        decorate(root, vehicle)
+        try:
+            self.model = mujoco.MjModel.from_xml_string(tostring(root, encoding="unicode"))
+        except ValueError as error:  # a mesh that is not there
+            raise UsageProblemError(f"the vehicle {vehicle.name} cannot be drawn: {error}") from error
+        paint(self.model)
+        self.data = mujoco.MjData(self.model)
+        self.span_m, self.ground_m = looks.span_m(vehicle), looks.foot_z_m(vehicle)
+        self.rotors = RotorLooks(self.model, vehicle)
+        self._free_joint = self._address("vehicle")
+        self._hinges = [self._address(f"rotor_{n}") for n in range(1, len(vehicle.rotors) + 1)]
+        self._spins = [-rotor.spin for rotor in vehicle.rotors]  # clockwise from above is negative about up
+        body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
+        moves = self.model.body_rootid[self.model.geom_bodyid] == body
+        self.shadeless = frozenset(np.flatnonzero(~moves).tolist()) | self.rotors.discs
+
+    def _address(self, joint: str) -> int:
+        number = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_JOINT, joint)
+        return int(self.model.jnt_qposadr[number])
+
+    def put(self, moment: Moment) -> None:
+        """Put the vehicle where it is at a moment, with its rotors turned and coloured."""
+        at, q = self._free_joint, self.data.qpos
+        q[at : at + 3] = flip_vector(moment.position_ned_m)
+        q[at + 3 : at + 7] = flip_quaternion(moment.attitude)
+        for address, spin, angle in zip(self._hinges, self._spins, moment.rotor_angle_rad, strict=False):
+            q[address] = spin * (angle % (2.0 * np.pi))
+        self.rotors.show(moment.rotor_speed_rad_s)
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_camlight(self.model, self.data)
+
+
+class Renderer:
+    """Draws moments of one flight; raise UsageProblemError when there is nothing to render with."""
+
+    def __init__(self, vehicle: Vehicle, path: FlightPath, width: int, height: int) -> None:
+        self.width, self.height = width, height
+        self._gl = make_context(width, height)
+        self._stage = Stage(vehicle)
+        self._marks = Marks(path, self._stage.span_m, self._stage.ground_m)
+        model = self._stage.model
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + _MARKS)
+        self._options = mujoco.MjvOption()
+        self._camera = mujoco.MjvCamera()
+
+    def draw(self, moment: Moment, camera: str) -> Picture:
+        """Return the picture of a moment, seen by a camera of ``cameras.CAMERAS``."""
+        stage, scene = self._stage, self._scene
+        stage.put(moment)
+        self._aim(camera, moment)
+        mujoco.mjv_updateScene(
+            stage.model,
+            stage.data,
+            self._options,
+            None,
+            self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL.value,
+            scene,
+        )
+        for geom in scene.geoms[
+            : scene.ngeom
+        ]:  # only the vehicle casts a shadow, the ground's have bad edges
+            if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid in stage.shadeless:
+                geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+        self._marks.draw(scene, moment)
+        return self._read()
+
+    def _aim(self, camera: str, moment: Moment) -> None:
+        seen = view(camera, moment, self._stage.span_m, self._stage.ground_m)
+        self._camera.lookat[:] = seen.look_at_m
+        self._camera.distance = seen.distance_m
+        self._camera.azimuth, self._camera.elevation = seen.azimuth_deg, seen.elevation_deg
+        self._stage.model.vis.global_.fovy = seen.field_deg
+
+    def _read(self) -> Picture:
+        area = mujoco.MjrRect(0, 0, self.width, self.height)
+        mujoco.mjr_render(area, self._scene, self._context)
+        upside_down = np.empty((self.height, self.width, 3), np.uint8)
+        mujoco.mjr_readPixels(upside_down, None, area, self._context)
+        return np.ascontiguousarray(upside_down[::-1])
+
+    def close(self) -> None:
+        """Give the context back."""
+        self._context.free()
+        self._gl.free()
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

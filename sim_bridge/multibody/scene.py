@@ -1,0 +1,121 @@
+"""The place where the vehicle flies: sky, ground, landing pad, light, landmarks and cameras, as MJCF.
+
+World frame: x north, y west, z up [m]. What cannot be said in MJCF without files, the pixels of grass, pad and clouds,
+``paint.py`` puts into the compiled model; without it they are plain colours.
+"""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element
+
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.multibody import looks
+from sim_bridge.multibody.landmarks import add_landmarks
+from sim_bridge.multibody.xml import add, paint_only, section
+
+CAMERAS = ("chase", "fixed", "top", "side")
+PAD_M = 4.0
+"""Half the side of the landing pad."""
+GRASS_TILE_M = 20.0
+"""Side of the piece of ground whose picture repeats."""
+LARGEST_PICTURE = 4096
+"""Pixels, either way, of what can be rendered off screen."""
+
+_SUN_TOWARDS = (0.45, 0.55, -1.0)
+_SUN_AT = (-18.0, -22.0, 40.0)
+
+
+def decorate(root: Element, vehicle: Vehicle) -> None:
+    """Put the place around the vehicle of a model whose body is called "vehicle", and dress the vehicle."""
+    world, body = section(root, "worldbody"), root.find(".//body[@name='vehicle']")
+    if body is None:
+        raise ValueError("the model has no body called vehicle")
+    ground_m = looks.foot_z_m(vehicle)
+    _visual(root)
+    _materials(section(root, "asset"))
+    _light(world)
+    _ground(world, ground_m)
+    _pad(world, ground_m)
+    add_landmarks(world, ground_m)
+    _cameras(world, body, vehicle, ground_m)
+    looks.dress(body, vehicle)
+
+
+def _visual(root: Element) -> None:
+    statistic = section(root, "statistic")
+    statistic.set("extent", "10")  # znear, zfar and the shadows are shares of it
+    statistic.set("center", "0 0 1")
+    visual = section(root, "visual")
+    add(visual, "global", offwidth=LARGEST_PICTURE, offheight=LARGEST_PICTURE, fovy=45)
+    add(visual, "quality", shadowsize=4096, offsamples=4, numslices=24, numstacks=12)
+    add(visual, "map", znear=0.008, zfar=120, shadowclip=0.35, shadowscale=0.9, haze=0.35)
+    add(
+        visual,
+        "headlight",
+        ambient=(0.40, 0.41, 0.43),
+        diffuse=(0.16, 0.16, 0.16),
+        specular=(0.05, 0.05, 0.05),
+    )
+    add(visual, "rgba", haze=(0.78, 0.85, 0.91, 1))
+
+
+def _materials(asset: Element) -> None:
+    add(
+        asset, "texture", name="sky", type="skybox", builtin="gradient", width=512, height=3072,
+        rgb1=(0.24, 0.47, 0.78), rgb2=(0.80, 0.87, 0.93),
+    )  # fmt: skip
+    for name, size, colour in (
+        ("grass", 1024, (0.34, 0.45, 0.20)),
+        ("mown", 512, (0.40, 0.50, 0.24)),
+        ("concrete", 1024, (0.56, 0.56, 0.54)),
+    ):
+        add(
+            asset, "texture", name=name, type="2d", builtin="flat", width=size, height=size,
+            rgb1=colour, rgb2=colour,
+        )  # fmt: skip
+    repeat = 2.0 / GRASS_TILE_M  # pictures of a plane repeat in units of two metres... of its half sizes
+    add(asset, "material", name="grass", texture="grass", texuniform="true", texrepeat=(repeat, repeat),
+        specular=0.0, shininess=0.0, reflectance=0.0)  # fmt: skip
+    add(asset, "material", name="mown", texture="mown", texrepeat=(8.0, 1.0), specular=0.0, shininess=0.0)
+    add(asset, "material", name="concrete", texture="concrete", specular=0.05, shininess=0.1)
+
+
+def _light(world: Element) -> None:
+    add(
+        world, "light", name="sun", type="directional", mode="trackcom", castshadow="true", dir=_SUN_TOWARDS,
+        pos=_SUN_AT, diffuse=(0.72, 0.70, 0.64), specular=(0.25, 0.25, 0.22), ambient=(0.02, 0.02, 0.02),
+    )  # fmt: skip
+
+
+def _ground(world: Element, ground_m: float) -> None:
+    ground = world.find("geom[@name='ground']")
+    if ground is None:
+        ground = add(world, "geom", name="ground", type="plane", pos=(0, 0, ground_m), size=(0, 0, 1))
+    for name in ("rgba", "material"):
+        ground.attrib.pop(name, None)
+    ground.set("material", "grass")
+    ground.set("size", "0 0 1")
+
+
+def _pad(world: Element, ground_m: float) -> None:
+    """The landing pad at home, with marks, and a mown strip through the field."""
+    paint_only(world, "box", size=(32.0, 3.2, 0.004), pos=(0, 0, ground_m - 0.001), material="mown")
+    paint_only(
+        world, "box", name="pad", size=(PAD_M, PAD_M, 0.01), pos=(0, 0, ground_m - 0.004), material="concrete"
+    )
+
+
+def _cameras(world: Element, body: Element, vehicle: Vehicle, ground_m: float) -> None:
+    """Cameras for whoever opens the model; the renderer's own move more smoothly (``cameras.py``)."""
+    far = 4.0 * looks.span_m(vehicle)
+    add(
+        body,
+        "camera",
+        name="chase",
+        mode="trackcom",
+        pos=(-far, 0, 0.5 * far),
+        xyaxes=(0, -1, 0, 0.45, 0, 0.9),
+    )
+    add(world, "camera", name="fixed", mode="targetbody", target="vehicle", pos=(-11, 6, ground_m + 1.75))
+    add(body, "camera", name="top", mode="trackcom", pos=(0, 0, 3.0 * far), xyaxes=(0, -1, 0, 1, 0, 0))
+    add(body, "camera", name="side", mode="trackcom", pos=(0, far, 0.1 * far), xyaxes=(-1, 0, 0, 0, -0.1, 1))

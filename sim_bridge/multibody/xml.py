@@ -1,0 +1,57 @@
+"""Small helpers for writing MJCF with ElementTree."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TypeAlias
+from xml.etree.ElementTree import Element, SubElement
+
+Value: TypeAlias = str | float | Iterable[float]
+
+
+def text(value: Value) -> str:
+    """Write a value as MJCF has it: numbers with nine digits, several of them separated by spaces."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int | float):
+        return f"{value:.9g}"
+    return " ".join(f"{number:.9g}" for number in value)
+
+
+def add(parent: Element, tag: str, **attributes: Value) -> Element:
+    """Append an element; a trailing underscore of a name is left out, as in ``class_``.
+
+    ``euler`` [rad, x-y-z in the turned axes] is written as ``quat``, which means the same whatever ``compiler`` says.
+    """
+    element = SubElement(parent, tag)
+    for name, value in attributes.items():
+        if name == "euler" and not isinstance(value, str | float | int):
+            element.set("quat", text(_quaternion(*value)))
+        else:
+            element.set(name.rstrip("_"), text(value))
+    return element
+
+
+def section(root: Element, tag: str) -> Element:
+    """Return the section of the model with this name; it is made if it is not there."""
+    found = root.find(tag)
+    return found if found is not None else SubElement(root, tag)
+
+
+def paint_only(parent: Element, kind: str, **attributes: Value) -> Element:
+    """Append a geom that is seen but touches nothing and weighs nothing."""
+    return add(parent, "geom", type=kind, contype=0, conaffinity=0, mass=0, group=2, **attributes)
+
+
+def _quaternion(x: float, y: float, z: float) -> tuple[float, float, float, float]:
+    """Turn about x, then the new y, then the new z, each in rad."""
+    cx, sx = math.cos(x / 2.0), math.sin(x / 2.0)
+    cy, sy = math.cos(y / 2.0), math.sin(y / 2.0)
+    cz, sz = math.cos(z / 2.0), math.sin(z / 2.0)
+    return (
+        cx * cy * cz - sx * sy * sz,
+        sx * cy * cz + cx * sy * sz,
+        cx * sy * cz - sx * cy * sz,
+        cx * cy * sz + sx * sy * cz,
+    )
