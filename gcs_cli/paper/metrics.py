@@ -27,7 +27,7 @@ SETTLED = 0.02
 LOW, HIGH = 0.1, 0.9
 STEADY_S = 1.0
 _SMALLEST_MOVE = 1e-9
-_PATH_EVERY_S = 0.02
+_PATH_EVERY_S = 0.04
 _SPACING_M = 0.05
 
 _BITS = {
@@ -165,14 +165,16 @@ def path_metrics(recording: Recording) -> PathMetrics | None:
 
 
 def _distance_from_path(recording: Recording, there: FloatArray) -> FloatArray:
-    """Distance of the flight, every 20 ms, from the polyline of its whole reference."""
-    here = recording.position_ned_m[:: max(1, round(_PATH_EVERY_S * recording.case.inner_hz)), :2]
+    """Distance of the flight, every 40 ms, from the polyline of its whole reference."""
+    here = recording.position_ned_m[:: max(1, round(_PATH_EVERY_S * recording.case.inner_hz)), None, :2]
     corners = _polyline(there)
-    nearest: FloatArray = np.linalg.norm(here - corners[0], axis=1)
-    for a, b in itertools.pairwise(corners):
-        along = b - a
-        share = np.clip((here - a) @ along / (along @ along), 0.0, 1.0)
-        nearest = np.minimum(nearest, np.linalg.norm(here - a - share[:, None] * along, axis=1))
+    nearest: FloatArray = np.linalg.norm(here[:, 0] - corners[0], axis=1)
+    if len(corners) > 1:
+        begin, along = corners[:-1], np.diff(corners, axis=0)
+        away = here - begin  # (points, segments, 2)
+        share = np.clip((away * along).sum(axis=2) / (along * along).sum(axis=1), 0.0, 1.0)
+        away -= share[:, :, None] * along
+        nearest = np.sqrt((away * away).sum(axis=2).min(axis=1))
     return nearest
 
 

@@ -1,0 +1,128 @@
+"""Fly many cases, in several processes, and keep of each what results and report need.
+
+A case does not know of the others and each is flown by one process alone: the results are the same with any number of
+processes, and come in the order of the cases.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gcs_cli.paper.cases import DESIRED, IDEAL, PLAIN
+from gcs_cli.paper.closed_loop import fly
+from gcs_cli.paper.metrics import effort, measure, path_metrics
+from gcs_cli.paper.types import Case, Recording
+
+MOST_JOBS = 8
+THIN = 4
+"""Of a recording that is only drawn, every so many ticks are kept: 250 Hz."""
+_DRAWN = (PLAIN, IDEAL)
+
+
+class Flown(NamedTuple):
+    """What experiments gave."""
+
+    entries: dict[str, dict[str, Any]]
+    """For results.json, by the case's key."""
+    recordings: dict[str, Recording]
+    """Of the cases that are drawn."""
+
+
+def default_jobs() -> int:
+    """Return how many processes fly at once unless told."""
+    return max(1, min(MOST_JOBS, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1))
+
+
+def entry_of(recording: Recording) -> dict[str, Any]:
+    """Return what results.json holds of a case."""
+    path = path_metrics(recording)
+    ended = {"time_s": recording.ended_s, "why": recording.ended_why}
+    return {
+        **recording.case._asdict(),
+        "force_ned_n": list(recording.case.force_ned_n),
+        "torque_frd_n_m": list(recording.case.torque_frd_n_m),
+        "metrics": {name: axis._asdict() for name, axis in measure(recording).items()},
+        "path": None if path is None else path._asdict(),
+        "effort": effort(recording)._asdict(),
+        "ended": None if recording.ended_s is None else ended,
+    }
+
+
+def thinned(recording: Recording, every: int = THIN) -> Recording:
+    """Return the recording with one of ``every`` rows."""
+    arrays: dict[str, Any] = {
+        name: value[::every].copy()
+        for name, value in recording._asdict().items()
+        if isinstance(value, np.ndarray)
+    }
+    return recording._replace(**arrays)
+
+
+def experiment(case: Case) -> tuple[dict[str, Any], Recording | None]:
+    """Fly a case; return its entry, and its recording where it is drawn; raise ConfigError."""
+    recording = fly(case)
+    entry = entry_of(recording)
+    condition = case.key.split("/")[2] if case.key.count("/") == 3 else PLAIN
+    if condition not in _DRAWN:
+        return entry, None
+    if case.trajectory == DESIRED and condition == PLAIN:
+        return entry, recording  # plants are compared tick by tick
+    return entry, thinned(recording)
+
+
+def run_cases(
+    cases: Sequence[Case], jobs: int, tell: Callable[[int, int], None] = lambda done, total: None
+) -> Flown:
+    """Fly the cases; ``tell`` is called with how many are done. Raise ConfigError.
+
+    With one job no process is started.
+    """
+    found: dict[str, tuple[dict[str, Any], Recording | None]] = {}
+    tell(0, len(cases))
+    if jobs == 1:
+        for case in cases:
+            found[case.key] = experiment(case)
+            tell(len(found), len(cases))
+    else:
+        _warm_up(cases)
+        found = _in_processes(cases, jobs, tell)
+    ordered = [(case.key, *found[case.key]) for case in cases]
+    return Flown(
+        {name: entry for name, entry, _ in ordered},
+        {name: recording for name, _, recording in ordered if recording is not None},
+    )
+
+
+def _warm_up(cases: Sequence[Case]) -> None:
+    """Compile each kernel once, here: all processes then read it from the cache."""
+    kinds = {(case.plant, case.controller): case for case in cases}
+    for case in kinds.values():
+        fly(case._replace(trajectory="step_roll", inner_hz=250))
+
+
+def _in_processes(
+    cases: Sequence[Case], jobs: int, tell: Callable[[int, int], None]
+) -> dict[str, tuple[dict[str, Any], Recording | None]]:
+    found: dict[str, tuple[dict[str, Any], Recording | None]] = {}
+    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _leave_interrupts_to_the_parent)
+    try:
+        waiting: dict[Future[tuple[dict[str, Any], Recording | None]], str] = {
+            pool.submit(experiment, case): case.key for case in cases
+        }
+        for future in as_completed(waiting):
+            found[waiting[future]] = future.result()
+            tell(len(found), len(cases))
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+    return found
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,31 @@
+"""What ``gcs paper`` prints at its end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+_PLANTS = {
+    "rigid_multibody": "rigid body against multibody",
+    "paper_rigid": "small angles against rigid body",
+}
+
+
+def print_results(console: Console, results: dict[str, Any], folder: Path) -> None:
+    """Print the claims with their verdicts, the difference of the plants, what is not there, and where the rest is."""
+    lines = []
+    for claim in results["comparisons"]["claims"]:
+        verdict = "holds" if claim["holds"] else "does not hold"
+        lines += [f"{verdict:>13}: {claim['claim']} ({claim['source']})", f"{'':15}{claim['words']}"]
+    for pair, contenders in results["plants"].items():
+        for name, found in contenders.items():
+            lines.append(
+                f"{_PLANTS.get(pair, pair)}, {results['contenders'][name]['label']}: at most "
+                f"{1e3 * found['max_position_m']:.2f} mm and {found['max_attitude_deg']:.3f}° apart"
+            )
+    lines += [f"left out: {part}: {why}" for part, why in results["left_out"].items()]
+    lines.append(f"results in {folder}")
+    for line in lines:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
