@@ -1,0 +1,176 @@
+"""The assembly of a vehicle: its parts, tuned so that they weigh what the vehicle file says.
+
+Mass, centre of gravity and inertia come from shapes and densities alone. Sizes of the usual parts, and densities of
+those that a vehicle file lets go, are turned until the whole has the file's mass and inertia, its centre of gravity in
+the origin and no products of inertia; the densities of the propellers until each rotor has its inertia. What cannot be
+met is in ``Assembly.misses``, and it flies as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from flightstack.contract import FloatArray
+from flightstack.params.vehicle import Rotor, Vehicle
+from sim_bridge.multibody.mass import MassProperties, about_point
+from sim_bridge.multibody.placing import PlacedPart, of_all, of_body, place
+from sim_bridge.multibody.solver import meet
+from sim_bridge.multibody.usual_parts import LIMITS, Knobs, arm_m, usual_parts
+
+_DENSITY_LIMIT = math.log(3.0)
+_LEAST_ROTOR_SHARE = 1e-6
+"""Of the vehicle's inertia: a rotor cannot be without any, even where the file says so."""
+
+TOLERANCE = 1e-3
+"""Share beyond which the user is told."""
+
+
+class Assembly(NamedTuple):
+    """A tuned assembly."""
+
+    parts: tuple[PlacedPart, ...]
+    whole: MassProperties  # about the centre of gravity, in the axes FRD of the frame
+    misses: dict[str, float]
+    """By how much it misses, as shares: of mass and moments of inertia, of the arm length for the centre of gravity,
+    of the largest moment for the products."""
+
+    @property
+    def worst_miss(self) -> float:
+        """The largest of ``misses``."""
+        return max(self.misses.values())
+
+    def worst_line(self) -> str:
+        """One sentence on how well it meets the vehicle file."""
+        name = max(self.misses, key=lambda key: self.misses[key])
+        return f"{len(self.parts)} parts meet the vehicle file within {self.misses[name]:.2g} ({name})"
+
+
+@lru_cache(maxsize=32)
+def assemble(vehicle: Vehicle) -> Assembly:
+    """Return the tuned assembly of a vehicle; the same vehicle gives the same bits. Raises ConfigError for a mesh."""
+    given = [placed for part in vehicle.parts for placed in place(vehicle, part)]
+    names = {placed.part.name for placed in given}
+    tuned = [index for index, placed in enumerate(given) if placed.part.tune]
+    usual_knobs = len(Knobs._fields) if vehicle.default_parts else 0
+
+    def build(x: FloatArray) -> list[PlacedPart]:
+        values = x.tolist()
+        parts = list(given)
+        for index, knob in zip(tuned, values[usual_knobs:], strict=True):
+            parts[index] = _denser(parts[index], math.exp(knob))
+        if vehicle.default_parts:
+            usual = usual_parts(vehicle, Knobs(*values[:usual_knobs]))
+            parts += [placed for placed in usual if placed.part.name not in names]
+        return _with_rotor_inertia(vehicle, parts)
+
+    limits = np.array([*LIMITS[:usual_knobs], *[_DENSITY_LIMIT] * len(tuned)])
+    knobs = meet(_miss_of(vehicle, build), limits) if len(limits) else limits
+    parts = build(knobs)
+    return Assembly(tuple(parts), of_all(vehicle, parts), _misses(vehicle, parts))
+
+
+def _denser(placed: PlacedPart, factor: float) -> PlacedPart:
+    return placed._replace(part=replace(placed.part, density_kg_m3=factor * placed.part.density_kg_m3))
+
+
+def _with_rotor_inertia(vehicle: Vehicle, parts: list[PlacedPart]) -> list[PlacedPart]:
+    """Give the parts of each rotor the density with which it has its inertia; a rotor without parts gets a disc."""
+    ready = [placed for placed in parts if placed.body == 0]
+    for number, rotor in enumerate(vehicle.rotors, start=1):
+        own = [placed for placed in parts if placed.body == number] or [
+            placed for placed in usual_parts(vehicle, Knobs()) if placed.body == number
+        ]
+        factor = _rotor_inertia(vehicle, rotor) / float(of_body(own, number).inertia_kg_m2[2, 2])
+        ready += [_denser(placed, factor) for placed in own]
+    return ready
+
+
+def _rotor_inertia(vehicle: Vehicle, rotor: Rotor) -> float:
+    return max(rotor.inertia_kg_m2, _LEAST_ROTOR_SHARE * vehicle.inertia_kg_m2[2])
+
+
+def _miss_of(
+    vehicle: Vehicle, build: Callable[[FloatArray], list[PlacedPart]]
+) -> Callable[[FloatArray], FloatArray]:
+    """Return what must become zero: mass, centre of gravity, moments and products of inertia, as shares."""
+
+    def miss(x: FloatArray) -> FloatArray:
+        return _miss(vehicle, of_all(vehicle, build(x)))
+
+    return miss
+
+
+def _miss(vehicle: Vehicle, whole: MassProperties) -> FloatArray:
+    inertia = whole.inertia_kg_m2 + about_point(whole.mass_kg, whole.centre_m)
+    wanted = np.array(vehicle.inertia_kg_m2)
+    return np.concatenate(
+        [
+            [whole.mass_kg / vehicle.mass_kg - 1.0],
+            whole.centre_m / arm_m(vehicle),
+            np.diag(inertia) / wanted - 1.0,
+            inertia[[0, 0, 1], [1, 2, 2]] / wanted.max(),
+        ]
+    )
+
+
+_NAMES = (
+    "mass", "centre of gravity x", "centre of gravity y", "centre of gravity z",
+    "Ix", "Iy", "Iz", "Ixy", "Ixz", "Iyz",
+)  # fmt: skip
+
+
+def _misses(vehicle: Vehicle, parts: list[PlacedPart]) -> dict[str, float]:
+    values = np.abs(_miss(vehicle, of_all(vehicle, parts))).tolist()
+    misses = dict(zip(_NAMES, values, strict=True))
+    for number, rotor in enumerate(vehicle.rotors, start=1):
+        own = float(of_body(parts, number).inertia_kg_m2[2, 2])
+        wanted = _rotor_inertia(vehicle, rotor)
+        misses[f"inertia of rotor {number}"] = abs(own / wanted - 1.0)
+    return misses
+
+
+def mass_table(vehicle: Vehicle, assembly: Assembly) -> str:
+    """Return a table of the parts with material, density and mass, and of the whole beside the vehicle file."""
+    lines = [
+        f"{'part':<16}{'shape':<10}{'material':<13}{'kg/m³':>8}{'g':>10}{'x':>10}{'y':>10}{'z, m FRD':>10}"
+    ]
+    for placed in assembly.parts:
+        part, own = placed.part, placed.properties()
+        x, y, z = own.centre_m
+        if placed.body:
+            x, y, z = own.centre_m + np.array(vehicle.rotors[placed.body - 1].position_frd_m)
+        lines.append(
+            f"{part.name:<16}{part.shape:<10}{part.material:<13}{part.density_kg_m3:>8.0f}"
+            f"{own.mass_kg * 1e3:>10.2f}{x:>10.4f}{y:>10.4f}{z:>10.4f}"
+        )
+    whole = assembly.whole
+    moments = np.diag(whole.inertia_kg_m2)
+    lines.append("")
+    lines.append(f"{'':<24}{'assembly':>16}{'vehicle file':>16}{'miss':>10}")
+    rows = [("mass, kg", whole.mass_kg, vehicle.mass_kg, "mass")]
+    rows += [
+        (f"{name}, kg m²", float(value), wanted, name)
+        for name, value, wanted in zip(("Ix", "Iy", "Iz"), moments, vehicle.inertia_kg_m2, strict=True)
+    ]
+    rows += [
+        (f"centre of gravity {axis}, m", float(value), 0.0, f"centre of gravity {axis}")
+        for axis, value in zip("xyz", whole.centre_m, strict=True)
+    ]
+    rotors = assembly.misses
+    for number, rotor in enumerate(vehicle.rotors, start=1):
+        about_axis = float(of_body(assembly.parts, number).inertia_kg_m2[2, 2])
+        name = f"inertia of rotor {number}"
+        rows.append((f"rotor {number} J, kg m²", about_axis, rotor.inertia_kg_m2, name))
+    lines += [
+        f"{title:<24}{value:>16.8g}{wanted:>16.8g}{rotors[name]:>10.1e}"
+        for title, value, wanted, name in rows
+    ]
+    products = max(assembly.misses[name] for name in ("Ixy", "Ixz", "Iyz"))
+    lines.append(f"products of inertia are below {products:.1e} of the largest moment")
+    return "\n".join(lines)
