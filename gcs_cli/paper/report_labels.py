@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 
 from gcs_cli.paper import cases
@@ -73,6 +73,22 @@ def fixed(value: float | None, places: int) -> str:
 def cell(shown: str, style: str = "") -> str:
     """Return a table cell of a number that was written before."""
     return f'<td class="{f"n {style}".strip()}">{escape(shown)}</td>'
+
+
+def wide_table(columns: Sequence[str], rows: Iterable[str], style: str = "", caption: str = "") -> str:
+    """Return a table that scrolls by itself on a narrow screen; a column whose name begins with # holds numbers."""
+    heads = "".join(
+        f'<th class="n">{escape(name[1:])}</th>' if name.startswith("#") else f"<th>{escape(name)}</th>"
+        for name in columns
+    )
+    named = f' class="{style}"' if style else ""
+    above = f"<caption>{escape(caption)}</caption>" if caption else ""
+    return f'<div class="wide"><table{named}>{above}<tr>{heads}</tr>{"".join(rows)}</table></div>'
+
+
+def row(cells: str, begins: bool = False) -> str:
+    """Return a row of a table; ``begins``: it is the first one of a group."""
+    return f"<tr{' class=stage' if begins else ''}>{cells}</tr>"
 
 
 def anchored(name: str, html: str) -> str:

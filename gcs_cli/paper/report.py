@@ -1,0 +1,155 @@
+"""The report of ``gcs paper``: section IV of the paper, redone; one HTML file that needs nothing else.
+
+What it says is in ``results``, the content of results.json; curves come from the recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from gcs_cli.paper import cases
+from gcs_cli.paper.report_compare import claims_section, matrix_sections, xy_figures
+from gcs_cli.paper.report_flights import (
+    Recordings,
+    beside,
+    desired_figure,
+    metrics_table,
+    response_figures,
+    step_figure,
+    step_table,
+)
+from gcs_cli.paper.report_labels import ANGLES, PLANTS, anchored
+from gcs_cli.paper.report_linear import linear_sections
+from gcs_cli.paper.report_pictures import Picture, pictures_section
+from gcs_cli.paper.report_pil import pil_sections
+from gcs_cli.paper.report_plants import plants_section
+from gcs_cli.paper.report_summary import summary_section, tiles
+from gcs_cli.paper.report_tables import corrections_section, tables_section
+from gcs_cli.report_plots import section
+
+TITLE = "The paper, reproduced"
+PAPER = "Quadcopter Modelling, Control Design and PIL Verification Based on DSP F28377s"
+_HERE = Path(__file__).parent
+_STYLE_SHEETS = (_HERE.parent / "report.css", _HERE.parent / "pil" / "pil.css", _HERE / "paper.css")
+_NAVIGATION = (
+    ("summary", "What came out"),
+    ("claims", "Does it hold?"),
+    ("pictures", "Pictures"),
+    ("tables", "Tables I–III"),
+    ("corrections", "Corrections"),
+    ("fig-7", "Fig. 7"),
+    ("fig-8", "Figs. 8–13"),
+    ("metrics", "Figures of the responses"),
+    ("steps", "Steps"),
+    ("plants", "Plants"),
+    ("fig-14", "Fig. 14"),
+    ("matrix-hard-paper", "Disturbances"),
+    ("fig-15", "Fig. 15, PIL"),
+    ("linear", "Poles"),
+    ("bode", "Open loops"),
+    ("margins", "Margins"),
+    ("onset", "Lowest rate"),
+    ("conditions", "How it was made"),
+)
+
+
+def render(results: Mapping[str, Any], recordings: Recordings, pictures: Sequence[Picture] = ()) -> str:
+    """Return the report as HTML; parts that ``results`` does not have say why they are left out."""
+    body = "".join(_sections(results, recordings, pictures))
+    style = "".join(sheet.read_text(encoding="utf-8") for sheet in _STYLE_SHEETS)
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{TITLE}</title><style>{style}</style></head>"
+        f"<body><main>{_header(results)}{_navigation(body)}{tiles(results)}{body}</main></body></html>\n"
+    )
+
+
+def _header(results: Mapping[str, Any]) -> str:
+    return (
+        f'<header><h1>{TITLE}</h1><div class="about">“{escape(PAPER)}”, section IV, flown again by '
+        f"flightstack {escape(results['version'])}: every table and figure from one command, with figures in place of "
+        "impressions.</div></header>"
+    )
+
+
+def _navigation(body: str) -> str:
+    links = "".join(
+        f'<a href="#{name}">{escape(title)}</a>' for name, title in _NAVIGATION if f'id="{name}"' in body
+    )
+    return f"<nav>{links}</nav>"
+
+
+def _sections(
+    results: Mapping[str, Any], recordings: Recordings, pictures: Sequence[Picture]
+) -> Iterator[str]:
+    left_out, found = results["left_out"], results["cases"]
+    yield summary_section(results)
+    yield claims_section(results["comparisons"].get("claims", ()))
+    yield pictures_section(pictures)
+    yield tables_section(results["vehicle"], results["gains"])
+    yield corrections_section(results["corrections"])
+    yield desired_figure(recordings)
+    yield from response_figures(recordings)
+    yield _metrics(found, recordings)
+    yield from _steps(found, recordings)
+    yield plants_section(results["plants"], recordings, left_out.get(cases.MULTIBODY, ""))
+    yield from xy_figures(recordings)
+    yield from matrix_sections(found)
+    yield from pil_sections(results["pil"], left_out.get("pil", ""))
+    yield from linear_sections(results["linear"], results["onset"] or (), left_out.get("linear", ""))
+    yield _conditions(results)
+
+
+def _metrics(found: Mapping[str, Any], recordings: Recordings) -> str:
+    plants = beside(recordings)
+    table = metrics_table(found, cases.DESIRED, plants)
+    if not table:
+        return ""
+    note = (
+        "Of figures 8 to 13, with our gains besides. Overshoot is that of the worst move between two rests of the "
+        "axis; rise and settling time are those of the last one, from its begin: on this smooth trajectory they tell "
+        "of the reference as much as of the controller. Roll and pitch have no rests, so errors alone."
+    )
+    title = "Figures of the responses along the desired trajectory"
+    return anchored("metrics", section(title, table, note=note))
+
+
+def _steps(found: Mapping[str, Any], recordings: Recordings) -> Iterator[str]:
+    plant = cases.SMALL_ANGLE
+    yield step_figure(recordings, "Steps of the attitude, inner loop alone", "steps", ANGLES, plant)
+    yield step_figure(recordings, "Steps of the position", "steps-position", ("x", "y", "z"), plant)
+    tables = ""
+    for name, title in PLANTS.items():
+        table = step_table(found, name)
+        if table:
+            unfolded = " open" if name == plant else ""
+            tables += f"<details{unfolded}><summary>{escape(title)}</summary>{table}</details>"
+    if tables:
+        note = "Of the axis that steps: what the paper's words of overshoot and stabilisation time have no numbers for."
+        yield anchored("step-figures", section("Figures of the steps", tables, note=note))
+
+
+def _conditions(results: Mapping[str, Any]) -> str:
+    conditions = results.get("conditions", {})
+    rows = "".join(
+        f"<tr><th>{escape(name)}</th><td>{escape(label)}</td></tr>" for name, label in conditions.items()
+    )
+    trajectories = "".join(
+        f"<tr><th>{escape(name)}</th><td>{escape(of['description'])}; {of['duration_s']:g} s</td></tr>"
+        for name, of in results.get("trajectories", {}).items()
+    )
+    words = (
+        "<p>Made by <code>gcs paper</code>. Loops and plants are those of the flight stack and its simulator, joined "
+        "tick by tick in one process: inner loop at 1 kHz, outer loop at 250 Hz, unless a condition says otherwise. "
+        "Flights begin in hover, and there is no ground. The same command gives the same "
+        '<a href="results.json">results.json</a>, which holds every number of this page. Model, derivation and '
+        "corrections: docs/paper.md.</p>"
+    )
+    body = (
+        f"{words}<h3>Conditions</h3><table>{rows}</table><h3>Trajectories</h3><table>{trajectories}</table>"
+    )
+    return anchored("conditions", section("How it was made", body))

@@ -1,0 +1,257 @@
+"""The flights along the desired trajectory as parts of the report: figures 7 to 13, steps, and their figures. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from flightstack.contract import FloatArray
+from gcs_cli.paper import cases
+from gcs_cli.paper.report_axes import Axis, chart, spanning
+from gcs_cli.paper.report_labels import (
+    ANGLES,
+    AXES,
+    AXIS_TITLES,
+    LABELS,
+    PLANTS,
+    REFERENCE,
+    STYLES,
+    anchored,
+    cell,
+    fixed,
+    legend_of,
+    row,
+    wide_table,
+)
+from gcs_cli.paper.report_space import Path, space_chart
+from gcs_cli.paper.types import Recording
+from gcs_cli.report_chart import Line
+from gcs_cli.report_plots import section
+
+Recordings = Mapping[str, Recording]
+Cases = Mapping[str, Mapping[str, Any]]
+
+PAIR = (cases.PID, cases.BACKSTEPPING)
+ERROR_SIZE = (480, 150)
+STEP_SIZE = (480, 220)
+_STEP_SHOWN_S = 2.5
+_FIGURES = {"roll": 8, "pitch": 9, "yaw": 10, "x": 11, "y": 12, "z": 13}
+_COLUMN = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
+_LEAST = {False: 0.02, True: 0.2}
+"""Smallest span of an axis in metres and in degrees: rounding shall not look like a flight."""
+
+
+def signals(recording: Recording, axis: str) -> tuple[FloatArray, FloatArray]:
+    """Return reference and response of an axis, in metres or degrees, z upwards, shape (n,) each."""
+    column = _COLUMN[axis]
+    if axis in ANGLES:
+        wanted = recording.reference[:, 3] if axis == "yaw" else recording.euler_target_rad[:, column]
+        return np.degrees(wanted), np.degrees(recording.euler_rad[:, column])
+    sign = -1.0 if axis == "z" else 1.0
+    return sign * recording.reference[:, column], sign * recording.position_ned_m[:, column]
+
+
+def label(axis: str) -> str:
+    """Return the label of an axis of a chart."""
+    if axis in ANGLES:
+        return f"{AXIS_TITLES[axis]} [°]"
+    return "height −z [m]" if axis == "z" else f"{AXIS_TITLES[axis]} [m]"
+
+
+def over_time(recording: Recording) -> Axis:
+    """Return the axis of time of a flight that came to its end or not."""
+    end = float(recording.time_s[-1]) if len(recording.time_s) else 1.0
+    return Axis("time [s]", 0.0, math.ceil(end - 1e-6))
+
+
+def desired_figure(recordings: Recordings) -> str:
+    """Return figure 7: the desired trajectory over time, from above and in space."""
+    recording = recordings.get(cases.key(cases.PID, cases.DESIRED))
+    if recording is None:
+        return ""
+    time = over_time(recording)
+    charts = []
+    for axis in ("x", "y", "z", "yaw"):
+        wanted = signals(recording, axis)[0]
+        lines = [Line(f"desired {axis}", recording.time_s, wanted, "s1")]
+        charts.append(chart(f"Desired {axis}", time, spanning(label(axis), [wanted]), lines, size=STEP_SIZE))
+    path = recording.reference[:, :3]
+    plan = Line("desired path", path[:, 1], path[:, 0], "s1")
+    above = chart(
+        "Desired path from above",
+        spanning("east [m]", [path[:, 1]]),
+        spanning("north [m]", [path[:, 0]]),
+        [plan],
+        size=(480, 330),
+        equal=True,
+    )
+    space = space_chart("Desired path in space", [Path("desired path", path, "s1")])
+    note = (
+        "The paper's figure has no numbers that could be read off; this trajectory is our choice, defined in "
+        "gcs_cli/paper/trajectories/desired.toml. Right below: the path in space, with its shadow on the ground."
+    )
+    body = f'<div class="pair">{"".join(charts)}{above}{space}</div>'
+    return anchored("fig-7", section("Fig. 7: desired trajectory", body, note=note))
+
+
+def response_figures(recordings: Recordings) -> Iterator[str]:
+    """Yield figures 8 to 13: each axis on two plants side by side, and below each what is missing to the reference."""
+    plants = beside(recordings)
+    if not plants:
+        return
+    for axis in AXES:
+        columns = "".join(_column(recordings, axis, plant) for plant in plants)
+        title = f"Fig. {_FIGURES[axis]}: {AXIS_TITLES[axis]}"
+        asked = "asked for by the outer loop (PID flight)" if axis in ("roll", "pitch") else "desired"
+        note = "" if axis != "roll" else (
+            "Each controller's outer loop asks for a roll and pitch of its own, and each error is that to its own; "
+            "drawn is what the PID's asked for."
+        )  # fmt: skip
+        html = section(title, f'<div class="pair">{columns}</div>', legend_of(PAIR, asked), note)
+        yield anchored(f"fig-{_FIGURES[axis]}", html)
+
+
+def beside(recordings: Recordings) -> list[str]:
+    """Return the two plants that are shown side by side: the paper's, and the most physical one that was flown."""
+    flown = [
+        plant
+        for plant in (cases.SMALL_ANGLE, cases.MULTIBODY, cases.RIGID)
+        if all(cases.key(name, cases.DESIRED, cases.PLAIN, plant) in recordings for name in PAIR)
+    ]
+    return flown[:2]
+
+
+def _column(recordings: Recordings, axis: str, plant: str) -> str:
+    pair = {name: recordings[cases.key(name, cases.DESIRED, cases.PLAIN, plant)] for name in PAIR}
+    lines: list[Line] = []
+    errors: list[Line] = []
+    for name, recording in pair.items():
+        wanted, got = signals(recording, axis)
+        if not lines:
+            lines.append(Line("reference", recording.time_s, wanted, REFERENCE))
+        lines.append(Line(LABELS[name], recording.time_s, got, STYLES[name]))
+        errors.append(Line(LABELS[name], recording.time_s, got - wanted, f"{STYLES[name]} thin"))
+    time = over_time(max(pair.values(), key=lambda recording: len(recording.time_s)))
+    least = _LEAST[axis in ANGLES]
+    unit = "°" if axis in ANGLES else "m"
+    head = f'<h3 class="plant">{escape(PLANTS[plant])}</h3>'
+    response = chart(
+        f"{AXIS_TITLES[axis]}, {PLANTS[plant]}",
+        time._replace(label=""),
+        spanning(label(axis), [line.y for line in lines], least=least),
+        lines,
+        size=STEP_SIZE,
+    )
+    missing = chart(
+        f"Error of {AXIS_TITLES[axis]}, {PLANTS[plant]}",
+        time,
+        spanning(f"error [{unit}]", [line.y for line in errors], least=0.1 * least),
+        errors,
+        size=ERROR_SIZE,
+    )
+    return f"<div>{head}{response}{missing}</div>"
+
+
+def step_figure(recordings: Recordings, title: str, anchor: str, axes: Sequence[str], plant: str) -> str:
+    """Return the responses of all contenders to steps of these axes."""
+    charts, names = [], []
+    for axis in axes:
+        flown = {
+            name: recordings[key]
+            for name in LABELS
+            if (key := cases.key(name, f"step_{axis}", cases.PLAIN, plant)) in recordings
+        }
+        if not flown:
+            continue
+        names = list(flown)
+        charts.append(_step_chart(flown, axis))
+    if not charts:
+        return ""
+    body = f'<div class="pair">{"".join(charts)}</div>'
+    return anchored(anchor, section(title, body, legend_of(names)))
+
+
+def _step_chart(flown: Mapping[str, Recording], axis: str) -> str:
+    lines: list[Line] = []
+    for name, recording in flown.items():
+        wanted, got = signals(recording, axis)
+        if not lines:
+            lines.append(Line("reference", recording.time_s, wanted, REFERENCE))
+        lines.append(Line(LABELS[name], recording.time_s, got, STYLES[name]))
+    begin_s = float(lines[0].x[int(np.argmax(lines[0].y != lines[0].y[0]))])
+    shown_s = _STEP_SHOWN_S if axis not in ANGLES else 0.2 * _STEP_SHOWN_S
+    shown_s *= 2.0 if axis in ("x", "y", "yaw") else 1.0
+    kept = [_between(line, begin_s - 0.08 * shown_s, begin_s + shown_s) for line in lines]
+    time = Axis("time [s]", begin_s - 0.08 * shown_s, begin_s + shown_s)
+    return chart(
+        f"Step of {axis}", time, spanning(label(axis), [line.y for line in kept]), kept, size=STEP_SIZE
+    )
+
+
+def _between(line: Line, start_s: float, end_s: float) -> Line:
+    within = (line.x >= start_s) & (line.x <= end_s)
+    return line._replace(x=line.x[within], y=line.y[within])
+
+
+_COLUMNS = (
+    *("axis", "controller", "plant", "#overshoot", "#rise 10–90 %", "#settling 2 %"),
+    *("#steady-state error", "#RMS error", "#largest error"),
+)
+
+
+def metrics_table(found: Cases, trajectory: str, plants: Sequence[str]) -> str:
+    """Return overshoot, rise, settling and errors of each axis, contender and plant; empty if nothing was flown."""
+    rows = [one for axis in AXES for one in _axis_rows(found, trajectory, axis, plants)]
+    return wide_table(_COLUMNS, rows) if rows else ""
+
+
+def step_table(found: Cases, plant: str) -> str:
+    """Return the figures of each axis in the flight in which it steps; empty if nothing was flown."""
+    rows = [one for axis in AXES for one in _axis_rows(found, f"step_{axis}", axis, (plant,))]
+    return wide_table(_COLUMNS, rows) if rows else ""
+
+
+def _axis_rows(found: Cases, trajectory: str, axis: str, plants: Sequence[str]) -> Iterator[str]:
+    first = True
+    for plant in plants:
+        for name, label_ in LABELS.items():
+            case = found.get(cases.key(name, trajectory, cases.PLAIN, plant))
+            if case is None:
+                continue
+            head = f"<th>{escape(AXIS_TITLES[axis]) if first else ''}</th><td>{escape(label_)}</td>"
+            yield row(f"{head}<td>{escape(PLANTS[plant])}</td>{metrics_cells(case, axis)}", first)
+            first = False
+
+
+def metrics_cells(case: Mapping[str, Any], axis: str) -> str:
+    """Return the six cells of an axis: %, s, s, then degrees or millimetres; the sentence of a crash instead."""
+    if case["ended"] is not None:
+        return f'<td class="bad" colspan="6">{escape(ending(case))}</td>'
+    of = case["metrics"].get(axis)
+    if of is None:
+        return '<td class="n" colspan="6">–</td>'
+    factor, unit, places = (math.degrees(1.0), "°", 3) if axis in ANGLES else (1e3, "mm", 1)
+    errors = (of[name] for name in ("steady_state_error", "rms_error", "max_error"))
+    return "".join(
+        (
+            cell(with_unit(fixed(of["overshoot_percent"], 1), "%")),
+            cell(with_unit(fixed(of["rise_time_s"], 3), "s")),
+            cell(with_unit(fixed(of["settling_time_s"], 3), "s")),
+            *(cell(with_unit(fixed(factor * error, places), unit)) for error in errors),
+        )
+    )
+
+
+def with_unit(shown: str, unit: str) -> str:
+    """Append a unit, but not to a dash."""
+    return shown if shown == "–" else f"{shown} {unit}"
+
+
+def ending(case: Mapping[str, Any]) -> str:
+    """Say when and why a flight ended before its time."""
+    ended = case["ended"]
+    return f"crashed at {fixed(ended['time_s'], 2)} s: {ended['why']}"

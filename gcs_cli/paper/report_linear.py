@@ -1,0 +1,207 @@
+"""The linear analysis as parts of the report: poles, Bode plots, margins, lowest rates, onset in simulation. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from gcs_cli.paper.cases import CONTENDERS
+from gcs_cli.paper.linear.gains import AttitudeGains
+from gcs_cli.paper.linear.margins import response
+from gcs_cli.paper.linear.sampled import Actuators, AttitudeTick
+from gcs_cli.paper.report_axes import Axis, Guide, Mark, chart, spanning
+from gcs_cli.paper.report_flights import STEP_SIZE
+from gcs_cli.paper.report_labels import (
+    ANGLES,
+    AXES,
+    AXIS_TITLES,
+    LABELS,
+    STYLES,
+    UNKNOWN,
+    anchored,
+    cell,
+    fixed,
+    number,
+    row,
+    wide_table,
+)
+from gcs_cli.report_chart import Line
+from gcs_cli.report_plots import section
+
+SHOWN_ACTUATORS = "ideal rotors, one step of delay"
+BODE_HZ = 1000.0
+_LEAST_SPAN = 4.0  # /s: of a pole map whose poles are all real
+_POINTS = 360
+_LOWEST_RAD_S = 1.0
+_NAMES = {(contender.controller, contender.gains): contender.name for contender in CONTENDERS}
+
+Loops = Sequence[Mapping[str, Any]]
+
+
+def linear_sections(linear: Mapping[str, Any], onset: Sequence[Mapping[str, Any]], why: str) -> Iterator[str]:
+    """Yield the sections; one with the sentence ``why`` if the analysis was left out."""
+    if not linear:
+        yield anchored("linear", section("Linear analysis", f'<p class="none">Left out: {escape(why)}</p>'))
+        return
+    loops: Loops = linear["loops"]
+    legend = [(_title(loop), _style(loop), False) for loop in loops]
+    poles = "".join(_pole_map(loops, axis) for axis in AXES)
+    note = (
+        "Continuous loops at hover. Attitude: feedback alone, without feed-forward and integral of the outer loop. x "
+        "and y: with reference filter and attitude loop inside. The linear PD has backstepping's poles by construction."
+    )
+    body = f'<div class="pair">{poles}</div>'
+    yield anchored("linear", section("Linear analysis: poles", body, legend, note))
+    bode = "".join(_bode(loops, axis) for axis in ANGLES)
+    note = (
+        f"Open attitude loops as they are computed: sampled at {BODE_HZ:g} Hz, held, with one step of delay and ideal "
+        "rotors. Gain margin: where the phase crosses −180°. Phase margin: where the gain crosses 0 dB."
+    )
+    title = "Linear analysis: open loops"
+    yield anchored("bode", section(title, f'<div class="pair">{bode}</div>', legend, note))
+    yield anchored("margins", section("Linear analysis: margins", margins_table(loops), note=_MARGINS_NOTE))
+    yield anchored(
+        "onset", section("Lowest stable rate of the inner loop", onset_table(onset), note=_ONSET_NOTE)
+    )
+
+
+_MARGINS_NOTE = (
+    f"Sampled loops, {SHOWN_ACTUATORS}; gain margin and phase margin at each inner rate [Hz]. Unstable: no margin. "
+    "ωn and ζ are what the proportional and derivative gain alone would place; ζ above 1: two real poles."
+)
+_ONSET_NOTE = (
+    "Predicted: the rate at which an eigenvalue of the sampled loop leaves the unit circle. Simulated: real loops and "
+    "plant in flight, kicked by 10⁻⁷ rad/s about one axis; the lowest rate at which the kick dies away, found by "
+    "bisection without knowing the prediction."
+)
+
+
+def _name(loop: Mapping[str, Any]) -> str:
+    return _NAMES.get((loop["controller"], loop["gains"]), "")
+
+
+def _title(loop: Mapping[str, Any]) -> str:
+    return LABELS.get(_name(loop), f"{loop['controller']}, {loop['gains']}")
+
+
+def _style(loop: Mapping[str, Any]) -> str:
+    return STYLES.get(_name(loop), "s6")
+
+
+def _pole_map(loops: Loops, axis: str) -> str:
+    marks = []
+    for loop in loops:
+        for real, imaginary in loop["axes"][axis]["poles"]:
+            sign = "+" if imaginary >= 0.0 else "−"
+            hint = f"{_title(loop)}: {number(real)} {sign} {number(abs(imaginary))} j /s"
+            marks.append(Mark(real, imaginary, _style(loop), hint))
+    real, imaginary = (np.array([mark[index] for mark in marks]) for index in (0, 1))
+    drawn = chart(
+        f"Poles of {axis}",
+        spanning("real part [1/s]", [real, np.zeros(1)], least=_LEAST_SPAN),
+        spanning("imaginary part [1/s]", [imaginary], least=_LEAST_SPAN),
+        [],
+        marks=marks,
+        guides=[Guide("", 0.0, upright=True)],
+        size=STEP_SIZE,
+    )
+    return f'<div><h3 class="plant">{escape(AXIS_TITLES[axis])}</h3>{drawn}</div>'
+
+
+def _bode(loops: Loops, axis: str) -> str:
+    dt_s = 1.0 / BODE_HZ
+    frequency = np.geomspace(_LOWEST_RAD_S, 0.999 * np.pi * BODE_HZ, _POINTS)
+    gain, phase = [], []
+    for loop in loops:
+        law = AttitudeGains(**loop["axes"][axis]["gains"])
+        values = response(AttitudeTick(law, BODE_HZ, Actuators(1)).open(), frequency * dt_s)
+        turned = np.degrees(np.unwrap(np.angle(values)))
+        turned -= 360.0 * np.round((turned[0] + 180.0) / 360.0)  # begins between −360° and 0°
+        gain.append(Line(_title(loop), frequency, 20.0 * np.log10(np.abs(values)), _style(loop)))
+        phase.append(Line(_title(loop), frequency, turned, _style(loop)))
+    along = spanning("frequency [rad/s]", [frequency], log=True)
+    heading = f'<h3 class="plant">{escape(AXIS_TITLES[axis])}</h3>'
+    above = chart(
+        f"Gain of the open loop, {axis}", along, spanning("gain [dB]", [line.y for line in gain]), gain,
+        guides=[Guide("0 dB", 0.0)], size=STEP_SIZE,
+    )  # fmt: skip
+    below = chart(
+        f"Phase of the open loop, {axis}", along, Axis("phase [°]", -400.0, -60.0), phase,
+        guides=[Guide("−180°", -180.0)], size=STEP_SIZE,
+    )  # fmt: skip
+    return f"<div>{heading}{above}</div><div>{heading}{below}</div>"
+
+
+def margins_table(loops: Loops) -> str:
+    """Return natural frequency, damping, poles and margins of each axis and loop."""
+    rows, rates = [], _rates(loops)
+    for axis in ANGLES:
+        for index, loop in enumerate(loops):
+            of = loop["axes"][axis]
+            head = f"<th>{escape(AXIS_TITLES[axis]) if not index else ''}</th><td>{escape(_title(loop))}</td>"
+            mode = cell(fixed(of["natural_rad_s"], 1)) + cell(fixed(of["damping"], 2))
+            figures = "".join(_margin_cell(_sampled(of)["margins"].get(rate)) for rate in rates)
+            rows.append(row(f"{head}{mode}<td>{escape(_poles(of['poles']))}</td>{figures}", not index))
+    heads = (f"#{rate} Hz" for rate in rates)
+    return wide_table(("axis", "controller", "#ωn [rad/s]", "#ζ", "poles [1/s]", *heads), rows)
+
+
+def _rates(loops: Loops) -> list[str]:
+    return list(_sampled(loops[0]["axes"]["roll"])["margins"])
+
+
+def _sampled(of: Mapping[str, Any]) -> Mapping[str, Any]:
+    named = {entry["actuators"]: entry for entry in of["sampled"]}
+    found: Mapping[str, Any] = named.get(SHOWN_ACTUATORS, of["sampled"][0])
+    return found
+
+
+def _margin_cell(margins: Mapping[str, Any] | None) -> str:
+    if margins is None:
+        return '<td class="n bad">unstable</td>'
+    gain, phase = fixed(margins["gain_db"], 1), fixed(margins["phase_deg"], 0)
+    gain_text = "any gain" if gain == UNKNOWN else f"{gain} dB"
+    phase_text = "any phase" if phase == UNKNOWN else f"{phase}°"
+    return cell(f"{gain_text}, {phase_text}")
+
+
+def _poles(poles: Sequence[Sequence[float]]) -> str:
+    told = []
+    for real, imaginary in poles:
+        if imaginary < 0.0:
+            continue  # told with its conjugate
+        told.append(number(real) if imaginary == 0.0 else f"{number(real)} ± {number(imaginary)} j")
+    return ", ".join(told)
+
+
+def onset_table(onset: Sequence[Mapping[str, Any]]) -> str:
+    """Return predicted and simulated rates of each setting, axis and loop."""
+    if not onset:
+        return '<p class="none">Left out.</p>'
+    rows, before = [], ""
+    for entry in sorted(onset, key=lambda entry: _place(onset, entry)):
+        new = entry["setting"] != before
+        before = entry["setting"]
+        head = f"<th>{escape(before) if new else ''}</th><td>{escape(AXIS_TITLES[entry['axis']])}</td>"
+        rates = _rate_cell(entry["predicted_hz"]) + _rate_cell(entry["simulated_hz"])
+        apart = cell(_percent(entry["difference_percent"]))
+        rows.append(row(f"{head}<td>{escape(_title(entry))}</td>{rates}{apart}", new))
+    return wide_table(
+        ("rotors and delay", "axis", "controller", "#predicted", "#simulated", "#difference"), rows
+    )
+
+
+def _place(onset: Sequence[Mapping[str, Any]], entry: Mapping[str, Any]) -> tuple[int, int]:
+    settings = list(dict.fromkeys(one["setting"] for one in onset))
+    return settings.index(entry["setting"]), AXES.index(entry["axis"])
+
+
+def _rate_cell(rate_hz: float | None) -> str:
+    return '<td class="n bad">none up to 2 kHz</td>' if rate_hz is None else cell(f"{fixed(rate_hz, 1)} Hz")
+
+
+def _percent(value: float | None) -> str:
+    return UNKNOWN if value is None else f"{fixed(value, 2)} %"

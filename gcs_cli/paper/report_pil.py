@@ -1,0 +1,129 @@
+"""The processor in the loop as parts of the report: figure 15 and the numerical equivalence. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from html import escape
+from typing import Any
+
+from gcs_cli.paper.pil_section import EMULATED
+from gcs_cli.paper.report_labels import LABELS, STYLES, anchored, cell, fixed, row, wide_table
+from gcs_cli.pil.histogram_chart import histogram_chart
+from gcs_cli.pil.profile import STAGE_TITLES, StageProfile
+from gcs_cli.pil.report_tables import checks_section, differences_section
+from gcs_cli.report_plots import section
+
+_LABELLED = {
+    "instructions": "instructions on an emulated Cortex-M4F, not the F28377S",
+    "cycles": "processor cycles on the board",
+    "ns": "nanoseconds of this machine",
+}
+_COLUMNS = (
+    ("count", "steps", 0),
+    ("min", "least", 0),
+    ("mean", "mean", 1),
+    ("p99", "99 % within", 0),
+    ("max", "most", 0),
+)
+
+
+def pil_sections(pil: Mapping[str, Any], why: str) -> Iterator[str]:
+    """Yield figure 15 and the equivalence of each controller; one with the sentence ``why`` if it was left out."""
+    title = "Fig. 15: execution profile on the target"
+    why = (pil.get("why_left_out") or "") if pil else why
+    if not pil or not pil["controllers"]:
+        yield anchored("fig-15", section(title, f'<p class="none">Left out: {escape(why)}</p>'))
+        return
+    profiles = {name: of["profile"] for name, of in pil["controllers"].items() if of["profile"]}
+    unit = next((profile["unit"] for profile in profiles.values()), "")
+    about = next((profile["about"] for profile in profiles.values()), "")
+    charts = "".join(
+        f"<div>{_histogram(stage, profile, name)}</div>"
+        for stage in STAGE_TITLES
+        for name, profile in profiles.items()
+        if stage in profile["stages"]
+    )
+    body = (
+        f"<p>{escape(pil['meaning'])} Mission: {escape(pil['mission'])}; gains of the paper, {pil['inner_hz']:g} and "
+        f"{pil['outer_hz']:g} Hz.</p>{_profile_table(profiles, unit)}"
+        f'<div class="pair histograms">{charts}</div>{_identity(pil)}'
+    )
+    legend = [(LABELS.get(name, name), STYLES.get(name, "s6"), False) for name in profiles]
+    yield anchored("fig-15", section(title, body, legend, about))
+    yield anchored("pil", _verdicts(pil))
+    for name, of in pil["controllers"].items():
+        label = LABELS.get(name, name)
+        folded = checks_section(of["checks"]) + differences_section(of["differences"], of["compared"])
+        link = f'<p class="note">All of it: <a href="pil-{escape(name)}/pil.html">pil-{escape(name)}/pil.html</a></p>'
+        summary = f"Numerical equivalence in full: {escape(label)}"
+        yield f'<section class="folded"><details><summary>{summary}</summary>{folded}{link}</details></section>'
+
+
+def _histogram(stage: str, profile: Mapping[str, Any], name: str) -> str:
+    of = profile["stages"][stage]
+    histogram = of["histogram"]
+    one = StageProfile(
+        stage, of["count"], of["min"], of["mean"], of["p99"], of["max"], tuple(histogram["edges"]),
+        tuple(histogram["counts"]),
+    )  # fmt: skip
+    return histogram_chart(one, profile["unit"], STYLES.get(name, "s6"))
+
+
+def _profile_table(profiles: Mapping[str, Mapping[str, Any]], unit: str) -> str:
+    rows = []
+    for stage, title in STAGE_TITLES.items():
+        for name, profile in profiles.items():
+            of = profile["stages"].get(stage)
+            if of is not None:
+                figures = "".join(cell(fixed(of[key], places)) for key, _, places in _COLUMNS)
+                rows.append(row(f"<th>{title}</th><td>{escape(LABELS.get(name, name))}</td>{figures}"))
+    heads = (f"#{title}" for _, title, _ in _COLUMNS)
+    return wide_table(("stage", "controller", *heads), rows, caption=_LABELLED.get(unit, unit))
+
+
+def _identity(pil: Mapping[str, Any]) -> str:
+    target = next((of["target"] for of in pil["controllers"].values() if of["target"]), None)
+    if target is None:
+        return ""
+    stacks = [of["stack"]["high_water"] for of in pil["controllers"].values() if of["stack"]]
+    stack = f"; stack used at most: {max(stacks)} octets" if stacks and target["char_bits"] == 8 else ""
+    emulated = (
+        "emulated: it has no clock" if pil["target"] == EMULATED else f"{target['clock_hz'] / 1e6:g} MHz"
+    )
+    words = f"Target: {target['board']}, {emulated}; {target['compiler']}; sources {target['source_hash']}{stack}."
+    return f'<p class="note">{escape(words)}</p>'
+
+
+def _verdicts(pil: Mapping[str, Any]) -> str:
+    """Return the equivalence of each pair of flights in one line: the largest difference of all signals."""
+    rows = []
+    for name, of in pil["controllers"].items():
+        pairs = list(dict.fromkeys(one["pair"] for one in of["differences"]))
+        style = "good" if of["verdict"] == "passed" else "bad"
+        for index, pair in enumerate(pairs):
+            title, verdict = ("", "") if index else (escape(LABELS.get(name, name)), escape(of["verdict"]))
+            cells = f"<th>{title}</th><td>{escape(pair)}</td>{_difference_cells(of, pair)}"
+            rows.append(row(f'{cells}<td class="{style}">{verdict}</td>', not index))
+    note = (
+        "MIL: the loops in Python. SIL: the C core on this machine. PIL: the C core on the target. ulp: unit in the "
+        "last place of a float32 as large as the signal's largest value."
+    )
+    columns = (
+        "controller",
+        "flights compared",
+        "#position, largest difference",
+        "#of all signals, largest",
+        "verdict",
+    )
+    return section("Numerical equivalence", wide_table(columns, rows), note=note)
+
+
+def _difference_cells(of: Mapping[str, Any], pair: str) -> str:
+    rows = [row for row in of["differences"] if row["pair"] == pair]
+    if rows and all(row["largest"] == 0.0 for row in rows):
+        return '<td class="n good" colspan="2">same bits</td>'
+    position = next((row["largest"] for row in rows if row["signal"] == "position"), None)
+    worst = max((row for row in rows if row["ulps"] is not None), key=lambda row: row["ulps"], default=None)
+    shown = "–" if position is None else f"{fixed(1e6 * position, 2)} µm"
+    of_all = "–" if worst is None else f"{fixed(worst['ulps'], 0)} ulp ({worst['signal'].replace('_', ' ')})"
+    return cell(shown) + cell(of_all)

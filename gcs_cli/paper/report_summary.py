@@ -1,0 +1,219 @@
+"""What was reproduced, in sentences and figures: the top of the report. Every number comes from the results. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from html import escape
+from typing import Any
+
+from gcs_cli.paper import cases
+from gcs_cli.paper.pil_section import EMULATED
+from gcs_cli.paper.report_compare import space_rms
+from gcs_cli.paper.report_labels import LABELS, PLANTS, anchored, fixed, number
+from gcs_cli.report_plots import section
+
+Results = Mapping[str, Any]
+_PAPERS = "paper"
+_PARTS = {"linear": "linear analysis", "onset": "onset of instability", "pil": "processor in the loop"}
+
+
+def tiles(results: Results) -> str:
+    """Return the figures that stand on top."""
+    found = [("flights", str(len(results["cases"]))), ("crashes among them", str(len(crashed(results))))]
+    claims = paper_claims(results)
+    if claims:
+        held = sum(all(claim["holds"] for claim in of) for of in claims.values())
+        found.append(("claims of the paper that hold on both plants", f"{held} of {len(claims)}"))
+    worst = worst_plants(results)
+    if worst is not None:
+        found.append(
+            ("rigid body to multibody, at most", f"{number(1e3 * worst[0])} mm, {number(worst[1], 2)}°")
+        )
+    same = same_bits(results)
+    if same is not None:
+        found.append(("C core, here and on the target", "same bits" if same else "differs"))
+    apart = onset_apart(results)
+    if apart is not None:
+        found.append(("onset, simulated to predicted", f"within {fixed(apart, 2)} %"))
+    cells = "".join(
+        f'<div class="tile"><b>{escape(value)}</b><span>{escape(name)}</span></div>' for name, value in found
+    )
+    return f'<div class="tiles">{cells}</div>'
+
+
+def summary_section(results: Results) -> str:
+    """Return what came out, in sentences."""
+    items = "".join(f"<li>{sentence}</li>" for sentence in sentences(results))
+    return anchored("summary", section("What came out", f'<ul class="summary">{items}</ul>'))
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """Yield the sentences, as HTML."""
+    corrected = len(results["corrections"])
+    yield (
+        f"The paper's model and both controllers fly, with {corrected} corrections of what is printed; "
+        '<a href="#corrections">each is named</a>. None of its figures has numbers, so shapes and claims can be '
+        "compared, and no curve."
+    )
+    yield from _of_claims(results)
+    yield from _of_gains(results)
+    yield from _of_crashes(results)
+    yield from _of_plants(results)
+    yield from _of_linear(results)
+    yield from _of_pil(results)
+    for part, why in results["left_out"].items():
+        yield f'<span class="bad">Left out: {escape(_PARTS.get(part, part))}</span>: {escape(why)}'
+
+
+def paper_claims(results: Results) -> dict[str, list[Mapping[str, Any]]]:
+    """Return the claims of the paper (not our questions) by their name, each with its verdict on every plant."""
+    named: dict[str, list[Mapping[str, Any]]] = {}
+    for claim in results["comparisons"].get("claims", ()):
+        if claim["source"].startswith(_PAPERS):
+            named.setdefault(claim["name"], []).append(claim)
+    return named
+
+
+def _of_claims(results: Results) -> Iterator[str]:
+    for of in paper_claims(results).values():
+        held = [PLANTS.get(claim["plant"], claim["plant"]) for claim in of if claim["holds"]]
+        fell = [PLANTS.get(claim["plant"], claim["plant"]) for claim in of if not claim["holds"]]
+        verdict = '<b class="good">Holds</b>' if not fell else '<b class="bad">Does not hold</b>'
+        if held and fell:
+            verdict = f"<b>Holds on the {escape(', '.join(held))}, not on the {escape(', '.join(fell))}</b>"
+        words = escape(of[0]["words"])
+        yield f"“{escape(of[0]['claim'])}” ({escape(of[0]['source'])}): {verdict}. {words}"
+
+
+def _of_gains(results: Results) -> Iterator[str]:
+    """Say what own gains reach beside the paper's, on the hard profile's overshoot and the smooth profile's error."""
+    found = results["cases"]
+    names = (cases.PID, cases.BACKSTEPPING, cases.POLES, cases.TUNED_PID)
+    flown = {name: found.get(cases.key(name, cases.SMOOTH)) for name in names}
+    told = [
+        f"{fixed(1e3 * space_rms(case), 1)} mm ({LABELS[name]})"
+        for name, case in flown.items()
+        if flies(case)
+    ]
+    if len(told) == len(names):
+        yield escape(
+            f"What the gains do, beside what the method does: RMS error on the smooth profile, small-angle model: "
+            f"{', '.join(told)}."
+        )
+
+
+def flies(case: Mapping[str, Any] | None) -> bool:
+    """Tell whether a case was flown, and to its end."""
+    return case is not None and case["ended"] is None
+
+
+def crashed(results: Results) -> list[str]:
+    """Return the keys of the flights that crashed."""
+    return [name for name, case in results["cases"].items() if case["ended"] is not None]
+
+
+def _of_crashes(results: Results) -> Iterator[str]:
+    lost: dict[str, list[str]] = {}
+    for name in crashed(results):
+        contender, _, rest = name.partition("/")
+        condition = rest.split("/")[1] if rest.count("/") == 2 else rest
+        label = results.get("conditions", {}).get(condition, condition)
+        of = lost.setdefault(LABELS.get(contender, contender), [])
+        if label not in of:
+            of.append(label)
+    for contender, conditions in lost.items():
+        yield escape(f"{contender} crashes in at least one flight with: {'; '.join(conditions)}.")
+    if not lost and results["cases"]:
+        yield "No flight of the matrix ended in a crash."
+
+
+def worst_plants(results: Results) -> tuple[float, float] | None:
+    """Return by how much rigid body and multibody differ at most [m, °], of all controllers."""
+    of = results["plants"].get(f"{cases.RIGID}_{cases.MULTIBODY}")
+    if not of:
+        return None
+    return max(one["max_position_m"] for one in of.values()), max(
+        one["max_attitude_deg"] for one in of.values()
+    )
+
+
+def _of_plants(results: Results) -> Iterator[str]:
+    worst, of = worst_plants(results), results["plants"].get(f"{cases.RIGID}_{cases.MULTIBODY}")
+    if worst is None or not of:
+        return
+    kept = [name for name, one in of.items() if one.get("within_bounds")]
+    broken = [LABELS.get(name, name) for name in of if name not in kept]
+    one = next(iter(of.values()))
+    bound = f"{fixed(100.0 * one['position_bound_m'], 0)} cm and {fixed(one['attitude_bound_deg'], 1)}°"
+    verdict = (
+        f"the bound of {bound} is kept by all" if not broken else f"not within {bound}: {', '.join(broken)}"
+    )
+    yield escape(
+        "The rigid-body plant and the multibody plant, which share no equation, stay within "
+        f"{number(1e3 * worst[0])} mm and {number(worst[1], 2)}° of each other over the whole desired trajectory; "
+        f"{verdict}."
+    )
+
+
+def onset_apart(results: Results) -> float | None:
+    """Return the largest difference between simulated and predicted onset [%]; None if there is none."""
+    apart = [
+        abs(one["difference_percent"])
+        for one in results["onset"] or ()
+        if one["difference_percent"] is not None
+    ]
+    return max(apart, default=None)
+
+
+def _of_linear(results: Results) -> Iterator[str]:
+    apart = onset_apart(results)
+    if apart is None:
+        return
+    rates = {
+        (one["controller"], one["axis"]): one["predicted_hz"]
+        for one in reversed(results["onset"])
+        if one["gains"] == "paper" and one["setting"] == results["onset"][0]["setting"]
+    }
+    pid, backstepping = (rates.get((name, "roll")) for name in (cases.PID, cases.BACKSTEPPING))
+    words = (
+        f"The rate at which instability sets in is predicted within {fixed(apart, 2)} % of the simulated one"
+    )
+    if pid and backstepping:
+        words += (
+            "; with ideal rotors and one step of delay the roll loop needs at least "
+            f"{fixed(pid, 0)} Hz with the paper's PID and {fixed(backstepping, 0)} Hz with its backstepping"
+        )
+    yield escape(f"{words}.")
+
+
+def same_bits(results: Results) -> bool | None:
+    """Tell whether SIL and PIL gave the same bits in all signals of all flights; None if they were not flown."""
+    pil = results["pil"]
+    if not pil or not pil["controllers"]:
+        return None
+    rows = [
+        row for of in pil["controllers"].values() for row in of["differences"] if row["pair"] == "SIL–PIL"
+    ]
+    return bool(rows) and all(row["largest"] == 0.0 for row in rows)
+
+
+def _of_pil(results: Results) -> Iterator[str]:
+    same, pil = same_bits(results), results["pil"]
+    if same is None:
+        return
+    target = "an emulated Cortex-M4F (no board was measured)" if pil["target"] == EMULATED else pil["target"]
+    apart = [
+        row["largest"]
+        for of in pil["controllers"].values()
+        for row in of["differences"]
+        if row["signal"] == "position" and row["pair"] == "MIL–PIL" and row["largest"] is not None
+    ]
+    words = "the same bits" if same else "other bits, see below"
+    position = (
+        f" The path differs from that of the Python loops by {number(1e6 * max(apart))} µm at most."
+        if apart
+        else ""
+    )
+    yield escape(
+        f"The C loops on {target} give {words} as on this machine, in every signal of both flights.{position}"
+    )
