@@ -40,7 +40,7 @@ def view(camera: str, moment: Moment, span_m: float, ground_m: float) -> View:
     if camera == "chase":
         look = (at[0], at[1], at[2] + 0.25 * span_m)
         azimuth = _CHASE_ASIDE_DEG - math.degrees(moment.chase_heading_rad)
-        return View(look, 5.6 * span_m, azimuth, -19.0)
+        return View(look, 4.7 * span_m, azimuth, -19.0)
     if camera == "top":
         return View(at, max(6.0, 16.0 * span_m), 0.0, -89.9)
     if camera == "side":

@@ -6,7 +6,7 @@ import contextlib
 import io
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,16 +14,17 @@ from typing import Any
 from PIL import Image
 
 from flightstack.atomic_file import write_bytes_atomically
-from sim_bridge.errors import UsageProblemError
 
 FILMS = (".mp4", ".gif")
+PALETTE_FRAMES = 8
+"""Pictures that a GIF takes its colours from, before the first one is written."""
+
 _COLOURS = 255
-_PALETTE_FRAMES = 12
 _SHEET_GAP_PX = 6
 _GIF_TICK_S = 0.01
+_GIF_SHORTEST_TICKS = 2  # players take less for a mistake and slow down
 
-Frames = Iterable[Image.Image]
-Drawn = Callable[[], None]
+FrameAt = Callable[[int], Image.Image]
 
 
 def write_png(path: Path, image: Image.Image) -> None:
@@ -45,10 +46,15 @@ def sheet(images: Sequence[Image.Image]) -> Image.Image:
     return whole
 
 
-def write_film(path: Path, frames: Frames, fps: float) -> None:
-    """Write a film by the ending of its name, one of ``FILMS``; raise OSError or UsageProblemError."""
+def drawn_for(path: Path, count: int) -> int:
+    """Return how many pictures a film of ``count`` frames asks for."""
+    return count + min(PALETTE_FRAMES, count) if path.suffix.lower() == ".gif" else count
+
+
+def write_film(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
+    """Write a film of ``count`` frames by the ending of its name, one of ``FILMS``; raise OSError."""
     with _replacing(path) as temporary:
-        (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(temporary, frames, fps)
+        (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(temporary, frame_at, count, fps)
 
 
 @contextlib.contextmanager
@@ -62,43 +68,41 @@ def _replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _write_mp4(path: Path, frames: Frames, fps: float) -> None:
-    """H.264 with the colours that every player knows; the sides are even, as it needs them."""
+def _write_mp4(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
+    """H.264 with the colours that every player knows; it needs sides of even length."""
     import imageio_ffmpeg  # noqa: PLC0415  # brings a program of its own
 
-    writer: Any = None
-    try:
-        for frame in frames:
-            if writer is None:
-                writer = imageio_ffmpeg.write_frames(
-                    str(path), frame.size, fps=fps, codec="libx264", pix_fmt_in="rgb24", pix_fmt_out="yuv420p",
-                    macro_block_size=2, quality=None, output_params=["-crf", "21", "-movflags", "+faststart"],
-                    ffmpeg_log_level="error",
-                )  # fmt: skip
-                writer.send(None)
-            writer.send(frame.tobytes())
-    finally:
-        if writer is not None:
-            writer.close()
-    if not path.exists() or not path.stat().st_size:
-        raise UsageProblemError(f"{path.name}: ffmpeg wrote nothing")
-
-
-def _write_gif(path: Path, frames: Frames, fps: float) -> None:
-    """One palette for all frames, taken from some of them, so that colours do not flicker."""
-    images = list(frames)
-    chosen = images[:: max(1, len(images) // _PALETTE_FRAMES)]
-    palette = sheet([image.resize((160, 90)) for image in chosen]).quantize(
-        _COLOURS, Image.Quantize.MEDIANCUT
-    )
-    flat = [image.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG) for image in images]
-    flat[0].save(
-        path, "GIF", save_all=True, append_images=flat[1:], duration=gif_durations_ms(len(flat), fps), loop=0,
-        optimize=False, disposal=1,
+    first = frame_at(0)
+    writer: Any = imageio_ffmpeg.write_frames(
+        str(path), first.size, fps=fps, codec="libx264", pix_fmt_in="rgb24", pix_fmt_out="yuv420p",
+        macro_block_size=2, quality=None, output_params=["-crf", "21", "-movflags", "+faststart"],
+        ffmpeg_log_level="error",
     )  # fmt: skip
+    try:
+        writer.send(None)
+        writer.send(first.tobytes())
+        for index in range(1, count):
+            writer.send(frame_at(index).tobytes())
+    finally:
+        writer.close()
+    if not path.exists() or not path.stat().st_size:
+        raise OSError(0, "ffmpeg wrote nothing")
+
+
+def _write_gif(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
+    """One palette for all frames, taken from some of them, so that colours do not flicker."""
+    chosen = [frame_at(round(i * (count - 1) / PALETTE_FRAMES)) for i in range(min(PALETTE_FRAMES, count))]
+    palette = sheet(chosen).quantize(_COLOURS, Image.Quantize.MEDIANCUT)
+    flat = (
+        frame_at(index).quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
+        for index in range(count)
+    )
+    next(flat).save(
+        path, "GIF", save_all=True, append_images=flat, duration=gif_durations_ms(count, fps), loop=0
+    )
 
 
 def gif_durations_ms(count: int, fps: float) -> list[int]:
     """Return how long each frame stays: a GIF counts in hundredths of a second, the errors must not add up."""
     ends = [round(index / fps / _GIF_TICK_S) for index in range(count + 1)]
-    return [10 * max(2, end - begin) for begin, end in pairwise(ends)]
+    return [10 * max(_GIF_SHORTEST_TICKS, end - begin) for begin, end in pairwise(ends)]

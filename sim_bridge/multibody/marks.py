@@ -46,7 +46,7 @@ class Marks:
 
     def _draw_target(self, scene: Any, at: Point) -> None:
         """A ball, and marks around the vehicle, which usually is where its target is, that point at it."""
-        _solid(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.07 * self._span_m,) * 3, at, _TARGET)
+        _solid(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.045 * self._span_m,) * 3, at, _TARGET)
         for axis in range(3):
             for side in (-self._span_m, self._span_m):
                 ends = np.array([at, at], dtype=np.float64)

@@ -12,6 +12,7 @@ from sim_bridge.multibody.renderer import Picture
 
 _PANEL = (14, 20, 28, 178)
 _TEXT, _FAINT = (244, 246, 248, 255), (176, 188, 200, 255)
+_EMPTY = (58, 68, 80, 255)
 _SLOW, _FAST = (120, 176, 226), (255, 116, 40)
 _SMALLEST_PX = 160
 """A picture narrower or lower than this has no room for words."""
@@ -84,7 +85,7 @@ class Overlay:
             colour = tuple(round(a + (b - a) * share) for a, b in zip(_SLOW, _FAST, strict=True))
             begin, end = left + 40.0 * u, right - 64.0 * u
             draw.text((left + 16.0 * u, y), str(index + 1), font=self._small, fill=_FAINT)
-            draw.rectangle((begin, y + 6.0 * u, end, y + 14.0 * u), fill=(255, 255, 255, 40))
+            draw.rectangle((begin, y + 6.0 * u, end, y + 14.0 * u), fill=_EMPTY)
             if share > 0.0:
                 draw.rectangle(
                     (begin, y + 6.0 * u, begin + share * (end - begin), y + 14.0 * u), fill=(*colour, 255)

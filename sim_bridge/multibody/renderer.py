@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import Any, TypeAlias
-from xml.etree.ElementTree import tostring
 
 import mujoco
 import numpy as np
@@ -14,10 +13,11 @@ from sim_bridge.multibody import looks
 from sim_bridge.multibody.cameras import view
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.marks import MOST_TRAIL, Marks, RotorLooks
+from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.offscreen import make_context
 from sim_bridge.multibody.paint import paint
 from sim_bridge.multibody.poses import FlightPath, Moment
-from sim_bridge.multibody.scene import decorate
+from sim_bridge.multibody.usual_parts import foot_z_m
 
 Picture: TypeAlias = np.ndarray[Any, np.dtype[np.uint8]]
 """Shape (height, width, 3), red, green, blue."""
@@ -30,19 +30,16 @@ class Stage:
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
-        root = looks.bare_model(vehicle)
-        decorate(root, vehicle)
         try:
-            self.model = mujoco.MjModel.from_xml_string(tostring(root, encoding="unicode"))
+            self.model = mujoco.MjModel.from_xml_string(model_xml(vehicle, scene=True))
         except ValueError as error:  # a mesh that is not there
             raise UsageProblemError(f"the vehicle {vehicle.name} cannot be drawn: {error}") from error
         paint(self.model)
         self.data = mujoco.MjData(self.model)
-        self.span_m, self.ground_m = looks.span_m(vehicle), looks.foot_z_m(vehicle)
+        self.span_m, self.ground_m = looks.span_m(vehicle), -foot_z_m(vehicle)
         self.rotors = RotorLooks(self.model, vehicle)
         self._free_joint = self._address("vehicle")
         self._hinges = [self._address(f"rotor_{n}") for n in range(1, len(vehicle.rotors) + 1)]
-        self._spins = [-rotor.spin for rotor in vehicle.rotors]  # clockwise from above is negative about up
         body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
         moves = self.model.body_rootid[self.model.geom_bodyid] == body
         self.shadeless = frozenset(np.flatnonzero(~moves).tolist()) | self.rotors.discs
@@ -56,8 +53,8 @@ class Stage:
         at, q = self._free_joint, self.data.qpos
         q[at : at + 3] = flip_vector(moment.position_ned_m)
         q[at + 3 : at + 7] = flip_quaternion(moment.attitude)
-        for address, spin, angle in zip(self._hinges, self._spins, moment.rotor_angle_rad, strict=False):
-            q[address] = spin * (angle % (2.0 * np.pi))
+        for address, angle in zip(self._hinges, moment.rotor_angle_rad, strict=False):
+            q[address] = angle % (2.0 * np.pi)
         self.rotors.show(moment.rotor_speed_rad_s)
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.multibody import looks
 from sim_bridge.multibody.landmarks import add_landmarks
+from sim_bridge.multibody.usual_parts import foot_z_m
 from sim_bridge.multibody.xml import add, paint_only, section
 
 CAMERAS = ("chase", "fixed", "top", "side")
@@ -30,7 +31,7 @@ def decorate(root: Element, vehicle: Vehicle) -> None:
     world, body = section(root, "worldbody"), root.find(".//body[@name='vehicle']")
     if body is None:
         raise ValueError("the model has no body called vehicle")
-    ground_m = looks.foot_z_m(vehicle)
+    ground_m = -foot_z_m(vehicle)
     _visual(root)
     _materials(section(root, "asset"))
     _light(world)
