@@ -62,6 +62,7 @@ CONDITIONS = (
     Condition("lag_20", "motor lag of 20 ms", {"lag_s": 0.020}),
     Condition("delay", "one more inner period of delay, 1 ms", {"delay_steps": 1}),
     Condition("slow", "inner loop at 500 Hz", {"inner_hz": 500}),
+    Condition("twice", "the trajectory at twice its size", {"scale": 2.0}),
 )
 
 

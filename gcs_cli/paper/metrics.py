@@ -1,6 +1,6 @@
 """Figures of a recording: of each axis against its reference, of the path in XY, and of the rotors' work. Pure.
 
-A move of an axis is what lies between two holds of its reference (half a second or longer without a change); a step is
+A move of an axis is what lies between two holds of its reference (nearly a second or longer without a change); a step is
 a move that takes no time. Its response is scaled to 0 before and 1 after it. Over the moves of an axis
 
 * overshoot is the largest share by which the response passes 1 before the next move begins: the worst of all moves;
@@ -21,8 +21,8 @@ import numpy as np
 from flightstack.contract import FloatArray, LoopStatus
 from gcs_cli.paper.types import AxisMetrics, Recording
 
-HOLD_S = 0.45
-"""A reference that rests so long is held; steps half a second apart are moves of their own."""
+HOLD_S = 0.9
+"""A reference that rests so long is held; what it does between two holds is one move, or none if it comes back."""
 SETTLED = 0.02
 LOW, HIGH = 0.1, 0.9
 STEADY_S = 1.0
