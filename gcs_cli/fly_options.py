@@ -6,6 +6,7 @@ import math
 import socket
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 
 from flightstack.clock import nearest_outer_hz, rates
@@ -20,7 +21,7 @@ from gcs_cli.plan_parts import plan_problem
 from gcs_cli.run_directory import LOG_NAME
 
 CONTROLLERS = "flightstack.attitude_controllers"
-PLANTS = ("rigid", "paper")
+PLANTS = ("rigid", "multibody", "paper")
 DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
 GCS_LOSS_S = 5.0
 MOST_INSTANCES = 100
@@ -105,7 +106,9 @@ def _check_flags(options: FlyOptions) -> None:
             f"--controller {options.controller}: there is none; known are {', '.join(known)}", USAGE
         )
     if options.plant not in PLANTS:
-        raise CliError(f"--plant {options.plant}: expected {' or '.join(PLANTS)}", USAGE)
+        raise CliError(f"--plant {options.plant}: expected {', '.join(PLANTS[:-1])} or {PLANTS[-1]}", USAGE)
+    if options.plant == "multibody" and find_spec("mujoco") is None:
+        raise CliError("--plant multibody needs MuJoCo: pip install 'flightstack[multibody]'", USAGE)
     parse_loops(options.loops)
     if options.speed != "max":
         _number("--speed", options.speed, 0.001, 10_000.0)

@@ -14,6 +14,7 @@ from flightstack.contract import Vector3
 from flightstack.params.errors import ConfigError
 from sim_bridge import arguments
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
+from sim_bridge.render_command import render
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -22,7 +23,9 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
 _ZERO = "0,0,0"
 _VehicleOption = Annotated[str, typer.Option(help="Built-in vehicle (paper_quad, x_quad) or a TOML file.")]
-_PlantOption = Annotated[str, typer.Option(help="rigid, or paper: the paper's small-angle model.")]
+_PlantOption = Annotated[
+    str, typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")
+]
 _WindOption = Annotated[str, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")]
 _GustOption = Annotated[float, typer.Option(help="Standard deviation of the gusts, m/s.")]
 _ForceOption = Annotated[str, typer.Option(metavar="N,E,D", help="Constant external force, N.")]
@@ -175,6 +178,9 @@ def open_loop(
         warn=complain,
     )  # fmt: skip
     _print(json.dumps(state) if as_json else _table(state))
+
+
+app.command()(render)
 
 
 def _print(text: str) -> None:

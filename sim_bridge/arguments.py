@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib.util import find_spec
 
 from flightstack.contract import Vector3
 from flightstack.geodesy import GeoPoint
@@ -10,8 +11,8 @@ from flightstack.params.vehicle import Vehicle
 from sim_bridge.battery import BatteryOptions
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.faults import Fault, Kind, parse_fault
+from sim_bridge.plant_names import MULTIBODY, NO_MUJOCO, PLANT_NAMES
 
-PLANT_NAMES = ("rigid", "paper")
 _LONGEST_QUOTE = 60
 
 
@@ -59,6 +60,8 @@ def plant(name: str) -> str:
     """Check the name of a plant."""
     if name not in PLANT_NAMES:
         raise UsageProblemError(f"--plant: {name!r} is not one of {', '.join(PLANT_NAMES)}")
+    if name == MULTIBODY and find_spec("mujoco") is None:
+        raise UsageProblemError(NO_MUJOCO)
     return name
 
 

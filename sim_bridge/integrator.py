@@ -41,7 +41,7 @@ def _combine(x: FloatArray, h: float, a: FloatArray, b: FloatArray, c: FloatArra
 
 
 @compiled
-def _next_gust(m: Record) -> None:
+def next_gust(m: Record) -> None:
     """Gauss-Markov processes of wind and torque, exact for their values at the steps, held over each step."""
     row = m["noise_row"]
     gust, scale, noise = m["gust"], m["gust_scale"], m["noise"]
@@ -71,7 +71,7 @@ def _advance(memory: RecordArray, command: FloatArray, flags: int, steps: int, o
     at_end = rotor_forces(m)
     for _ in range(steps):
         if gusty:
-            _next_gust(m)
+            next_gust(m)
         before_step(x, m)
         at_start = at_end
         half_step(m)

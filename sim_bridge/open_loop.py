@@ -12,11 +12,11 @@ from flightstack.contract import MAX_ROTORS, FloatArray, Quaternion
 from flightstack.geometry import euler_from_quaternion
 from flightstack.mavlink.hot_frames import ARMED_FLAG
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.compiled_plant import CompiledPlant
 from sim_bridge.disturbance import Disturbance, wind_warning
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.layout import CONTACT, DIVERGED
-from sim_bridge.plant import InitialState, PlantOptions
+from sim_bridge.plant import InitialState, Plant, PlantOptions
+from sim_bridge.plants import make_plant
 
 MOST_STEPS = 100_000_000  # at most a minute of computing
 _STEPS_AT_ONCE = 100_000  # between two looks at Ctrl-C
@@ -60,7 +60,7 @@ def check_length(seconds: float, dt_s: float) -> None:
         )
 
 
-def start_warning(plant: CompiledPlant, ground: bool) -> str | None:
+def start_warning(plant: Plant, ground: bool) -> str | None:
     """Return a sentence when the vehicle starts in the ground, else None."""
     buried_m = plant.buried_m()
     if not ground or buried_m < 1e-6:
@@ -71,7 +71,7 @@ def start_warning(plant: CompiledPlant, ground: bool) -> str | None:
     )
 
 
-def _fly(plant: CompiledPlant, command: FloatArray, steps: int, step_s: float, ground: bool) -> None:
+def _fly(plant: Plant, command: FloatArray, steps: int, step_s: float, ground: bool) -> None:
     """Fly ``steps`` equal steps; raise PlantDivergedError, or UsageProblemError on too soft a ground."""
     plant.set_step(step_s)
     soft = ground and plant.ground_softness_m > _SOFTEST_GROUND_M
@@ -99,7 +99,7 @@ def run_open_loop(run: OpenLoop, warn: Callable[[str], None] = lambda _: None) -
     check_length(run.seconds, run.dt_s)
     vehicle = run.vehicle if run.lag else run.vehicle.with_ideal_rotors()
     options = PlantOptions(run.disturbance, run.seed, run.initial, run.ground, limits=False, battery=None)
-    plant = CompiledPlant(vehicle, run.plant, options)
+    plant = make_plant(vehicle, run.plant, options)
     command = np.zeros(MAX_ROTORS)
     command[: len(run.rotor_speed_rad_s)] = run.rotor_speed_rad_s
     if not run.lag:
@@ -115,7 +115,7 @@ def run_open_loop(run: OpenLoop, warn: Callable[[str], None] = lambda _: None) -
     return _state(plant, run.seconds)
 
 
-def _state(plant: CompiledPlant, time_s: float) -> dict[str, Any]:
+def _state(plant: Plant, time_s: float) -> dict[str, Any]:
     x = plant.output[0]["state"].tolist()
     euler = plant.euler_rad() or euler_from_quaternion(Quaternion(*x[6:10]))
     return {

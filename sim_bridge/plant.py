@@ -78,6 +78,10 @@ class Plant(Protocol):
         """
         ...
 
+    def rotor_speeds_rad_s(self) -> list[float]:
+        """Rotor speeds in full precision, in the order of the vehicle file."""
+        ...
+
     def show(self) -> int:
         """Write the present state to ``output``; returns as ``advance``."""
         ...
@@ -88,6 +92,19 @@ class Plant(Protocol):
 
     def airspeed_m_s(self) -> float:
         """Speed relative to the air."""
+        ...
+
+    @property
+    def ground_softness_m(self) -> float:
+        """How far the ground gives way under the vehicle's weight; more with longer steps."""
+        ...
+
+    def buried_m(self) -> float:
+        """How far the vehicle reaches into the ground in the state shown (negative above it, where known)."""
+        ...
+
+    def about(self) -> str | None:
+        """Tell what the user should know of how the plant was made, if anything."""
         ...
 
     def euler_rad(self) -> Vector3 | None:

@@ -120,6 +120,9 @@ def _simulator(options: ServerOptions) -> Simulator:
         physics_hz=options.physics_hz,
         system_id=options.system_id,
     )
+    about = simulator.plant.about()
+    if about:
+        say(about)
     for fault in options.faults:
         simulator.inject(fault)
     return simulator

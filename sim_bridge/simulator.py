@@ -14,11 +14,11 @@ from flightstack.mavlink.hot_frames import GROUND_CONTACT_FLAG, HEADER_SIZE, Act
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.battery import INTERVAL_US as BATTERY_INTERVAL_US
 from sim_bridge.battery import battery_report
-from sim_bridge.compiled_plant import CompiledPlant
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.faults import Fault, Kind, Schedule
 from sim_bridge.layout import CONTACT, DIVERGED, OUTPUT
 from sim_bridge.plant import Plant, PlantOptions
+from sim_bridge.plants import make_plant
 
 SIMULATOR_COMPONENT = 200
 DEFAULT_INTERVAL_US = 2000
@@ -46,7 +46,7 @@ class Simulator:
         system_id: int = 1,
     ) -> None:
         self.vehicle = vehicle
-        self.plant: Plant = CompiledPlant(vehicle, plant, options or PlantOptions())
+        self.plant: Plant = make_plant(vehicle, plant, options or PlantOptions())
         self.time_us = 0
         self._physics_dt_us = 1e6 / physics_hz
         self._frame = PlantStateFrame(system_id, SIMULATOR_COMPONENT)

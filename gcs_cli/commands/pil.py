@@ -54,7 +54,7 @@ def fly(
     controller: Annotated[str, typer.Option(help="pid or backstepping.")] = "pid",
     gains: Annotated[str, typer.Option(help="tuned, paper, or a TOML file.")] = "tuned",
     vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
-    plant: Annotated[str, typer.Option(help="rigid, or paper: the paper's small-angle model.")] = "rigid",
+    plant: Annotated[str, typer.Option(help="rigid, multibody or paper.")] = "rigid",
     inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop.")] = 500.0,
     outer_hz: Annotated[
         float | None,

@@ -6,8 +6,6 @@ impedance: the nearer to 1, the harder.
 
 from __future__ import annotations
 
-from flightstack.params.vehicle import GRAVITY_M_S2
-
 TIME_S = 0.01
 """Time constant; MuJoCo takes two steps where that is longer."""
 

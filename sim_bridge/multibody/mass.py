@@ -6,7 +6,7 @@ All in SI units; inertia matrices are about the centre of gravity, in the axes o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -89,7 +89,12 @@ def _capsule(radius: float, length: float) -> tuple[float, tuple[float, float, f
     return shaft + ends, (across, across, along + round_ends)
 
 
-_SOLIDS = {"box": _box, "cylinder": _cylinder, "sphere": _sphere, "capsule": _capsule}
+_SOLIDS: dict[str, Callable[..., tuple[float, tuple[float, float, float]]]] = {
+    "box": _box,
+    "cylinder": _cylinder,
+    "sphere": _sphere,
+    "capsule": _capsule,
+}
 
 
 @lru_cache(maxsize=64)

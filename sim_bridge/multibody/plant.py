@@ -1,0 +1,194 @@
+"""The multibody plant: frame and spinning rotors as bodies of a MuJoCo model, on legs on the ground.
+
+MuJoCo computes the accelerations of all bodies and the contact with the ground; ``rotor_drive.py`` makes the forces and
+integrates with the classic Runge-Kutta method, in the same variables as the rigid plant. MuJoCo's own ``mj_step`` with
+its RK4 turns the attitude by mean rates, which is of second order only where the axis of rotation moves; this is of
+fourth order.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from flightstack.contract import FloatArray, Vector3
+from flightstack.geometry import quaternion_from_euler
+from flightstack.params.vehicle import Vehicle
+from sim_bridge import rotor_drive
+from sim_bridge.layout import DIVERGED, RecordArray
+from sim_bridge.multibody.assembly import assemble
+from sim_bridge.multibody.mjcf import model_xml
+from sim_bridge.multibody.usual_parts import foot_z_m
+from sim_bridge.plant import InitialState, PlantOptions
+from sim_bridge.record_plant import DEFAULT_STEP_S, RecordPlant
+from sim_bridge.rotor_drive import LOST, NEAR
+
+_NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+_AFTER_VELOCITY = int(mujoco.mjtStage.mjSTAGE_VEL)
+_STAGES = (0, 1, 2, 3)
+_FIRST_DEPTH_M = 1e-5
+_FRAME = 6  # degrees of freedom
+
+
+class MultibodyPlant(RecordPlant):
+    """The vehicle's assembly on MuJoCo; see ``Plant`` for its methods."""
+
+    def __init__(self, vehicle: Vehicle, options: PlantOptions) -> None:
+        super().__init__(vehicle, options)
+        self.assembly = assemble(vehicle)
+        self._model = mujoco.MjModel.from_xml_string(model_xml(vehicle, lean=True))
+        self._data = mujoco.MjData(self._model)
+        self._ground_geom = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_GEOM, "ground")
+        self._foot_z_m = foot_z_m(vehicle)
+        self._softness_m = 0.0
+        self._watched = NEAR
+        first = 1 + mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
+        self._on_rotors: FloatArray = self._data.xfrc_applied[first:]
+        self._views()
+        self._drive: RecordArray = np.zeros(1, rotor_drive.DRIVE)
+        self._set_drive(len(vehicle.rotors))
+        self._memory[0]["ground_z"], self._memory[0]["reach"] = self._foot_z_m, self._reach_m()
+        self._set_state(options.initial)
+        self.set_step(DEFAULT_STEP_S)
+
+    def _views(self) -> None:
+        """Keep MuJoCo's arrays at hand: looking them up takes as long as a kernel."""
+        data = self._data
+        self._qpos: FloatArray = data.qpos
+        self._qvel: FloatArray = data.qvel
+        self._qacc: FloatArray = data.qacc
+        self._bias: FloatArray = data.qfrc_bias
+        self._held: FloatArray = data.qfrc_constraint
+        self._applied: FloatArray = data.qfrc_applied
+
+    def _set_drive(self, rotors: int) -> None:
+        """Read the constants of the drives out of MuJoCo's mass matrix at the level attitude."""
+        model, data, d = self._model, self._data, self._drive[0]
+        mujoco.mj_forward(model, data)
+        columns = np.eye(model.nv)
+        mass = np.zeros((model.nv, model.nv))
+        for row, column in zip(mass, columns, strict=True):
+            mujoco.mj_mulM(model, data, row, column)
+        row = np.linalg.solve(mass[:_FRAME, :_FRAME], mass[:_FRAME, _FRAME:]).T
+        d["gain"][:rotors, :rotors] = mass[_FRAME:, _FRAME:] - row @ mass[:_FRAME, _FRAME:]
+        d["row"][:rotors] = row * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # FLU to FRD
+        d["spin"][:rotors] = [rotor.spin for rotor in self._vehicle.rotors]
+
+    def _reach_m(self) -> float:
+        """Distance from the origin to the farthest point that may touch the ground."""
+        geoms = [index for index in range(self._model.ngeom) if self._model.geom_contype[index]]
+        away = np.linalg.norm(self._data.geom_xpos[geoms] - self._data.qpos[:3], axis=1)
+        return float((away + self._model.geom_rbound[geoms]).max(initial=0.0))
+
+    def _set_state(self, initial: InitialState) -> None:
+        body = self._memory[0]["body"]
+        body[0:3], body[3:6] = initial.position_ned_m, initial.velocity_ned_m_s
+        body[6:10], body[10:13] = quaternion_from_euler(*initial.euler_rad), initial.rates_frd_rad_s
+
+    # ------------------------------------------------------------------ time
+
+    def set_step(self, step_s: float) -> None:
+        """Choose the fixed step of the integration [s]."""
+        super().set_step(step_s)
+        self._model.opt.timestep = step_s
+        self._softness_m = self._rest_depth_m()
+        self._model.geom_pos[self._ground_geom, 2] = self._softness_m - self._foot_z_m
+
+    def _rest_depth_m(self) -> float:
+        """How deep a level vehicle stands in the ground, by a secant step: the force is linear in the depth."""
+        if not self._memory[0]["ground"]:
+            return 0.0
+        model = self._model
+        data = mujoco.MjData(model)
+        self._look_for_contacts(True)
+        self._watched = NEAR
+        model.geom_pos[self._ground_geom, 2] = -self._foot_z_m
+        depths, falls = (0.0, _FIRST_DEPTH_M), []
+        for depth in depths:
+            data.qpos[2] = -depth
+            mujoco.mj_forward(model, data)
+            falls.append(float(data.qacc[2]))
+        rise = falls[1] - falls[0]
+        return -falls[0] * _FIRST_DEPTH_M / rise if rise > 0.0 else 0.0
+
+    def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
+        rotor_drive.hold_commands(self._memory, command_rad_s, flags)
+        where = rotor_drive.FLYING
+        for _ in range(steps):
+            where = self._step()
+            if where == LOST:
+                break
+        return self.show()
+
+    def _step(self) -> int:
+        """Advance by one step; return where the vehicle is."""
+        memory, drive, qpos, qvel = self._memory, self._drive, self._qpos, self._qvel
+        where = rotor_drive.begin_step(memory, drive, qpos, qvel)
+        self._watch_ground(where)
+        for stage in _STAGES:
+            if where == LOST:
+                break
+            self._accelerations(stage)
+            where = rotor_drive.end_stage(memory, drive, stage, self._qacc, qpos, qvel)
+        return where
+
+    def _watch_ground(self, where: int) -> None:
+        """Let MuJoCo look for contacts only where there may be some."""
+        if where != self._watched:
+            self._watched = where
+            self._look_for_contacts(where == NEAR)
+
+    def _look_for_contacts(self, wanted: bool) -> None:
+        option = self._model.opt
+        others = option.disableflags & ~_NO_CONTACT
+        option.disableflags = others if wanted else others | _NO_CONTACT
+
+    def _accelerations(self, stage: int) -> None:
+        """Let MuJoCo compute the accelerations of the state that was written to it."""
+        model, data = self._model, self._data
+        mujoco.mj_step1(model, data)
+        rotor_drive.apply_forces(
+            self._memory, self._drive, stage, self._bias, self._held, self._applied, self._on_rotors
+        )
+        mujoco.mj_forwardSkip(model, data, _AFTER_VELOCITY, 1)
+
+    # ------------------------------------------------------------------ what is
+
+    def show(self) -> int:
+        """Write the present state to ``output``; returns as ``advance``."""
+        where = rotor_drive.show_pose(self._memory, self._drive, self._qpos, self._qvel)
+        touches = 0
+        if where == NEAR:
+            self._watch_ground(where)
+            mujoco.mj_fwdPosition(self._model, self._data)
+            touches = int(self._data.ncon > 0)
+        return rotor_drive.show_state(self._memory, self.output, touches)
+
+    def acceleration_ned_m_s2(self) -> Vector3:
+        """Acceleration at the present state."""
+        where = rotor_drive.show_pose(self._memory, self._drive, self._qpos, self._qvel)
+        if where == LOST:
+            return Vector3(0.0, 0.0, 0.0)
+        self._watch_ground(where)
+        self._accelerations(0)
+        x, y, z = self._qacc[:3].tolist()
+        return Vector3(x, -y, -z)
+
+    @property
+    def ground_softness_m(self) -> float:
+        """How far the ground gives way under the vehicle's weight; more with longer steps."""
+        return self._softness_m
+
+    def buried_m(self) -> float:
+        """How far the vehicle reaches into the ground in the state shown; 0 above it."""
+        if self.show() & DIVERGED or not self._data.ncon:
+            return 0.0
+        return max(0.0, -float(self._data.contact.dist.min()) - self._softness_m)
+
+    def about(self) -> str | None:
+        """Tell how well the assembly meets the vehicle file."""
+        return self.assembly.worst_line()
+
+    def euler_rad(self) -> Vector3 | None:
+        """Roll, pitch, yaw are no states of this plant."""
+        return None

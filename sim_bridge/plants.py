@@ -1,0 +1,23 @@
+"""Plants by their names."""
+
+from __future__ import annotations
+
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.compiled_plant import CompiledPlant
+from sim_bridge.errors import UsageProblemError
+from sim_bridge.plant import Plant, PlantOptions
+from sim_bridge.plant_names import MULTIBODY, NO_MUJOCO
+
+
+def make_plant(vehicle: Vehicle, name: str, options: PlantOptions) -> Plant:
+    """Return the plant of this name, one of ``plant_names``.
+
+    Raises UsageProblemError where MuJoCo is not installed, ConfigError for a mesh that is not a solid.
+    """
+    if name != MULTIBODY:
+        return CompiledPlant(vehicle, name, options)
+    try:
+        from sim_bridge.multibody.plant import MultibodyPlant  # noqa: PLC0415  # an extra, and slow to load
+    except ImportError:
+        raise UsageProblemError(NO_MUJOCO) from None
+    return MultibodyPlant(vehicle, options)
