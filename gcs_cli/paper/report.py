@@ -13,6 +13,7 @@ from typing import Any
 from gcs_cli.paper import cases
 from gcs_cli.paper.report_compare import claims_section, matrix_sections, xy_figures
 from gcs_cli.paper.report_flights import (
+    PAIR,
     Recordings,
     beside,
     desired_figure,
@@ -21,7 +22,7 @@ from gcs_cli.paper.report_flights import (
     step_figure,
     step_table,
 )
-from gcs_cli.paper.report_labels import ANGLES, PLANTS, anchored
+from gcs_cli.paper.report_labels import ANGLES, LABELS, PLANTS, anchored
 from gcs_cli.paper.report_linear import linear_sections
 from gcs_cli.paper.report_pictures import Picture, pictures_section
 from gcs_cli.paper.report_pil import pil_sections
@@ -106,11 +107,14 @@ def _sections(
 
 def _metrics(found: Mapping[str, Any], recordings: Recordings) -> str:
     plants = beside(recordings)
-    table = metrics_table(found, cases.DESIRED, plants)
+    table = metrics_table(found, cases.DESIRED, plants, PAIR)
     if not table:
         return ""
+    others = metrics_table(found, cases.DESIRED, plants, [name for name in LABELS if name not in PAIR])
+    if others:
+        table += f"<details><summary>The same of the other gains</summary>{others}</details>"
     note = (
-        "Of figures 8 to 13, with our gains besides. Overshoot is that of the worst move between two rests of the "
+        "Of figures 8 to 13. Overshoot is that of the worst move between two rests of the "
         "axis; rise and settling time are those of the last one, from its begin: on this smooth trajectory they tell "
         "of the reference as much as of the controller. Roll and pitch have no rests, so errors alone."
     )

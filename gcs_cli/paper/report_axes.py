@@ -138,7 +138,12 @@ def _equal(x: Axis, y: Axis, size: tuple[int, int]) -> _Frame:
 def _ticks(scale: Scale, pixels: float) -> list[float]:
     if scale.log:
         return decade_ticks(scale.low, scale.high)
-    return nice_ticks(scale.low, scale.high, max(3, round(abs(scale.end - scale.start) / pixels)))
+    wanted = max(3, round(abs(scale.end - scale.start) / pixels))
+    for count in (wanted, wanted + 1, wanted + 2):  # steps of 1, 2 and 5 may be far from the one that fits
+        ticks = nice_ticks(scale.low, scale.high, count)
+        if len(ticks) >= wanted:
+            break
+    return ticks
 
 
 def _grid(frame: _Frame, size: tuple[int, int], labels: tuple[str, str]) -> Iterator[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -20,6 +20,7 @@ from gcs_cli.paper.report_labels import (
     PLANTS,
     REFERENCE,
     STYLES,
+    UNKNOWN,
     anchored,
     cell,
     fixed,
@@ -203,26 +204,28 @@ _COLUMNS = (
 )
 
 
-def metrics_table(found: Cases, trajectory: str, plants: Sequence[str]) -> str:
+def metrics_table(found: Cases, trajectory: str, plants: Sequence[str], names: Sequence[str]) -> str:
     """Return overshoot, rise, settling and errors of each axis, contender and plant; empty if nothing was flown."""
-    rows = [one for axis in AXES for one in _axis_rows(found, trajectory, axis, plants)]
+    rows = [one for axis in AXES for one in _axis_rows(found, trajectory, axis, plants, names)]
     return wide_table(_COLUMNS, rows) if rows else ""
 
 
 def step_table(found: Cases, plant: str) -> str:
     """Return the figures of each axis in the flight in which it steps; empty if nothing was flown."""
-    rows = [one for axis in AXES for one in _axis_rows(found, f"step_{axis}", axis, (plant,))]
+    rows = [one for axis in AXES for one in _axis_rows(found, f"step_{axis}", axis, (plant,), LABELS)]
     return wide_table(_COLUMNS, rows) if rows else ""
 
 
-def _axis_rows(found: Cases, trajectory: str, axis: str, plants: Sequence[str]) -> Iterator[str]:
+def _axis_rows(
+    found: Cases, trajectory: str, axis: str, plants: Sequence[str], names: Iterable[str]
+) -> Iterator[str]:
     first = True
     for plant in plants:
-        for name, label_ in LABELS.items():
+        for name in names:
             case = found.get(cases.key(name, trajectory, cases.PLAIN, plant))
             if case is None:
                 continue
-            head = f"<th>{escape(AXIS_TITLES[axis]) if first else ''}</th><td>{escape(label_)}</td>"
+            head = f"<th>{escape(AXIS_TITLES[axis]) if first else ''}</th><td>{escape(LABELS[name])}</td>"
             yield row(f"{head}<td>{escape(PLANTS[plant])}</td>{metrics_cells(case, axis)}", first)
             first = False
 
@@ -248,7 +251,7 @@ def metrics_cells(case: Mapping[str, Any], axis: str) -> str:
 
 def with_unit(shown: str, unit: str) -> str:
     """Append a unit, but not to a dash."""
-    return shown if shown == "–" else f"{shown} {unit}"
+    return shown if shown == UNKNOWN else f"{shown}{'' if unit == '°' else ' '}{unit}"
 
 
 def ending(case: Mapping[str, Any]) -> str:

@@ -67,7 +67,7 @@ def fixed(value: float | None, places: int) -> str:
     """Return a number with so many places: the way to write a column. A dash for None and what is not finite."""
     if value is None or not math.isfinite(value):
         return UNKNOWN
-    return f"{value + 0.0:.{places}f}".replace("-", "−")
+    return f"{round(value, places) + 0.0:.{places}f}".replace("-", "−")
 
 
 def cell(shown: str, style: str = "") -> str:

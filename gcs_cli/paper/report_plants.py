@@ -60,7 +60,7 @@ def _table(plants: Mapping[str, Any]) -> str:
                 cell(f"{number(_MM * found[key])} mm") for key in ("max_position_m", "rms_position_m")
             )
             turned = "".join(
-                cell(f"{number(found[key])} °") for key in ("max_attitude_deg", "rms_attitude_deg")
+                cell(f"{number(found[key])}°") for key in ("max_attitude_deg", "rms_attitude_deg")
             )
             rows.append(row(f"{head}{apart}{turned}{_bound(found)}", not index))
     columns = ("plants", "controller", "#position, largest", "#RMS", "#attitude, largest", "#RMS", "bound")

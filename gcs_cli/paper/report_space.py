@@ -99,9 +99,11 @@ def _floor(low: FloatArray, high: FloatArray, view: _View) -> Iterator[str]:
         yield _line("grid", (high[0], low[1], height), (high[0], high[1], height), view)
         yield _line("grid", (high[0], low[1], height), (low[0], low[1], height), view)
         yield _label(tick_text(height), (low[0], low[1], height), view, (-12.0, 4.0))
+    for north, east in ((high[0], low[1]), (low[0], low[1]), (high[0], high[1])):
+        yield _line("grid", (north, east, ground), (north, east, high[2]), view)
     yield _label("north [m]", (0.5 * (low[0] + high[0]), high[1], ground), view, (46.0, 26.0))
     yield _label("east [m]", (low[0], 0.5 * (low[1] + high[1]), ground), view, (-20.0, 34.0))
-    yield _label("height [m]", (low[0], low[1], high[2]), view, (10.0, -12.0))
+    yield _label("height [m]", (low[0], low[1], high[2]), view, (-4.0, -12.0))
 
 
 def _step(low: FloatArray, high: FloatArray) -> float:
