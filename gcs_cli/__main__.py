@@ -56,18 +56,20 @@ def options(
 
 
 def _register() -> None:
-    from gcs_cli.commands import actions, fly, log, mission, param, perf, pil, status, watch  # noqa: PLC0415
+    from gcs_cli.commands import actions, fly, log, mission, paper, param, perf, pil, replay, status, watch  # noqa: PLC0415
 
     app.command()(fly.fly)
     app.add_typer(mission.app, name="mission")
     app.add_typer(param.app, name="param")
     app.add_typer(log.app, name="log")
     app.add_typer(pil.app, name="pil")
+    app.command()(paper.paper)
     for action in actions.ACTIONS:
         app.command()(action)
     app.command()(status.status)
     app.command()(watch.watch)
     app.command()(perf.perf)
+    app.command()(replay.replay)
 
 
 _register()

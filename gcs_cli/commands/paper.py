@@ -1,0 +1,59 @@
+"""``gcs paper``: the paper, reproduced."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.settings import JsonOption, settings_of
+
+
+def paper(
+    context: typer.Context,
+    out: Annotated[
+        Path, typer.Option(help="Directory of the results; those of a run before are replaced.")
+    ] = Path("runs/paper"),
+    no_pil: Annotated[bool, typer.Option("--no-pil", help="Leave out the loops on a target.")] = False,
+    no_multibody: Annotated[
+        bool, typer.Option("--no-multibody", help="Leave out the multibody plant.")
+    ] = False,
+    port: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TARGET",
+            help="Run the loops on a board: serial:DEVICE[:BAUD].  [default: an emulated one]",
+            show_default=False,
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=64, help="Flights at once.  [default: one for each processor]")
+    ] = None,
+    open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Fly every experiment of the paper; write report.html and results.json."""
+    from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
+    from gcs_cli.paper.printed import print_results  # noqa: PLC0415
+    from gcs_cli.paper.run import HTML_NAME, PaperOptions, run  # noqa: PLC0415
+
+    if settings_of(context).connect is not None:
+        raise CliError("paper flies vehicles of its own: leave --connect out", USAGE)
+    if port is not None and no_pil:
+        raise CliError("--port names a target for what --no-pil leaves out: give one of them", USAGE)
+    options = PaperOptions(out, not no_pil, not no_multibody, jobs=jobs)
+    if port is not None:
+        options = options._replace(target=port)
+    console = FlyConsole(stderr=as_json, highlight=False)
+    results = run(options, console)
+    if as_json:
+        print(json.dumps({**results, "directory": str(out)}, allow_nan=False), flush=True)
+    else:
+        print_results(console, results, out)
+    if open_report:
+        import webbrowser  # noqa: PLC0415
+
+        webbrowser.open((out / HTML_NAME).resolve().as_uri())

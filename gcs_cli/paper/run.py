@@ -1,0 +1,100 @@
+"""``gcs paper``: fly the experiments, do the analysis, run the loops on the target, and write what came out.
+
+Each part is written when it ends, whole or not at all: who interrupts the command keeps the parts that were done, and
+``left_out`` names the others.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+
+from flightstack.atomic_file import write_text_atomically
+from gcs_cli.errors import FAILED, USAGE, CliError
+from gcs_cli.paper import linear, pil_section
+from gcs_cli.paper.cases import MULTIBODY, all_cases
+from gcs_cli.paper.experiments import Flown, default_jobs, run_cases
+from gcs_cli.paper.report import render
+from gcs_cli.paper.results import results_of, text_of
+from gcs_cli.paper.types import Case
+from gcs_cli.transfer_bar import step_bar
+
+JSON_NAME, HTML_NAME = "results.json", "report.html"
+NO_MUJOCO = "the multibody plant needs MuJoCo: pip install 'flightstack[multibody]'"
+NOT_WANTED = "left out on request"
+NOT_REACHED = "not done: the command was ended before"
+
+
+class PaperOptions(NamedTuple):
+    """What the command was asked for."""
+
+    out: Path
+    pil: bool = True
+    multibody: bool = True
+    target: str = pil_section.EMULATED
+    jobs: int | None = None
+    """Processes that fly at once; None: one for each processor."""
+
+
+def run(options: PaperOptions, console: Console, cases: Sequence[Case] | None = None) -> dict[str, Any]:
+    """Do it all and return the results; ``cases`` in place of the whole matrix. Raise CliError, ConfigError."""
+    _make_directory(options.out)
+    if options.pil and options.target != pil_section.EMULATED:
+        why = pil_section.problem(options.target)
+        if why is not None:  # before minutes are spent on the rest
+            raise CliError(why, USAGE)
+    left_out = {} if options.pil else {"pil": NOT_WANTED}
+    if not options.multibody:
+        left_out[MULTIBODY] = NOT_WANTED
+    elif importlib.util.find_spec("mujoco") is None:
+        left_out[MULTIBODY] = NO_MUJOCO
+    chosen = all_cases(MULTIBODY not in left_out) if cases is None else cases
+    flown = _fly(chosen, options.jobs or default_jobs(), console)
+    reached = {**left_out, "linear": NOT_REACHED, "onset": NOT_REACHED}
+    if options.pil:
+        reached["pil"] = NOT_REACHED
+    results = results_of(flown, reached)
+    _write(options.out, results, flown)
+    for part, words, work in (
+        ("linear", "linear analysis", linear.results),
+        ("onset", "onset of instability", linear.onset),
+        ("pil", "processor in the loop", lambda: pil_section.run(options.out, options.target)),
+    ):
+        if part in left_out:
+            continue
+        with console.status(words):
+            results[part] = work()
+        del results["left_out"][part]
+        _write(options.out, results, flown)
+        console.print(f"{words}: done", markup=False, highlight=False)
+    return results
+
+
+def _make_directory(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CliError(f"{out}: the directory cannot be made: {error.strerror}", USAGE) from None
+
+
+def _fly(cases: Sequence[Case], jobs: int, console: Console) -> Flown:
+    with step_bar("experiments", console) as bar:
+        flown = run_cases(cases, jobs, bar.show)
+    crashed = sum(entry["ended"] is not None for entry in flown.entries.values())
+    told = f"experiments: {len(flown.entries)} flown, {crashed} of them ended in a crash"
+    console.print(told, markup=False, highlight=False)
+    return flown
+
+
+def _write(folder: Path, results: dict[str, Any], flown: Flown) -> None:
+    """Write results.json and report.html, each whole or not at all; raise CliError."""
+    html = render(results, flown.recordings)
+    try:
+        write_text_atomically(folder / JSON_NAME, text_of(results))
+        write_text_atomically(folder / HTML_NAME, html)
+    except OSError as error:
+        raise CliError(f"{folder}: the results cannot be written: {error.strerror}", FAILED) from None
