@@ -2,8 +2,28 @@
 
 from __future__ import annotations
 
+import faulthandler
 import os
+import signal
+from collections.abc import Iterator
+
+import pytest
 
 # pymavlink's mavutil reads it once, at its first import, whichever module that is: without it mavutil.mavlink is
 # the dialect of version 1, whose messages cannot be signed
 os.environ.setdefault("MAVLINK20", "1")
+
+# a shell that runs the tests in its background lets them, and all that they start, ignore Ctrl-C: no test of
+# Ctrl-C could pass
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+HANGS_AFTER_S = 600.0
+
+
+@pytest.fixture(autouse=True)
+def _never_hangs() -> Iterator[None]:
+    """End the process with a trace of what it waited for: a run that hangs tells nobody anything."""
+    faulthandler.dump_traceback_later(HANGS_AFTER_S, exit=True)
+    yield
+    faulthandler.cancel_dump_traceback_later()

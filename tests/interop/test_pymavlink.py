@@ -38,8 +38,7 @@ def script(linked: Witness) -> Witness:
 
 def fly_up(script: Witness) -> None:
     """Arm, take off in PX4's way (all NaN: MIS_TAKEOFF_ALT) and wait for the end of the climb."""
-    script.connection.arducopter_arm()
-    script.connection.motors_armed_wait()
+    script.arm()
     script.mav.command_long_send(script.system, 1, mavlink.MAV_CMD_NAV_TAKEOFF, 0, *[NAN] * 7)
     until_mode(script, "TAKEOFF")  # its heartbeat may come before the acknowledgement
     until_mode(script, "LOITER")

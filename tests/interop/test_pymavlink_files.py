@@ -71,8 +71,7 @@ def test_nothing_is_written_and_nothing_found_that_is_not_there(files: MAVFTP, t
 def test_a_log_is_listed_and_fetched_by_both_protocols(
     script: Witness, station_vehicle: RealVehicle, files: MAVFTP, tmp_path: Path
 ) -> None:
-    script.connection.arducopter_arm()
-    script.connection.motors_armed_wait()
+    script.arm()
     script.connection.arducopter_disarm()
     script.connection.motors_disarmed_wait()
     script.mav.log_request_list_send(script.system, 1, 0, 0xFFFF)

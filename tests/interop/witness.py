@@ -62,5 +62,15 @@ class Witness:
         self.mav.command_long_send(self.system, component, number, 0, *values)
         return self.until("COMMAND_ACK", lambda ack: ack.command == number)
 
+    def arm(self) -> None:
+        """Arm with the verb of pymavlink's users, as soon as the vehicle says that it can be armed."""
+        ready = mavutil.mavlink.MAV_SYS_STATUS_PREARM_CHECK
+        self.until("SYS_STATUS", lambda status: status.onboard_control_sensors_health & ready)
+        self.connection.arducopter_arm()
+        arming = mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+        ack = self.until("COMMAND_ACK", lambda ack: ack.command == arming)
+        assert ack.result == mavutil.mavlink.MAV_RESULT_ACCEPTED, self.connection.messages.get("STATUSTEXT")
+        self.connection.motors_armed_wait()
+
     def close(self) -> None:
         self.connection.close()

@@ -342,9 +342,15 @@ def test_watch_draws_on_a_terminal_and_restores_it(ending: bytes | signal.Signal
         os.close(terminal)
 
 
+MOST_READS = 2000
+"""Of a terminal that is drawn eight times a second: minutes."""
+
+
 def _read_until(terminal: int, wanted: bytes) -> bytes:
     seen = b""
-    while wanted not in seen:
+    for _ in range(MOST_READS):
+        if wanted in seen:
+            return seen
         assert select.select([terminal], [], [], LONG_S)[0], f"{wanted!r} never came"
         seen += os.read(terminal, 65536)
-    return seen
+    raise AssertionError(f"{wanted!r} never came, but {seen[-200:]!r}")
