@@ -22,3 +22,14 @@ def euler_from_quaternions(q: FloatArray) -> FloatArray:
     roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
     return np.column_stack((roll, pitch, heading_from_quaternions(q)))
+
+
+def quaternions_from_euler(euler_rad: FloatArray) -> FloatArray:
+    """Unit quaternions of roll, pitch, yaw (3-2-1), shape (n, 3) to (n, 4): the way back."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(euler_rad.T / 2.0), np.sin(euler_rad.T / 2.0)
+    return np.column_stack((
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    ))  # fmt: skip

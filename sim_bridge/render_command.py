@@ -61,9 +61,9 @@ def render(
     ] = None,
     camera: Annotated[str, typer.Option(help="chase, fixed, top or side.")] = "chase",
     size: Annotated[
-        str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 1280x720; 640x360 for a gif]")
+        str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 1280x720; 480x270 for a gif]")
     ] = None,
-    fps: Annotated[float | None, typer.Option(help="Frames per second.  [default: 30; 15 for a gif]")] = None,
+    fps: Annotated[float | None, typer.Option(help="Frames per second.  [default: 30; 12.5 for a gif]")] = None,
     begin: Annotated[float | None, typer.Option("--from", help="Begin of the film, s.")] = None,
     end: Annotated[float | None, typer.Option("--to", help="End of the film, s.")] = None,
     speed: Annotated[float, typer.Option(help="Show it so many times as fast as it was flown.")] = 1.0,
@@ -74,8 +74,8 @@ def render(
     if not (png or sheet or video or view):
         raise UsageProblemError("nothing to do: give --png, --sheet, --video or --view")
     is_gif = video is not None and video.suffix.lower() == ".gif"
-    width, height = _size(size or ("640x360" if is_gif else "1280x720"))
-    rate = (15.0 if is_gif else 30.0) if fps is None else fps
+    width, height = _size(size or ("480x270" if is_gif else "1280x720"))
+    rate = (12.5 if is_gif else 30.0) if fps is None else fps
     wish = _Wish(png, sheet, video, camera, width, height, rate, speed, _times(at), not no_words)
     _check(wish)
     require("sim-bridge render", "PIL", *(["imageio_ffmpeg"] if video and not is_gif else []))

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from flightstack.contract import FloatArray
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.multibody import looks
 from sim_bridge.multibody.frames import flip_vector
-from sim_bridge.multibody.poses import FlightPath, Moment
+from sim_bridge.multibody.poses import Moment
 
 MOST_TRAIL = 500
 _TRAIL_NEW, _TRAIL_OLD = np.array([1.0, 0.78, 0.10, 0.95]), np.array([0.98, 0.90, 0.55, 0.28])
@@ -26,18 +27,24 @@ Point = Sequence[float]
 
 
 class Marks:
-    """Adds geoms to a scene; ``width_m`` is the radius of the lines."""
+    """Adds geoms to a scene; ``trail`` gives the way flown until a time, NED [m], in at most so many points."""
 
-    def __init__(self, path: FlightPath, span_m: float, ground_m: float) -> None:
-        self._path = path
+    def __init__(
+        self,
+        trail: Callable[[float, int], FloatArray],
+        waypoints_ned_m: FloatArray,
+        span_m: float,
+        ground_m: float,
+    ) -> None:
+        self._trail = trail
         self._span_m, self._ground_m = span_m, ground_m
         self._width_m = 0.022 * span_m
-        self._waypoints = [flip_vector(row) for row in path.poses.waypoints_ned_m.tolist()]
+        self._waypoints = [flip_vector(row) for row in waypoints_ned_m.tolist()]
 
     def draw(self, scene: Any, moment: Moment) -> None:
         """Add all marks of a moment to a scene that holds the model already."""
         self._draw_plan(scene)
-        points = [flip_vector(row) for row in self._path.trail(moment.time_s, MOST_TRAIL).tolist()]
+        points = [flip_vector(row) for row in self._trail(moment.time_s, MOST_TRAIL).tolist()]
         for index, (begin, end) in enumerate(pairwise(points), start=1):
             age = 1.0 - index / len(points)
             _line(scene, begin, end, self._width_m, _TRAIL_NEW + (_TRAIL_OLD - _TRAIL_NEW) * age**0.5)

@@ -40,8 +40,8 @@ class Stage:
         self.rotors = RotorLooks(self.model, vehicle)
         self._free_joint = self._address("vehicle")
         self._hinges = [self._address(f"rotor_{n}") for n in range(1, len(vehicle.rotors) + 1)]
-        body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
-        moves = self.model.body_rootid[self.model.geom_bodyid] == body
+        self.body = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, "vehicle"))
+        moves = self.model.body_rootid[self.model.geom_bodyid] == self.body
         self.shadeless = frozenset(np.flatnonzero(~moves).tolist()) | self.rotors.discs
 
     def _address(self, joint: str) -> int:
@@ -68,7 +68,7 @@ class Renderer:
         self.width, self.height = width, height
         self._gl = make_context(width, height)
         self._stage = Stage(vehicle)
-        self._marks = Marks(path, self._stage.span_m, self._stage.ground_m)
+        self._marks = Marks(path.trail, path.poses.waypoints_ned_m, self._stage.span_m, self._stage.ground_m)
         model = self._stage.model
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
