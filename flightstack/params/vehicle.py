@@ -87,7 +87,7 @@ def built_in_vehicles() -> list[str]:
 def load_vehicle(name_or_path: str) -> Vehicle:
     """Read a vehicle by the name of a built-in one or by the path of a TOML file; raise ConfigError."""
     path = Path(name_or_path)
-    if not path.suffix and not path.exists():
+    if not path.suffix and not path.is_file():
         if name_or_path not in built_in_vehicles():
             known = ", ".join(built_in_vehicles())
             raise ConfigError(name_or_path, "", f"is neither a file nor a built-in vehicle ({known})")
