@@ -51,7 +51,8 @@ def linear_sections(linear: Mapping[str, Any], onset: Sequence[Mapping[str, Any]
     poles = "".join(_pole_map(loops, axis) for axis in AXES)
     note = (
         "Continuous loops at hover. Attitude: feedback alone, without feed-forward and integral of the outer loop. x "
-        "and y: with reference filter and attitude loop inside. The linear PD has backstepping's poles by construction."
+        "and y: with reference filter and attitude loop inside. The linear PD has backstepping's poles by "
+        "construction; the paper's controllers share one height loop. Pointing at a cross shows its numbers."
     )
     body = f'<div class="pair">{poles}</div>'
     yield anchored("linear", section("Linear analysis: poles", body, legend, note))
@@ -122,7 +123,7 @@ def _bode(loops: Loops, axis: str) -> str:
         turned -= 360.0 * np.round((turned[0] + 180.0) / 360.0)  # begins between −360° and 0°
         gain.append(Line(_title(loop), frequency, 20.0 * np.log10(np.abs(values)), _style(loop)))
         phase.append(Line(_title(loop), frequency, turned, _style(loop)))
-    along = spanning("frequency [rad/s]", [frequency], log=True)
+    along = Axis("frequency [rad/s]", _LOWEST_RAD_S, 1.25 * np.pi * BODE_HZ, log=True)
     heading = f'<h3 class="plant">{escape(AXIS_TITLES[axis])}</h3>'
     above = chart(
         f"Gain of the open loop, {axis}", along, spanning("gain [dB]", [line.y for line in gain]), gain,

@@ -47,7 +47,7 @@ def take(recordings: Mapping[str, Recording]) -> list[Picture]:
     if find_spec("mujoco") is None:
         return [Picture("No pictures: they need MuJoCo: pip install 'flightstack[multibody]'.", "")]
     plants = (cases.MULTIBODY, cases.RIGID, cases.SMALL_ANGLE)
-    keys = (cases.key(cases.PID, cases.DESIRED, cases.PLAIN, plant) for plant in plants)
+    keys = (cases.key(cases.BACKSTEPPING, cases.DESIRED, cases.PLAIN, plant) for plant in plants)
     key = next((key for key in keys if key in recordings), None)
     if key is None:
         return [Picture("No pictures: nothing was flown along the desired trajectory.", "")]
@@ -98,7 +98,7 @@ def quaternions(euler_rad: FloatArray) -> FloatArray:
 
 def _drawn(recording: Recording) -> list[Picture]:
     end_s = float(recording.time_s[-1])
-    flown = f"{LABELS[cases.PID]}, {PLANTS[recording.case.plant]}"
+    flown = f"{LABELS[cases.BACKSTEPPING]}, {PLANTS[recording.case.plant]}"
     pictures = []
     with tempfile.TemporaryDirectory(prefix="gcs-paper-") as name:
         folder = Path(name)

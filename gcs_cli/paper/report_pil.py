@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 
 from gcs_cli.paper.pil_section import EMULATED
-from gcs_cli.paper.report_labels import LABELS, STYLES, anchored, cell, fixed, row, wide_table
+from gcs_cli.paper.report_labels import LABELS, PLANTS, STYLES, anchored, cell, fixed, number, row, wide_table
 from gcs_cli.pil.histogram_chart import histogram_chart
 from gcs_cli.pil.profile import STAGE_TITLES, StageProfile
 from gcs_cli.pil.report_tables import checks_section, differences_section
@@ -45,7 +45,7 @@ def pil_sections(pil: Mapping[str, Any], why: str) -> Iterator[str]:
     )
     body = (
         f"<p>{escape(pil['meaning'])} Mission: {escape(pil['mission'])}; gains of the paper, {pil['inner_hz']:g} and "
-        f"{pil['outer_hz']:g} Hz.</p>{_profile_table(profiles, unit)}"
+        f"{pil['outer_hz']:g} Hz, on the {escape(PLANTS[pil['plant']])}.</p>{_profile_table(profiles, unit)}"
         f'<div class="pair histograms">{charts}</div>{_identity(pil)}'
     )
     legend = [(LABELS.get(name, name), STYLES.get(name, "s6"), False) for name in profiles]
@@ -87,10 +87,10 @@ def _identity(pil: Mapping[str, Any]) -> str:
         return ""
     stacks = [of["stack"]["high_water"] for of in pil["controllers"].values() if of["stack"]]
     stack = f"; stack used at most: {max(stacks)} octets" if stacks and target["char_bits"] == 8 else ""
-    emulated = (
-        "emulated: it has no clock" if pil["target"] == EMULATED else f"{target['clock_hz'] / 1e6:g} MHz"
+    clock = "without a clock" if pil["target"] == EMULATED else f"at {target['clock_hz'] / 1e6:g} MHz"
+    words = (
+        f"Target: {target['board']} {clock}; {target['compiler']}; sources {target['source_hash']}{stack}."
     )
-    words = f"Target: {target['board']}, {emulated}; {target['compiler']}; sources {target['source_hash']}{stack}."
     return f'<p class="note">{escape(words)}</p>'
 
 
@@ -124,6 +124,6 @@ def _difference_cells(of: Mapping[str, Any], pair: str) -> str:
         return '<td class="n good" colspan="2">same bits</td>'
     position = next((row["largest"] for row in rows if row["signal"] == "position"), None)
     worst = max((row for row in rows if row["ulps"] is not None), key=lambda row: row["ulps"], default=None)
-    shown = "–" if position is None else f"{fixed(1e6 * position, 2)} µm"
+    shown = "–" if position is None else f"{number(1e6 * position)} µm"
     of_all = "–" if worst is None else f"{fixed(worst['ulps'], 0)} ulp ({worst['signal'].replace('_', ' ')})"
     return cell(shown) + cell(of_all)

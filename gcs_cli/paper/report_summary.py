@@ -14,6 +14,8 @@ from gcs_cli.report_plots import section
 
 Results = Mapping[str, Any]
 _PAPERS = "paper"
+_SMALL, _RIGID = cases.SMALL_ANGLE, cases.RIGID
+_SATURATED_POINTS = 10.0
 _PARTS = {"linear": "linear analysis", "onset": "onset of instability", "pil": "processor in the loop"}
 
 
@@ -58,6 +60,7 @@ def sentences(results: Results) -> Iterator[str]:
     yield from _of_claims(results)
     yield from _of_gains(results)
     yield from _of_crashes(results)
+    yield from _of_spin_up(results)
     yield from _of_plants(results)
     yield from _of_linear(results)
     yield from _of_pil(results)
@@ -125,6 +128,36 @@ def _of_crashes(results: Results) -> Iterator[str]:
         yield escape(f"{contender} crashes in at least one flight with: {'; '.join(conditions)}.")
     if not lost and results["cases"]:
         yield "No flight of the matrix ended in a crash."
+
+
+def _of_spin_up(results: Results) -> Iterator[str]:
+    """Say what the rotors' reaction to spinning up, which the paper leaves out, does to its yaw loop."""
+    found = results["cases"]
+    keys = (cases.key(cases.PID, cases.DESIRED, cases.PLAIN, plant) for plant in (_SMALL, _RIGID))
+    pair = [found[key] for key in keys if flies(found.get(key))]
+    if len(pair) < 2:
+        return
+    without, with_it = (case["effort"]["saturated_percent"]["yaw"] for case in pair)
+    if with_it - without < _SATURATED_POINTS:
+        return
+    words = (
+        "The paper leaves out the torque by which rotors react when they spin up. With it, on the rigid body, the yaw "
+        f"torque that Table II asks for is out of the rotors' reach in {fixed(with_it, 0)} % of the desired trajectory "
+        f"({fixed(without, 0)} % on the small-angle model)"
+    )
+    needed = next(
+        (
+            one["predicted_hz"]
+            for one in results["onset"] or ()
+            if "spin-up" in one["setting"] and (one["controller"], one["gains"]) == (cases.PID, "paper")
+        ),
+        None,
+    )
+    if needed:
+        words += (
+            f": that loop would be stable from {fixed(needed, 0)} Hz on, and runs at {pair[1]['inner_hz']} Hz"
+        )
+    yield escape(f"{words}.")
 
 
 def worst_plants(results: Results) -> tuple[float, float] | None:
