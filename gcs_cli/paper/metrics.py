@@ -1,7 +1,7 @@
 """Figures of a recording: of each axis against its reference, of the path in XY, and of the rotors' work. Pure.
 
-A move of an axis is what lies between two holds of its reference (nearly a second or longer without a change); a step is
-a move that takes no time. Its response is scaled to 0 before and 1 after it. Over the moves of an axis
+A move of an axis is what lies between two holds of its reference (nearly a second or longer without a change); a
+step is a move that takes no time. Its response is scaled to 0 before and 1 after it. Over the moves of an axis
 
 * overshoot is the largest share by which the response passes 1 before the next move begins: the worst of all moves;
 * rise time, from 10 to 90 %, and settling time, from the move's begin until the response stays within 2 % of 1, are
@@ -108,7 +108,9 @@ def moves(time_s: FloatArray, reference: FloatArray) -> list[Move]:
     changes = np.flatnonzero(np.diff(reference) != 0.0) + 1
     edges = [0, *changes.tolist(), len(reference)]
     step_s = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 0.0
-    holds = [(first, last) for first, last in itertools.pairwise(edges) if (last - first) * step_s >= HOLD_S]
+    shortest = HOLD_S / step_s if step_s > 0.0 else 0.0
+    # the first is a hold however short it is: a flight begins at rest
+    holds = [(a, b) for a, b in itertools.pairwise(edges) if a == 0 or b - a >= shortest]
     found = []
     for (_, begin), (arrived, end) in itertools.pairwise(holds):
         start, target = float(reference[begin - 1]), float(reference[arrived])
