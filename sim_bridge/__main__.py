@@ -14,7 +14,8 @@ from flightstack.contract import Vector3
 from flightstack.params.errors import ConfigError
 from sim_bridge import arguments
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
-from sim_bridge.render_command import render
+from sim_bridge.live_view import LiveView
+from sim_bridge.render_command import render, require
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -23,9 +24,7 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
 _ZERO = "0,0,0"
 _VehicleOption = Annotated[str, typer.Option(help="Built-in vehicle (paper_quad, x_quad) or a TOML file.")]
-_PlantOption = Annotated[
-    str, typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")
-]
+_PlantOption = Annotated[str, typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")]
 _WindOption = Annotated[str, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")]
 _GustOption = Annotated[float, typer.Option(help="Standard deviation of the gusts, m/s.")]
 _ForceOption = Annotated[str, typer.Option(metavar="N,E,D", help="Constant external force, N.")]
@@ -89,6 +88,7 @@ def run(
     home: Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Where the vehicle stands.")] = (
         "47.397742,8.545594,488.0"
     ),
+    view: Annotated[bool, typer.Option("--view", help="Show the vehicle in a window.")] = False,
     timeout: Annotated[
         float | None,
         typer.Option(
@@ -126,7 +126,15 @@ def run(
         physics_hz=arguments.in_range("--physics-hz", physics_hz, SLOWEST_PHYSICS_HZ, FASTEST_PHYSICS_HZ),
         timeout_s=None if timeout is None else arguments.in_range("--timeout", timeout, 0.001, 1e6),
     )
-    raise typer.Exit(serve(options))
+    if view:
+        require("sim-bridge --view")
+        options = options._replace(view=LiveView(vehicle))
+    try:
+        code = serve(options)
+    finally:
+        if options.view is not None:
+            options.view.close()
+    raise typer.Exit(code)
 
 
 @app.command("open-loop")

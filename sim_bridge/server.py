@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import math
 import select
@@ -23,6 +24,7 @@ from sim_bridge.connection import (
 from sim_bridge.disturbance import wind_warning
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.faults import Fault
+from sim_bridge.live_view import LiveView
 from sim_bridge.lockstep import SimulatorLink
 from sim_bridge.plant import PlantOptions
 from sim_bridge.session import Session
@@ -47,6 +49,7 @@ class ServerOptions(NamedTuple):
     physics_hz: float
     timeout_s: float | None  # None: wait for a client for ever
     faults: tuple[Fault, ...] = ()
+    view: LiveView | None = None
 
 
 def say(text: str) -> None:
@@ -84,7 +87,8 @@ def serve(options: ServerOptions) -> int:
     ask_for_punctual_sleeps()
     timeout_s = DEFAULT_TIMEOUT_S if options.timeout_s is None else options.timeout_s
     link = SimulatorLink(simulator, options.vehicle, options.home, options.system_id)
-    with client:
+    watching = contextlib.nullcontext() if options.view is None else options.view.watching(simulator)
+    with client, watching:
         connection = Connection(client, stop, timeout_s)
         return _fly(Session(link, connection, options.speed, stop), connection, timeout_s)
 

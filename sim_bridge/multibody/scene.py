@@ -19,8 +19,6 @@ PAD_M = 4.0
 """Half the side of the landing pad."""
 GRASS_TILE_M = 20.0
 """Side of the piece of ground whose picture repeats."""
-LARGEST_PICTURE = 4096
-"""Pixels, either way, of what can be rendered off screen."""
 
 _SUN_TOWARDS = (0.45, 0.55, -1.0)
 _SUN_AT = (-18.0, -22.0, 40.0)
@@ -47,7 +45,7 @@ def _visual(root: Element) -> None:
     statistic.set("extent", "10")  # znear, zfar and the shadows are shares of it
     statistic.set("center", "0 0 1")
     visual = section(root, "visual")
-    add(visual, "global", offwidth=LARGEST_PICTURE, offheight=LARGEST_PICTURE, fovy=45)
+    add(visual, "global", offwidth=1280, offheight=720, fovy=45)
     add(visual, "quality", shadowsize=4096, offsamples=4, numslices=24, numstacks=12)
     add(visual, "map", znear=0.008, zfar=120, shadowclip=0.35, shadowscale=0.9, haze=0.35)
     add(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable
@@ -18,6 +19,7 @@ from sim_bridge.multibody.renderer import Stage
 _FRAME_S = 1.0 / 60.0
 _SPACE, _RIGHT, _LEFT, _HOME = 32, 262, 263, 268  # GLFW's numbers of keys
 _SEEK_S = 2.0
+_PATIENCE_S = 3.0
 _DISTANCE_SPANS, _ELEVATION_DEG, _AZIMUTH_DEG = 6.0, -20.0, -24.0
 
 HELP = "space stops and goes on, the arrows go back and forth, Home begins anew; close the window to end"
@@ -99,6 +101,7 @@ def show(
     """Show moments in a window until it is closed or there are no more; None leaves what is shown."""
     from mujoco.viewer import launch_passive  # noqa: PLC0415  # needs a display
 
+    others = set(threading.enumerate())
     with launch_passive(
         stage.model, stage.data, key_callback=press, show_left_ui=False, show_right_ui=False
     ) as window:
@@ -114,6 +117,8 @@ def show(
                     marks.draw(window.user_scn, moment)
                 window.sync()
             time.sleep(_FRAME_S)
+    for thread in set(threading.enumerate()) - others:  # it still draws: Python must not end before it does
+        thread.join(_PATIENCE_S)
 
 
 def _aim(camera: Any, stage: Stage) -> None:
