@@ -11,7 +11,7 @@ from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from sim_bridge.layout import MAX_POINTS
 
 _FREQUENCY_RAD_S = 150.0  # of the vertical bounce: a vehicle at rest sinks in by g/ω² = 0.44 mm
-_DAMPING_RATIO = 0.7
+DAMPING_RATIO = 0.7
 _LARGEST_RATE_STEP = 1.2  # fastest decay rate times step; RK4 is stable up to 2.78
 _ROTOR_CLEARANCE_M = 0.02  # the rotors lie at least so far above the feet
 
@@ -65,11 +65,11 @@ def ground_contact(vehicle: Vehicle, step_s: float, single_point: bool) -> Groun
         assert len(points) <= MAX_POINTS == 2 * MAX_ROTORS
         ratio = _fastest_over_bounce(vehicle, points[: len(vehicle.rotors)])
     # the damping matrix is 2ζ/ω times the stiffness matrix: the fastest mode decays at 2ζω·ratio
-    frequency = min(_FREQUENCY_RAD_S, _LARGEST_RATE_STEP / (2.0 * _DAMPING_RATIO * ratio * step_s))
+    frequency = min(_FREQUENCY_RAD_S, _LARGEST_RATE_STEP / (2.0 * DAMPING_RATIO * ratio * step_s))
     return Ground(
         points,
         vehicle.mass_kg * frequency**2,
-        2.0 * _DAMPING_RATIO * frequency * vehicle.mass_kg,
+        2.0 * DAMPING_RATIO * frequency * vehicle.mass_kg,
         GRAVITY_M_S2 / frequency**2,
         float(points[0, 2]),
     )

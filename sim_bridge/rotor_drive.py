@@ -45,6 +45,7 @@ DRIVE = np.dtype(
         ("speed", "f8", (3, MAX_ROTORS)),  # at the start, the middle and the end of the step
         ("wanted", "f8", (3, MAX_ROTORS)),  # accelerations then, rad/s²
         ("angle", "f8", MAX_ROTORS),
+        ("sink", "f8"),  # m, how far the vehicle stands in the ground: MuJoCo has it so much lower
     ],
     align=True,
 )
@@ -72,7 +73,7 @@ def _note_speeds(m: Record, d: Record, when: int) -> None:
 @compiled
 def _pose(x: FloatArray, d: Record, when: int, rotors: int, qpos: FloatArray, qvel: FloatArray) -> None:
     """Write a state to MuJoCo."""
-    qpos[0], qpos[1], qpos[2] = x[0], -x[1], -x[2]
+    qpos[0], qpos[1], qpos[2] = x[0], -x[1], -x[2] - d["sink"]
     qpos[3], qpos[4], qpos[5], qpos[6] = x[6], x[7], -x[8], -x[9]
     qvel[0], qvel[1], qvel[2] = x[3], -x[4], -x[5]
     qvel[3], qvel[4], qvel[5] = x[10], -x[11], -x[12]

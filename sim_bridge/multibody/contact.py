@@ -1,18 +1,35 @@
-"""How MuJoCo's contact with the ground is set: firm, without a bounce, and feet that do not creep.
+"""How MuJoCo's contact with the ground is set: as firm as the rigid plant's, without a bounce, and without creep.
 
-A contact in MuJoCo is a spring and damper with a time constant and a damping ratio, whose force also depends on an
-impedance: the nearer to 1, the harder.
+A contact in MuJoCo wants the acceleration a* = −b·v − k·r of the touching point (v its speed, r its depth) and gets
+the share d/(1 − d) of what is missing as acceleration of the point's effective mass. With b = 2/(d·T), k = 1/(d·T²·ζ*²)
+and R feet under a mass the whole stands on a spring and damper with
+
+    κ = R·d/(1 − d)     ω² = κ/(1 + κ)·k     2·ζ·ω = κ/(1 + κ)·b
+
+from which T and ζ*, MuJoCo's ``solref``, follow for the ω and ζ of ``sim_bridge/ground.py``.
 """
 
 from __future__ import annotations
 
-TIME_S = 0.01
-"""Time constant; MuJoCo takes two steps where that is longer."""
+import math
 
-_IMPEDANCE = 0.9
-REFERENCE = f"{TIME_S} 1"
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.ground import DAMPING_RATIO, ground_contact
+
+_IMPEDANCE = 0.1
 IMPEDANCE = f"{_IMPEDANCE} {_IMPEDANCE} 0.001"
+"""MuJoCo's ``solimp``: the same at any depth."""
 FRICTION_STIFFNESS = 10
 """Of friction over that of the normal force: a foot that is pushed creeps less."""
 CREEP_ITERATIONS = 4
 """Of the solver that takes the rest of the creep away."""
+
+
+def reference(vehicle: Vehicle, step_s: float) -> tuple[float, float]:
+    """Return MuJoCo's ``solref`` for an integration step: time constant [s] and damping ratio."""
+    ground = ground_contact(vehicle, step_s, single_point=False)
+    frequency = math.sqrt(ground.stiffness_n_m / vehicle.mass_kg)
+    feet = len(vehicle.rotors) * _IMPEDANCE / (1.0 - _IMPEDANCE)
+    share = feet / (1.0 + feet) / _IMPEDANCE
+    time_s = share / (DAMPING_RATIO * frequency)
+    return time_s, math.sqrt(share) / (frequency * time_s)

@@ -37,6 +37,7 @@ _COLOURS = {
     "propeller": "0.75 0.78 0.80 0.35",
 }
 _PLAIN = "0.7 0.7 0.7 1"
+_STEP_S = 0.001
 _SEEN, _HIDDEN = 1, 3  # groups of geoms: viewers show 0 to 2
 
 
@@ -47,10 +48,11 @@ def model_xml(vehicle: Vehicle, *, scene: bool = False, lean: bool = False) -> s
     that touch nothing. Raises ConfigError for a mesh that is not a solid.
     """
     assembly = assemble(vehicle)
+    solref = _exact(contact.reference(vehicle, _STEP_S))
     root = Element("mujoco", model=vehicle.name)
     add(root, "compiler", angle="radian", inertiafromgeom="auto", discardvisual="true" if lean else "false")
     option = add(
-        root, "option", timestep=0.001, integrator="RK4", gravity=f"0 0 {-GRAVITY_M_S2!r}",
+        root, "option", timestep=_STEP_S, integrator="RK4", gravity=f"0 0 {-GRAVITY_M_S2!r}",
         cone="elliptic", impratio=contact.FRICTION_STIFFNESS, noslip_iterations=contact.CREEP_ITERATIONS,
     )  # fmt: skip
     add(option, "flag", autoreset="disable")
@@ -65,9 +67,9 @@ def model_xml(vehicle: Vehicle, *, scene: bool = False, lean: bool = False) -> s
     add(
         world, "geom", name="ground", type="plane", size="0 0 1", pos=_exact((0.0, 0.0, -foot_z_m(vehicle))),
         rgba="0.45 0.5 0.42 1", contype=0, conaffinity=1, friction=f"{FRICTION} 0.005 0.0001",
-        solref=contact.REFERENCE, solimp=contact.IMPEDANCE,
+        solref=solref, solimp=contact.IMPEDANCE,
     )  # fmt: skip
-    _vehicle(world, vehicle, assembly, scene)
+    _vehicle(world, vehicle, assembly, solref, scene)
     if scene:
         from sim_bridge.multibody.scene import decorate  # noqa: PLC0415  # the view's; not needed to fly
 
@@ -76,12 +78,12 @@ def model_xml(vehicle: Vehicle, *, scene: bool = False, lean: bool = False) -> s
     return tostring(root, encoding="unicode") + "\n"
 
 
-def _vehicle(world: Element, vehicle: Vehicle, assembly: Assembly, scene: bool) -> None:
+def _vehicle(world: Element, vehicle: Vehicle, assembly: Assembly, solref: str, scene: bool) -> None:
     body = add(world, "body", name="vehicle")
     add(body, "freejoint", name="vehicle")
     for placed in assembly.parts:
         if placed.body == 0:
-            _geom(body, placed, _SEEN)
+            _geom(body, placed, solref, _SEEN)
     for number, rotor in enumerate(vehicle.rotors, start=1):
         hub = _exact(flip_vector(rotor.position_frd_m))
         add(body, "site", name=f"hub_{number}", pos=hub, size=0.003, group=4)
@@ -89,10 +91,10 @@ def _vehicle(world: Element, vehicle: Vehicle, assembly: Assembly, scene: bool) 
         add(spinning, "joint", name=f"rotor_{number}", type="hinge", axis=f"0 0 {-rotor.spin}")
         for placed in assembly.parts:
             if placed.body == number:
-                _geom(spinning, placed, _HIDDEN if scene else _SEEN)
+                _geom(spinning, placed, solref, _HIDDEN if scene else _SEEN)
 
 
-def _geom(body: Element, placed: PlacedPart, group: int) -> None:
+def _geom(body: Element, placed: PlacedPart, solref: str, group: int) -> None:
     part = placed.part
     attributes: dict[str, str | float] = {"name": part.name, "type": part.shape}
     if part.shape == "mesh":
@@ -109,7 +111,7 @@ def _geom(body: Element, placed: PlacedPart, group: int) -> None:
     add(
         body, "geom", **attributes, pos=_exact(flip_vector(part.position_frd_m)),
         density=repr(part.density_kg_m3), group=group, contype=1 if touches else 0, conaffinity=0,
-        **({"friction": f"{FRICTION} 0.005 0.0001", "solref": contact.REFERENCE, "solimp": contact.IMPEDANCE}
+        **({"friction": f"{FRICTION} 0.005 0.0001", "solref": solref, "solimp": contact.IMPEDANCE}
            if touches else {}),
     )  # fmt: skip
 

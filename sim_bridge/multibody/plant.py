@@ -16,6 +16,7 @@ from flightstack.geometry import quaternion_from_euler
 from flightstack.params.vehicle import Vehicle
 from sim_bridge import rotor_drive
 from sim_bridge.layout import DIVERGED, RecordArray
+from sim_bridge.multibody import contact
 from sim_bridge.multibody.assembly import assemble
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.usual_parts import foot_z_m
@@ -38,8 +39,6 @@ class MultibodyPlant(RecordPlant):
         self.assembly = assemble(vehicle)
         self._model = mujoco.MjModel.from_xml_string(model_xml(vehicle, lean=True))
         self._data = mujoco.MjData(self._model)
-        self._ground_geom = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_GEOM, "ground")
-        self._foot_z_m = foot_z_m(vehicle)
         self._softness_m = 0.0
         self._watched = NEAR
         first = 1 + mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
@@ -47,7 +46,7 @@ class MultibodyPlant(RecordPlant):
         self._views()
         self._drive: RecordArray = np.zeros(1, rotor_drive.DRIVE)
         self._set_drive(len(vehicle.rotors))
-        self._memory[0]["ground_z"], self._memory[0]["reach"] = self._foot_z_m, self._reach_m()
+        self._memory[0]["ground_z"], self._memory[0]["reach"] = foot_z_m(vehicle), self._reach_m()
         self._set_state(options.initial)
         self.set_step(DEFAULT_STEP_S)
 
@@ -91,8 +90,9 @@ class MultibodyPlant(RecordPlant):
         """Choose the fixed step of the integration [s]."""
         super().set_step(step_s)
         self._model.opt.timestep = step_s
+        self._model.geom_solref[:] = contact.reference(self._vehicle, step_s)
         self._softness_m = self._rest_depth_m()
-        self._model.geom_pos[self._ground_geom, 2] = self._softness_m - self._foot_z_m
+        self._drive[0]["sink"] = self._softness_m
 
     def _rest_depth_m(self) -> float:
         """How deep a level vehicle stands in the ground, by a secant step: the force is linear in the depth."""
@@ -102,14 +102,13 @@ class MultibodyPlant(RecordPlant):
         data = mujoco.MjData(model)
         self._look_for_contacts(True)
         self._watched = NEAR
-        model.geom_pos[self._ground_geom, 2] = -self._foot_z_m
-        depths, falls = (0.0, _FIRST_DEPTH_M), []
+        depths, falls = (_FIRST_DEPTH_M, 2.0 * _FIRST_DEPTH_M), []
         for depth in depths:
             data.qpos[2] = -depth
             mujoco.mj_forward(model, data)
             falls.append(float(data.qacc[2]))
         rise = falls[1] - falls[0]
-        return -falls[0] * _FIRST_DEPTH_M / rise if rise > 0.0 else 0.0
+        return (1.0 - falls[0] / rise) * _FIRST_DEPTH_M if rise > 0.0 else 0.0
 
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         rotor_drive.hold_commands(self._memory, command_rad_s, flags)

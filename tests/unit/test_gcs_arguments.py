@@ -76,7 +76,7 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
     ("flags", "said"),
     [
         ({"controller": "fuzzy"}, "--controller fuzzy: there is none; known are backstepping, pid"),
-        ({"plant": "flat"}, "--plant flat: expected rigid or paper"),
+        ({"plant": "flat"}, "--plant flat: expected rigid, multibody or paper"),
         ({"speed": "fast"}, "--speed fast: expected a number"),
         ({"speed": "0"}, "--speed 0: expected a number"),
         ({"speed": "nan"}, "--speed nan"),
