@@ -15,9 +15,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
 
 from flightstack.contract import FloatArray
+from gcs_cli.paper.linear.exponential import exponential
 from gcs_cli.paper.linear.gains import AttitudeGains, PositionGains, ReferenceFilter
 
 
@@ -61,7 +61,7 @@ def _held_chain(
         slope[4, 4], slope[4, 5] = -1.0 / lag_s, 1.0 / lag_s
     else:
         slope[3, 5] = 1.0
-    over = expm(slope * dt_s)
+    over = exponential(slope * dt_s)
     if lag_s == 0.0:
         over[4, 4] = 0.0  # there is no motor: a state that nothing moves would be a pole at 1
     return over[:5, :5], over[:5, 5]

@@ -31,7 +31,7 @@ from gcs_cli.paper.types import Case
 
 ARMED = 2
 """FS_ACTUATORS: the rotors turn."""
-STEP_RAD, STEP_M = 1e-4, 1e-3
+STEP_RAD, STEP_M = 1e-4, 1e-4
 """Steps small enough that what is not linear stays below a millionth of them."""
 TRAJECTORY = "step_roll"
 """A case must name one; nothing here flies it."""
