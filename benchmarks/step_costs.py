@@ -113,7 +113,7 @@ def _log(world: BenchWorld) -> Call:
         for _ in range(5):
             times[0] += 2000
             recorder.inner_row(times[0])
-        recorder.outer(times[0], state, setpoint, target)
+        recorder.outer(times[0], state, setpoint, target, 0)
 
     return five
 
