@@ -31,8 +31,8 @@ TIMERS = 5
 M_TRIGGERED = TIMERS
 DETECTOR_MEMORY_SIZE = 2 * TIMERS
 P_LIMIT, P_TIME, P_ROTORS, P_SLOW = 0, TIMERS, 2 * TIMERS, 2 * TIMERS + 1
-R_EXPECTED, R_MEAN, R_ERROR = 0, MAX_ROTORS, 2 * MAX_ROTORS
-ROTOR_MEMORY_SIZE = 3 * MAX_ROTORS
+R_EXPECTED, R_MEAN, R_ERROR, R_MEASURED = 0, MAX_ROTORS, 2 * MAX_ROTORS, 3 * MAX_ROTORS
+ROTOR_MEMORY_SIZE = R_MEASURED + 1
 
 _REFERENCE_AT = LoopRow.REFERENCE_ATTITUDE.start
 _COMMAND_AT = LoopRow.ROTOR_COMMAND.start
@@ -73,7 +73,7 @@ def rotor_params(vehicle: Vehicle, dt_s: float) -> FloatArray:
 def follow_rotors(row: FloatArray, memory: FloatArray, params: FloatArray) -> None:
     """Compare each rotor's measured speed with what its commands lead to; once per inner tick.
 
-    ``row`` (48,) holds speeds from before its commands. ``memory`` (24,) keeps, for each rotor, the speed that the
+    ``row`` (48,) holds speeds from before its commands. ``memory`` (25,) keeps, for each rotor, the speed that the
     commands lead to (first-order lag, exact for commands that are held), its mean, and the mean of the error.
     """
     last = len(params) - 1
@@ -106,13 +106,15 @@ def _watch(memory: FloatArray, index: int, beyond: bool, time_s: float, dt_s: fl
 def _rotor_error(row: FloatArray, rotors: FloatArray, params: FloatArray) -> float:
     """Return the largest mean error of a rotor's speed as share of the mean speed that was expected.
 
-    A simulator that measures no speeds sends zeros: then nothing is known, and the error is 0.
+    A simulator that measures no speeds sends zeros: while none other has come in this flight nothing is known, and
+    the error is 0. After that, zeros are rotors that stand: an empty battery stops them all.
     """
-    worst, measured = 0.0, False
+    worst = 0.0
     for i in range(int(params[P_ROTORS])):
-        measured = measured or row[_SPEED_AT + i] != 0.0
+        if row[_SPEED_AT + i] != 0.0:
+            rotors[R_MEASURED] = 1.0
         worst = max(worst, abs(rotors[R_ERROR + i]) / max(abs(rotors[R_MEAN + i]), params[P_SLOW]))
-    return worst if measured else 0.0
+    return worst if rotors[R_MEASURED] > 0.0 else 0.0
 
 
 @compiled
@@ -128,7 +130,7 @@ def detect(
     """Advance all detectors by one outer tick; return the bits of what is wrong, and ``MOVING``.
 
     ``state`` (13,), ``setpoint`` (11,) and ``row`` (48,), the newest row of the inner loop, as in ``contract``;
-    ``rotors`` (24,) is the memory of ``follow_rotors``; ``memory`` (10,) is updated; ``params`` come from
+    ``rotors`` (25,) is the memory of ``follow_rotors``; ``memory`` (10,) is updated; ``params`` come from
     ``detector_params``. A state that is not finite leaves the other detectors as they are.
     """
     status = int(row[_STATUS_AT])

@@ -176,6 +176,17 @@ def test_speeds_that_nobody_measures_are_no_fault() -> None:
     assert not bench.run(5.0) & ROTOR_FAULT
 
 
+def test_rotors_that_all_stop_in_flight_are_a_fault_that_stays() -> None:
+    """As with an empty battery: zeros are no missing measurement in a flight that has had others."""
+    bench = Bench()
+    assert not bench.run(1.0) & ROTOR_FAULT
+    bench.row[LoopRow.ROTOR_SPEED] = 0.0
+    assert not bench.run(0.1) & ROTOR_FAULT
+    for _ in range(50):
+        found = bench.run(0.1)
+    assert found & ROTOR_FAULT
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("index", range(13))
 def test_a_number_that_is_none_is_found_at_once(value: float, index: int) -> None:
