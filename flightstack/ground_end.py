@@ -34,10 +34,11 @@ class GroundEnd:
         """Let ``poller`` wake when something arrives."""
         self._ports.register(poller)
 
-    def serve(self, now_s: float) -> None:
-        """Take what has arrived, and send what is due."""
-        hub, ports = self._hub, self._ports
+    def serve(self, now_s: float) -> bool:
+        """Take what has arrived, and send what is due; return whether anything has arrived."""
+        hub, ports, heard = self._hub, self._ports, False
         for channel, peer, data in ports.receive(self._is_heard):
+            heard = True
             hub.receive(PeerAddress(channel, *peer), data, now_s)
         for channel, peer in ports.opened():
             hub.add_peer(PeerAddress(channel, *peer), permanent=True)
@@ -46,6 +47,7 @@ class GroundEnd:
         if self._sending is None:
             self._sending = hub.poll(now_s)
         self.send()
+        return heard
 
     def send(self) -> None:
         """Send what is due, as far as the slice of time goes; ``serve`` was called before."""
