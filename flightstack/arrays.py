@@ -57,3 +57,16 @@ def store_attitude_target(out: FloatArray, target: AttitudeTarget) -> None:
     """Write an ``AttitudeTarget`` in its array form to ``out``, shape (5,)."""
     q = target.attitude
     out[0], out[1], out[2], out[3], out[4] = q.w, q.x, q.y, q.z, target.thrust_n
+
+
+@compiled
+def store_outer_row(
+    out: FloatArray, state: FloatArray, setpoint: FloatArray, target: FloatArray, flags: int
+) -> None:
+    """Write state (13,), setpoint (11,), attitude target (5,) and flags, one after the other, to ``out`` (30,)."""
+    at = 0
+    for part in (state, setpoint, target):
+        for value in part:
+            out[at] = value
+            at += 1
+    out[at] = flags

@@ -19,6 +19,9 @@ class Mode(IntEnum):
     TERMINATION = 8
 
 
+STREAM_MODES = (Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
+"""Modes in which a stream from the ground says where to fly, and whether to leave the ground."""
+
 _AUTO = 4 << 16
 CUSTOM_MODE: dict[Mode, int] = {
     Mode.TAKEOFF: _AUTO | 2 << 24,

@@ -96,7 +96,7 @@ class PlanKeeper:
             home = self.places.home
             home_ned_m = Vector3(home.north_m, home.east_m, -home.altitude_m)
             self._navigator.change_plan(*self._plan_table())
-            self.supervisor.set_home(home_ned_m)
+            self.supervisor.fence.set_home(home_ned_m)
             self._set_bounds()
             self._recorder.home(self.now.time_us, point, home_ned_m)
         return refusal

@@ -163,7 +163,7 @@ class AutopilotFacts:
     @property
     def state_is_good(self) -> bool:
         """Whether the newest state is one to fly by: it has arrived, is finite, and neither too old nor frozen."""
-        stale = self._autopilot.supervisor.state_is_stale
+        stale = self._autopilot.supervisor.states.is_stale
         return self._autopilot.has_state and not stale and bool(np.isfinite(self.state).all())
 
     @property

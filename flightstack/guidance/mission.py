@@ -30,7 +30,8 @@ DO_JUMP = 177
 DO_CHANGE_SPEED = 178
 
 # progress: the current item and its phase, the last item reached (−1: none), and the goal in force
-M_CURRENT, M_PHASE, M_TIMER, M_REACHED, M_FINISHED, M_WANTS_RETURN = range(6)
+M_PHASE, M_TIMER, M_CURRENT, M_REACHED, M_FINISHED, M_WANTS_RETURN = range(6)
+M_PROGRESS = slice(M_CURRENT, M_WANTS_RETURN + 1)
 M_X, M_Y, M_Z, M_YAW, M_YAW_IS_SET, M_YAW_IS_COUNTED, M_YAW_RATE, M_SPEED = range(6, 14)
 # where a vehicle on the ground rises to before it sets out for an item that is no takeoff
 M_RISE_X, M_RISE_Y, M_RISE_Z = range(14, 17)

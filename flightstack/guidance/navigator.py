@@ -36,6 +36,7 @@ from flightstack.guidance.mission import (
     M_FINISHED,
     M_LOG,
     M_LOG_COUNT,
+    M_PROGRESS,
     M_REACHED,
     M_SPEED,
     M_WANTS_RETURN,
@@ -68,13 +69,14 @@ from flightstack.guidance.setpoints import (
 )
 from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.guidance.trajectory import BRAKING, Trajectory, setpoint_of
-from flightstack.modes import Mode
+from flightstack.modes import STREAM_MODES, Mode
 
 ARRIVED_M = 0.5
 """So near to the place it was sent to, a vehicle holds."""
-STREAM_MODES = (Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
-"""Modes in which guidance follows what is streamed to the vehicle."""
-_STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)  # found faster than members of an enumeration
+# looking up a member of an enumeration takes seven times as long as looking up a name or a key
+_OFFBOARD = Mode.OFFBOARD
+_NUMBER = {mode: int(mode) for mode in Mode}
+_STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)
 
 
 class MissionProgress(NamedTuple):
@@ -97,10 +99,13 @@ class Navigator:
         self.setpoint = np.zeros(SETPOINT_SIZE)
         self._trajectory = np.zeros(TRAJECTORY_SIZE)
         self._mission = np.zeros(MISSION_MEMORY_SIZE)
+        self._progress = self._mission[M_PROGRESS]
+        self._progress_seen = b""
         self._reported = 0
         self._repositions = False
         self._aim = np.zeros(AIM_SIZE)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0))
+        self._land_now = self._land.data  # a number of an array takes four times as long to read
         self._stream = empty_stream()
         self.attitude_target = np.eye(1, ATTITUDE_TARGET_SIZE)[0]
         """What the loops fly in place of the outer loop's target while ``flies_attitude``; array form."""
@@ -150,12 +155,12 @@ class Navigator:
     @property
     def landed(self) -> bool:
         """Whether the vehicle stands on the ground."""
-        return bool(self._land[0] > 0.0)
+        return self._land_now[0] > 0.0
 
     @property
     def touches_ground(self) -> bool:
         """Whether something other than the rotors holds the vehicle up: landed, or about to count as landed."""
-        return bool(self._land[1] >= CONTACT_S)
+        return self._land_now[1] >= CONTACT_S
 
     def level_target(self, state: FloatArray, attitude_target: FloatArray) -> FloatArray:
         """Return a level attitude with little thrust, shape (5,), for a vehicle that touches the ground.
@@ -173,6 +178,11 @@ class Navigator:
         return MissionProgress(
             int(m[M_CURRENT]), int(m[M_REACHED]), bool(m[M_FINISHED]), bool(m[M_WANTS_RETURN])
         )
+
+    def progress_changed(self) -> bool:
+        """Tell whether ``progress`` is another one than at the last call."""
+        seen, self._progress_seen = self._progress_seen, self._progress.tobytes()
+        return seen != self._progress_seen
 
     @property
     def mission_flies(self) -> bool:
@@ -315,7 +325,7 @@ class Navigator:
 
     def flies_attitude(self, mode: Mode) -> bool:
         """Tell whether guidance gives attitude and thrust itself, in ``attitude_target``."""
-        return mode is Mode.OFFBOARD and bool(self._stream[S_KIND] >= ATTITUDE)
+        return mode is _OFFBOARD and bool(self._stream[S_KIND] >= ATTITUDE)
 
     def wants_to_rise(self, mode: Mode, down_m: float) -> bool:
         """Tell whether the stream asks a vehicle that stands at ``down_m`` to take off."""
@@ -338,7 +348,7 @@ class Navigator:
 
         ``attitude_target`` (5,) is the loops' last one.
         """
-        number = int(mode)
+        number = _NUMBER[mode]
         if number in _STREAM_NUMBERS:
             stream_kernel(
                 number, state, self._trajectory, self._stream, self._land, attitude_target,

@@ -41,11 +41,12 @@ class Trace:
     when ``n`` has reached ``capacity``; ``append`` does the same at the cost of a call and a view.
     """
 
-    __slots__ = ("_flush", "capacity", "n", "rows", "times_us")
+    __slots__ = ("_each", "_flush", "capacity", "n", "rows", "times_us")
 
     def __init__(self, capacity: int, columns: int, flush: Callable[[], None]) -> None:
         self.capacity = capacity
         self.rows: FloatArray = np.zeros((capacity, columns))
+        self._each: list[FloatArray] = list(self.rows)  # a view made anew takes longer than one found
         self.times_us: TimeArray = np.zeros(capacity, np.uint64)
         self.n = 0
         self._flush = flush
@@ -57,8 +58,7 @@ class Trace:
         index = self.n
         self.times_us[index] = time_us
         self.n = index + 1
-        row: FloatArray = self.rows[index]
-        return row
+        return self._each[index]
 
 
 class _EventTopic:

@@ -6,8 +6,16 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from flightstack.arrays import store_outer_row
 from flightstack.commander.transitions import Status
-from flightstack.contract import FloatArray, LoopRow, Vector3
+from flightstack.contract import (
+    ATTITUDE_TARGET_SIZE,
+    SETPOINT_SIZE,
+    STATE_SIZE,
+    FloatArray,
+    LoopRow,
+    Vector3,
+)
 from flightstack.geodesy import GeoPoint
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.logging.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
@@ -35,7 +43,12 @@ class FlightRecorder:
         self._origin = home
         self._home = (home, Vector3(0.0, 0.0, 0.0))
         self._log: FlightLog | None = None
-        self._scratch = np.zeros(LoopRow.SIZE)
+        scratch = np.zeros(LoopRow.SIZE)
+        self._no_row: Callable[[int], FloatArray] = lambda _: scratch
+        self.inner_row: Callable[[int], FloatArray] = self._no_row
+        """Return the row that the inner loop fills in this tick, given its time; that of no log while none is open."""
+        no_target = np.zeros(ATTITUDE_TARGET_SIZE)  # compile now, or load from the cache
+        store_outer_row(np.zeros(OUTER.size), np.zeros(STATE_SIZE), np.zeros(SETPOINT_SIZE), no_target, 0)
         self._mission = (MissionProgress(0, -1, False, False), 0)
         self._missions = 0
         self.error: OSError | None = None
@@ -44,10 +57,6 @@ class FlightRecorder:
     def is_logging(self) -> bool:
         """Whether a log is being written."""
         return self._log is not None
-
-    def inner_row(self, time_us: int) -> FloatArray:
-        """Return the row that the inner loop fills in this tick."""
-        return self._scratch if self._log is None else self._log.inner.append(time_us)
 
     def take_back_row(self) -> None:
         """Forget the newest row of ``inner_row``: the loops failed before they filled it."""
@@ -66,10 +75,7 @@ class FlightRecorder:
         if self._log is None:
             return
         row = self._log.outer.append(time_us)
-        row[OUTER.state : OUTER.setpoint] = state
-        row[OUTER.setpoint : OUTER.target_attitude] = setpoint
-        row[OUTER.target_attitude : OUTER.loop_flags] = attitude_target
-        row[OUTER.loop_flags] = loop_flags
+        store_outer_row(row, state, setpoint, attitude_target, loop_flags)
 
     def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
         """Record mode and arming, and whether a failsafe acts; arming begins a log, disarming ends it."""
@@ -93,6 +99,7 @@ class FlightRecorder:
         self._log = self._open_log()
         if self._log is None:
             return
+        self.inner_row = self._log.inner.append
         self._log.start(time_us, self._info, self._parameters(), self._origin)
         self._write_home(time_us)
         self.landed(time_us, True)
@@ -157,3 +164,4 @@ class FlightRecorder:
             self._log.close()
             self.error = self.error or self._log.error
             self._log = None
+            self.inner_row = self._no_row

@@ -59,6 +59,9 @@ class Freshness(NamedTuple):
     )
 
 
+NEW_STATE = Freshness(0, 0)
+
+
 class SimulatorLink:
     """Takes the simulator's bytes, keeps the newest state, and makes the answer to it.
 
@@ -215,6 +218,7 @@ class SimulatorLink:
             if content != self._seen:
                 self._seen = content
                 self._changed_us = now_us
+                return NEW_STATE
         frozen_us = (
             0 if self._speaks_hil else now_us - self._changed_us
         )  # its coarse numbers may well stay the same

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightstack.assembly import build
-from flightstack.autopilot import NOTICE
 from flightstack.config import StackConfig
 from flightstack.ground.hub import MAX_PEERS
 from flightstack.ground.peer import GROUND, PeerAddress
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.modes import Mode
+from flightstack.snapshot import NOTICE
 
 ALICE, BOB = PeerAddress(GROUND, "alice", 1), PeerAddress("api", "bob", 2)
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3

@@ -1,0 +1,91 @@
+"""The detectors of a flight, with all that they remember. No I/O, no clock."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flightstack.commander.detectors import (
+    BEYOND_ATTITUDE,
+    BEYOND_POSITION,
+    DETECTOR_MEMORY_SIZE,
+    MOVING,
+    NOT_FINITE,
+    ROTOR_FAULT,
+    ROTOR_MEMORY_SIZE,
+    detect,
+    detector_params,
+    follow_rotors,
+    rotor_params,
+)
+from flightstack.commander.failsafe import Failsafe
+from flightstack.contract import SETPOINT_SIZE, FloatArray
+from flightstack.params.behaviour import Behaviour
+from flightstack.params.vehicle import Vehicle
+
+FAULTS = (
+    (NOT_FINITE, Failsafe.NOT_FINITE),
+    (BEYOND_ATTITUDE, Failsafe.ATTITUDE),
+    (BEYOND_POSITION, Failsafe.POSITION_ERROR),
+    (ROTOR_FAULT, Failsafe.ROTOR),
+)
+
+
+class FaultWatch:
+    """Looks at each row of the loops, and at state and setpoint once per outer tick."""
+
+    def __init__(
+        self, vehicle: Vehicle, behaviour: Behaviour, outer_hz: float, divisor: int, state: FloatArray
+    ) -> None:
+        """Watch ``state`` (13,), which is written in place; ``divisor`` inner ticks make an outer one."""
+        self._vehicle = vehicle
+        self._state = state
+        self._dt_s = 1.0 / outer_hz
+        self._detector = np.zeros(DETECTOR_MEMORY_SIZE)
+        self._rotors = np.zeros(ROTOR_MEMORY_SIZE)
+        self._nowhere = np.zeros(SETPOINT_SIZE)
+        self._rotor_params = rotor_params(vehicle, self._dt_s / divisor)
+        self.found = 0
+        """Bits of ``detectors.detect``, of the newest look."""
+        self.set_behaviour(behaviour)
+
+    def set_behaviour(self, behaviour: Behaviour) -> None:
+        """Take new limits, from the next look on."""
+        self._params = detector_params(behaviour, self._vehicle)
+
+    def warm_up(self, row: FloatArray) -> None:
+        """Compile the detectors, or load them from the cache."""
+        self.look(self._nowhere, row, True)
+        self.follow_rotors(row)
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what was seen before: a flight begins."""
+        self._detector[:] = 0.0
+        self._rotors[:] = 0.0
+        self.found = 0
+
+    def follow_rotors(self, row: FloatArray) -> None:
+        """Take the newest row of the inner loop, shape (48,), once per inner tick."""
+        follow_rotors(row, self._rotors, self._rotor_params)
+
+    def look(self, setpoint: FloatArray, row: FloatArray, position_is_controlled: bool) -> int:
+        """Advance by one outer tick; return the bits found.
+
+        ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop. Nobody can be far from a
+        place that nobody flies to: on the ground, or while a stream gives attitudes.
+        """
+        if not position_is_controlled:
+            self._nowhere[:3] = self._state[:3]
+            setpoint = self._nowhere
+        found = detect(self._state, setpoint, row, self._rotors, self._detector, self._params, self._dt_s)
+        self.found = found
+        return found
+
+    @property
+    def moves(self) -> bool:
+        """Whether the state's own speeds say that it must change."""
+        return self.found & MOVING != 0
+
+    def failsafes(self) -> set[Failsafe]:
+        """Return the failsafes of what was found."""
+        return {failsafe for bit, failsafe in FAULTS if self.found & bit}

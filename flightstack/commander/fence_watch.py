@@ -1,0 +1,61 @@
+"""The geofence of a flight: its areas, the limits of the parameters around home, and a breach that a user overrode."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack.contract import FloatArray
+from flightstack.guidance.fence import NO_FENCE, Fence, FenceMonitor
+from flightstack.params.behaviour import Behaviour
+
+BREACH_GROWS_M = 5.0
+"""So much farther out, a fence that a user has overridden acts again."""
+
+
+class FenceWatch(FenceMonitor):
+    """A monitor that is set up anew whenever areas, parameters or home change."""
+
+    def __init__(self, behaviour: Behaviour) -> None:
+        super().__init__()
+        self._fence_areas = NO_FENCE
+        self._behaviour = behaviour
+        self._home_ned_m = (0.0, 0.0, 0.0)
+        self._overridden_margin_m = math.inf
+        self._set_up()
+
+    def warm_up(self, state: FloatArray) -> None:
+        """Compile the fence's step, or load it from the cache."""
+        probe = FenceMonitor()
+        probe.configure(NO_FENCE, max_altitude_m=1.0)
+        probe.step(state)
+
+    def set_behaviour(self, behaviour: Behaviour) -> None:
+        """Take new parameters."""
+        self._behaviour = behaviour
+        self._set_up()
+
+    def set_fence(self, fence: Fence) -> None:
+        """Take the areas of a geofence that was checked; ``NO_FENCE`` for none."""
+        self._fence_areas = fence
+        self._set_up()
+
+    def set_home(self, home_ned_m: tuple[float, float, float]) -> None:
+        """Measure distance and altitude from another home."""
+        self._home_ned_m = home_ned_m
+        self._set_up()
+
+    def _set_up(self) -> None:
+        b = self._behaviour
+        brakes = (b.acceleration_m_s2, b.vertical_acceleration_m_s2) if b.fence_predicts else None
+        self.configure(
+            self._fence_areas, b.fence_max_distance_m, b.fence_max_altitude_m, self._home_ned_m, brakes
+        )
+
+    def note_override(self) -> None:
+        """A user flies on outside the fence: remember how far out that was."""
+        self._overridden_margin_m = self.margin_m
+
+    @property
+    def breach_grows(self) -> bool:
+        """Whether the vehicle is so much farther out than when a user overrode the fence that it acts again."""
+        return self.margin_m < self._overridden_margin_m - BREACH_GROWS_M
