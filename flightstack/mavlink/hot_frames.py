@@ -24,7 +24,6 @@ _ALIGNMENT = 6  # the payload starts at 16 in the buffer
 _TIME = struct.Struct("<Q")
 _HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, incompat, compat, seq, system, component, id (24 bits)
 _CRC = struct.Struct("<H")
-_FIXED = struct.Struct("<3s4x3s")  # what is the same in all frames of one message: see _HEADER
 _crc16 = crc16.mcrf4xx
 
 VALID_FLAG = 1
@@ -50,8 +49,14 @@ class _HotFrame:
             self.frame, 0, 0xFD, self.payload_size, 0, 0, 0, system_id, component_id,
             layout.message_id & 0xFFFF, layout.message_id >> 16,
         )  # fmt: skip
-        self._fixed = _FIXED.unpack_from(self.frame)
+        # what is the same in all frames of one message (see _HEADER), time, flags, checksum
+        self._unpack = struct.Struct(f"<3s4x3sQ{self.payload_size - 9}xBH").unpack_from
+        self._magic, self._message = bytes(self.frame[:3]), bytes(self.frame[7:HEADER_SIZE])
         self._seq = 0
+        self.time_us = 0
+        """Time of the message held."""
+        self.flags = VALID_FLAG
+        """Flags of the message held."""
         self._crc_at = HEADER_SIZE + self.payload_size
         self._checked = self.frame[1 : self._crc_at + 1]
         self._flags_at = self._crc_at - 1
@@ -60,23 +65,14 @@ class _HotFrame:
     def _doubles(self, offset: int, count: int) -> FloatArray:
         return np.frombuffer(self._buffer, "<f8", count, _ALIGNMENT + HEADER_SIZE + offset)
 
-    @property
-    def time_us(self) -> int:
-        """Time of the message held."""
-        return int(_TIME.unpack_from(self.frame, HEADER_SIZE)[0])
-
-    @property
-    def flags(self) -> int:
-        """Flags of the message held."""
-        return self.frame[self._flags_at]
-
     def seal(self, time_us: int, flags: int) -> memoryview:
         """Complete the frame around the payload in place and return its bytes, valid until the next call."""
         frame = self.frame
+        self.time_us, self.flags = time_us, flags | VALID_FLAG
         frame[4] = self._seq
         self._seq = (self._seq + 1) & 255
         _TIME.pack_into(frame, HEADER_SIZE, time_us)
-        frame[self._flags_at] = flags | VALID_FLAG
+        frame[self._flags_at] = self.flags
         frame[self._crc_at] = self._extra  # the checksum covers one byte more, which is not sent
         _CRC.pack_into(frame, self._crc_at, _crc16(self._checked))
         return frame
@@ -86,12 +82,15 @@ class _HotFrame:
 
         Signed or truncated frames are legal MAVLink too: those take the general codec's way.
         """
-        if len(data) != self.size or _FIXED.unpack_from(data) != self._fixed:
+        if len(data) != self.size:
             return False
-        crc = _crc16(self._extra_byte, _crc16(data[1 : self._crc_at]))
-        if _CRC.unpack_from(data, self._crc_at)[0] != crc:
+        magic, message, time_us, flags, crc = self._unpack(data)
+        if magic != self._magic or message != self._message:
+            return False
+        if crc != _crc16(self._extra_byte, _crc16(data[1 : self._crc_at])):
             return False
         self.frame[:] = data
+        self.time_us, self.flags = time_us, flags
         return True
 
 
