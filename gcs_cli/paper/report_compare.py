@@ -77,7 +77,7 @@ def xy_figures(recordings: Recordings) -> Iterator[str]:
         _xy(recordings, OTHERS, trajectory, cases.PLAIN) for trajectory in (cases.SMOOTH, cases.HARD)
     )
     if others:
-        note = "The same flights as above, on the left and below: what better gains do, and what the poles alone do."
+        note = "Small-angle plant. What our gains do in the PID, and what backstepping's poles do without backstepping."
         title = "Beside figure 14: other gains in the same laws"
         legend = legend_of(OTHERS, "desired")
         yield anchored("fig-14-others", section(title, f'<div class="pair">{others}</div>', legend, note))

@@ -64,7 +64,10 @@ def sentences(results: Results) -> Iterator[str]:
     yield from _of_plants(results)
     yield from _of_linear(results)
     yield from _of_pil(results)
-    for part, why in results["left_out"].items():
+    left_out = dict(results["left_out"])
+    if results["pil"] and results["pil"]["why_left_out"]:
+        left_out["pil"] = results["pil"]["why_left_out"]
+    for part, why in left_out.items():
         yield f'<span class="bad">Left out: {escape(_PARTS.get(part, part))}</span>: {escape(why)}'
 
 

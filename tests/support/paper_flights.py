@@ -1,0 +1,129 @@
+"""A small run of the paper's experiments for tests of its report: real flights at low rates, the rest made by hand."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from gcs_cli.paper import cases
+from gcs_cli.paper.closed_loop import fly
+from gcs_cli.paper.experiments import Flown, entry_of
+from gcs_cli.paper.results import results_of
+from gcs_cli.paper.types import Case
+
+INNER_HZ, OUTER_HZ = 250, 125
+CONTENDERS = [one for one in cases.CONTENDERS if one.name in (cases.PID, cases.BACKSTEPPING, cases.POLES)]
+SIMPLE = [one for one in cases.CONDITIONS if one.name in (cases.PLAIN, cases.IDEAL)]
+
+
+@cache
+def small_flights() -> Flown:
+    """Fly three contenders along each trajectory, at rates that make it quick: these are no figures of the paper."""
+    chosen = cases.matrix((cases.DESIRED,), (cases.SMALL_ANGLE, cases.RIGID), CONTENDERS, SIMPLE[:1])
+    chosen += cases.matrix((cases.SMOOTH, cases.HARD), (cases.SMALL_ANGLE,), CONTENDERS, SIMPLE)
+    chosen += cases.matrix(cases.STEPS, (cases.SMALL_ANGLE,), CONTENDERS, SIMPLE[:1])
+    recordings = {case.key: fly(_quick(case)) for case in chosen}
+    return Flown({key: entry_of(one) for key, one in recordings.items()}, recordings)
+
+
+def _quick(case: Case) -> Case:
+    return case._replace(inner_hz=INNER_HZ, outer_hz=OUTER_HZ)
+
+
+def small_results() -> dict[str, Any]:
+    """Return the content of results.json of these flights; the caller may change it."""
+    return results_of(small_flights(), {})
+
+
+def linear_part() -> dict[str, Any]:
+    """Return a linear analysis of one loop, as it stands in results.json."""
+    law = {"kp": 100.0, "ki": 0.0, "kd": 16.0, "rate_feedforward": 1.0, "acceleration_feedforward": 0.0}
+    margin = {
+        "gain_db": 12.34,
+        "reduction_db": None,
+        "phase_deg": 56.7,
+        "crossover_rad_s": 1.0,
+        "delay_s": 0.1,
+    }
+    axis = {
+        "gains": law,
+        "natural_rad_s": 10.0,
+        "damping": 0.8,
+        "poles": [[-8.0, -6.0], [-8.0, 6.0]],
+        "sampled": [
+            {
+                "actuators": "ideal rotors, one step of delay",
+                "margins": {"250": None, "1000": margin},
+                "lowest_stable_hz": 123.4,
+            }
+        ],
+    }
+    axes = dict.fromkeys(("roll", "pitch", "yaw", "x", "y", "z"), axis)
+    return {"loops": [{"controller": "pid", "gains": "paper", "axes": axes}]}
+
+
+def onset_part() -> list[dict[str, Any]]:
+    """Return two onsets, one of them at no rate."""
+    found = {
+        "controller": "pid",
+        "gains": "paper",
+        "setting": "ideal rotors, one step of delay",
+        "axis": "roll",
+    }
+    return [
+        {**found, "simulated_hz": 203.25, "predicted_hz": 203.0, "difference_percent": 0.123},
+        {**found, "axis": "yaw", "simulated_hz": None, "predicted_hz": None, "difference_percent": None},
+    ]
+
+
+def pil_part() -> dict[str, Any]:
+    """Return the comparison of a flight on the emulated target, as it stands in results.json."""
+    stage = {
+        "count": 100,
+        "min": 891.0,
+        "mean": 980.25,
+        "p99": 1254.0,
+        "max": 2485.0,
+        "histogram": {"edges": [890.5, 1690.5, 2490.5], "counts": [99, 1]},
+    }
+    row = {
+        "signal": "position",
+        "stage": "trajectory",
+        "unit": "m",
+        "samples": 9,
+        "at_s": 1.5,
+        "full_scale": 3.0,
+    }
+    apart = {"largest": 4.77e-7, "rms": 1e-7, "ulps": 2.0, "rms_ulps": 0.4, "float32_steps": 2}
+    same = {"largest": 0.0, "rms": 0.0, "ulps": 0.0, "rms_ulps": 0.0, "float32_steps": 0}
+    check = {
+        "name": "SIL–PIL wrench",
+        "passed": True,
+        "limit": 0.0,
+        "measured": 0.0,
+        "margin": None,
+        "unit": "ulp",
+    }
+    of = {
+        "verdict": "passed",
+        "checks": [{**check, "about": "same bits"}],
+        "differences": [{**row, **apart, "pair": "MIL–PIL"}, {**row, **same, "pair": "SIL–PIL"}],
+        "compared": "Every step.",
+        "profile": {"unit": "instructions", "about": "They are no time.", "stages": {"whole": stage}},
+        "target": {
+            "board": "emulated Cortex-M4F", "compiler": "zig", "source_hash": "d61c", "clock_hz": 0, "char_bits": 8,
+        },
+        "stack": {"size": 16384, "high_water": 872},
+        "flights": {},
+    }  # fmt: skip
+    return {
+        "target": "emulated",
+        "why_left_out": None,
+        "meaning": "It stands for no board.",
+        "mission": "takeoff and landing",
+        "gains": "paper",
+        "plant": "paper",
+        "inner_hz": 1000.0,
+        "outer_hz": 250.0,
+        "controllers": {"pid": of, "backstepping": of},
+    }
