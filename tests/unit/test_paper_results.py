@@ -1,0 +1,245 @@
+"""The matrix of experiments, tables, verdicts, and results.json: the same from one process and from two."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from gcs_cli.errors import CliError
+from gcs_cli.paper import comparisons, linear, pil_section, plants, run
+from gcs_cli.paper.cases import (
+    BACKSTEPPING,
+    CONDITIONS,
+    CONTENDERS,
+    MULTIBODY,
+    PID,
+    POLES,
+    RIGID,
+    SMALL_ANGLE,
+    all_cases,
+    key,
+    matrix,
+)
+from gcs_cli.paper.closed_loop import fly
+from gcs_cli.paper.corrections import CORRECTIONS
+from gcs_cli.paper.experiments import entry_of, run_cases, thinned
+from gcs_cli.paper.results import results_of, text_of
+from gcs_cli.paper.run import HTML_NAME, JSON_NAME, PaperOptions
+from gcs_cli.paper.tables import table_1, table_2, table_3
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+FEW = [
+    *matrix(("step_roll", "step_x"), (SMALL_ANGLE,), CONTENDERS[:2], CONDITIONS[:2]),
+    *matrix(("step_roll",), (RIGID,), CONTENDERS[:2], CONDITIONS[:1]),
+]
+
+
+def test_keys_are_distinct_and_every_combination_is_there() -> None:
+    cases = all_cases(True)
+    assert len({case.key for case in cases}) == len(cases)
+    assert len(set(cases)) == len(cases)
+    by_key = {case.key: case for case in cases}
+    for contender in CONTENDERS:
+        for condition in CONDITIONS:
+            for trajectory in ("desired", "smooth", "hard"):
+                for plant in (SMALL_ANGLE, RIGID):
+                    case = by_key[key(contender.name, trajectory, condition.name, plant)]
+                    assert (case.controller, case.gains) == (contender.controller, contender.gains)
+                    assert all(getattr(case, name) == value for name, value in condition.changes.items())
+        assert key(contender.name, "desired", plant=MULTIBODY) in by_key
+    assert {case.plant for case in all_cases(False)} == {SMALL_ANGLE, RIGID}
+
+
+def test_tables_show_what_is_printed_and_what_flies() -> None:
+    one, two, three = table_1(), table_2(), table_3()
+    assert [entry.symbol for entry in one if entry.corrected] == []
+    assert [entry.symbol for entry in two if entry.corrected] == ["Kd_z"]
+    assert [entry.symbol for entry in three if entry.corrected] == []
+    assert {entry.symbol: entry.used for entry in three}["c2"] == 285.74
+    assert {entry.symbol: entry.printed for entry in one}["τ"] is None
+
+
+@pytest.mark.parametrize("correction", CORRECTIONS, ids=lambda correction: correction.where)
+def test_corrections_name_files_that_are_there(correction: Any) -> None:
+    assert (REPOSITORY / correction.place).exists() or correction.place == "docs/paper.md"
+
+
+# ---------------------------------------------------------------- results.json
+
+
+def test_one_process_and_two_give_the_same_results() -> None:
+    alone, together = run_cases(FEW, 1), run_cases(FEW, 2)
+    assert text_of(results_of(alone, {})) == text_of(results_of(together, {}))
+    assert list(alone.recordings) == list(together.recordings)
+    for name, recording in alone.recordings.items():
+        assert recording.position_ned_m.tobytes() == together.recordings[name].position_ned_m.tobytes()
+
+
+def test_results_are_json_with_floats_in_full() -> None:
+    flown = run_cases(FEW[:2], 1)
+    results = json.loads(text_of(results_of(flown, {"pil": "not wanted"})))
+    entry = results["cases"][FEW[0].key]
+    assert entry == json.loads(json.dumps(entry_of(fly(FEW[0]))))
+    assert entry["metrics"]["roll"]["rms_error"] == entry_of(fly(FEW[0]))["metrics"]["roll"]["rms_error"]
+    assert results["left_out"] == {"pil": "not wanted"}
+    assert results["trajectories"]["step_roll"]["moves"][0]["by"] == math.radians(5.0)
+
+
+def test_a_thinned_recording_has_every_so_many_rows() -> None:
+    full = fly(FEW[0])
+    thin = thinned(full, 7)
+    assert (thin.euler_rad == full.euler_rad[::7]).all()
+    assert (thin.case, thin.ended_s, thin.ended_why) == (full.case, full.ended_s, full.ended_why)
+
+
+# ---------------------------------------------------------------- verdicts
+
+
+def case_entry(
+    overshoot: float, rms_m: float = 0.1, ended: bool = False, steady_m: float = 0.0
+) -> dict[str, Any]:
+    axis = {"overshoot_percent": overshoot, "steady_state_error": steady_m}
+    path = dict.fromkeys(("max_error_m", "path_rms_m", "path_max_m", "beyond_m"), 0.1)
+    return {
+        "ended": {"time_s": 1.0, "why": "turned over"} if ended else None,
+        "path": {"rms_error_m": rms_m, **path},
+        "metrics": {"x": axis, "y": {**axis, "steady_state_error": 0.0}},
+    }
+
+
+def cases_with(**changed: dict[str, Any]) -> dict[str, Any]:
+    """All cases of the comparison on the small-angle plant, alike but for those of the given contenders."""
+    return {
+        case.key: changed.get(case.key.split("/")[0], case_entry(20.0))
+        for case in matrix(("smooth", "hard"), (SMALL_ANGLE,))
+    }
+
+
+def verdicts(cases: dict[str, Any]) -> dict[str, bool]:
+    return {claim["name"]: claim["holds"] for claim in comparisons.claims(cases)}
+
+
+def test_verdicts_follow_the_figures() -> None:
+    alike = verdicts(cases_with())
+    assert alike == {
+        "similar": True, "overshoot": False, "limits": False, "method": False, "torque": False, "stable": True,
+    }  # fmt: skip
+    assert verdicts(cases_with(backstepping=case_entry(18.9)))["overshoot"]
+    assert not verdicts(cases_with(backstepping=case_entry(19.1)))["overshoot"]
+    assert verdicts(cases_with(backstepping=case_entry(19.4)))["method"]
+    assert not verdicts(cases_with(backstepping=case_entry(20.0, rms_m=0.089)))["similar"]
+    assert not verdicts(cases_with(pid=case_entry(20.0, rms_m=0.089)))["similar"]
+    assert verdicts(cases_with(pid=case_entry(20.0, steady_m=-0.01)))["torque"]
+
+
+def test_a_crash_is_told_and_decides_nothing_in_its_favour() -> None:
+    claims = {
+        claim["name"]: claim
+        for claim in comparisons.claims(cases_with(backstepping=case_entry(1.0, ended=True)))
+    }
+    assert not any(claim["holds"] for claim in claims.values())
+    assert (
+        claims["overshoot"]["words"] == "backstepping crashed on the small-angle plant: nothing to compare."
+    )
+    assert "nowhere" in claims["stable"]["words"]
+
+
+def test_advantage_with_limits_alone_is_the_limits() -> None:
+    cases = cases_with(backstepping=case_entry(15.0))
+    cases[key(BACKSTEPPING, "hard", "ideal")] = case_entry(19.5)
+    assert verdicts(cases)["limits"]
+
+
+def test_a_table_without_flights_is_empty() -> None:
+    assert comparisons.claims({}) == []
+    assert comparisons.xy({}) == {}
+
+
+def test_the_table_in_xy_has_none_for_a_crash() -> None:
+    table = comparisons.xy(cases_with(poles=case_entry(20.0, ended=True)))["hard"][SMALL_ANGLE]["plain"]
+    assert table[POLES] is None
+    assert table[PID]["overshoot_percent"] == 20.0
+
+
+# ---------------------------------------------------------------- plants
+
+
+def test_the_difference_of_plants_is_the_largest_anywhere() -> None:
+    one = fly(FEW[0])
+    moved = one.position_ned_m.copy()
+    moved[1000] += [0.003, 0.004, 0.0]
+    turned = one.euler_rad.copy()
+    turned[2000, 1] -= math.radians(0.4)
+    found = plants.difference(one, one._replace(position_ned_m=moved, euler_rad=turned))
+    assert found["max_position_m"] == pytest.approx(0.005)
+    assert found["max_attitude_deg"] == pytest.approx(0.4)
+    assert plants.difference(one, one)["max_position_m"] == 0.0
+
+
+def test_the_bound_holds_the_multibody_plant() -> None:
+    one = fly(FEW[0])
+    names = [key(PID, "desired", plant=plant) for plant in (RIGID, MULTIBODY)]
+    for away_m, within in ((0.009, True), (0.011, False)):
+        other = one._replace(position_ned_m=one.position_ned_m + np.array([away_m, 0.0, 0.0]))
+        found = plants.comparisons(dict(zip(names, (one, other), strict=True)))
+        assert found["rigid_multibody"][PID]["within_bounds"] is within
+
+
+# ---------------------------------------------------------------- the command
+
+
+@pytest.fixture
+def quick_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The analysis is tested elsewhere, and takes long."""
+    monkeypatch.setattr(linear, "results", dict)
+    monkeypatch.setattr(linear, "onset", dict)
+
+
+def silent() -> Console:
+    return Console(file=io.StringIO())
+
+
+@pytest.mark.usefixtures("quick_parts")
+def test_the_same_command_twice_gives_the_same_files(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        run.run(PaperOptions(tmp_path / name, pil=False, multibody=False, jobs=1), silent(), FEW)
+    for name in (JSON_NAME, HTML_NAME):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    results = json.loads((tmp_path / "one" / JSON_NAME).read_text(encoding="utf-8"))
+    assert results["left_out"] == {"pil": run.NOT_WANTED, MULTIBODY: run.NOT_WANTED}
+    assert list(results["cases"]) == [case.key for case in FEW]
+
+
+@pytest.mark.usefixtures("quick_parts")
+def test_an_interrupt_keeps_the_parts_that_were_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> dict[str, Any]:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pil_section, "run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run.run(PaperOptions(tmp_path, multibody=False, jobs=1), silent(), FEW[:1])
+    results = json.loads((tmp_path / JSON_NAME).read_text(encoding="utf-8"))
+    assert list(results["cases"]) == [FEW[0].key]
+    assert results["left_out"]["pil"] == run.NOT_REACHED
+    assert "linear" not in results["left_out"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted((JSON_NAME, HTML_NAME))
+
+
+def test_a_directory_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(CliError, match="the directory cannot be made: Not a directory"):
+        run.run(PaperOptions(file / "paper"), silent(), [])
+
+
+def test_a_target_that_is_not_there_is_told_before_anything_flies(tmp_path: Path) -> None:
+    with pytest.raises(CliError, match="/dev/nobody"):
+        run.run(PaperOptions(tmp_path, target="serial:/dev/nobody"), silent(), FEW)
+    assert list(tmp_path.iterdir()) == []
