@@ -6,10 +6,11 @@ processes, and come in the order of the cases.
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from typing import Any, NamedTuple
 
@@ -111,11 +112,12 @@ def _in_processes(
     cases: Sequence[Case], jobs: int, tell: Callable[[int, int], None]
 ) -> dict[str, tuple[dict[str, Any], Recording | None]]:
     found: dict[str, tuple[dict[str, Any], Recording | None]] = {}
-    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _leave_interrupts_to_the_parent)
+    pool = ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"))
     try:
-        waiting: dict[Future[tuple[dict[str, Any], Recording | None]], str] = {
-            pool.submit(experiment, case): case.key for case in cases
-        }
+        with _interrupts_ignored():
+            waiting: dict[Future[tuple[dict[str, Any], Recording | None]], str] = {
+                pool.submit(experiment, case): case.key for case in cases
+            }
         for future in as_completed(waiting):
             found[waiting[future]] = future.result()
             tell(len(found), len(cases))
@@ -124,5 +126,11 @@ def _in_processes(
     return found
 
 
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextlib.contextmanager
+def _interrupts_ignored() -> Iterator[None]:
+    """Ignore Ctrl-C while processes are started, which then ignore it for good: who started them ends them."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

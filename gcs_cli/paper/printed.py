@@ -23,7 +23,7 @@ def print_results(console: Console, results: dict[str, Any], folder: Path) -> No
         for name, found in contenders.items():
             lines.append(
                 f"{_PLANTS.get(pair, pair)}, {results['contenders'][name]['label']}: at most "
-                f"{1e3 * found['max_position_m']:.2f} mm and {found['max_attitude_deg']:.3f}° apart"
+                f"{1e3 * found['max_position_m']:.3g} mm and {found['max_attitude_deg']:.3g}° apart"
             )
     lines += [f"left out: {part}: {why}" for part, why in results["left_out"].items()]
     lines.append(f"results in {folder}")

@@ -36,7 +36,7 @@ def results_of(flown: Flown, left_out: Mapping[str, str]) -> dict[str, Any]:
         "comparisons": {"claims": comparisons.claims(flown.entries), "xy": comparisons.xy(flown.entries)},
         "plants": plants.comparisons(flown.recordings),
         "linear": {},
-        "onset": {},
+        "onset": [],
         "pil": {},
         "left_out": dict(left_out),
     }

@@ -7,7 +7,7 @@ Each part is written when it ends, whole or not at all: who interrupts the comma
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,10 +15,11 @@ from rich.console import Console
 
 from flightstack.atomic_file import write_text_atomically
 from gcs_cli.errors import FAILED, USAGE, CliError
-from gcs_cli.paper import linear, pil_section
+from gcs_cli.paper import linear, pil_section, report_pictures
 from gcs_cli.paper.cases import MULTIBODY, all_cases
 from gcs_cli.paper.experiments import Flown, default_jobs, run_cases
 from gcs_cli.paper.report import render
+from gcs_cli.paper.report_pictures import Picture
 from gcs_cli.paper.results import results_of, text_of
 from gcs_cli.paper.types import Case
 from gcs_cli.transfer_bar import step_bar
@@ -54,24 +55,33 @@ def run(options: PaperOptions, console: Console, cases: Sequence[Case] | None = 
         left_out[MULTIBODY] = NO_MUJOCO
     chosen = all_cases(MULTIBODY not in left_out) if cases is None else cases
     flown = _fly(chosen, options.jobs or default_jobs(), console)
-    reached = {**left_out, "linear": NOT_REACHED, "onset": NOT_REACHED}
-    if options.pil:
-        reached["pil"] = NOT_REACHED
-    results = results_of(flown, reached)
+    parts = {part: work for part, work in _parts(options).items() if part not in left_out}
+    results = results_of(flown, {**left_out, **dict.fromkeys(parts, NOT_REACHED)})
     _write(options.out, results, flown)
-    for part, words, work in (
-        ("linear", "linear analysis", linear.results),
-        ("onset", "onset of instability", linear.onset),
-        ("pil", "processor in the loop", lambda: pil_section.run(options.out, options.target)),
-    ):
-        if part in left_out:
-            continue
+    for part, (words, work) in parts.items():
         with console.status(words):
-            results[part] = work()
+            results[part] = found = work()
         del results["left_out"][part]
+        why = found.get("why_left_out") if isinstance(found, dict) else None
+        if why is not None:
+            results["left_out"][part] = why
         _write(options.out, results, flown)
-        console.print(f"{words}: done", markup=False, highlight=False)
+        console.print(f"{words}: {'done' if why is None else 'left out'}", markup=False, highlight=False)
+    if MULTIBODY not in left_out:
+        with console.status("pictures"):
+            pictures = report_pictures.take(flown.recordings)
+        _write(options.out, results, flown, pictures)
+        console.print("pictures: done", markup=False, highlight=False)
     return results
+
+
+def _parts(options: PaperOptions) -> dict[str, tuple[str, Callable[[], Any]]]:
+    """What follows the flights: a part's name in the results, what is said of it, and its work."""
+    return {
+        "linear": ("linear analysis", linear.results),
+        "onset": ("onset of instability", linear.onset),
+        "pil": ("processor in the loop", lambda: pil_section.run(options.out, options.target)),
+    }
 
 
 def _make_directory(out: Path) -> None:
@@ -90,9 +100,9 @@ def _fly(cases: Sequence[Case], jobs: int, console: Console) -> Flown:
     return flown
 
 
-def _write(folder: Path, results: dict[str, Any], flown: Flown) -> None:
+def _write(folder: Path, results: dict[str, Any], flown: Flown, pictures: Sequence[Picture] = ()) -> None:
     """Write results.json and report.html, each whole or not at all; raise CliError."""
-    html = render(results, flown.recordings)
+    html = render(results, flown.recordings, pictures)
     try:
         write_text_atomically(folder / JSON_NAME, text_of(results))
         write_text_atomically(folder / HTML_NAME, html)
