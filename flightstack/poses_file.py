@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import zipfile
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,15 @@ from flightstack.contract import MAX_ROTORS, FloatArray
 from flightstack.params.errors import ConfigError
 
 NO_POINTS: FloatArray = np.zeros((0, 3))
-_BAD_FILE = (ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError, TypeError)
+_BAD_FILE = (
+    ValueError,
+    KeyError,
+    EOFError,
+    zipfile.BadZipFile,
+    NotImplementedError,
+    TypeError,
+    AttributeError,
+)
 
 
 class Poses(NamedTuple):
@@ -43,14 +51,18 @@ class Poses(NamedTuple):
 def write_poses(path: Path, poses: Poses) -> None:
     """Write the file, whole or not at all; raise OSError."""
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **{name: np.asarray(value) for name, value in poses._asdict().items()})
+    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in poses._asdict().items()}
+    np.savez_compressed(buffer, **arrays)
     write_bytes_atomically(path, buffer.getvalue())
 
 
 def read_poses(path: Path) -> Poses:
     """Read the file; raise ConfigError with the reason when it cannot be read or holds no poses."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with (
+            path.open("rb") as raw,
+            np.load(raw, allow_pickle=False) as file,
+        ):  # NumPy leaves damaged ones open
             content = {name: file[name] for name in Poses._fields if name in file}
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror or error}") from error
@@ -59,7 +71,7 @@ def read_poses(path: Path) -> Poses:
     return _checked(path, content)
 
 
-def _checked(path: Path, content: dict[str, np.ndarray]) -> Poses:  # type: ignore[type-arg]
+def _checked(path: Path, content: dict[str, np.ndarray[Any, Any]]) -> Poses:
     def numbers(name: str, *columns: int, default: FloatArray | None = None) -> FloatArray:
         value = content.get(name, default)
         if value is None:

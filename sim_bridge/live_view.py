@@ -13,7 +13,7 @@ import struct
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from flightstack.contract import MAX_ROTORS, STATE_SIZE
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 SNAPSHOT = struct.Struct(f"<d{STATE_SIZE}d{MAX_ROTORS}f")
 """Time [s], array form of ``VehicleState``, rotor speeds [rad/s]; shorter than what a pipe takes whole."""
 READY = b"ready\n"
+_WINDOW = (sys.executable, "-m", "sim_bridge.multibody.live_window")
 _PERIOD_S = 1.0 / 60.0
 _PATIENCE_S = 5.0
 
@@ -32,10 +33,10 @@ _PATIENCE_S = 5.0
 class LiveView:
     """The window's process, which has said that it stands; raise UsageProblemError when it cannot."""
 
-    def __init__(self, vehicle: str) -> None:
-        """Open a window for a vehicle, by the name or the path of its file."""
+    def __init__(self, vehicle: str, window: Sequence[str] = _WINDOW) -> None:
+        """Open a window for a vehicle, by the name or the path of its file; ``window`` is the program that does it."""
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "sim_bridge.multibody.live_window", vehicle],
+            [*window, vehicle],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -63,7 +63,9 @@ def render(
     size: Annotated[
         str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 1280x720; 480x270 for a gif]")
     ] = None,
-    fps: Annotated[float | None, typer.Option(help="Frames per second.  [default: 30; 12.5 for a gif]")] = None,
+    fps: Annotated[
+        float | None, typer.Option(help="Frames per second.  [default: 30; 12.5 for a gif]")
+    ] = None,
     begin: Annotated[float | None, typer.Option("--from", help="Begin of the film, s.")] = None,
     end: Annotated[float | None, typer.Option("--to", help="End of the film, s.")] = None,
     speed: Annotated[float, typer.Option(help="Show it so many times as fast as it was flown.")] = 1.0,
@@ -94,12 +96,16 @@ def render(
         if view:
             from sim_bridge.multibody.viewer import play  # noqa: PLC0415
 
-            play(loaded, path, first, last, speed)
+            with contextlib.suppress(KeyboardInterrupt):  # one way of closing the window
+                play(loaded, path, first, last, speed)
         if png or sheet or video:
             _write(wish, loaded, path, first, last)
 
 
 def _write(wish: _Wish, vehicle: Vehicle, path: FlightPath, first: float, last: float) -> None:
+    from sim_bridge.multibody.offscreen import choose  # noqa: PLC0415
+
+    choose()
     from sim_bridge.multibody.pictures import SHEET_PICTURES, Look, Pictures, film_of, spread  # noqa: PLC0415
 
     times = [_within("--at", time_s, path) for time_s in wish.times_s]

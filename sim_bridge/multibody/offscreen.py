@@ -26,7 +26,7 @@ _MOST_DEVICES = 16
 
 def make_context(width: int, height: int) -> Any:
     """Return a current OpenGL context for pictures of this size; raise UsageProblemError without a renderer."""
-    module = _choose()
+    module = choose()
     try:
         context = import_module(module).GLContext(width, height)
         context.make_current()
@@ -35,8 +35,11 @@ def make_context(width: int, height: int) -> Any:
     return context
 
 
-def _choose() -> str:
-    """Return the module of MuJoCo that makes the context."""
+def choose() -> str:
+    """Return the module of MuJoCo that makes the context; raise UsageProblemError when none can.
+
+    To be asked before MuJoCo is imported, which itself trips over a bad MUJOCO_GL.
+    """
     asked = os.environ.get(_ASKED, "").lower().strip()
     if asked in _OFF:
         raise UsageProblemError(f"no off-screen renderer: {_ASKED}={asked} turns it off; unset it")
