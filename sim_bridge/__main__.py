@@ -14,6 +14,7 @@ from flightstack.contract import Vector3
 from flightstack.params.errors import ConfigError
 from sim_bridge import arguments
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
+from sim_bridge.export_command import export_mjcf
 from sim_bridge.live_view import LiveView
 from sim_bridge.render_command import render, require
 
@@ -189,6 +190,7 @@ def open_loop(
 
 
 app.command()(render)
+app.command()(export_mjcf)
 
 
 def _print(text: str) -> None:
