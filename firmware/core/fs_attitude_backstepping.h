@@ -5,6 +5,8 @@
 #include "fs_numbers.h"
 
 /* Torque [N m, FRD]: the law of each axis, with coupling and gyroscopic torque cancelled. It has no memory. */
-fs_vector3 fs_attitude_backstepping_step(const fs_attitude_inputs *inputs, const fs_backstepping_params *params);
+fs_vector3 fs_attitude_backstepping_step(const fs_vector3 *error_rad, const fs_vector3 *rates_frd_rad_s,
+                                         const fs_attitude_reference *reference, fs_real relative_rotor_speed_rad_s,
+                                         const fs_backstepping_params *params);
 
 #endif

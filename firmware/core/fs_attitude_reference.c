@@ -45,8 +45,9 @@ static fs_vector3 pull(const fs_reference_memory *memory, const fs_quaternion *a
     return clipped(&acceleration, params->max_acceleration_rad_s2);
 }
 
-void fs_attitude_reference_step(fs_reference_memory *memory, const fs_quaternion *target,
-                                const fs_reference_params *params, fs_real dt_s, fs_attitude_reference *reference)
+void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quaternion *target,
+                                const fs_reference_params *params, fs_real dt_s, fs_reference_memory *next,
+                                fs_attitude_reference *reference)
 {
     const fs_vector3 zero = {FS_LIT(0.0), FS_LIT(0.0), FS_LIT(0.0)};
     const fs_quaternion attitude = {memory->w, memory->x, memory->y, memory->z};
@@ -57,7 +58,7 @@ void fs_attitude_reference_step(fs_reference_memory *memory, const fs_quaternion
         reference->attitude = *target;
         reference->rates_frd_rad_s = zero;
         reference->acceleration_frd_rad_s2 = zero;
-        keep(memory, reference);
+        keep(next, reference);
         return;
     }
     acceleration = pull(memory, &attitude, target, params);
@@ -73,7 +74,7 @@ void fs_attitude_reference_step(fs_reference_memory *memory, const fs_quaternion
     reference->attitude = fs_normalised(&turned);
     reference->rates_frd_rad_s = rates;
     reference->acceleration_frd_rad_s2 = acceleration;
-    keep(memory, reference);
+    keep(next, reference);
 }
 
 fs_quaternion fs_in_body_frame(fs_attitude_reference *reference, const fs_quaternion *attitude)

@@ -4,9 +4,13 @@
 
 #include "fs_numbers.h"
 
-/* Advance the reference by dt_s towards the target; rates and acceleration come in the reference's own body frame. */
-void fs_attitude_reference_step(fs_reference_memory *memory, const fs_quaternion *target,
-                                const fs_reference_params *params, fs_real dt_s, fs_attitude_reference *reference);
+/*
+ * Advance the reference by dt_s towards the target; rates and acceleration come in the reference's own body frame.
+ * next may be memory itself.
+ */
+void fs_attitude_reference_step(const fs_reference_memory *memory, const fs_quaternion *target,
+                                const fs_reference_params *params, fs_real dt_s, fs_reference_memory *next,
+                                fs_attitude_reference *reference);
 
 /*
  * Turn the reference's rates and acceleration from its own body frame into that of a vehicle at this attitude;

@@ -22,50 +22,70 @@ static uint32_t now(fs_clock clock)
     return clock != NULL ? clock() : 0UL;
 }
 
-static fs_real add_vector(fs_real sum, const fs_vector3 *v)
+static fs_real vector_sum(const fs_vector3 *v)
 {
-    return fs_add_part(fs_add_part(fs_add_part(sum, v->x), v->y), v->z);
+    return v->x + v->y + v->z;
 }
 
-static fs_real add_quaternion(fs_real sum, const fs_quaternion *q)
+static fs_real quaternion_sum(const fs_quaternion *q)
 {
-    return fs_add_part(fs_add_part(fs_add_part(fs_add_part(sum, q->w), q->x), q->y), q->z);
+    return q->w + q->x + q->y + q->z;
 }
 
+static uint16_t vector_is_finite(const fs_vector3 *v)
+{
+    return fs_is_finite(fs_add_part(fs_add_part(fs_add_part(FS_LIT(0.0), v->x), v->y), v->z));
+}
+
+static uint16_t quaternion_is_finite(const fs_quaternion *q)
+{
+    const fs_real half = fs_add_part(fs_add_part(FS_LIT(0.0), q->w), q->x);
+
+    return fs_is_finite(fs_add_part(fs_add_part(half, q->y), q->z));
+}
+
+/*
+ * Whether all numbers are finite. A finite sum of them says yes at once, because nothing that is not finite can be
+ * made up for; one that is not finite may come of numbers that are only large, and is looked into.
+ */
 static uint16_t state_is_finite(const fs_vehicle_state *state)
 {
-    const fs_real place = add_vector(add_vector(FS_LIT(0.0), &state->position_ned_m), &state->velocity_ned_m_s);
+    const fs_real sum = vector_sum(&state->position_ned_m) + vector_sum(&state->velocity_ned_m_s) +
+                        quaternion_sum(&state->attitude) + vector_sum(&state->rates_frd_rad_s);
 
-    return fs_is_finite(add_vector(add_quaternion(place, &state->attitude), &state->rates_frd_rad_s));
+    if (fs_is_finite(sum)) {
+        return 1U;
+    }
+    return (vector_is_finite(&state->position_ned_m) && vector_is_finite(&state->velocity_ned_m_s) &&
+            quaternion_is_finite(&state->attitude) && vector_is_finite(&state->rates_frd_rad_s))
+               ? 1U
+               : 0U;
 }
 
 /* Finite, and a yaw that has a sine: a processor without NaN may make a number of what fs_sin_cos gives beyond. */
 static uint16_t setpoint_is_sound(const fs_position_setpoint *setpoint)
 {
-    fs_real sum = add_vector(FS_LIT(0.0), &setpoint->position_ned_m);
+    const fs_real sum = vector_sum(&setpoint->position_ned_m) + vector_sum(&setpoint->velocity_ned_m_s) +
+                        vector_sum(&setpoint->acceleration_ned_m_s2) + setpoint->yaw_rate_rad_s;
 
-    sum = add_vector(sum, &setpoint->velocity_ned_m_s);
-    sum = add_vector(sum, &setpoint->acceleration_ned_m_s2);
-    sum = fs_add_part(sum, setpoint->yaw_rate_rad_s);
-    return fs_is_finite(sum) && fs_abs(setpoint->yaw_rad) <= FS_LARGEST_ANGLE_RAD ? 1U : 0U;
+    if (!(fs_abs(setpoint->yaw_rad) <= FS_LARGEST_ANGLE_RAD)) {
+        return 0U;
+    }
+    if (fs_is_finite(sum)) {
+        return 1U;
+    }
+    return (vector_is_finite(&setpoint->position_ned_m) && vector_is_finite(&setpoint->velocity_ned_m_s) &&
+            vector_is_finite(&setpoint->acceleration_ned_m_s2) && fs_is_finite(setpoint->yaw_rate_rad_s))
+               ? 1U
+               : 0U;
 }
 
 static uint16_t target_is_finite(const fs_attitude_target *target)
 {
-    return fs_is_finite(fs_add_part(add_quaternion(FS_LIT(0.0), &target->attitude), target->thrust_n));
-}
-
-/* Whether the mixer's sums overflowed nowhere. */
-static uint16_t mix_is_finite(const fs_loop_output *output, uint16_t rotors)
-{
-    const fs_wrench *achieved = &output->wrench_achieved;
-    fs_real sum = add_vector(fs_add_part(FS_LIT(0.0), achieved->thrust_n), &achieved->torque_frd_n_m);
-    uint16_t i;
-
-    for (i = 0U; i < rotors; i++) {
-        sum = fs_add_part(sum, output->rotor_command_rad_s[i]);
+    if (fs_is_finite(quaternion_sum(&target->attitude) + target->thrust_n)) {
+        return 1U;
     }
-    return fs_is_finite(sum);
+    return (quaternion_is_finite(&target->attitude) && fs_is_finite(target->thrust_n)) ? 1U : 0U;
 }
 
 void fs_loops_init(fs_loops *loops)
@@ -160,55 +180,32 @@ static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *sta
     const fs_quaternion aim = fs_blend(&loops->last_target.attitude, &loops->target.attitude, loops->fraction);
     fs_attitude_reference *reference = &output->reference;
     fs_vector3 *torque = &output->wrench.torque_frd_n_m;
-    fs_attitude_inputs inputs;
+    const fs_vector3 *rates = &state->rates_frd_rad_s;
     fs_quaternion turn;
+    fs_vector3 error;
 
-    tick->reference = loops->reference_memory;
     tick->pid = loops->pid_memory;
-    fs_attitude_reference_step(&tick->reference, &aim, &loops->reference, loops->rates.inner_dt_s, reference);
+    fs_attitude_reference_step(&loops->reference_memory, &aim, &loops->reference, loops->rates.inner_dt_s,
+                               &tick->reference, reference);
     turn = fs_in_body_frame(reference, &state->attitude);
-    inputs.attitude = state->attitude;
-    inputs.rates_frd_rad_s = state->rates_frd_rad_s;
-    inputs.reference = *reference;
-    inputs.error_rad = fs_rotation_vector(&turn);
-    inputs.relative_rotor_speed_rad_s = FS_LIT(0.0); /* the PID law has no use for it */
-    inputs.saturation = loops->saturation.torque;
+    error = fs_rotation_vector(&turn);
     if (loops->rates.controller == FS_CONTROLLER_PID) {
-        *torque = fs_attitude_pid_step(&tick->pid, &inputs, &loops->pid, loops->rates.inner_dt_s);
+        *torque = fs_attitude_pid_step(&tick->pid, &error, rates, reference, &loops->saturation.torque, &loops->pid,
+                                       loops->rates.inner_dt_s);
     } else {
-        inputs.relative_rotor_speed_rad_s =
+        const fs_real relative =
             fs_relative_rotor_speed(loops->last.rotor_command_rad_s, &loops->mixer, loops->rates.rotors);
-        *torque = fs_attitude_backstepping_step(&inputs, &loops->backstepping);
+        *torque = fs_attitude_backstepping_step(&error, rates, reference, relative, &loops->backstepping);
     }
     output->wrench.thrust_n = loops->target.thrust_n;
-    return fs_is_finite(add_vector(FS_LIT(0.0), torque)); /* an unsound integral makes an unsound torque */
-}
-
-static uint16_t saturation_bits(const fs_saturation *saturation)
-{
-    uint16_t bits = 0U;
-
-    if (saturation->torque.x != FS_LIT(0.0)) {
-        bits |= FS_STATUS_ROLL_SATURATED;
-    }
-    if (saturation->torque.y != FS_LIT(0.0)) {
-        bits |= FS_STATUS_PITCH_SATURATED;
-    }
-    if (saturation->torque.z != FS_LIT(0.0)) {
-        bits |= FS_STATUS_YAW_SATURATED;
-    }
-    if (saturation->thrust != FS_LIT(0.0)) {
-        bits |= FS_STATUS_THRUST_SATURATED;
-    }
-    return bits;
+    return vector_is_finite(torque); /* an unsound integral makes an unsound torque */
 }
 
 /* Run inner loop and mixer; return 0 and keep the tick, or the status bit that tells why the output is not sound. */
 static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint16_t state_is_sound, fs_clock clock,
-                           fs_loop_output *output, fs_loop_cost *cost)
+                           uint32_t began, fs_loop_output *output, fs_loop_cost *cost)
 {
-    const uint32_t began = now(clock);
-    uint16_t is_sound, is_free;
+    uint16_t is_sound;
     uint32_t controlled;
     fs_tick tick;
 
@@ -223,15 +220,11 @@ static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint1
     if (!is_sound) {
         return FS_STATUS_OUTPUT_NOT_FINITE;
     }
-    is_free = fs_mix(&output->wrench, &loops->mixer, loops->rates.rotors, output->rotor_command_rad_s,
-                     &output->wrench_achieved, &tick.saturation);
+    output->status = fs_mix(&output->wrench, &loops->mixer, loops->rates.rotors, output->rotor_command_rad_s,
+                            &output->wrench_achieved, &tick.saturation);
     cost->mixer = now(clock) - controlled;
-    output->status = 0U;
-    if (is_free == 0U) {
-        if (!mix_is_finite(output, loops->rates.rotors)) {
-            return FS_STATUS_OUTPUT_NOT_FINITE;
-        }
-        output->status = saturation_bits(&tick.saturation);
+    if (output->status == FS_STATUS_OUTPUT_NOT_FINITE) {
+        return FS_STATUS_OUTPUT_NOT_FINITE;
     }
     output->attitude_target = loops->target;
     loops->reference_memory = tick.reference;
@@ -246,6 +239,7 @@ void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, 
 {
     const uint32_t began = now(clock);
     const uint16_t state_is_sound = state_is_finite(&input->state);
+    uint32_t inner_began;
     uint16_t unsound;
 
     if ((input->flags & FS_RESET) != 0U) {
@@ -257,14 +251,16 @@ void fs_loops_step(fs_loops *loops, const fs_loop_input *input, fs_clock clock, 
         loops->is_target_sound = target_is_finite(&loops->target);
     }
     cost->outer = 0UL;
+    inner_began = now(clock);
     if ((input->flags & FS_OUTER_DUE) != 0U) {
-        const uint32_t outer_began = now(clock);
+        const uint32_t outer_began = inner_began;
         begin_outer_period(loops);
         outer_loop(loops, input, state_is_sound);
-        cost->outer = now(clock) - outer_began;
+        inner_began = now(clock);
+        cost->outer = inner_began - outer_began;
     }
     loops->fraction += loops->rates.fraction_step;
-    unsound = inner_loop(loops, &input->state, state_is_sound, clock, output, cost);
+    unsound = inner_loop(loops, &input->state, state_is_sound, clock, inner_began, output, cost);
     if (unsound != 0U) {
         *output = loops->last;
         output->attitude_target = loops->target;

@@ -4,6 +4,16 @@
 
 #include "fs_types.h"
 
+#define FS_LEAST_ROTORS 4U
+
+/* What the mixer needs of one rotor in each tick, side by side: its row of allocation, and its limits. */
+typedef struct {
+    fs_real share[4];
+    fs_real low, high;
+    fs_real middle; /* between low and high */
+    fs_real reach;  /* from there to either, less some rounding */
+} fs_rotor;
+
 /*
  * Rotor geometry in the form that the mixer computes with.
  *
@@ -18,14 +28,14 @@ typedef struct {
     fs_real high[FS_MAX_ROTORS];
     fs_real spin[FS_MAX_ROTORS];
     /* what follows from these, by fs_mixer_derive */
-    fs_real middle[FS_MAX_ROTORS]; /* between low and high */
-    fs_real reach[FS_MAX_ROTORS];  /* from there to either, less some rounding */
+    fs_rotor rotor[FS_MAX_ROTORS];
     fs_real largest_effect[4];     /* of any rotor, for each row of effectiveness */
-    fs_real largest_sum;           /* of the rotors' squared speeds */
+    fs_real resolution[4];         /* [N, N m] difference in each row that tells a limit from rounding */
     uint16_t is_inverse;           /* 1: effectiveness undoes allocation but for rounding, and every rotor lifts */
+    uint16_t is_even;              /* 1: all rotors have the same limits and the same share of the thrust */
 } fs_mixer;
 
-/* Direction in which the mixer could not follow, for thrust and each torque: -1 it made more, +1 less than demanded. */
+/* What the mixer could not follow of thrust [N] and torque [N m]: negative where it made more than demanded. */
 typedef struct {
     fs_real thrust;
     fs_vector3 torque;
@@ -37,8 +47,8 @@ typedef struct {
  *
  * Torque about roll and pitch is served first (they keep the vehicle upright), then thrust, then yaw with what is
  * left. With ideal rotors a squared speed may be negative: the speed then carries the sign. Speeds beyond the
- * rotors become zero. Return 1 when no rotor came near a limit: then the wrench is made as it was demanded, the
- * saturation is zero, and finite.
+ * rotors, of which there are at least FS_LEAST_ROTORS, become zero. Return the FS_STATUS_* bits of the saturation, or
+ * FS_STATUS_OUTPUT_NOT_FINITE alone: then nothing of what was written is to be used.
  */
 uint16_t fs_mix(const fs_wrench *wrench, const fs_mixer *mixer, uint16_t rotors,
                 fs_real rotor_speed_rad_s[FS_MAX_ROTORS], fs_wrench *achieved, fs_saturation *saturation);

@@ -52,16 +52,6 @@ typedef struct {
     fs_real max_acceleration_rad_s2;
 } fs_reference_params;
 
-/* What an attitude controller sees in one tick. */
-typedef struct {
-    fs_quaternion attitude;
-    fs_vector3 rates_frd_rad_s;
-    fs_attitude_reference reference;
-    fs_vector3 error_rad;
-    fs_real relative_rotor_speed_rad_s;
-    fs_vector3 saturation;
-} fs_attitude_inputs;
-
 /* Integral of the attitude error [rad s]. */
 typedef struct {
     fs_real roll;

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from flightstack import contract
 from flightstack.control.attitude_backstepping import BacksteppingParams
-from flightstack.control.attitude_controller import AttitudeInputs
 from flightstack.control.attitude_pid import PidMemory, PidParams
 from flightstack.control.attitude_reference import ReferenceMemory, ReferenceParams
 from flightstack.control.position_pid import PositionMemory, PositionParams
@@ -42,7 +41,6 @@ LAW_TYPES = {
     PositionParams: "fs_position_params",
     ReferenceMemory: "fs_reference_memory",
     ReferenceParams: "fs_reference_params",
-    AttitudeInputs: "fs_attitude_inputs",
     PidMemory: "fs_pid_memory",
     PidParams: "fs_pid_params",
     BacksteppingParams: "fs_backstepping_params",

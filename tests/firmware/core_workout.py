@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flightstack.contract import LoopStatus
 from tests.firmware.core_samples import Samples, sequence
 from tests.firmware.core_support import OUTER_DUE, RESET, SET_TARGET, Core, Loops
 
@@ -70,6 +71,8 @@ def shaken(core: Core) -> dict[str, np.ndarray]:
             assert loops.set("FS_ALLOC_00", 0.0) == 0
         if name == "1 6":  # a rotor whose drag is not what the allocation takes it for
             assert loops.set("FS_EFF_30", 2.0 * loops.get("FS_EFF_30")) == 0
+        if name == "1 8":  # a rotor that is weaker than the others
+            assert loops.set("FS_HIGH_0", 0.9 * loops.get("FS_HIGH_0")) == 0
         rows, status = loops.run(*sequence(3000, 20 + number, 10.0))
         made |= {name: rows, f"{name} status": status}
     return made
@@ -112,6 +115,39 @@ def extreme(core: Core) -> dict[str, np.ndarray]:
         rows, status = loops.run(anything(STATE), anything(SETPOINT), anything(TARGET), flags)
         made |= {f"extreme {law}": rows, f"extreme {law} status": status}
     return made
+
+
+def spun(core: Core) -> dict[str, np.ndarray]:
+    """Yaw rates whose torque is a number while the rotors' squared speeds for it are none, between sound ticks."""
+    rates = np.finfo(core.dtype).max / 10.0 ** np.arange(2, 10)
+    count = 2 * rates.size + 1
+    state, setpoint, target = (np.zeros((count, width)) for width in (STATE, SETPOINT, TARGET))
+    state[:, 6] = target[:, 0] = 1.0
+    target[:, 4] = 5.0
+    state[1::2, 12] = rates
+    flags = np.array([RESET | SET_TARGET] + [0] * (count - 1))
+    made = {}
+    for name, drag in (("as allocated", 1.0), ("otherwise", 2.0)):
+        numbers = ring_numbers(4, ideal=False)
+        numbers["FS_EFF_30"] *= drag
+        rows, status = Loops(core, numbers).run(state, setpoint, target, flags)
+        assert status[1] == LoopStatus.OUTPUT_NOT_FINITE
+        assert not (status[::2] & LoopStatus.OUTPUT_NOT_FINITE).any()
+        made |= {f"spun {name}": rows, f"spun {name} status": status}
+    return made
+
+
+def large(core: Core) -> dict[str, np.ndarray]:
+    """Numbers that are finite while their sum is not, in each part of the input: they are flown, or the last again."""
+    most = float(np.finfo(core.dtype).max)
+    state, setpoint, target = (np.zeros((4, width)) for width in (STATE, SETPOINT, TARGET))
+    state[:, 6] = target[:, 0] = 1.0
+    target[:, 4] = 5.0
+    state[1, :2] = setpoint[2, :2] = target[3, :2] = most
+    flags = np.array([RESET | SET_TARGET, 0, OUTER_DUE, SET_TARGET])
+    rows, status = Loops(core, {}).run(state, setpoint, target, flags)
+    assert not (status & LoopStatus.INPUT_NOT_FINITE).any()
+    return {"large": rows, "large status": status}
 
 
 def parameters(core: Core) -> dict[str, np.ndarray]:
@@ -168,7 +204,7 @@ def clock(core: Core) -> dict[str, np.ndarray]:
 def workout(core: Core) -> dict[str, np.ndarray]:
     """Run all of it."""
     made: dict[str, np.ndarray] = {}
-    for part in (mathematics, shaken, spoiled, extreme, parameters, rate_groups, clock):
+    for part in (mathematics, shaken, spoiled, extreme, spun, large, parameters, rate_groups, clock):
         made |= part(core)
     return made
 

@@ -13,7 +13,8 @@ from tests.firmware.step_machines import Costs, first_difference, gcc_image, on_
 from tests.firmware.step_streams import flown_steps, parameter_frame, random_steps
 
 RANDOM_STEPS = 100_000
-MEAN_INSTRUCTIONS, MOST_INSTRUCTIONS = 1150, 1850
+MEAN_INSTRUCTIONS, MOST_INSTRUCTIONS = 1050, 1500
+MOST_OF_ANY_INSTRUCTIONS = 1750
 
 
 @cache
@@ -61,9 +62,17 @@ def test_instruction_counts_repeat_exactly() -> None:
 
 @pytest.mark.parametrize("law", [0, 1], ids=["pid", "backstepping"])
 def test_a_step_stays_within_its_instructions(law: int, tmp_path: Path) -> None:
-    """The gate: docs/firmware.md has what each kind of step takes. The most is outer loop and a rotor at its limit."""
+    """The gate: docs/firmware.md has what each kind of step takes. The most is the first step, which resets."""
     stream = parameter_frame("FS_CTRL", float(law)) + flown()
-    for image in (zig_image(), gcc_image(tmp_path)):  # measured: 996 to 1112, and 1726 to 1815
+    for image in (zig_image(), gcc_image(tmp_path)):  # measured: 971 to 984, and 1426 to 1442
         _, costs = on_cortex_m4(stream, image)
         assert costs.mean["whole"] < MEAN_INSTRUCTIONS, costs
         assert costs.most["whole"] < MOST_INSTRUCTIONS, costs
+
+
+def test_any_step_stays_within_its_instructions(tmp_path: Path) -> None:
+    """Far from flight: roll, pitch, thrust and yaw limited at once, large angles, in a step that resets as well."""
+    stream = b"".join(random_steps(RANDOM_STEPS // 5, seed=4))
+    for image in (zig_image(), gcc_image(tmp_path)):  # measured: 1671 and 1693
+        _, costs = on_cortex_m4(stream, image)
+        assert costs.most["whole"] < MOST_OF_ANY_INSTRUCTIONS, costs

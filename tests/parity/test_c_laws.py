@@ -276,18 +276,21 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
         "torque": Compared(achieved[:, 1:].astype(np.float64), py_achieved[:, 1:]),
         "relative speed": Compared(relative[:, None].astype(np.float64), py_relative[:, None]),
     }
-    return Mixed(quantities, saturation, np.sign(lag) * (np.abs(lag) > 1e-9), wrenches, speeds[:, n:])
+    return Mixed(
+        quantities, np.sign(saturation), np.sign(lag) * (np.abs(lag) > 1e-9), wrenches, speeds[:, n:]
+    )
 
 
 @pytest.mark.parametrize("name", VEHICLES)
-def test_mixer_in_double_has_pythons_bits(name: str) -> None:
+def test_mixer_in_double_is_pythons_to_1e_12_and_has_its_bits_unless_thrust_is_limited(name: str) -> None:
     made = mixed("double", name)
+    unlimited = ~(made.python_saturation[:, :3] != 0.0).any(axis=1)
+    assert np.count_nonzero(unlimited) > 10_000
     for quantity, compared in made.quantities.items():
-        if quantity in ("thrust", "torque"):  # not multiplied out where nothing but thrust and yaw is limited
-            largest = np.abs(compared.python).max()
-            assert np.abs(compared.c - compared.python).max() < 1e-12 * largest, quantity  # measured 5e-15
-        else:
-            assert np.array_equal(compared.c, compared.python), quantity
+        largest = np.abs(compared.python).max()
+        assert np.abs(compared.c - compared.python).max() < 1e-12 * largest, quantity  # measured 8e-15
+        if quantity not in ("thrust", "torque"):  # not multiplied out where effectiveness undoes allocation
+            assert np.array_equal(compared.c[unlimited], compared.python[unlimited]), quantity
     assert np.array_equal(made.saturation, made.python_saturation)
     assert not made.beyond.any()
 
@@ -300,7 +303,7 @@ def test_mixer_in_float_is_near_and_takes_no_rounding_for_a_limit(name: str) -> 
             assert compared.full_scale_ulps().max() < MIXER_FLOAT_ULPS[quantity], quantity
     c, expected = made.saturation, made.python_saturation
     assert not np.any((c != 0.0) & (c != expected))
-    assert np.count_nonzero(c != expected) < 10  # a limit by less than the rounding: 1 found at most
+    assert np.count_nonzero(c != expected) < 10  # a limit by less than the rounding: 5 found at most
 
 
 def test_the_mixers_samples_reach_every_limit_both_ways() -> None:

@@ -14,6 +14,16 @@
 
 #define ROW 31
 
+/* AttitudeInputs of Python, a row of the samples: the core passes the parts that a law needs. */
+typedef struct {
+    fs_quaternion attitude;
+    fs_vector3 rates_frd_rad_s;
+    fs_attitude_reference reference;
+    fs_vector3 error_rad;
+    fs_real relative_rotor_speed_rad_s;
+    fs_vector3 saturation;
+} fs_attitude_inputs;
+
 uint32_t drive_sizes(uint32_t which)
 {
     const uint32_t sizes[4] = {(uint32_t)sizeof(fs_real), (uint32_t)sizeof(fs_loops), (uint32_t)sizeof(fs_loop_output),
@@ -51,7 +61,7 @@ void drive_reference(uint32_t count, fs_reference_memory *memory, const fs_quate
         const fs_quaternion target = fs_blend(&from[i], &to[i], fraction[i]);
         const fs_quaternion inverse = fs_conjugate(&attitude[i]);
         fs_quaternion turn;
-        fs_attitude_reference_step(&memory[i], &target, &params[i], dt_s[i], &reference[i]);
+        fs_attitude_reference_step(&memory[i], &target, &params[i], dt_s[i], &memory[i], &reference[i]);
         fs_in_body_frame(&reference[i], &attitude[i]);
         turn = fs_quaternion_product(&inverse, &reference[i].attitude);
         error[i] = fs_rotation_vector(&turn);
@@ -62,7 +72,9 @@ void drive_pid(uint32_t count, fs_pid_memory *memory, const fs_attitude_inputs *
                const fs_real *dt_s, fs_vector3 *torque)
 {
     for (uint32_t i = 0; i < count; i++) {
-        torque[i] = fs_attitude_pid_step(&memory[i], &inputs[i], &params[i], dt_s[i]);
+        const fs_attitude_inputs *in = &inputs[i];
+        torque[i] = fs_attitude_pid_step(&memory[i], &in->error_rad, &in->rates_frd_rad_s, &in->reference,
+                                         &in->saturation, &params[i], dt_s[i]);
     }
 }
 
@@ -70,7 +82,9 @@ void drive_backstepping(uint32_t count, const fs_attitude_inputs *inputs, const 
                         fs_vector3 *torque)
 {
     for (uint32_t i = 0; i < count; i++) {
-        torque[i] = fs_attitude_backstepping_step(&inputs[i], &params[i]);
+        const fs_attitude_inputs *in = &inputs[i];
+        torque[i] = fs_attitude_backstepping_step(&in->error_rad, &in->rates_frd_rad_s, &in->reference,
+                                                  in->relative_rotor_speed_rad_s, &params[i]);
     }
 }
 
