@@ -10,6 +10,7 @@ from flightstack.ground.command_service import CommandService
 from flightstack.ground.facts import AutopilotFacts
 from flightstack.ground.failure_commands import FailureCommands
 from flightstack.ground.file_services import file_services
+from flightstack.ground.guided_items import GuidedItems
 from flightstack.ground.link_commands import LinkCommands
 from flightstack.ground.link_loss import LinkLossService
 from flightstack.ground.mission_service import MissionService
@@ -39,6 +40,7 @@ def make_services(
     failures = FailureCommands(vehicle.simulator, lambda: vehicle.autopilot.behaviour.failures_allowed != 0)
     return [
         MissionService(own, vehicle.autopilot),
+        GuidedItems(own, vehicle),
         CommandService(own, vehicle, peer_at, link_commands.answer, failures),
         link_commands,
         *stream_services(own, vehicle.autopilot),

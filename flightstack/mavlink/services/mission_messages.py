@@ -31,6 +31,9 @@ PROTOCOL = frozenset(
 )
 """Messages of the protocol that go to a vehicle."""
 
+GOES_THERE, CHANGES_ALTITUDE = 2, 3
+"""Values of an item's ``current`` that make it no part of a plan: fly there now (``ground.guided_items``)."""
+
 _ITEM = struct.Struct("<ffffiifHB?")
 
 

@@ -14,7 +14,13 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address, is_for, sender
 from flightstack.mavlink.services.mission_downloads import Downloads
-from flightstack.mavlink.services.mission_messages import DEFAULT_TIMING, PROTOCOL, Timing, ack_message
+from flightstack.mavlink.services.mission_messages import (
+    DEFAULT_TIMING,
+    GOES_THERE,
+    PROTOCOL,
+    Timing,
+    ack_message,
+)
 from flightstack.mavlink.services.mission_store import (
     Check,
     CurrentRequested,
@@ -83,7 +89,7 @@ class MissionServer:
             self._on_list(message, client, now_s)
         elif kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
             self._on_request(message, client, now_s)
-        else:
+        elif message.current < GOES_THERE:
             self._on_item(message, client, now_s)
 
     def poll(self, now_s: float) -> list[tuple[Hashable, Message]]:
