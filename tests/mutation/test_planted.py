@@ -70,9 +70,12 @@ def caught(test: Callable[..., None], *arguments: object) -> bool:
 
 
 def test_a_sign_in_the_mixer(plant: Plant) -> None:
-    right = "share[1] * roll + share[2] * pitch"
+    right = "share[1] * torque->x + rotor->share[2] * torque->y"
     plant("core/fs_mixer.c", right, right.replace(" + ", " - "))
-    assert caught(test_c_laws.test_mixer_in_double_has_pythons_bits, "cross")
+    assert caught(
+        test_c_laws.test_mixer_in_double_is_pythons_to_1e_12_and_has_its_bits_unless_thrust_is_limited,
+        "cross",
+    )
 
 
 def test_a_gain_that_is_off_by_its_last_bit(plant: Plant) -> None:
@@ -98,7 +101,8 @@ def test_an_integrator_that_winds_up(plant: Plant) -> None:
 
 
 def test_a_status_bit_of_another_axis(plant: Plant) -> None:
-    plant("core/fs_loops.c", "bits |= FS_STATUS_PITCH_SATURATED;", "bits |= FS_STATUS_YAW_SATURATED;")
+    right = "pitch, resolution[2], FS_STATUS_PITCH_SATURATED"
+    plant("core/fs_mixer.c", right, right.replace("PITCH", "YAW"))
     assert caught(test_core_loops.test_a_shaken_vehicle_is_answered_as_by_python, "four")
 
 

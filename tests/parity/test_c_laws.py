@@ -285,7 +285,7 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
 def test_mixer_in_double_is_pythons_to_1e_12_and_has_its_bits_unless_thrust_is_limited(name: str) -> None:
     made = mixed("double", name)
     unlimited = ~(made.python_saturation[:, :3] != 0.0).any(axis=1)
-    assert np.count_nonzero(unlimited) > 10_000
+    assert unlimited.mean() > 0.05
     for quantity, compared in made.quantities.items():
         largest = np.abs(compared.python).max()
         assert np.abs(compared.c - compared.python).max() < 1e-12 * largest, quantity  # measured 8e-15
