@@ -82,7 +82,7 @@ def run(
         finished = _fly(folder, controller, target, plan, instance)
         if finished.problem is not None and finished.problem.exit_code == USAGE:
             raise finished.problem
-        controllers[controller] = _repeatable(finished.outcome.result)
+        controllers[controller] = repeatable(finished.outcome.result)
     return {
         "target": target,
         "why_left_out": None,
@@ -158,7 +158,7 @@ def _free_instance() -> int:
     raise CliError("the ports of ten instances are all in use: end the programs that use them", USAGE)
 
 
-def _repeatable(result: dict[str, Any]) -> dict[str, Any]:
+def repeatable(result: dict[str, Any]) -> dict[str, Any]:
     """Return what two runs agree on: neither times of this machine nor counters of the link."""
     flights = {
         stage: {name: flight[name] for name in _OF_FLIGHT} for stage, flight in result["flights"].items()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from gcs_cli.paper import cases
-from gcs_cli.paper.report_compare import claims_section, matrix_sections, xy_figures
+from gcs_cli.paper.report_compare import claims_section, hard_over_time, matrix_sections, xy_figures
 from gcs_cli.paper.report_flights import (
     PAIR,
     Recordings,
@@ -47,6 +47,7 @@ _NAVIGATION = (
     ("steps", "Steps"),
     ("plants", "Plants"),
     ("fig-14", "Fig. 14"),
+    ("hard", "Hard profile"),
     ("matrix-hard-paper", "Disturbances"),
     ("fig-15", "Fig. 15, PIL"),
     ("linear", "Poles"),
@@ -99,6 +100,7 @@ def _sections(
     yield from _steps(found, recordings)
     yield plants_section(results["plants"], recordings, left_out.get(cases.MULTIBODY, ""))
     yield from xy_figures(recordings)
+    yield hard_over_time(recordings)
     yield from matrix_sections(found)
     yield from pil_sections(results["pil"], left_out.get("pil", ""))
     yield from linear_sections(results["linear"], results["onset"] or (), left_out.get("linear", ""))

@@ -9,7 +9,16 @@ from typing import Any
 
 from gcs_cli.paper import cases
 from gcs_cli.paper.report_axes import chart, spanning
-from gcs_cli.paper.report_flights import PAIR, Cases, Recordings, ending
+from gcs_cli.paper.report_flights import (
+    PAIR,
+    STEP_SIZE,
+    Cases,
+    Recordings,
+    ending,
+    label,
+    over_time,
+    signals,
+)
 from gcs_cli.paper.report_labels import (
     LABELS,
     PLANTS,
@@ -21,6 +30,7 @@ from gcs_cli.paper.report_labels import (
     condition_label,
     fixed,
     legend_of,
+    minus,
     row,
     wide_table,
 )
@@ -32,6 +42,10 @@ XY_SIZE = (480, 400)
 OTHERS = (cases.POLES, cases.TUNED_PID)
 ALIKE = 0.01
 """Within this share of the best, somebody is as good."""
+TELLING_POINTS, SAME_POINTS = 0.5, 0.05
+"""Overshoots of a row that differ by less tell nobody apart; the least is marked, and what is written the same."""
+IN_METRES = 0.2
+"""Shorter ones are written in millimetres."""
 _CONDITION_TITLES = {cases.PLAIN: "with rotor limits and lag", cases.IDEAL: "without limits and lag"}
 _OPEN = ((cases.HARD, cases.SMALL_ANGLE), (cases.SMOOTH, cases.SMALL_ANGLE))
 
@@ -49,7 +63,11 @@ def claims_section(claims: Sequence[Mapping[str, Any]]) -> str:
         holds = '<td class="good">yes</td>' if claim["holds"] else '<td class="bad">no</td>'
         plant, words, threshold = (
             escape(text)
-            for text in (PLANTS.get(claim["plant"], claim["plant"]), claim["words"], claim["threshold"])
+            for text in (
+                PLANTS.get(claim["plant"], claim["plant"]),
+                minus(claim["words"]),
+                claim["threshold"],
+            )
         )
         cells = (
             f'<td class="two claim">{title}</td><td>{plant}</td>{holds}<td>{words}</td><td>{threshold}</td>'
@@ -81,6 +99,29 @@ def xy_figures(recordings: Recordings) -> Iterator[str]:
         title = "Beside figure 14: other gains in the same laws"
         legend = legend_of(OTHERS, "desired")
         yield anchored("fig-14-others", section(title, f'<div class="pair">{others}</div>', legend, note))
+
+
+def hard_over_time(recordings: Recordings) -> str:
+    """Return x, y, height and yaw of both controllers on the hard profile."""
+    flown = {name: recordings[key] for name in PAIR if (key := cases.key(name, cases.HARD)) in recordings}
+    if not flown:
+        return ""
+    longest = max(flown.values(), key=lambda recording: len(recording.time_s))
+    charts = []
+    for axis in ("x", "y", "z", "yaw"):
+        lines = [Line("desired", longest.time_s, signals(longest, axis)[0], REFERENCE)]
+        lines += [
+            Line(LABELS[name], one.time_s, signals(one, axis)[1], STYLES[name]) for name, one in flown.items()
+        ]
+        kept = [
+            lines[0],
+            *(line for line, one in zip(lines[1:], flown.values(), strict=True) if one.ended_s is None),
+        ]
+        reach = spanning(label(axis), [line.y for line in kept])
+        charts.append(chart(f"{axis} on the hard profile", over_time(longest), reach, lines, size=STEP_SIZE))
+    body = f'<div class="pair">{"".join(charts)}</div>'
+    note = "With rotor limits and lag, on the small-angle plant: many variations in a short period of time."
+    return anchored("hard", section("The hard profile over time", body, legend_of(PAIR, "desired"), note))
 
 
 def _xy(recordings: Recordings, contenders: Sequence[str], trajectory: str, condition: str) -> str:
@@ -138,8 +179,9 @@ def matrix_sections(found: Cases) -> Iterator[str]:
 
 _MATRIX_NOTE = (
     "Upper figure: RMS distance from the reference in space. Below: the largest error of one axis, and the largest "
-    "overshoot of x, y and z. Bold on colour: the smallest RMS of the row, and whatever is within 1 % of it; "
-    "underlined: the smallest overshoot. On the hard profile the largest error is a step itself, whoever flies it."
+    "overshoot of x, y and z. Bold on colour: the smallest RMS of the row, and whatever is within 1 % of it. "
+    "Underlined: the smallest overshoot, where they differ. On the hard profile the largest error is a step itself, "
+    "whoever flies it."
 )
 
 
@@ -159,8 +201,9 @@ def matrix_table(found: Cases, trajectory: str, plant: str) -> str:
 
 def _cells(flown: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     survivors = [case for case in flown.values() if case["ended"] is None]
-    best_rms = min((space_rms(case) for case in survivors), default=math.inf)
-    best_over = min((worst_overshoot(case) for case in survivors), default=math.inf)
+    best = min((space_rms(case) for case in survivors), default=math.inf)
+    over = [value for case in survivors if (value := worst_overshoot(case)) is not None]
+    least = min(over) if over and max(over) - min(over) >= TELLING_POINTS else -math.inf
     for name in LABELS:
         case = flown.get(name)
         if case is None:
@@ -168,23 +211,24 @@ def _cells(flown: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
         elif case["ended"] is not None:
             yield f'<td class="bad">{escape(ending(case))}</td>'
         else:
-            yield _cell(case, best_rms, best_over)
+            yield _cell(case, best, least)
 
 
-def _cell(case: Mapping[str, Any], best_rms: float, best_over: float) -> str:
+def _cell(case: Mapping[str, Any], best: float, least: float) -> str:
     rms, over = space_rms(case), worst_overshoot(case)
     largest = max(case["metrics"][axis]["max_error"] for axis in "xyz")
-    unit, factor, places = ("m", 1.0, 3) if rms >= 0.2 else ("mm", 1e3, 1)
-    wide, wide_factor, wide_places = ("m", 1.0, 2) if largest >= 0.2 else ("mm", 1e3, 0)
-    best = ' class="best"' if rms <= best_rms * (1.0 + ALIKE) else ""
-    beyond = f"{fixed(over, 1)} % over" if math.isfinite(over) else ""
-    if beyond and over <= best_over + 0.05:
+    style = ' class="best"' if rms <= best * (1.0 + ALIKE) else ""
+    beyond = "" if over is None else f"{fixed(over, 1)} % over"
+    if over is not None and over <= least + SAME_POINTS:
         beyond = f"<u>{beyond}</u>"
-    largest_text = f"max {fixed(wide_factor * largest, wide_places)} {wide}"
-    return (
-        f'<td class="two"><b{best}>{fixed(factor * rms, places)} {unit}</b><span>{largest_text}</span>'
-        f"<span>{beyond}</span></td>"
+    figures = (
+        f"<b{style}>{_length(rms, 3, 1)}</b><span>max {_length(largest, 2, 0)}</span><span>{beyond}</span>"
     )
+    return f'<td class="two">{figures}</td>'
+
+
+def _length(metres: float, places_m: int, places_mm: int) -> str:
+    return f"{fixed(metres, places_m)} m" if metres >= IN_METRES else f"{fixed(1e3 * metres, places_mm)} mm"
 
 
 def space_rms(case: Mapping[str, Any]) -> float:
@@ -192,7 +236,7 @@ def space_rms(case: Mapping[str, Any]) -> float:
     return math.sqrt(sum(case["metrics"][axis]["rms_error"] ** 2 for axis in "xyz"))
 
 
-def worst_overshoot(case: Mapping[str, Any]) -> float:
-    """Return the largest overshoot of x, y and z [%]; infinite where none is defined."""
+def worst_overshoot(case: Mapping[str, Any]) -> float | None:
+    """Return the largest overshoot of x, y and z [%]; None where none is defined."""
     there = [case["metrics"][axis]["overshoot_percent"] for axis in "xyz"]
-    return max((value for value in there if value is not None), default=math.inf)
+    return max((value for value in there if value is not None), default=None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 
@@ -68,6 +69,11 @@ def fixed(value: float | None, places: int) -> str:
     if value is None or not math.isfinite(value):
         return UNKNOWN
     return f"{round(value, places) + 0.0:.{places}f}".replace("-", "−")
+
+
+def minus(words: str) -> str:
+    """Give negative numbers in a sentence a true minus sign."""
+    return re.sub(r"(?<![\w.])-(?=\d)", "−", words)
 
 
 def cell(shown: str, style: str = "") -> str:

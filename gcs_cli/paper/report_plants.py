@@ -28,6 +28,7 @@ from gcs_cli.paper.types import Recording
 from gcs_cli.report_chart import Line
 from gcs_cli.report_plots import section
 
+_ROUNDING = 1e-4
 _MM, _LEAST_MM, _LEAST_DEG = 1e3, 0.01, 1e-3
 
 
@@ -57,14 +58,19 @@ def _table(plants: Mapping[str, Any]) -> str:
         for index, (contender, found) in enumerate(contenders.items()):
             head = f"<th>{escape(title) if not index else ''}</th><td>{escape(LABELS[contender])}</td>"
             apart = "".join(
-                cell(f"{number(_MM * found[key])} mm") for key in ("max_position_m", "rms_position_m")
+                cell(_small(_MM * found[key], " mm")) for key in ("max_position_m", "rms_position_m")
             )
             turned = "".join(
-                cell(f"{number(found[key])}°") for key in ("max_attitude_deg", "rms_attitude_deg")
+                cell(_small(found[key], "°")) for key in ("max_attitude_deg", "rms_attitude_deg")
             )
             rows.append(row(f"{head}{apart}{turned}{_bound(found)}", not index))
     columns = ("plants", "controller", "#position, largest", "#RMS", "#attitude, largest", "#RMS", "bound")
     return wide_table(columns, rows)
+
+
+def _small(value: float, unit: str) -> str:
+    """Write a difference; one that is nothing but rounding is only said to be below what anybody asks for."""
+    return f"< {_ROUNDING:g}{unit}" if value < _ROUNDING else f"{number(value)}{unit}"
 
 
 def _bound(found: Mapping[str, Any]) -> str:

@@ -9,13 +9,14 @@ from typing import Any
 from gcs_cli.paper import cases
 from gcs_cli.paper.pil_section import EMULATED
 from gcs_cli.paper.report_compare import space_rms
-from gcs_cli.paper.report_labels import LABELS, PLANTS, anchored, fixed, number
+from gcs_cli.paper.report_labels import LABELS, PLANTS, anchored, fixed, minus, number
 from gcs_cli.report_plots import section
 
 Results = Mapping[str, Any]
 _PAPERS = "paper"
 _SMALL, _RIGID = cases.SMALL_ANGLE, cases.RIGID
 _SATURATED_POINTS = 10.0
+_MAGNIFIED = 1e3
 _PARTS = {"linear": "linear analysis", "onset": "onset of instability", "pil": "processor in the loop"}
 
 
@@ -36,7 +37,7 @@ def tiles(results: Results) -> str:
         found.append(("C core, here and on the target", "same bits" if same else "differs"))
     apart = onset_apart(results)
     if apart is not None:
-        found.append(("onset, simulated to predicted", f"within {fixed(apart, 2)} %"))
+        found.append(("onset of instability, simulated and predicted", f"≤ {fixed(apart, 2)} % apart"))
     cells = "".join(
         f'<div class="tile"><b>{escape(value)}</b><span>{escape(name)}</span></div>' for name, value in found
     )
@@ -87,7 +88,7 @@ def _of_claims(results: Results) -> Iterator[str]:
         verdict = '<b class="good">Holds</b>' if not fell else '<b class="bad">Does not hold</b>'
         if held and fell:
             verdict = f"<b>Holds on the {escape(', '.join(held))}, not on the {escape(', '.join(fell))}</b>"
-        words = escape(of[0]["words"])
+        words = escape(minus(of[0]["words"]))
         yield f"“{escape(of[0]['claim'])}” ({escape(of[0]['source'])}): {verdict}. {words}"
 
 
@@ -120,17 +121,25 @@ def crashed(results: Results) -> list[str]:
 
 def _of_crashes(results: Results) -> Iterator[str]:
     lost: dict[str, list[str]] = {}
-    for name in crashed(results):
-        contender, _, rest = name.partition("/")
-        condition = rest.split("/")[1] if rest.count("/") == 2 else rest
-        label = results.get("conditions", {}).get(condition, condition)
-        of = lost.setdefault(LABELS.get(contender, contender), [])
-        if label not in of:
-            of.append(label)
-    for contender, conditions in lost.items():
-        yield escape(f"{contender} crashes in at least one flight with: {'; '.join(conditions)}.")
-    if not lost and results["cases"]:
+    for key in crashed(results):
+        name, _, condition, _ = key.split("/") if key.count("/") == 3 else (key, "", key, "")
+        told = results.get("conditions", {}).get(condition, condition)
+        of = lost.setdefault(name, [])
+        if told not in of:
+            of.append(told)
+    if not results["cases"]:
+        return
+    if not lost:
         yield "No flight of the matrix ended in a crash."
+        return
+    parts = [f"{LABELS.get(name, name)} ({'; '.join(of)})" for name, of in lost.items()]
+    never = [
+        title
+        for name, title in LABELS.items()
+        if name not in lost and any(k.startswith(f"{name}/") for k in results["cases"])
+    ]
+    words = f"Flights that ended in a crash, and with what: {', '.join(parts)}."
+    yield escape(f"{words} Never: {', '.join(never)}." if never else words)
 
 
 def _of_spin_up(results: Results) -> Iterator[str]:
@@ -177,18 +186,24 @@ def _of_plants(results: Results) -> Iterator[str]:
     worst, of = worst_plants(results), results["plants"].get(f"{cases.RIGID}_{cases.MULTIBODY}")
     if worst is None or not of:
         return
-    kept = [name for name, one in of.items() if one.get("within_bounds")]
-    broken = [LABELS.get(name, name) for name in of if name not in kept]
+    broken = [LABELS.get(name, name) for name, one in of.items() if not one.get("within_bounds")]
     one = next(iter(of.values()))
     bound = f"{fixed(100.0 * one['position_bound_m'], 0)} cm and {fixed(one['attitude_bound_deg'], 1)}°"
     verdict = (
         f"the bound of {bound} is kept by all" if not broken else f"not within {bound}: {', '.join(broken)}"
     )
-    yield escape(
-        "The rigid-body plant and the multibody plant, which share no equation, stay within "
+    words = (
+        "Rigid body (our equations) and multibody assembly (MuJoCo's mechanics) stay within "
         f"{number(1e3 * worst[0])} mm and {number(worst[1], 2)}° of each other over the whole desired trajectory; "
         f"{verdict}."
     )
+    others = [found["max_position_m"] for name, found in of.items() if name != cases.PID]
+    if others and cases.PID in of and of[cases.PID]["max_position_m"] > _MAGNIFIED * max(others):
+        words += (
+            " All of it comes with the PID of Table II, which magnifies what rounding begins; the others stay "
+            f"within {number(1e3 * max(others), 1)} mm."
+        )
+    yield escape(words)
 
 
 def onset_apart(results: Results) -> float | None:

@@ -115,7 +115,7 @@ def test_a_crash_is_said_and_ends_the_curve() -> None:
     text = parsed(html).text
     assert "crashed at 11.00 s: turned <over>" in text  # in the matrix
     assert "turned <over> at 11.00 s" in text  # beside figure 14
-    assert "crashes in at least one flight" in text
+    assert "ended in a crash, and with what: backstepping, Table III (Table I, motors of 5 ms, thrust" in text
     assert "<over>" not in html
 
 
