@@ -18,6 +18,7 @@ from gcs_cli.paper import closed_loop
 from gcs_cli.paper.cases import BACKSTEPPING, CONDITIONS, CONTENDERS, PID, POLES, make_case
 from gcs_cli.paper.closed_loop import fly, fly_rows, hover_speeds
 from gcs_cli.paper.metrics import measure, path_metrics
+from gcs_cli.paper.plants import ATTITUDE_BOUND_DEG, POSITION_BOUND_M, difference
 from gcs_cli.paper.trajectory import Move, Trajectory, load_trajectory, setpoints
 from gcs_cli.paper.types import Case, Recording
 from sim_bridge.disturbance import Disturbance
@@ -235,3 +236,15 @@ def test_the_torque_that_spins_the_rotors_up_shakes_the_papers_yaw_loop() -> Non
     assert not (left_out.status[late] & saturated).any()
     assert ((there.status[late] & saturated) != 0).mean() > 0.5
     assert not flown(BACKSTEPPING, "step_x", plant="rigid").status[late].any()
+
+
+@pytest.mark.parametrize("contender", [BACKSTEPPING, PID])
+def test_rigid_body_and_multibody_fly_the_desired_trajectory_alike(contender: str) -> None:
+    """Within 1 cm and 0.5°; where no loop amplifies rounding, within nanometres."""
+    pytest.importorskip("mujoco")
+    rigid, multibody = (flown(contender, "desired", plant=plant) for plant in ("rigid", "multibody"))
+    found = difference(rigid, multibody)
+    assert found["both_flew_to_the_end"]
+    assert found["max_position_m"] < (1e-9 if contender == BACKSTEPPING else POSITION_BOUND_M)
+    assert found["max_attitude_deg"] < (1e-6 if contender == BACKSTEPPING else ATTITUDE_BOUND_DEG)
+    assert rigid.position_ned_m.tobytes() != multibody.position_ned_m.tobytes()  # they are two plants

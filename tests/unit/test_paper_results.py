@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from gcs_cli.__main__ import main
 from gcs_cli.errors import CliError
 from gcs_cli.paper import comparisons, linear, pil_section, plants, run
 from gcs_cli.paper.cases import (
@@ -243,3 +244,35 @@ def test_a_target_that_is_not_there_is_told_before_anything_flies(tmp_path: Path
     with pytest.raises(CliError, match="/dev/nobody"):
         run.run(PaperOptions(tmp_path, target="serial:/dev/nobody"), silent(), FEW)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--connect", "udp:14999", "paper"], "gcs: paper flies vehicles of its own: leave --connect out"),
+        (
+            ["paper", "--no-pil", "--port", "serial:/dev/nobody"],
+            "gcs: --port names a target for what --no-pil leaves",
+        ),
+        (["paper", "--port", "serial:/dev/nobody"], "/dev/nobody"),
+        (["paper", "--port", "board"], "gcs: --target board: "),
+    ],
+)
+def test_usage_is_told_in_one_sentence(
+    arguments: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*arguments, "--out", str(tmp_path / "paper")]) == 2
+    told = capsys.readouterr().err
+    assert sentence in told
+    assert told.count("\n") == 1
+
+
+@pytest.mark.usefixtures("quick_parts")
+def test_json_is_the_results_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(run, "all_cases", lambda multibody: FEW[:1])
+    assert main(["paper", "--no-pil", "--no-multibody", "--jobs", "1", "--json", "--out", str(tmp_path)]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told.pop("directory") == str(tmp_path)
+    assert told == json.loads((tmp_path / JSON_NAME).read_text(encoding="utf-8"))
