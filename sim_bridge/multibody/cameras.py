@@ -42,7 +42,7 @@ def view(camera: str, moment: Moment, span_m: float, ground_m: float) -> View:
         azimuth = _CHASE_ASIDE_DEG - math.degrees(moment.chase_heading_rad)
         return View(look, 4.7 * span_m, azimuth, -19.0)
     if camera == "top":
-        return View(at, max(6.0, 16.0 * span_m), 0.0, -89.9)
+        return View(at, max(4.5, 12.0 * span_m), 0.0, -89.9)
     if camera == "side":
         return View((at[0], at[1], at[2] + 0.1 * span_m), 8.0 * span_m, -90.0, -6.0)
     return _from_fixed_place(at, span_m, ground_m)

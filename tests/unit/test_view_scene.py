@@ -1,0 +1,239 @@
+"""The scene: the vehicle in it turns as the flight does, in the model and in the pixels of a picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from flightstack.geometry_bulk import quaternions_from_euler
+from flightstack.params.vehicle import built_in_vehicles, load_vehicle
+from flightstack.poses_file import Poses
+from sim_bridge.errors import UsageProblemError
+from sim_bridge.multibody import offscreen
+from sim_bridge.multibody.cameras import CAMERAS
+from sim_bridge.multibody.overlay import Overlay
+from sim_bridge.multibody.poses import FlightPath, Moment
+from sim_bridge.multibody.renderer import Picture, Renderer, Stage
+from tests.support.sample_poses import sample_poses
+from tests.support.tools import missing
+
+WIDTH, HEIGHT = 480, 270
+
+
+@cache
+def stage(vehicle: str) -> Stage:
+    return Stage(load_vehicle(vehicle))
+
+
+def standing(
+    roll_deg: float = 0.0,
+    pitch_deg: float = 0.0,
+    yaw_deg: float = 0.0,
+    speed: float = 0.0,
+    height: float = 2.0,
+) -> FlightPath:
+    euler = np.radians([[roll_deg, pitch_deg, yaw_deg]])
+    return FlightPath(
+        Poses(
+            np.zeros(1), np.array([[0.0, 0.0, -height]]), quaternions_from_euler(euler), np.full((1, 4), speed),
+            np.full((1, 3), np.nan),
+        )
+    )  # fmt: skip
+
+
+def rotors(path: FlightPath, vehicle: str = "paper_quad") -> np.ndarray:
+    """Where the rotors are in the scene: north, west, up [m], front, right, back, left for the plus frame."""
+    place = stage(vehicle)
+    place.put(path.at(0.0))
+    return np.array([place.data.body(f"rotor_{number}").xpos for number in range(1, 5)])
+
+
+def test_the_nose_points_north_and_the_right_side_east() -> None:
+    front, right, back, left = rotors(standing())
+    assert front == pytest.approx((0.2, 0.0, 2.0), abs=1e-9)
+    assert right == pytest.approx((0.0, -0.2, 2.0), abs=1e-9)
+    assert back[0] < 0.0 < left[1]
+
+
+def test_a_vehicle_rolled_right_has_its_right_side_low() -> None:
+    _, right, _, left = rotors(standing(roll_deg=30.0))
+    assert right[2] - left[2] == pytest.approx(-0.4 * math.sin(math.radians(30.0)))
+
+
+def test_a_vehicle_pitched_up_has_its_nose_high_and_one_turned_right_looks_east() -> None:
+    front, _, back, _ = rotors(standing(pitch_deg=20.0))
+    assert front[2] - back[2] == pytest.approx(0.4 * math.sin(math.radians(20.0)))
+    front = rotors(standing(yaw_deg=90.0))[0]
+    assert front == pytest.approx((0.0, -0.2, 2.0), abs=1e-9)
+
+
+def test_rotors_turn_in_their_own_sense() -> None:
+    """Seen from above, rotor 1 of the paper's vehicle turns clockwise, rotor 2 counter-clockwise."""
+    place = stage("paper_quad")
+    turns = []
+    for angle in (0.0, 0.1):
+        place.put(standing().at(0.0)._replace(rotor_angle_rad=(angle,) * 4))
+        turns.append([place.data.body(f"rotor_{number}").xmat.reshape(3, 3)[1, 0] for number in (1, 2)])
+    first, second = np.array(turns[1]) - np.array(turns[0])
+    assert first == pytest.approx(-math.sin(0.1))
+    assert second == pytest.approx(math.sin(0.1))
+
+
+@pytest.mark.parametrize("vehicle", built_in_vehicles())
+def test_a_standing_vehicle_stands_on_the_pad(vehicle: str) -> None:
+    """Its lowest part is within a centimetre of the top of the pad, and the scene keeps out of its way."""
+    place = stage(vehicle)
+    place.put(standing(height=0.0).at(0.0))
+    model, data = place.model, place.data
+    pad = model.geom("pad").id
+    top = data.geom_xpos[pad][2] + model.geom_size[pad][2]
+    feet = [g for g in range(model.ngeom) if (model.geom(g).name or "").startswith("foot")]
+    lowest = min(data.geom_xpos[foot][2] - model.geom_size[foot][0] for foot in feet)
+    assert lowest == pytest.approx(top, abs=0.01)
+    for name in CAMERAS:
+        assert model.camera(name).id >= 0
+    assert not model.geom_contype[[g for g in place.shadeless if model.geom(g).name != "ground"]].any()
+
+
+def test_fast_rotors_blur_and_faster_ones_are_redder() -> None:
+    place = stage("paper_quad")
+    place.rotors.show((0.0, 150.0, 300.0, math.nan))
+    disc = [place.model.geom(f"disc_{n}").rgba for n in range(1, 5)]
+    blade = [place.model.geom(f"blade_{n}_0").rgba for n in range(1, 5)]
+    assert disc[0][3] == disc[3][3] == 0.0 < disc[1][3]
+    assert blade[0][3] == blade[3][3] == 1.0 > blade[1][3]
+    assert disc[2][0] - disc[2][2] > disc[1][0] - disc[1][2]
+
+
+# ------------------------------------------------------------------ pixels
+
+
+@pytest.fixture(scope="module")
+def renderer() -> Iterator[Renderer]:
+    try:
+        made = Renderer(load_vehicle("x_quad"), standing(), WIDTH, HEIGHT)
+    except UsageProblemError as error:
+        missing(str(error))
+    with made:
+        yield made
+
+
+def orange(picture: Picture) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of pixels in the colour of the front arms."""
+    red, green, blue = (picture[:, :, channel].astype(int) for channel in range(3))
+    return np.nonzero((red > 80) & (red > 1.6 * green) & (red > 2 * blue))
+
+
+def seen(renderer: Renderer, moment: Moment, camera: str = "chase") -> Picture:
+    return renderer.draw(moment, camera)
+
+
+def over_grass(path: FlightPath) -> Moment:
+    """Far from all else that is orange."""
+    return path.at(0.0)._replace(position_ned_m=(15.0, 12.0, -3.0))
+
+
+def arm_heights(picture: Picture) -> tuple[float, float]:
+    """How high in the picture the left and the right one of the front arms are [pixels above the middle]."""
+    rows, columns = orange(picture)
+    assert len(rows) > 20
+    middle = np.median(columns)
+    return (
+        HEIGHT / 2 - float(rows[columns < middle].mean()),
+        HEIGHT / 2 - float(rows[columns > middle].mean()),
+    )
+
+
+def test_a_vehicle_rolled_right_looks_rolled_right(renderer: Renderer) -> None:
+    difference = {}
+    for roll in (-25.0, 0.0, 25.0):
+        left, right = arm_heights(seen(renderer, over_grass(standing(roll_deg=roll))))
+        difference[roll] = left - right
+    assert difference[25.0] > difference[0.0] + 5.0  # measured: −16, −4 and 7 pixels
+    assert difference[-25.0] < difference[0.0] - 5.0
+
+
+def test_from_above_north_is_up_and_the_nose_is_where_the_heading_says(renderer: Renderer) -> None:
+    for yaw, row_sign, column_sign in ((0.0, -1, 0), (90.0, 0, 1), (180.0, 1, 0), (-90.0, 0, -1)):
+        rows, columns = orange(seen(renderer, over_grass(standing(yaw_deg=yaw)), "top"))
+        down, right = rows.mean() - HEIGHT / 2, columns.mean() - WIDTH / 2
+        if row_sign:
+            assert np.sign(down) == row_sign
+            assert abs(down) > 2.0 * abs(right)
+        else:
+            assert np.sign(right) == column_sign
+            assert abs(right) > 2.0 * abs(down)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_every_camera_shows_a_place(renderer: Renderer, camera: str) -> None:
+    """Not a void: many colours, and grass or concrete somewhere."""
+    picture = seen(renderer, FlightPath(sample_poses(4.0)).at(2.0), camera)
+    assert picture.shape == (HEIGHT, WIDTH, 3)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 1000
+    red, green, blue = (picture[:, :, channel].astype(int) for channel in range(3))
+    assert ((green > red) & (green > blue)).mean() > 0.05 or (abs(red - green) < 12).mean() > 0.2
+
+
+def test_the_same_moment_gives_the_same_picture(renderer: Renderer) -> None:
+    path = FlightPath(sample_poses(4.0))
+    first = seen(renderer, path.at(1.5))
+    seen(renderer, path.at(3.0), "side")
+    np.testing.assert_array_equal(seen(renderer, path.at(1.5)), first)
+
+
+def test_words_are_written_where_there_is_room_for_them(renderer: Renderer) -> None:
+    moment = FlightPath(sample_poses(4.0)).at(2.0)
+    picture = seen(renderer, moment)
+    with_words = np.asarray(Overlay("a title", (300.0,) * 4, WIDTH, HEIGHT).write(picture, moment))
+    assert (with_words != picture).any()
+    small = picture[:64, :64].copy()
+    np.testing.assert_array_equal(np.asarray(Overlay("", (300.0,) * 4, 64, 64).write(small, moment)), small)
+
+
+# ------------------------------------------------------------------ no renderer
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("disable", "no off-screen renderer: MUJOCO_GL=disable turns it off; unset it"),
+        ("nonsense", "MUJOCO_GL=nonsense is no renderer: set it to egl or osmesa, or unset it"),
+    ],
+)
+def test_the_users_choice_of_a_renderer_is_respected(
+    monkeypatch: pytest.MonkeyPatch, value: str, said: str
+) -> None:
+    monkeypatch.setenv("MUJOCO_GL", value)
+    with pytest.raises(UsageProblemError) as caught:
+        offscreen.choose()
+    assert str(caught.value) == said
+
+
+def test_without_any_renderer_the_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
+    monkeypatch.setattr(offscreen.ctypes.util, "find_library", lambda _name: None)
+    with pytest.raises(UsageProblemError) as caught:
+        offscreen.choose()
+    assert str(caught.value) == offscreen.NO_RENDERER
+
+
+def test_a_renderer_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(offscreen, "choose", lambda: "sim_bridge.errors")  # has no GLContext
+    with pytest.raises(UsageProblemError, match="no off-screen renderer: install EGL"):
+        offscreen.make_context(10, 10)
+
+
+def test_the_scene_is_a_model_that_plain_mujoco_reads(tmp_path: Path) -> None:
+    from sim_bridge.multibody.mjcf import model_xml  # noqa: PLC0415
+
+    file = tmp_path / "scene.xml"
+    file.write_text(model_xml(load_vehicle("paper_quad"), scene=True))
+    assert mujoco.MjModel.from_xml_path(str(file)).ngeom > 100
