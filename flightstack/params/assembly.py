@@ -88,6 +88,11 @@ def _part(entry: Table) -> Part:
         raise entry.error("tune", "a part of the rotors is always tuned, to their inertia: leave it out")
     roll, pitch, yaw = entry.numbers("euler_deg", 3, -360.0, 360.0, _NOWHERE)
     x, y, z = entry.numbers("position_frd_m", 3, -10.0, 10.0, _NOWHERE)
+    if mount == "rotor" and (shape in ("box", "mesh") or x or y or roll or pitch):
+        raise entry.error(
+            "mount", "a part that is not round about the rotor's axis would shake the vehicle: "
+            "take a cylinder, capsule or sphere on the axis",
+        )  # fmt: skip
     part = Part(
         name,
         shape,

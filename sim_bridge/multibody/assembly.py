@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.contract import FloatArray
+from flightstack.params.errors import ConfigError
 from flightstack.params.vehicle import Rotor, Vehicle
 from sim_bridge.multibody.mass import MassProperties, about_point
 from sim_bridge.multibody.placing import PlacedPart, of_all, of_body, place
@@ -26,6 +27,8 @@ from sim_bridge.multibody.usual_parts import LIMITS, Knobs, arm_m, usual_parts
 _DENSITY_LIMIT = math.log(3.0)
 _LEAST_ROTOR_SHARE = 1e-6
 """Of the vehicle's inertia: a rotor cannot be without any, even where the file says so."""
+
+_LEAST_KG, _LEAST_KG_M2 = 1e-9, 1e-14
 
 TOLERANCE = 1e-3
 """Share beyond which the user is told."""
@@ -72,6 +75,9 @@ def assemble(vehicle: Vehicle) -> Assembly:
     limits = np.array([*LIMITS[:usual_knobs], *[_DENSITY_LIMIT] * len(tuned)])
     knobs = meet(_miss_of(vehicle, build), limits) if len(limits) else limits
     parts = build(knobs)
+    frame = of_body(parts, 0)
+    if frame.mass_kg < _LEAST_KG or np.linalg.eigvalsh(frame.inertia_kg_m2)[0] < _LEAST_KG_M2:
+        raise ConfigError(vehicle.name, "part", "nothing on the frame weighs anything: add parts to it")
     return Assembly(tuple(parts), of_all(vehicle, parts), _misses(vehicle, parts))
 
 
