@@ -9,6 +9,7 @@ from typing import Any
 from flightstack import __version__
 from gcs_cli.paper import comparisons, plants
 from gcs_cli.paper.cases import CONDITIONS, CONTENDERS
+from gcs_cli.paper.claims import claims
 from gcs_cli.paper.corrections import CORRECTIONS
 from gcs_cli.paper.experiments import Flown
 from gcs_cli.paper.tables import Entry, table_1, table_2, table_3
@@ -33,7 +34,7 @@ def results_of(flown: Flown, left_out: Mapping[str, str]) -> dict[str, Any]:
         "conditions": {condition.name: condition.label for condition in CONDITIONS},
         "trajectories": {name: _about(name) for name in names},
         "cases": flown.entries,
-        "comparisons": {"claims": comparisons.claims(flown.entries), "xy": comparisons.xy(flown.entries)},
+        "comparisons": {"claims": claims(flown.entries), "xy": comparisons.xy(flown.entries)},
         "plants": plants.comparisons(flown.recordings),
         "linear": {},
         "onset": [],

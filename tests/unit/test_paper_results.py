@@ -28,6 +28,7 @@ from gcs_cli.paper.cases import (
     key,
     matrix,
 )
+from gcs_cli.paper.claims import claims
 from gcs_cli.paper.closed_loop import fly
 from gcs_cli.paper.corrections import CORRECTIONS
 from gcs_cli.paper.experiments import entry_of, run_cases, thinned
@@ -104,14 +105,15 @@ def test_a_thinned_recording_has_every_so_many_rows() -> None:
 
 
 def case_entry(
-    overshoot: float, rms_m: float = 0.1, ended: bool = False, steady_m: float = 0.0
+    overshoot: float, rms_m: float = 0.1, ended: bool = False, steady_m: float = 0.0, yaw_percent: float = 0.0
 ) -> dict[str, Any]:
     axis = {"overshoot_percent": overshoot, "steady_state_error": steady_m}
     path = dict.fromkeys(("max_error_m", "path_rms_m", "path_max_m", "beyond_m"), 0.1)
     return {
         "ended": {"time_s": 1.0, "why": "turned over"} if ended else None,
         "path": {"rms_error_m": rms_m, **path},
-        "metrics": {"x": axis, "y": {**axis, "steady_state_error": 0.0}},
+        "metrics": {"x": axis, "y": {**axis, "steady_state_error": 0.0}, "z": {"max_error": 0.13}},
+        "effort": {"saturated_percent": {"yaw": yaw_percent}},
     }
 
 
@@ -124,7 +126,7 @@ def cases_with(**changed: dict[str, Any]) -> dict[str, Any]:
 
 
 def verdicts(cases: dict[str, Any]) -> dict[str, bool]:
-    return {claim["name"]: claim["holds"] for claim in comparisons.claims(cases)}
+    return {claim["name"]: claim["holds"] for claim in claims(cases)}
 
 
 def test_verdicts_follow_the_figures() -> None:
@@ -141,15 +143,10 @@ def test_verdicts_follow_the_figures() -> None:
 
 
 def test_a_crash_is_told_and_decides_nothing_in_its_favour() -> None:
-    claims = {
-        claim["name"]: claim
-        for claim in comparisons.claims(cases_with(backstepping=case_entry(1.0, ended=True)))
-    }
-    assert not any(claim["holds"] for claim in claims.values())
-    assert (
-        claims["overshoot"]["words"] == "backstepping crashed on the small-angle plant: nothing to compare."
-    )
-    assert "nowhere" in claims["stable"]["words"]
+    found = {claim["name"]: claim for claim in claims(cases_with(backstepping=case_entry(1.0, ended=True)))}
+    assert not any(claim["holds"] for claim in found.values())
+    assert found["overshoot"]["words"] == "backstepping crashed on the small-angle plant: nothing to compare."
+    assert "nowhere" in found["stable"]["words"]
 
 
 def test_advantage_with_limits_alone_is_the_limits() -> None:
@@ -158,8 +155,20 @@ def test_advantage_with_limits_alone_is_the_limits() -> None:
     assert verdicts(cases)["limits"]
 
 
+def test_a_yaw_loop_that_saturates_is_told() -> None:
+    (claim, *_) = claims(cases_with(pid=case_entry(20.0, yaw_percent=80.4)))
+    assert claim["words"].endswith("The PID's yaw loop is at the rotors' limits in 80 % of the time.")
+    flights = {case.key: case_entry(20.0) for case in matrix(("desired",), (SMALL_ANGLE, RIGID))}
+    (claim,) = claims(flights)
+    assert claim["holds"]
+    flights[key(PID, "desired", plant=RIGID)] = case_entry(20.0, yaw_percent=80.4)
+    (claim,) = claims(flights)
+    assert not claim["holds"]
+    assert "80 % of the time on the rigid-body plant" in claim["words"]
+
+
 def test_a_table_without_flights_is_empty() -> None:
-    assert comparisons.claims({}) == []
+    assert claims({}) == []
     assert comparisons.xy({}) == {}
 
 
