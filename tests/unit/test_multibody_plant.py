@@ -1,0 +1,344 @@
+"""The multibody plant against the rigid one, conservation laws, closed forms of gyrostats, and the ground."""
+
+from __future__ import annotations
+
+import math
+import sys
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+import pytest
+
+from flightstack.contract import Vector3
+from flightstack.mavlink.hot_frames import ARMED_FLAG, ActuatorsFrame
+from flightstack.params.vehicle import Vehicle, load_vehicle
+from sim_bridge import plants
+from sim_bridge.contact import FRICTION
+from sim_bridge.disturbance import NO_DISTURBANCE, Disturbance
+from sim_bridge.errors import PlantDivergedError, UsageProblemError
+from sim_bridge.layout import CONTACT, DIVERGED
+from sim_bridge.multibody.frames import flip_quaternion, flip_vector
+from sim_bridge.multibody.mjcf import model_xml
+from sim_bridge.multibody.plant import MultibodyPlant
+from sim_bridge.plant import AT_REST, InitialState, Plant, PlantOptions
+from sim_bridge.plants import make_plant
+from sim_bridge.simulator import Simulator
+
+BOTH_PLANTS = pytest.mark.parametrize("name", ["rigid", "multibody"])
+BOTH_VEHICLES = pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
+STOPPED = np.zeros(8)
+TOLD = Disturbance(Vector3(2.0, 1.0, -0.5), 0.0, Vector3(0.1, 0.2, 0.3), Vector3(0.01, 0.02, -0.01))
+
+
+class Flight:
+    """A plant in the air whose rotors may give no thrust, so that nothing but mechanics is left."""
+
+    def __init__(
+        self, name: str, vehicle: Vehicle, initial: InitialState = AT_REST, speeds: tuple[float, ...] = (),
+        disturbance: Disturbance = NO_DISTURBANCE, step_s: float = 1e-3, thrust: bool = True, ground: bool = False,
+    ) -> None:  # fmt: skip
+        options = PlantOptions(disturbance, 1, initial, ground, limits=False, battery=None)
+        self.plant: Plant = make_plant(vehicle, name, options)
+        self.plant.set_step(step_s)
+        self.step_s = step_s
+        self.command = np.zeros(8)
+        if speeds:
+            self.plant.set_rotor_speeds(speeds)
+            self.command[: len(speeds)] = speeds
+        if not thrust:
+            for rotor in range(len(vehicle.rotors)):
+                self.plant.set_rotor_fault(rotor, share=0.0)
+        self.result = self.plant.show()
+
+    def fly(self, seconds: float) -> Flight:
+        self.result = self.plant.advance(self.command, ARMED_FLAG, round(seconds / self.step_s))
+        return self
+
+    @property
+    def state(self) -> np.ndarray:
+        return self.plant.output[0]["state"].copy()
+
+
+def hover(vehicle: Vehicle) -> float:
+    return math.sqrt(vehicle.weight_n / sum(r.thrust_coefficient_n_s2 for r in vehicle.rotors))
+
+
+class Conditions:
+    """A random state, rotors that are on their way to other speeds, wind, a force and a torque."""
+
+    def __init__(self, vehicle: str, seed: int) -> None:
+        random = np.random.default_rng(seed)
+        self.vehicle = load_vehicle(vehicle)
+        place, velocity, euler, rates = random.normal(size=(4, 3)) * [[5.0], [3.0], [0.3], [2.0]]
+        self.initial = InitialState(Vector3(*place), Vector3(*velocity), Vector3(*euler), Vector3(*rates))
+        speed = hover(self.vehicle)
+        self.speeds = tuple((speed * random.uniform(0.6, 1.0, 4)).tolist())
+        self.command = speed * (1.0 + 0.03 * random.normal(size=4))
+
+    def end(self, name: str, step_s: float) -> np.ndarray:
+        """State after one second."""
+        flight = Flight(name, self.vehicle, self.initial, self.speeds, TOLD, step_s)
+        flight.command[:4] = self.command
+        assert flight.fly(1.0).result == 0
+        return flight.state
+
+
+@BOTH_VEHICLES
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_flies_as_the_rigid_plant_and_nearer_with_shorter_steps(vehicle: str, seed: int) -> None:
+    """Against the rigid plant at 20 µs: fourth order, so that half the step leaves a sixteenth of the error."""
+    conditions = Conditions(vehicle, seed)
+    truth = conditions.end("rigid", 2e-5)
+    steps = (4e-3, 2e-3, 1e-3)
+    errors = [np.abs(conditions.end("multibody", step_s) - truth).max() for step_s in steps]
+    for step_s, error in zip(steps, errors, strict=True):
+        assert error < 1e6 * step_s**4  # measured: 0.0004e6 to 0.62e6
+    orders = [math.log2(coarse / fine) for coarse, fine in pairwise(errors)]
+    assert min(orders) > 3.9  # measured: 3.97
+    same_step = np.abs(conditions.end("multibody", 1e-3) - conditions.end("rigid", 1e-3)).max()
+    assert same_step < 1e-9  # measured: at most 4e-11; the same equations in other hands
+
+
+def model_state(
+    vehicle: Vehicle, state: np.ndarray, speeds: list[float]
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """The exported model in this state: a second opinion on momentum and energy."""
+    model = mujoco.MjModel.from_xml_string(model_xml(vehicle))
+    data = mujoco.MjData(model)
+    data.qpos[:3], data.qvel[:3] = flip_vector(state[:3]), flip_vector(state[3:6])
+    data.qpos[3:7], data.qvel[3:6] = flip_quaternion(state[6:10]), flip_vector(state[10:13])
+    data.qvel[6:] = speeds
+    mujoco.mj_forward(model, data)
+    mujoco.mj_subtreeVel(model, data)
+    mujoco.mj_energyVel(model, data)
+    return model, data
+
+
+@BOTH_PLANTS
+@pytest.mark.parametrize("spin_up", [False, True])
+def test_torque_free_spin_conserves_momentum_and_energy(name: str, spin_up: bool) -> None:
+    """Without air: the angular momentum in space stays, also while the rotors speed up, and so does ½ωᵀIω while not."""
+    vehicle = load_vehicle("paper_quad")
+    spin = InitialState(Vector3(0.0, 0.0, -50.0), rates_frd_rad_s=Vector3(3.0, -2.0, 4.0))
+    flight = Flight(name, vehicle, spin, (200.0, 150.0, 220.0, 100.0), thrust=False)
+    if spin_up:
+        flight.command[:4] = (300.0, 100.0, 250.0, 50.0)
+    inertia = np.array(vehicle.inertia_kg_m2)
+
+    def seen() -> tuple[np.ndarray, float]:
+        state = flight.state
+        model, data = model_state(vehicle, state, flight.plant.rotor_speeds_rad_s())
+        momentum = data.subtree_angmom[model.body("vehicle").id].copy()
+        return momentum, 0.5 * float(state[10:13] @ (inertia * state[10:13]))
+
+    momentum, energy = seen()
+    for _ in range(10):
+        flight.fly(0.5)
+        now, now_energy = seen()
+        bound = 1e-6 if spin_up else 1e-10  # measured: 1.4e-7 and 2.4e-12
+        assert np.abs(now - momentum).max() < bound * np.linalg.norm(momentum)
+        if not spin_up:
+            assert now_energy == pytest.approx(energy, rel=1e-11)  # measured: 6e-14
+
+
+def gyrostat(rates: Vector3, torque: Vector3 = Vector3(0.0, 0.0, 0.0)) -> tuple[Flight, float]:  # noqa: B008
+    """The paper's vehicle with only its clockwise rotors turning, and the rate h/I at which its axis goes round."""
+    vehicle = load_vehicle("paper_quad")
+    speeds = (220.0, 0.0, 220.0, 0.0)
+    start = InitialState(Vector3(0.0, 0.0, -50.0), rates_frd_rad_s=rates)
+    flight = Flight(
+        "multibody", vehicle, start, speeds, Disturbance(torque_frd_n_m=torque), thrust=False, step_s=1e-3
+    )
+    momentum = 2.0 * 220.0 * vehicle.rotors[0].inertia_kg_m2
+    return flight, momentum / vehicle.inertia_kg_m2[0]
+
+
+def test_free_precession_of_a_gyrostat() -> None:
+    """I ṗ = −h q, I q̇ = h p: the rate turns in the body with h/I."""
+    flight, rate = gyrostat(Vector3(0.5, 0.0, 0.0))
+    crossings, last = [], 0.0
+    for tick in range(1, 12001):
+        q = float(flight.fly(1e-3).state[11])
+        if last < 0.0 <= q:
+            crossings.append(1e-3 * (tick - q / (q - last)))
+        last = q
+    periods = np.diff(crossings)
+    assert len(periods) >= 5
+    assert 2.0 * math.pi / periods.mean() == pytest.approx(rate, rel=1e-5)  # asked for: 1 %
+    assert np.hypot(*flight.state[10:12]) == pytest.approx(0.5, rel=1e-9)
+
+
+def test_constant_torque_makes_a_gyrostat_precess_and_nod() -> None:
+    """I ṗ = τ − h q, I q̇ = h p from rest: p = τ/h·sin(h t/I), q = τ/h·(1 − cos(h t/I))."""
+    torque = 1e-3
+    flight, rate = gyrostat(Vector3(0.0, 0.0, 0.0), Vector3(torque, 0.0, 0.0))
+    amplitude = torque / (rate * load_vehicle("paper_quad").inertia_kg_m2[0])
+    mean = 0.0
+    for tick in range(1, 4001):
+        p, q = flight.fly(1e-3).state[10:12]
+        angle = rate * tick * 1e-3
+        assert abs(p - amplitude * math.sin(angle)) < 1e-5 * amplitude
+        assert abs(q - amplitude * (1.0 - math.cos(angle))) < 1e-5 * amplitude
+        mean += q
+    turns = rate * 4.0 / (2.0 * math.pi)
+    assert turns > 2.0
+    assert mean / 4000 == pytest.approx(amplitude, rel=0.1)  # the precession of the textbooks, τ/h
+
+
+def test_the_hinges_accelerate_as_the_lag_wants() -> None:
+    """MuJoCo's own accelerations of the hinges, from the torques of the drives, in a wild state."""
+    conditions = Conditions("paper_quad", 4)
+    flight = Flight("multibody", conditions.vehicle, conditions.initial, conditions.speeds, TOLD)
+    flight.command[:4] = 1.3 * np.array(conditions.speeds)
+    flight.fly(1e-3)
+    assert isinstance(flight.plant, MultibodyPlant)
+    flight.plant.acceleration_ned_m_s2()
+    wanted = (flight.command[:4] - flight.plant.rotor_speeds_rad_s()) / conditions.vehicle.rotors[0].lag_s
+    assert wanted.min() > 1e3
+    assert np.allclose(flight.plant._data.qacc[6:], wanted, rtol=1e-10)
+
+
+def test_spin_up_turns_the_vehicle_the_other_way() -> None:
+    """Σ J_r·ΔΩ of the clockwise rotors is what the frame gets, and I_z holds the rotors too."""
+    vehicle = load_vehicle("paper_quad")
+    flight = Flight("multibody", vehicle, InitialState(Vector3(0.0, 0.0, -9.0)), (100.0,) * 4, thrust=False)
+    flight.command[:4] = (200.0, 100.0, 200.0, 100.0)
+    yaw_rate = flight.fly(0.2).state[12]
+    expected = -2.0 * vehicle.rotors[0].inertia_kg_m2 * 100.0 / vehicle.inertia_kg_m2[2]
+    assert yaw_rate == pytest.approx(expected, rel=1e-5)
+
+
+@BOTH_VEHICLES
+@pytest.mark.parametrize("step_s", [0.01, 0.002, 1e-3, 1e-4])
+def test_rests_at_the_origin(vehicle: str, step_s: float) -> None:
+    flight = Flight("multibody", load_vehicle(vehicle), step_s=step_s, ground=True)
+    assert flight.result == CONTACT
+    flight.plant.advance(STOPPED, 0, round(5.0 / step_s))
+    assert np.abs(flight.state - [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]).max() < 1e-12  # measured: 6e-14
+    assert flight.plant.buried_m() < 1e-12
+
+
+@BOTH_VEHICLES
+def test_touches_down_without_bouncing_away(vehicle: str) -> None:
+    start = InitialState(Vector3(0.0, 0.0, -0.02), Vector3(0.1, 0.0, 1.0))
+    flight = Flight("multibody", load_vehicle(vehicle), start, ground=True)
+    heights = []
+    for _ in range(1000):
+        flight.result = flight.plant.advance(STOPPED, 0, 1)
+        heights.append(-flight.state[2])
+    first = int(np.argmax(np.array(heights) < 0.0))
+    assert max(heights[first:]) < 0.01  # measured: 3 mm
+    assert min(heights) > -0.01  # measured: 4 mm
+    assert flight.result == CONTACT
+    assert np.abs(flight.state[[2, 3, 4, 5]]).max() < 1e-6
+
+
+@BOTH_VEHICLES
+@pytest.mark.parametrize("sink_m_s", [2.0, 10.0, 30.0])
+def test_hard_landing_stays_finite_and_above_ground(vehicle: str, sink_m_s: float) -> None:
+    start = InitialState(
+        Vector3(0.0, 0.0, -1.0), Vector3(2.0, 1.0, sink_m_s), Vector3(0.4, -0.3, 1.0), Vector3(3.0, -2.0, 1.0)
+    )
+    flight = Flight("multibody", load_vehicle(vehicle), start, ground=True)
+    for _ in range(160):
+        result = flight.plant.advance(STOPPED, 0, 50)
+        assert np.isfinite(flight.state).all()
+        assert np.linalg.norm(flight.state[3:6]) < math.hypot(sink_m_s, 5.0) + 5.0
+    assert result == CONTACT
+    assert np.abs(flight.state[3:6]).max() < 1e-3
+    assert flight.state[2] < 0.25  # no deeper than legs and arms allow
+
+
+@pytest.mark.parametrize("euler_deg", [(180.0, 0.0, 0.0), (90.0, 0.0, 30.0), (140.0, 20.0, 0.0)])
+def test_a_tumbled_vehicle_lies_still(euler_deg: tuple[float, ...]) -> None:
+    start = InitialState(Vector3(0.0, 0.0, -1.0), euler_rad=Vector3(*np.radians(euler_deg)))
+    flight = Flight("multibody", load_vehicle("paper_quad"), start, ground=True)
+    flight.plant.advance(STOPPED, 0, 15000)
+    before = flight.state
+    assert flight.plant.advance(STOPPED, 0, 5000) == CONTACT
+    assert np.abs(flight.state - before)[:6].max() < 1e-6
+
+
+@BOTH_VEHICLES
+def test_friction_holds_below_its_limit_and_slides_above(vehicle: str) -> None:
+    weight = load_vehicle(vehicle).weight_n
+
+    def pushed(share: float) -> Flight:
+        push = Disturbance(force_ned_n=Vector3(share * weight, 0.0, 0.0))
+        flight = Flight("multibody", load_vehicle(vehicle), disturbance=push, ground=True)
+        flight.plant.advance(STOPPED, 0, 3000)
+        return flight
+
+    held = pushed(0.3)
+    before = held.state
+    assert 0.0 < before[0] < 1e-3
+    held.plant.advance(STOPPED, 0, 10000)
+    assert np.abs(held.state - before)[:2].max() < 1e-6  # measured: 2e-8
+    assert pushed(FRICTION + 0.05).state[3] > 0.5
+
+
+@BOTH_VEHICLES
+def test_takes_off_when_thrust_exceeds_weight(vehicle: str) -> None:
+    flight = Flight("multibody", load_vehicle(vehicle), ground=True)
+    flight.command[:4] = 0.95 * hover(load_vehicle(vehicle))
+    assert flight.fly(2.0).result == CONTACT
+    flight.command[:4] = 1.1 * hover(load_vehicle(vehicle))
+    assert flight.fly(1.0).result == 0
+    assert flight.state[2] < -0.3
+    assert np.abs(flight.state[[0, 1, 7, 8, 9]]).max() < 1e-9
+
+
+def test_a_bad_command_is_counted_and_the_last_good_one_holds() -> None:
+    vehicle = load_vehicle("paper_quad")
+    flight = Flight("multibody", vehicle, InitialState(Vector3(0.0, 0.0, -9.0)), (hover(vehicle),) * 4)
+    flight.fly(0.1)
+    flight.command[:4] = (math.nan, math.inf, -math.inf, 1e300)
+    flight.fly(0.1)
+    assert flight.plant.bad_commands == 4
+    assert flight.result == 0
+    assert flight.plant.rotor_speeds_rad_s() == pytest.approx([hover(vehicle)] * 4)
+
+
+def test_ideal_rotors_are_at_their_speeds_at_once() -> None:
+    vehicle = load_vehicle("paper_quad").with_ideal_rotors()
+    flight = Flight("multibody", vehicle, InitialState(Vector3(0.0, 0.0, -9.0)))
+    flight.command[:4] = (100.0, 200.0, 300.0, 400.0)
+    flight.fly(1e-3)
+    assert flight.plant.rotor_speeds_rad_s() == [100.0, 200.0, 300.0, 400.0]
+    assert np.isfinite(flight.state).all()
+
+
+def test_numbers_that_run_away_end_the_flight_with_a_sentence() -> None:
+    push = PlantOptions(Disturbance(torque_frd_n_m=Vector3(1e6, 0.0, 0.0)), ground=False)
+    simulator = Simulator(load_vehicle("paper_quad"), "multibody", push)
+    actuators = ActuatorsFrame()
+    with pytest.raises(PlantDivergedError, match="diverged at t="):  # noqa: PT012  # in one of the ticks
+        for _ in range(1000):
+            simulator.apply(actuators)
+    assert simulator.plant.show() & DIVERGED
+    assert np.isfinite(np.array(simulator.plant.acceleration_ned_m_s2())).all()
+
+
+def test_acceleration_and_airspeed_are_those_of_the_rigid_plant() -> None:
+    conditions = Conditions("x_quad", 5)
+    both = [
+        Flight(name, conditions.vehicle, conditions.initial, conditions.speeds, TOLD)
+        for name in ("rigid", "multibody")
+    ]
+    rigid, multibody = (flight.plant for flight in both)
+    assert multibody.acceleration_ned_m_s2() == pytest.approx(rigid.acceleration_ned_m_s2(), rel=1e-12)
+    assert multibody.airspeed_m_s() == pytest.approx(rigid.airspeed_m_s(), rel=1e-15)
+    assert multibody.euler_rad() is None
+    assert "parts meet the vehicle file" in (multibody.about() or "")
+
+
+@pytest.fixture
+def no_mujoco(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "sim_bridge.multibody.plant", None)
+
+
+@pytest.mark.usefixtures("no_mujoco")
+def test_says_what_to_install() -> None:
+    with pytest.raises(UsageProblemError, match=r"needs MuJoCo: pip install 'flightstack\[multibody\]'"):
+        plants.make_plant(load_vehicle("paper_quad"), "multibody", PlantOptions())
