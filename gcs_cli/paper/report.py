@@ -11,19 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from gcs_cli.paper import cases
-from gcs_cli.paper.report_compare import claims_section, hard_over_time, matrix_sections, xy_figures
+from gcs_cli.paper.report_compare import claims_section, hard_over_time, xy_figures
 from gcs_cli.paper.report_flights import (
     PAIR,
     Recordings,
     beside,
     desired_figure,
-    metrics_table,
     response_figures,
     step_figure,
-    step_table,
 )
 from gcs_cli.paper.report_labels import ANGLES, LABELS, PLANTS, anchored
 from gcs_cli.paper.report_linear import linear_sections
+from gcs_cli.paper.report_matrix import matrix_sections
+from gcs_cli.paper.report_metrics import metrics_table, step_table
 from gcs_cli.paper.report_pictures import Picture, pictures_section
 from gcs_cli.paper.report_pil import pil_sections
 from gcs_cli.paper.report_plants import plants_section

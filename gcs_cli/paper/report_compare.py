@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
@@ -12,9 +11,7 @@ from gcs_cli.paper.report_axes import chart, spanning
 from gcs_cli.paper.report_flights import (
     PAIR,
     STEP_SIZE,
-    Cases,
     Recordings,
-    ending,
     label,
     over_time,
     signals,
@@ -25,10 +22,7 @@ from gcs_cli.paper.report_labels import (
     REFERENCE,
     STYLES,
     TRAJECTORIES,
-    UNKNOWN,
     anchored,
-    condition_label,
-    fixed,
     legend_of,
     minus,
     row,
@@ -40,14 +34,7 @@ from gcs_cli.report_plots import section
 
 XY_SIZE = (480, 400)
 OTHERS = (cases.POLES, cases.TUNED_PID)
-ALIKE = 0.01
-"""Within this share of the best, somebody is as good."""
-TELLING_POINTS, SAME_POINTS = 0.5, 0.05
-"""Overshoots of a row that differ by less tell nobody apart; the least is marked, and what is written the same."""
-IN_METRES = 0.2
-"""Shorter ones are written in millimetres."""
 _CONDITION_TITLES = {cases.PLAIN: "with rotor limits and lag", cases.IDEAL: "without limits and lag"}
-_OPEN = ((cases.HARD, cases.SMALL_ANGLE), (cases.SMOOTH, cases.SMALL_ANGLE))
 
 
 def claims_section(claims: Sequence[Mapping[str, Any]]) -> str:
@@ -159,84 +146,3 @@ def _crashes(flown: Mapping[str, Recording]) -> str:
         f"{LABELS[name]} {one.ended_why} at {one.ended_s:.2f} s" for name, one in flown.items() if one.ended_s
     ]
     return f' <span class="bad">{escape("; ".join(told))}</span>' if told else ""
-
-
-def matrix_sections(found: Cases) -> Iterator[str]:
-    """Yield a table for each profile and plant: conditions down, contenders across, the best one marked."""
-    for trajectory in (cases.HARD, cases.SMOOTH, cases.DESIRED):
-        for plant in (cases.SMALL_ANGLE, cases.RIGID):
-            table = matrix_table(found, trajectory, plant)
-            if not table:
-                continue
-            title = f"{TRAJECTORIES[trajectory].capitalize()} profile, {PLANTS[plant]}"
-            name = f"matrix-{trajectory}-{plant}"
-            if (trajectory, plant) in _OPEN:
-                yield anchored(name, section(f"Disturbances: {title}", table, note=_MATRIX_NOTE))
-            else:
-                folded = f"<details><summary>{escape(title)}</summary>{table}</details>"
-                yield anchored(name, f"<section>{folded}</section>")
-
-
-_MATRIX_NOTE = (
-    "Upper figure: RMS distance from the reference in space. Below: the largest error of one axis, and the largest "
-    "overshoot of x, y and z. Bold on colour: the smallest RMS of the row, and whatever is within 1 % of it. "
-    "Underlined: the smallest overshoot, where they differ. On the hard profile the largest error is a step itself, "
-    "whoever flies it."
-)
-
-
-def matrix_table(found: Cases, trajectory: str, plant: str) -> str:
-    """Return the table; empty if no such case was flown."""
-    rows = []
-    for condition in cases.CONDITIONS:
-        flown = {
-            name: found[key]
-            for name in LABELS
-            if (key := cases.key(name, trajectory, condition.name, plant)) in found
-        }
-        if flown:
-            rows.append(row(f"<th>{escape(condition_label(condition))}</th>{''.join(_cells(flown))}"))
-    return wide_table(("", *LABELS.values()), rows, style="matrix") if rows else ""
-
-
-def _cells(flown: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
-    survivors = [case for case in flown.values() if case["ended"] is None]
-    best = min((space_rms(case) for case in survivors), default=math.inf)
-    over = [value for case in survivors if (value := worst_overshoot(case)) is not None]
-    least = min(over) if over and max(over) - min(over) >= TELLING_POINTS else -math.inf
-    for name in LABELS:
-        case = flown.get(name)
-        if case is None:
-            yield f"<td>{UNKNOWN}</td>"
-        elif case["ended"] is not None:
-            yield f'<td class="bad">{escape(ending(case))}</td>'
-        else:
-            yield _cell(case, best, least)
-
-
-def _cell(case: Mapping[str, Any], best: float, least: float) -> str:
-    rms, over = space_rms(case), worst_overshoot(case)
-    largest = max(case["metrics"][axis]["max_error"] for axis in "xyz")
-    style = ' class="best"' if rms <= best * (1.0 + ALIKE) else ""
-    beyond = "" if over is None else f"{fixed(over, 1)} % over"
-    if over is not None and over <= least + SAME_POINTS:
-        beyond = f"<u>{beyond}</u>"
-    figures = (
-        f"<b{style}>{_length(rms, 3, 1)}</b><span>max {_length(largest, 2, 0)}</span><span>{beyond}</span>"
-    )
-    return f'<td class="two">{figures}</td>'
-
-
-def _length(metres: float, places_m: int, places_mm: int) -> str:
-    return f"{fixed(metres, places_m)} m" if metres >= IN_METRES else f"{fixed(1e3 * metres, places_mm)} mm"
-
-
-def space_rms(case: Mapping[str, Any]) -> float:
-    """Return the RMS distance from the reference in space [m], from the RMS errors of the axes."""
-    return math.sqrt(sum(case["metrics"][axis]["rms_error"] ** 2 for axis in "xyz"))
-
-
-def worst_overshoot(case: Mapping[str, Any]) -> float | None:
-    """Return the largest overshoot of x, y and z [%]; None where none is defined."""
-    there = [case["metrics"][axis]["overshoot_percent"] for axis in "xyz"]
-    return max((value for value in there if value is not None), default=None)

@@ -12,11 +12,12 @@ import pytest
 
 from gcs_cli.paper import cases
 from gcs_cli.paper.report import render
-from gcs_cli.paper.report_compare import matrix_table, space_rms
-from gcs_cli.paper.report_flights import metrics_table, signals, step_table
+from gcs_cli.paper.report_flights import signals
 from gcs_cli.paper.report_labels import LABELS, fixed, number
+from gcs_cli.paper.report_matrix import matrix_table, space_rms
+from gcs_cli.paper.report_metrics import metrics_table, step_table
 from gcs_cli.paper.report_pictures import Picture, poses_of, quaternions, take
-from gcs_cli.paper.report_summary import sentences
+from gcs_cli.paper.report_sentences import sentences
 from gcs_cli.paper.report_tables import plain
 from tests.support.paper_flights import linear_part, onset_part, pil_part, small_flights, small_results
 from tests.unit.test_report import parsed

@@ -1,0 +1,196 @@
+"""What came out, in sentences; every number in them comes from the results. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+
+from gcs_cli.paper import cases
+from gcs_cli.paper.pil_section import EMULATED
+from gcs_cli.paper.report_findings import (
+    Results,
+    crashed,
+    flies,
+    onset_apart,
+    paper_claims,
+    same_bits,
+    worst_plants,
+)
+from gcs_cli.paper.report_labels import LABELS, PLANTS, fixed, minus, number
+from gcs_cli.paper.report_matrix import space_rms
+
+_SMALL, _RIGID = cases.SMALL_ANGLE, cases.RIGID
+_SATURATED_POINTS = 10.0
+"""Further ticks in which the rotors cannot give the yaw torque, in points: fewer are not worth a sentence."""
+_MAGNIFIED = 1e3
+_PARTS = {"linear": "linear analysis", "onset": "onset of instability", "pil": "processor in the loop"}
+
+
+def sentences(results: Results) -> Iterator[str]:
+    """Yield the sentences, as HTML."""
+    corrected = len(results["corrections"])
+    yield (
+        f"The paper's model and both controllers fly, with {corrected} corrections of what is printed; "
+        '<a href="#corrections">each is named</a>. None of its figures has numbers, so shapes and claims can be '
+        "compared, and no curve."
+    )
+    yield from _of_claims(results)
+    yield from _of_gains(results)
+    yield from _of_crashes(results)
+    yield from _of_spin_up(results)
+    yield from _of_plants(results)
+    yield from _of_linear(results)
+    yield from _of_pil(results)
+    left_out = dict(results["left_out"])
+    if results["pil"] and results["pil"]["why_left_out"]:
+        left_out["pil"] = results["pil"]["why_left_out"]
+    for part, why in left_out.items():
+        yield f'<span class="bad">Left out: {escape(_PARTS.get(part, part))}</span>: {escape(why)}'
+
+
+def _of_claims(results: Results) -> Iterator[str]:
+    for of in paper_claims(results).values():
+        held = [PLANTS.get(claim["plant"], claim["plant"]) for claim in of if claim["holds"]]
+        fell = [PLANTS.get(claim["plant"], claim["plant"]) for claim in of if not claim["holds"]]
+        verdict = '<b class="good">Holds</b>' if not fell else '<b class="bad">Does not hold</b>'
+        if held and fell:
+            verdict = f"<b>Holds on the {escape(', '.join(held))}, not on the {escape(', '.join(fell))}</b>"
+        words = escape(minus(of[0]["words"]))
+        yield f"“{escape(of[0]['claim'])}” ({escape(of[0]['source'])}): {verdict}. {words}"
+
+
+def _of_gains(results: Results) -> Iterator[str]:
+    """Say what own gains reach beside the paper's, on the hard profile's overshoot and the smooth profile's error."""
+    found = results["cases"]
+    names = (cases.PID, cases.BACKSTEPPING, cases.POLES, cases.TUNED_PID)
+    flown = {name: found.get(cases.key(name, cases.SMOOTH)) for name in names}
+    told = [
+        f"{fixed(1e3 * space_rms(case), 1)} mm ({LABELS[name]})"
+        for name, case in flown.items()
+        if flies(case)
+    ]
+    if len(told) == len(names):
+        yield escape(
+            f"What the gains do, beside what the method does: RMS error on the smooth profile, small-angle model: "
+            f"{', '.join(told)}."
+        )
+
+
+def _of_crashes(results: Results) -> Iterator[str]:
+    lost: dict[str, list[str]] = {}
+    for key in crashed(results):
+        name, _, condition, _ = key.split("/") if key.count("/") == 3 else (key, "", key, "")
+        told = results.get("conditions", {}).get(condition, condition)
+        of = lost.setdefault(name, [])
+        if told not in of:
+            of.append(told)
+    if not results["cases"]:
+        return
+    if not lost:
+        yield "No flight of the matrix ended in a crash."
+        return
+    parts = [f"{LABELS.get(name, name)} ({'; '.join(of)})" for name, of in lost.items()]
+    never = [
+        title
+        for name, title in LABELS.items()
+        if name not in lost and any(k.startswith(f"{name}/") for k in results["cases"])
+    ]
+    words = f"Flights that ended in a crash, and with what: {', '.join(parts)}."
+    yield escape(f"{words} Never: {', '.join(never)}." if never else words)
+
+
+def _of_spin_up(results: Results) -> Iterator[str]:
+    """Say what the rotors' reaction to spinning up, which the paper leaves out, does to its yaw loop."""
+    found = results["cases"]
+    keys = (cases.key(cases.PID, cases.DESIRED, cases.PLAIN, plant) for plant in (_SMALL, _RIGID))
+    pair = [found[key] for key in keys if flies(found.get(key))]
+    if len(pair) < 2:
+        return
+    without, with_it = (case["effort"]["saturated_percent"]["yaw"] for case in pair)
+    if with_it - without < _SATURATED_POINTS:
+        return
+    words = (
+        "The paper leaves out the torque by which rotors react when they spin up. With it, on the rigid body, the yaw "
+        f"torque that Table II asks for is out of the rotors' reach in {fixed(with_it, 0)} % of the desired trajectory "
+        f"({fixed(without, 0)} % on the small-angle model)"
+    )
+    needed = next(
+        (
+            one["predicted_hz"]
+            for one in results["onset"] or ()
+            if "spin-up" in one["setting"] and (one["controller"], one["gains"]) == (cases.PID, "paper")
+        ),
+        None,
+    )
+    if needed:
+        words += (
+            f": that loop would be stable from {fixed(needed, 0)} Hz on, and runs at {pair[1]['inner_hz']} Hz"
+        )
+    yield escape(f"{words}.")
+
+
+def _of_plants(results: Results) -> Iterator[str]:
+    worst, of = worst_plants(results), results["plants"].get(f"{cases.RIGID}_{cases.MULTIBODY}")
+    if worst is None or not of:
+        return
+    broken = [LABELS.get(name, name) for name, one in of.items() if not one.get("within_bounds")]
+    one = next(iter(of.values()))
+    bound = f"{fixed(100.0 * one['position_bound_m'], 0)} cm and {fixed(one['attitude_bound_deg'], 1)}°"
+    verdict = (
+        f"the bound of {bound} is kept by all" if not broken else f"not within {bound}: {', '.join(broken)}"
+    )
+    words = (
+        "Rigid body (our equations) and multibody assembly (MuJoCo's mechanics) stay within "
+        f"{number(1e3 * worst[0])} mm and {number(worst[1], 2)}° of each other over the whole desired trajectory; "
+        f"{verdict}."
+    )
+    others = [found["max_position_m"] for name, found in of.items() if name != cases.PID]
+    if others and cases.PID in of and of[cases.PID]["max_position_m"] > _MAGNIFIED * max(others):
+        words += (
+            " All of it comes with the PID of Table II, which magnifies what rounding begins; the others stay "
+            f"within {number(1e3 * max(others), 1)} mm."
+        )
+    yield escape(words)
+
+
+def _of_linear(results: Results) -> Iterator[str]:
+    apart = onset_apart(results)
+    if apart is None:
+        return
+    rates = {
+        (one["controller"], one["axis"]): one["predicted_hz"]
+        for one in reversed(results["onset"])
+        if one["gains"] == "paper" and one["setting"] == results["onset"][0]["setting"]
+    }
+    pid, backstepping = (rates.get((name, "roll")) for name in (cases.PID, cases.BACKSTEPPING))
+    words = (
+        f"The rate at which instability sets in is predicted within {fixed(apart, 2)} % of the simulated one"
+    )
+    if pid and backstepping:
+        words += (
+            "; with ideal rotors and one step of delay the roll loop needs at least "
+            f"{fixed(pid, 0)} Hz with the paper's PID and {fixed(backstepping, 0)} Hz with its backstepping"
+        )
+    yield escape(f"{words}.")
+
+
+def _of_pil(results: Results) -> Iterator[str]:
+    same, pil = same_bits(results), results["pil"]
+    if same is None:
+        return
+    target = "an emulated Cortex-M4F (no board was measured)" if pil["target"] == EMULATED else pil["target"]
+    apart = [
+        row["largest"]
+        for of in pil["controllers"].values()
+        for row in of["differences"]
+        if row["signal"] == "position" and row["pair"] == "MIL–PIL" and row["largest"] is not None
+    ]
+    words = "the same bits" if same else "other bits, see below"
+    position = (
+        f" The path differs from that of the Python loops by {number(1e6 * max(apart))} µm at most."
+        if apart
+        else ""
+    )
+    yield escape(
+        f"The C loops on {target} give {words} as on this machine, in every signal of both flights.{position}"
+    )
