@@ -55,11 +55,10 @@ class LiveView:
         os.set_blocking(self._pipe, False)
 
     def _complaint(self) -> str:
-        assert self._process.stderr is not None
-        lines = self._process.stderr.read().decode(errors="replace").split("\n")
-        self._process.wait()
-        said = next((line.strip() for line in reversed(lines) if line.strip()), "it ended at once")
-        return said if said.startswith("--view") else f"--view: the window cannot be opened: {said}"
+        """Return the last line that it wrote, once it has ended."""
+        said = self._process.communicate()[1].decode(errors="replace").split("\n")
+        last = next((line.strip() for line in reversed(said) if line.strip()), "it ended at once")
+        return last if last.startswith("--view") else f"--view: the window cannot be opened: {last}"
 
     def write(self, snapshot: bytes) -> bool:
         """Hand over a snapshot; return False when the window is closed."""
@@ -91,9 +90,10 @@ class LiveView:
 
     def close(self) -> None:
         """Close the window; nothing happens when it is closed."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+            assert pipe is not None
+            with contextlib.suppress(OSError):
+                pipe.close()
         try:
             self._process.wait(_PATIENCE_S)
         except subprocess.TimeoutExpired:

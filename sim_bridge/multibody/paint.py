@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -114,6 +115,17 @@ def _sky(height: int, width: int) -> Image:
     return np.concatenate([_sky_towards(*face) for face in faces])[:height]
 
 
+@cache
+def _clouds() -> Image:
+    """How thick the layer of clouds is; it repeats beyond its edges."""
+    size = 512
+    return (
+        0.75 * _noise(size, 5, _SEED + 7)
+        + 0.45 * _noise(size, 13, _SEED + 8)
+        + 0.3 * _noise(size, 40, _SEED + 9)
+    )
+
+
 def _sky_towards(x: Image, up: Image, z: Image) -> Image:
     """Colour of the sky in given directions, of any length; ``up`` is away from the ground."""
     length = np.sqrt(x * x + up * up + z * z)
@@ -121,12 +133,9 @@ def _sky_towards(x: Image, up: Image, z: Image) -> Image:
     image = _mix((0.80, 0.87, 0.93), (0.42, 0.63, 0.86), np.clip(high * 2.4, 0, 1) ** 0.7)
     image += (np.array([0.20, 0.42, 0.72]) - image) * (np.clip((high - 0.25) / 0.75, 0, 1) ** 1.1)[..., None]
     # a flat layer of clouds, seen from below
-    size, reach = 512, 0.30
-    layer = (
-        0.75 * _noise(size, 5, _SEED + 7)
-        + 0.45 * _noise(size, 13, _SEED + 8)
-        + 0.3 * _noise(size, 40, _SEED + 9)
-    )
+    reach = 0.30
+    layer = _clouds()
+    size = len(layer)
     scale = 0.17 * size / np.maximum(high, 0.02)
     column = np.floor(x / length * scale).astype(int) % size
     row = np.floor(z / length * scale).astype(int) % size

@@ -1,0 +1,247 @@
+"""``sim-bridge render`` and ``gcs replay`` as processes: files of pictures, and what is said when there are none."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import imageio_ffmpeg
+import pytest
+from PIL import Image
+
+from flightstack.params.vehicle import load_vehicle
+from flightstack.poses_file import write_poses
+from sim_bridge.__main__ import main
+from sim_bridge.errors import UsageProblemError
+from sim_bridge.live_view import READY, SNAPSHOT, LiveView
+from sim_bridge.multibody.offscreen import choose
+from sim_bridge.simulator import Simulator
+from tests.support.process import Process
+from tests.support.sample_poses import sample_poses
+from tests.support.synthetic_flight import synthetic_flight_bytes
+from tests.support.tools import missing
+
+SMALL = ("--size", "96x54")
+
+
+@pytest.fixture(scope="module")
+def poses(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    try:
+        choose()
+    except UsageProblemError as error:
+        missing(str(error))
+    path = tmp_path_factory.mktemp("poses") / "poses.npz"
+    write_poses(path, sample_poses(2.0))
+    return path
+
+
+def render(*arguments: object) -> subprocess.CompletedProcess[str]:
+    program = [sys.executable, "-m", "sim_bridge", "render", *map(str, arguments)]
+    return subprocess.run(program, capture_output=True, text=True, check=False)
+
+
+def frames_of(path: Path) -> tuple[int, tuple[int, int]]:
+    if path.suffix == ".gif":
+        with Image.open(path) as image:
+            return image.n_frames, image.size
+    program = [
+        imageio_ffmpeg.get_ffmpeg_exe(),
+        "-v",
+        "error",
+        "-i",
+        str(path),
+        "-f",
+        "image2pipe",
+        "-c:v",
+        "ppm",
+        "-",
+    ]
+    pictures = subprocess.run(program, capture_output=True, check=True).stdout
+    heads = re.findall(rb"P6\n(\d+) (\d+)\n255\n", pictures)
+    return len(heads), (int(heads[0][0]), int(heads[0][1]))
+
+
+def test_pictures_a_sheet_and_films_of_the_asked_size(poses: Path, tmp_path: Path) -> None:
+    gif, mp4 = tmp_path / "f.gif", tmp_path / "f.mp4"
+    done = render(
+        poses, *SMALL, "--png", tmp_path / "p.png", "--at", "0.5,1.5", "--sheet", tmp_path / "s.png",
+        "--video", gif, "--fps", "10", "--from", "1", "--to", "1.5", "--camera", "side",
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.split() == [str(tmp_path / name) for name in ("p-1.png", "p-2.png", "s.png", "f.gif")]
+    with Image.open(tmp_path / "p-2.png") as picture, Image.open(tmp_path / "s.png") as whole:
+        assert picture.size == (96, 54)
+        assert whole.size == (2 * 96 + 6, 54)
+    assert frames_of(gif) == (5, (96, 54))
+    done = render(poses, *SMALL, "--video", mp4, "--fps", "10", "--speed", "4", "--camera", "fixed")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert frames_of(mp4) == (5, (96, 54))
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "f.gif",
+        "f.mp4",
+        "p-1.png",
+        "p-2.png",
+        "s.png",
+    ]
+
+
+def test_a_log_is_replayed_from_end_to_end(poses: Path, tmp_path: Path) -> None:
+    """The synthetic flight, through ``gcs replay``, which takes the vehicle from the log."""
+    (tmp_path / "flight.ulg").write_bytes(synthetic_flight_bytes(inner_ms=20, outer_ms=20, seconds=4.0))
+    arguments = ["replay", str(tmp_path), *SMALL, "--fps", "5", "--speed", "4", "--no-words"]
+    program = [sys.executable, "-m", "gcs_cli", *arguments]
+    done = subprocess.run(program, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert frames_of(tmp_path / "replay.mp4") == (5, (96, 54))
+    done = subprocess.run([*program, "--camera", "nose"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "sim-bridge: --camera: 'nose' is not one of chase, fixed, top, side\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "nothing to do: give --png, --sheet, --video or --view"),
+        (["--png", "p.jpg"], "--png p.jpg: the name must end in .png"),
+        (["--video", "f.avi"], "--video f.avi: the name must end in .mp4 or .gif"),
+        (["--png", "no/where/p.png"], "--png no/where/p.png: there is no directory no/where"),
+        (["--png", "p.png", "--camera", "nose"], "--camera: 'nose' is not one of chase, fixed, top, side"),
+        (["--png", "p.png", "--size", "big"], "--size: 'big' is not WIDTHxHEIGHT in pixels, such as 1280x720"),
+        (["--png", "p.png", "--size", "8x9"], "--size: 8 is outside the allowed range 16 to 4096"),
+        (["--video", "f.mp4", "--size", "97x54"], "--size: an mp4 needs even numbers, not 97x54"),
+        (["--video", "f.mp4", "--fps", "0"], "--fps: 0 is outside the allowed range 0.1 to 240"),
+        (["--video", "f.mp4", "--speed", "nan"], "--speed: nan is outside the allowed range 0.001 to 1000"),
+        (["--png", "p.png", "--at", "1,x"], "--at: '1,x' is not"),
+        (["--png", "p.png", "--at", "99"], "--at: 99 s is outside the flight, 0 to 2 s"),
+        (["--video", "f.mp4", "--from", "-1"], "--from: -1 s is outside the flight, 0 to 2 s"),
+        (["--video", "f.mp4", "--from", "1.5", "--to", "1"], "--from 1.5, --to 1: the film would end before it begins"),
+        (["--video", "f.mp4", "--speed", "0.001", "--fps", "240"], "the film would have 480000 frames"),
+        (["--png", "p.png", "--vehicle", "boat"], "boat: is neither a file nor a built-in vehicle"),
+    ],
+)  # fmt: skip
+def test_bad_arguments_get_a_sentence(
+    poses: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        assert main(["render", str(poses), *arguments]) == 2
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert f"sim-bridge: {said}" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_a_renderer_nothing_is_written(poses: Path, tmp_path: Path) -> None:
+    program = [sys.executable, "-m", "sim_bridge", "render", str(poses), "--png", str(tmp_path / "p.png")]
+    environment = {**os.environ, "MUJOCO_GL": "disable"}
+    done = subprocess.run(program, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 2
+    assert done.stderr == "sim-bridge: no off-screen renderer: MUJOCO_GL=disable turns it off; unset it\n"
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_film_leaves_the_old_one(poses: Path, tmp_path: Path) -> None:
+    film = tmp_path / "f.mp4"
+    film.write_bytes(b"the old one")
+    arguments = [poses, *SMALL, "--video", film, "--fps", "240", "--speed", "0.01"]
+    process = Process("sim_bridge", "render", *map(str, arguments))
+    begun = threading.Event()
+    while not begun.wait(0.02):  # the film under way has a name of its own
+        if len(list(tmp_path.iterdir())) > 1:
+            begun.set()
+        assert process._popen.poll() is None, process.output
+    process.interrupt()
+    assert process.end() == 1
+    assert "interrupted" in process.output
+    assert [path.name for path in tmp_path.iterdir()] == ["f.mp4"]
+    assert film.read_bytes() == b"the old one"
+
+
+# ------------------------------------------------------------------ live
+
+_WINDOW = """
+import sys
+sys.stdout.write("ready\\n"); sys.stdout.flush()
+data = sys.stdin.buffer.read()
+open(sys.argv[1], "wb").write(data)
+"""
+
+
+def test_a_live_window_hears_of_the_flight_and_does_not_change_it(tmp_path: Path) -> None:
+    """A program in the window's place keeps what it gets; the states sent are those without it."""
+    assert READY == b"ready\n"
+    sent = {}
+    for watched in (False, True):
+        simulator = Simulator(load_vehicle("paper_quad"))
+        commands = simulator.frame.rotor_speed_rad_s.astype(float) * 0.0 + 250.0
+        frames = []
+        view = LiveView(str(tmp_path / "heard"), (sys.executable, "-c", _WINDOW)) if watched else None
+        for step in range(200):
+            simulator.plant.advance(commands, 0, 2)
+            frames.append(bytes(simulator.state_frame()))
+            if view is not None and step == 0:
+                watching = view.watching(simulator)
+                watching.__enter__()
+        if view is not None:
+            watching.__exit__(None, None, None)
+        sent[watched] = frames
+    assert sent[True] == sent[False]
+    heard = (tmp_path / "heard").read_bytes()
+    assert heard
+    assert len(heard) % SNAPSHOT.size == 0
+
+
+def test_a_window_that_cannot_open_says_why() -> None:
+    program = (sys.executable, "-c", "import sys; print('--view: no display', file=sys.stderr); sys.exit(2)")
+    with pytest.raises(UsageProblemError, match=r"^--view: no display$"):
+        LiveView("paper_quad", program)
+    with pytest.raises(UsageProblemError, match=r"^--view: the window cannot be opened: it ended at once$"):
+        LiveView("paper_quad", (sys.executable, "-c", ""))
+
+
+def test_live_view_without_a_display_ends_before_anything_starts() -> None:
+    environment = {
+        name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")
+    }
+    program = [sys.executable, "-m", "sim_bridge", "--view", "--port", "0"]
+    done = subprocess.run(program, capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("sim-bridge: --view: no display")
+
+
+def test_a_window_shows_a_flight_on_a_virtual_display(poses: Path) -> None:
+    """Xvfb is a display that nobody sees: the window opens there, takes snapshots and closes in order."""
+    if shutil.which("Xvfb") is None:
+        missing("Xvfb is not installed: apt install xvfb")
+    read, write = os.pipe()
+    with subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "320x240x24"], pass_fds=[write], stderr=subprocess.DEVNULL
+    ) as server:  # fmt: skip
+        os.close(write)
+        try:
+            with os.fdopen(read) as told:
+                display = f":{int(told.readline())}"
+            program = [sys.executable, "-m", "sim_bridge.multibody.live_window", "paper_quad"]
+            with subprocess.Popen(
+                program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                env={**os.environ, "DISPLAY": display},
+            ) as window:  # fmt: skip
+                assert window.stdout is not None
+                ready = window.stdout.readline()
+                snapshot = SNAPSHOT.pack(1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, *[0.0] * 6, *[200.0] * 8)
+                _, said = window.communicate(20 * snapshot)
+            assert (ready, window.returncode) == (READY, 0), said
+        finally:
+            server.terminate()
