@@ -71,6 +71,12 @@ def key(contender: str, trajectory: str, condition: str = PLAIN, plant: str = SM
     return f"{contender}/{trajectory}/{condition}/{plant}"
 
 
+def condition_of(case: Case) -> str:
+    """Return the name of the condition that a case's key tells; a case outside the matrix is plain."""
+    parts = case.key.split("/")
+    return parts[2] if len(parts) == 4 else PLAIN
+
+
 def make_case(contender: Contender, trajectory: str, condition: Condition, plant: str) -> Case:
     """Return one case of the matrix."""
     name = key(contender.name, trajectory, condition.name, plant)

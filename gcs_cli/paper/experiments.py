@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gcs_cli.paper.cases import DESIRED, IDEAL, PLAIN
+from gcs_cli.paper.cases import DESIRED, IDEAL, PLAIN, condition_of
 from gcs_cli.paper.closed_loop import fly
 from gcs_cli.paper.metrics import effort, measure, path_metrics
 from gcs_cli.paper.types import Case, Recording
@@ -70,7 +70,7 @@ def experiment(case: Case) -> tuple[dict[str, Any], Recording | None]:
     """Fly a case; return its entry, and its recording where it is drawn; raise ConfigError."""
     recording = fly(case)
     entry = entry_of(recording)
-    condition = case.key.split("/")[2] if case.key.count("/") == 3 else PLAIN
+    condition = condition_of(case)
     if condition not in _DRAWN:
         return entry, None
     if case.trajectory == DESIRED and condition == PLAIN:

@@ -70,7 +70,7 @@ def test_tables_show_what_is_printed_and_what_flies() -> None:
 
 @pytest.mark.parametrize("correction", CORRECTIONS, ids=lambda correction: correction.where)
 def test_corrections_name_files_that_are_there(correction: Any) -> None:
-    assert (REPOSITORY / correction.place).exists() or correction.place == "docs/paper.md"
+    assert (REPOSITORY / correction.place).exists()
 
 
 # ---------------------------------------------------------------- results.json
