@@ -163,6 +163,15 @@ def test_reference_rate_is_what_keeps_the_x_loop_of_backstepping_stable(analysed
     assert found["filtered"]["margins"] is None
 
 
+def test_motor_lag_that_a_loop_bears_is_kd_over_kp_less_what_sampling_takes(analysed) -> None:
+    """Half a millisecond of hold beside 20 to 40 ms of lag: the paper's gains end between these."""
+    for loop in analysed["loops"][:2]:
+        for axis in ATTITUDE_AXES:
+            found = loop["axes"][axis]
+            bound = found["gains"]["kd"] / found["gains"]["kp"]
+            assert 0.85 * bound < found["largest_lag_s"] < bound
+
+
 # ---------------------------------------------------------------------- margins are what they say
 
 

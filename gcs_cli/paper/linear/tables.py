@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
 
 from flightstack.params.vehicle import DEFAULT_VEHICLE, GRAVITY_M_S2, load_vehicle
 from gcs_cli.paper.linear.continuous import (
@@ -36,6 +40,7 @@ CASCADE_RATES = (Rates(250.0, 50.0), Rates(500.0, 100.0), Rates(1000.0, 250.0))
 TILT_OF = {"x": "pitch", "y": "roll"}
 """The attitude axis inside each horizontal loop."""
 LARGEST_DIVISOR = 1024
+_SHORTEST_LAG_S = 1e-3
 _DIGITS = 10
 
 
@@ -44,7 +49,8 @@ def results() -> dict[str, Any]:
 
     ``loops`` is a list with ``controller``, ``gains`` and ``axes``: for each axis its gains, continuous poles, the
     natural frequency and damping that kp and kd place, the closed form of its step response, and ``sampled``: a list
-    of actuators, each with margins at the rates and the lowest stable rate. Times in seconds, angles in degrees,
+    of actuators, each with margins at the rates and the lowest stable rate; attitudes also have ``largest_lag_s``, the
+    motor lag that ends stability at 1 kHz. Times in seconds, angles in degrees,
     gains in decibels; None where there is no such figure (margins of an unstable loop).
     """
     vehicle = load_vehicle(DEFAULT_VEHICLE)
@@ -126,7 +132,25 @@ def _attitude_axis(law: AttitudeGains, axis: str) -> dict[str, Any]:
         "poles": _poles(feedback.poles()),
         "step": _figures(feedback),
         "sampled": sampled,
+        "largest_lag_s": _rounded(_largest_lag_s(law)),
     }
+
+
+def _largest_lag_s(law: AttitudeGains) -> float | None:
+    """Return the motor lag that the loop bears at the highest inner rate without delay; None: any up to 1 s.
+
+    In continuous time it is kd/kp: s² (lag s + 1) + kd s + kp has all its roots on the left below that.
+    """
+    hz = INNER_RATES_HZ[-1]
+
+    def excess(lag_s: float) -> float:
+        return spectral_radius(AttitudeTick(law, hz, Actuators(0, lag_s)).closed()) - 1.0
+
+    lags = np.geomspace(_SHORTEST_LAG_S, 1.0, 60).tolist()
+    for shorter, longer in pairwise(lags):
+        if excess(longer) >= 0.0:
+            return float(brentq(excess, shorter, longer, xtol=1e-12))
+    return None
 
 
 def _mode(law: Any) -> dict[str, Any]:
