@@ -30,11 +30,12 @@ class Flights(NamedTuple):
     command_s: Figure
 
 
-def _fly(inner_hz: float) -> tuple[dict[str, Any], float]:
+def fly(inner_hz: float, plant: str = "rigid") -> tuple[dict[str, Any], float]:
+    """Fly once; return the summary and how long the whole command took [s]."""
     with tempfile.TemporaryDirectory() as folder:
         command = [
             sys.executable, "-m", "gcs_cli", "fly", str(PLAN), "--json", "--out", folder,
-            "--inner-hz", f"{inner_hz:g}", "--instance", str(free_instance()),
+            "--inner-hz", f"{inner_hz:g}", "--instance", str(free_instance()), "--plant", plant,
         ]  # fmt: skip
         began_s = time.perf_counter()
         done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=ROOT)
@@ -47,11 +48,11 @@ def _fly(inner_hz: float) -> tuple[dict[str, Any], float]:
 
 def flights(rates_hz: tuple[float, ...], rounds: int) -> dict[float, Flights]:
     """Fly at each inner rate, interleaved; the first flight of all only warms the caches."""
-    _fly(rates_hz[0])
+    fly(rates_hz[0])
     seen: dict[float, list[tuple[float, float, float]]] = {rate: [] for rate in rates_hz}
     for _ in range(rounds):
         for rate in rates_hz:
-            summary, took_s = _fly(rate)
+            summary, took_s = fly(rate)
             factor = summary["real_time_factor"]
             seen[rate].append((factor, 1e6 / factor / rate, took_s))
     return {
