@@ -13,10 +13,10 @@ _PAPERS = "paper"
 
 
 def paper_claims(results: Results) -> dict[str, list[Mapping[str, Any]]]:
-    """Return the claims of the paper (not our questions) by their name, each with its verdict on every plant."""
+    """Return what the paper claims or implies (not our questions) by its name, each with its verdict on every plant."""
     named: dict[str, list[Mapping[str, Any]]] = {}
     for claim in results["comparisons"].get("claims", ()):
-        if claim["source"].startswith(_PAPERS):
+        if _PAPERS in claim["source"]:
             named.setdefault(claim["name"], []).append(claim)
     return named
 

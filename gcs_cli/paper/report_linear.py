@@ -71,7 +71,8 @@ def linear_sections(linear: Mapping[str, Any], onset: Sequence[Mapping[str, Any]
 
 _MARGINS_NOTE = (
     f"Sampled loops, {SHOWN_ACTUATORS}; gain margin and phase margin at each inner rate [Hz]. Unstable: no margin. "
-    "ωn and ζ are what the proportional and derivative gain alone would place; ζ above 1: two real poles."
+    "ωn and ζ are what the proportional and derivative gain alone would place; ζ above 1: two real poles. Motor lag "
+    f"borne: what ends stability at {BODE_HZ:g} Hz without delay."
 )
 _ONSET_NOTE = (
     "Predicted: the rate at which an eigenvalue of the sampled loop leaves the unit circle. Simulated: real loops and "
@@ -145,9 +146,16 @@ def margins_table(loops: Loops) -> str:
             head = f"<th>{escape(AXIS_TITLES[axis]) if not index else ''}</th><td>{escape(_title(loop))}</td>"
             mode = cell(fixed(of["natural_rad_s"], 1)) + cell(fixed(of["damping"], 2))
             figures = "".join(_margin_cell(_sampled(of)["margins"].get(rate)) for rate in rates)
-            rows.append(row(f"{head}{mode}<td>{escape(_poles(of['poles']))}</td>{figures}", not index))
+            poles = f"<td>{escape(_poles(of['poles']))}</td>"
+            rows.append(row(f"{head}{mode}{poles}{figures}{_lag_cell(of)}", not index))
     heads = (f"#{rate} Hz" for rate in rates)
-    return wide_table(("axis", "controller", "#ωn [rad/s]", "#ζ", "poles [1/s]", *heads), rows)
+    columns = ("axis", "controller", "#ωn [rad/s]", "#ζ", "poles [1/s]", *heads, "#motor lag borne")
+    return wide_table(columns, rows)
+
+
+def _lag_cell(of: Mapping[str, Any]) -> str:
+    lag_s = of["largest_lag_s"]
+    return cell("any" if lag_s is None else f"{fixed(1e3 * lag_s, 1)} ms")
 
 
 def _rates(loops: Loops) -> list[str]:

@@ -23,7 +23,9 @@ def tiles(results: Results) -> str:
     claims = paper_claims(results)
     if claims:
         held = sum(all(claim["holds"] for claim in of) for of in claims.values())
-        found.append(("claims of the paper that hold on both plants", f"{held} of {len(claims)}"))
+        found.append(
+            ("claims of the paper, made or implied, that hold on every plant", f"{held} of {len(claims)}")
+        )
     worst = worst_plants(results)
     if worst is not None:
         found.append(

@@ -50,6 +50,7 @@ def linear_part() -> dict[str, Any]:
         "natural_rad_s": 10.0,
         "damping": 0.8,
         "poles": [[-8.0, -6.0], [-8.0, 6.0]],
+        "largest_lag_s": 0.0219,
         "sampled": [
             {
                 "actuators": "ideal rotors, one step of delay",

@@ -217,3 +217,35 @@ def test_pictures_that_cannot_be_had_are_a_sentence(monkeypatch: pytest.MonkeyPa
     (picture,) = take(small_flights().recordings)
     assert "pip install 'flightstack[multibody]'" in picture.caption
     assert "pip install" in parsed(render(small_results(), {}, [picture])).text
+
+
+def test_margins_and_rates_are_those_of_the_analysis(page: str) -> None:
+    text = parsed(page).text
+    for words in (
+        "12.3 dB, 57°", "unstable", "−8.00 ± 6.00 j", "21.9 ms", "203.0 Hz", "203.2 Hz", "0.12 %", "none up to 2 kHz",
+    ):  # fmt: skip
+        assert words in text, words
+    poles = page[page.index('id="linear"') : page.index('id="bode"')]
+    assert poles.count('class="cross s1"') == 12  # two poles of six axes
+    bode = page[page.index('id="bode"') : page.index('id="margins"')]
+    assert len(re.findall(r'class="line s1"', bode)) == 6  # gain and phase of three axes
+
+
+def test_the_target_s_costs_and_differences_are_those_of_the_comparison(page: str) -> None:
+    text = parsed(page).text
+    for words in (
+        "0.477 µm",
+        "same bits",
+        "980.2",
+        "2485",
+        "stack used at most: 872 octets",
+        "without a clock",
+    ):
+        assert words in text, words
+    assert page.count('href="pil-') == 2
+
+
+def test_a_loop_of_other_gains_is_named_by_them() -> None:
+    results = small_results() | {"linear": linear_part(), "onset": onset_part()}
+    results["linear"]["loops"][0]["gains"] = "mine"
+    assert "pid, mine" in parsed(render(results, {})).text
