@@ -16,7 +16,7 @@ FIELD_DEG = 45.0
 """Vertical field of view of all cameras but the fixed one, which zooms."""
 _FIXED_AT = (-11.0, 6.0)
 _EYE_M = 1.75
-_NARROWEST_DEG = 24.0
+_NARROWEST_DEG = 18.0
 _CHASE_ASIDE_DEG = -24.0
 """Seen from straight behind, the arms of a plus frame hide each other and the way flown."""
 

@@ -18,7 +18,7 @@ from sim_bridge.multibody.poses import Moment
 MOST_TRAIL = 500
 _TRAIL_NEW, _TRAIL_OLD = np.array([1.0, 0.78, 0.10, 0.95]), np.array([0.98, 0.90, 0.55, 0.28])
 _TARGET = np.array([0.95, 0.10, 0.62, 0.75])
-_PLAN = np.array([0.10, 0.42, 0.95, 0.55])
+_PLAN = np.array([0.10, 0.42, 0.95, 0.45])
 _SLOW, _FAST = np.array([0.50, 0.66, 0.82]), np.array([1.0, 0.36, 0.06])
 _BLUR_FROM, _BLUR_TO = 40.0, 130.0  # rad/s: from here to there the blades vanish in their disc
 _UPRIGHT = np.eye(3).reshape(9)
@@ -64,7 +64,7 @@ class Marks:
         """Balls on poles, joined by thin lines."""
         for number, at in enumerate(self._waypoints, start=1):
             _solid(
-                scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.22 * self._span_m,) * 3, at, _PLAN, label=str(number)
+                scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.13 * self._span_m,) * 3, at, _PLAN, label=str(number)
             )
             foot = (at[0], at[1], self._ground_m)
             if at[2] > self._ground_m:

@@ -46,7 +46,7 @@ def _visual(root: Element) -> None:
     statistic.set("center", "0 0 1")
     visual = section(root, "visual")
     add(visual, "global", offwidth=1280, offheight=720, fovy=45)
-    add(visual, "quality", shadowsize=4096, offsamples=4, numslices=24, numstacks=12)
+    add(visual, "quality", shadowsize=4096, offsamples=4, numslices=16, numstacks=10)
     add(visual, "map", znear=0.008, zfar=120, shadowclip=0.35, shadowscale=0.9, haze=0.35)
     add(
         visual,
