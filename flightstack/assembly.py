@@ -15,15 +15,13 @@ from flightstack.autopilot import Autopilot
 from flightstack.clock import LoopTiming, Rates, rates
 from flightstack.commands import VehicleContext
 from flightstack.config import StackConfig
-from flightstack.contract import LoopRow
+from flightstack.contract import FloatArray, LoopRow
 from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import load_controller
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.targets import make_loops
 from flightstack.ground.facts import AutopilotFacts
 from flightstack.ground.hub import GroundHub
-from flightstack.guidance.navigator import Navigator
-from flightstack.guidance.params import guidance_params
 from flightstack.logging.flight_log import vehicle_info
 from flightstack.logging.recorder import FlightRecorder, OpenLog
 from flightstack.mavlink.services.log_store import NO_LOGS, LogStore
@@ -104,8 +102,8 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
         simulator.rotor_speed_rad_s,
         simulator,
     )
-    warm_up(backend, Navigator(guidance_params(behaviour, vehicle.weight_n), pace.outer_hz), simulator)
-    autopilot.supervisor.warm_up(np.zeros(LoopRow.SIZE))
+    warm_up(backend, autopilot.now.setpoint, simulator)
+    autopilot.supervisor.warm_up()
     connect_parameters(params, autopilot, backend, recorder)
     timing = LoopTiming(round(1e9 / pace.inner_hz))
     report = TimingReport(timing, pace, config.lockstep)
@@ -117,9 +115,9 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
     )
 
 
-def warm_up(backend: ControlBackend, navigator: Navigator, simulator: SimulatorLink) -> None:
-    """Compile every kernel now, or load it from the cache: the first tick must not take a second."""
+def warm_up(backend: ControlBackend, setpoint: FloatArray, simulator: SimulatorLink) -> None:
+    """Compile the loops now, or load them from the cache: the first tick must not take a second."""
     row = np.zeros(LoopRow.SIZE)
-    navigator.warm_up(simulator.state, backend.attitude_target)
-    backend.step(simulator.state, navigator.setpoint, simulator.rotor_speed_rad_s, True, row)
+    for _ in range(2):  # the second time, they know their arrays
+        backend.step(simulator.state, setpoint, simulator.rotor_speed_rad_s, True, row)
     backend.reset(simulator.state)

@@ -83,6 +83,19 @@ def compiled(function: F) -> F:
     return numba.njit(cache=cache, error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
+def direct(kernel: Callable[..., Any], *examples: Any) -> Callable[..., Any]:
+    """Return ``kernel`` for arguments of the types of ``examples``, without Numba's look at the types in each call.
+
+    That look costs 40 ns an array and 115 ns a record. The compiled code takes what it gets for what it was made for:
+    arrays must be contiguous and of the examples' types (TypeError for another size of the numbers only).
+    """
+    if isinstance(kernel, FunctionType):  # NUMBA_DISABLE_JIT
+        return kernel
+    types = tuple(numba.typeof(example) for example in examples)
+    kernel.compile(types)  # type: ignore[attr-defined]
+    return kernel.get_overload(types)  # type: ignore[attr-defined,no-any-return]
+
+
 def specialise(template: Callable[..., Any], key: str, **names: Any) -> Callable[..., Any]:
     """Compile a copy of ``template`` whose global ``names`` are bound to the given functions and types.
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from flightstack.compiled import direct
 from flightstack.contract import FloatArray, Quaternion, Vector3
 from flightstack.geometry import quaternion_from_euler, rotate
 from flightstack.params.vehicle import Vehicle
@@ -21,7 +22,9 @@ class CompiledPlant(RecordPlant):
     def __init__(self, vehicle: Vehicle, name: str, options: PlantOptions) -> None:
         super().__init__(vehicle, options)
         self._paper = name == "paper"
-        self._kernel = advance_kernel(name)
+        self._kernel = self._call = advance_kernel(name)
+        self._met: FloatArray | None = None
+        self._bound: FloatArray | None = None
         self._slope = slope_kernel(name)
         self.set_step(DEFAULT_STEP_S)
         self._set_state(options.initial)
@@ -58,7 +61,17 @@ class CompiledPlant(RecordPlant):
         self._set_ground(ground_contact(self._vehicle, step_s, single_point=self._paper))
 
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
-        return self._kernel(self._memory, command_rad_s, flags, steps, self.output)
+        if command_rad_s is not self._bound:
+            self._meet(command_rad_s)
+        return self._call(self._memory, command_rad_s, flags, steps, self.output)
+
+    def _meet(self, command_rad_s: FloatArray) -> None:
+        """Take the kernel for any array, and at the second meeting with the same one that made for its type."""
+        self._call, self._bound = self._kernel, None
+        if command_rad_s is self._met:
+            self._call = direct(self._kernel, self._memory, command_rad_s, 0, 1, self.output)
+            self._bound = command_rad_s
+        self._met = command_rad_s
 
     def show(self) -> int:
         """Write the present state to ``output``; returns as ``advance``."""

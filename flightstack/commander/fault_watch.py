@@ -18,7 +18,8 @@ from flightstack.commander.detectors import (
     rotor_params,
 )
 from flightstack.commander.failsafe import Failsafe
-from flightstack.contract import SETPOINT_SIZE, FloatArray
+from flightstack.compiled import direct
+from flightstack.contract import SETPOINT_SIZE, FloatArray, LoopRow
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
 
@@ -47,16 +48,15 @@ class FaultWatch:
         self.found = 0
         """Bits of ``detectors.detect``, of the newest look."""
         self.set_behaviour(behaviour)
+        row = np.zeros(LoopRow.SIZE)
+        self._follow = direct(follow_rotors, row, self._rotors, self._rotor_params)
+        self._detect = direct(
+            detect, state, self._nowhere, row, self._rotors, self._detector, self._params, self._dt_s
+        )
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Take new limits, from the next look on."""
         self._params = detector_params(behaviour, self._vehicle)
-
-    def warm_up(self, row: FloatArray) -> None:
-        """Compile the detectors, or load them from the cache."""
-        self.look(self._nowhere, row, True)
-        self.follow_rotors(row)
-        self.begin()
 
     def begin(self) -> None:
         """Forget what was seen before: a flight begins."""
@@ -66,7 +66,7 @@ class FaultWatch:
 
     def follow_rotors(self, row: FloatArray) -> None:
         """Take the newest row of the inner loop, shape (48,), once per inner tick."""
-        follow_rotors(row, self._rotors, self._rotor_params)
+        self._follow(row, self._rotors, self._rotor_params)
 
     def look(self, setpoint: FloatArray, row: FloatArray, position_is_controlled: bool) -> int:
         """Advance by one outer tick; return the bits found.
@@ -77,9 +77,10 @@ class FaultWatch:
         if not position_is_controlled:
             self._nowhere[:3] = self._state[:3]
             setpoint = self._nowhere
-        found = detect(self._state, setpoint, row, self._rotors, self._detector, self._params, self._dt_s)
-        self.found = found
-        return found
+        self.found = self._detect(
+            self._state, setpoint, row, self._rotors, self._detector, self._params, self._dt_s
+        )
+        return self.found
 
     @property
     def moves(self) -> bool:

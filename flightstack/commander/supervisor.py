@@ -78,9 +78,8 @@ class Supervisor:
         self._phase = Phase.DISARMED
         self._time_us = 0
 
-    def warm_up(self, row: FloatArray) -> None:
-        """Compile the detectors and the fence, or load them from the cache."""
-        self.faults.warm_up(row)
+    def warm_up(self) -> None:
+        """Compile the fence, or load it from the cache."""
         self.fence.warm_up(self._state)
 
     # ------------------------------------------------------------------ what is

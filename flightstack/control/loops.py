@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from flightstack.arrays import attitude_target, position_setpoint, store_attitude_target, vehicle_state
-from flightstack.compiled import as_tuple, compiled, specialise, store
+from flightstack.compiled import as_tuple, compiled, direct, specialise, store
 from flightstack.contract import (
     ATTITUDE_TARGET_SIZE,
     MAX_ROTORS,
@@ -284,6 +284,9 @@ class PythonLoops:
             CONTROLLER_PARAMS_SIZE=numbers.controller.size,
         )
         self._compile(controller.name)
+        self._met: tuple[FloatArray, FloatArray] | None = None
+        self._bound: tuple[FloatArray, FloatArray] | None = None
+        self._inner, self._outer = self._kernel, outer_kernel
 
     def _compile(self, name: str) -> None:
         """Compile the kernel with the controller, or load it from the cache; raise ConfigError."""
@@ -331,10 +334,13 @@ class PythonLoops:
         row: FloatArray,
     ) -> None:
         """Run the outer loop if it is due, then the inner loop; write ``row`` with the rotor commands."""
+        bound = self._bound
+        if bound is None or state is not bound[0] or rotor_speed_rad_s is not bound[1]:
+            self._meet(state, rotor_speed_rad_s, setpoint, row)
         if outer_due:
             self._last_target[:] = self.attitude_target
             self._fraction = 0.0
-            outer_kernel(
+            self._outer(
                 state,
                 setpoint,
                 self._position_memory,
@@ -344,7 +350,20 @@ class PythonLoops:
                 self.attitude_target,
             )
         self._fraction += self._fraction_step
-        self._kernel(state, self._fraction, rotor_speed_rad_s, self._memory, row)
+        self._inner(state, self._fraction, rotor_speed_rad_s, self._memory, row)
+
+    def _meet(self, state: FloatArray, speeds: FloatArray, setpoint: FloatArray, row: FloatArray) -> None:
+        """Take kernels for any arrays, and at the second meeting with the same ones those made for their types."""
+        self._inner, self._outer = self._kernel, outer_kernel
+        self._bound = None
+        if self._met is not None and state is self._met[0] and speeds is self._met[1]:
+            self._inner = direct(self._kernel, state, 1.0, speeds, self._memory, row)
+            self._outer = direct(
+                outer_kernel, state, setpoint, self._position_memory, self._position_params, self._last,
+                self._outer_dt_s, self.attitude_target,
+            )  # fmt: skip
+            self._bound = state, speeds
+        self._met = state, speeds
 
     def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
         """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""

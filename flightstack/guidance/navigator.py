@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.arrays import store_position_setpoint, vehicle_state
-from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, FloatArray
+from flightstack.compiled import direct
+from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
 from flightstack.geometry import euler_from_quaternion
 from flightstack.guidance.aim import (
     A_HOME_X,
@@ -112,6 +113,15 @@ class Navigator:
         self._plan = np.zeros((0, PLAN_COLUMNS))
         self._jumps_left = np.zeros(0)
         self.set_plan(self._plan, self._jumps_left)
+        state, target = np.zeros(STATE_SIZE), np.zeros(ATTITUDE_TARGET_SIZE)
+        self._fly_stream = direct(
+            stream_kernel, 0, state, self._trajectory, self._stream, self._land, target,
+            self._params_array, self._dt_s, self.setpoint, self.attitude_target,
+        )  # fmt: skip
+        self._fly_goal = direct(
+            goal_kernel, 0, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim,
+            self._land, target, self._params_array, self._dt_s, self.setpoint,
+        )  # fmt: skip
 
     # ------------------------------------------------------------------ parameters
 
@@ -350,18 +360,12 @@ class Navigator:
         """
         number = _NUMBER[mode]
         if number in _STREAM_NUMBERS:
-            stream_kernel(
+            self._fly_stream(
                 number, state, self._trajectory, self._stream, self._land, attitude_target,
                 self._params_array, self._dt_s, self.setpoint, self.attitude_target,
             )  # fmt: skip
             return
-        goal_kernel(
+        self._fly_goal(
             number, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim,
             self._land, attitude_target, self._params_array, self._dt_s, self.setpoint,
         )  # fmt: skip
-
-    def warm_up(self, state: FloatArray, attitude_target: FloatArray) -> None:
-        """Compile every kernel, or load it from the cache."""
-        for mode in (Mode.HOLD, Mode.POSITION):
-            self.rest_at(state)
-            self.step(mode, state, attitude_target)

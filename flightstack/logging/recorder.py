@@ -8,6 +8,7 @@ import numpy as np
 
 from flightstack.arrays import store_outer_row
 from flightstack.commander.transitions import Status
+from flightstack.compiled import direct
 from flightstack.contract import (
     ATTITUDE_TARGET_SIZE,
     SETPOINT_SIZE,
@@ -47,8 +48,8 @@ class FlightRecorder:
         self._no_row: Callable[[int], FloatArray] = lambda _: scratch
         self.inner_row: Callable[[int], FloatArray] = self._no_row
         """Return the row that the inner loop fills in this tick, given its time; that of no log while none is open."""
-        no_target = np.zeros(ATTITUDE_TARGET_SIZE)  # compile now, or load from the cache
-        store_outer_row(np.zeros(OUTER.size), np.zeros(STATE_SIZE), np.zeros(SETPOINT_SIZE), no_target, 0)
+        sizes = (OUTER.size, STATE_SIZE, SETPOINT_SIZE, ATTITUDE_TARGET_SIZE)
+        self._store_outer = direct(store_outer_row, *(np.zeros(size) for size in sizes), 0)
         self._mission = (MissionProgress(0, -1, False, False), 0)
         self._missions = 0
         self.error: OSError | None = None
@@ -75,7 +76,7 @@ class FlightRecorder:
         if self._log is None:
             return
         row = self._log.outer.append(time_us)
-        store_outer_row(row, state, setpoint, attitude_target, loop_flags)
+        self._store_outer(row, state, setpoint, attitude_target, loop_flags)
 
     def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
         """Record mode and arming, and whether a failsafe acts; arming begins a log, disarming ends it."""
