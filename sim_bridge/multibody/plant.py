@@ -1,9 +1,8 @@
 """The multibody plant: frame and spinning rotors as bodies of a MuJoCo model, on legs on the ground.
 
-MuJoCo computes the accelerations of all bodies and the contact with the ground; ``rotor_drive.py`` makes the forces and
-integrates with the classic Runge-Kutta method, in the same variables as the rigid plant. MuJoCo's own ``mj_step`` with
-its RK4 turns the attitude by mean rates, which is of second order only where the axis of rotation moves; this is of
-fourth order.
+MuJoCo computes the accelerations of all bodies and the contact with the ground; ``rotor_drive.py`` makes the forces of
+every stage and integrates with the classic Runge-Kutta method, in the same variables as the rigid plant. MuJoCo's own
+``mj_step`` has an RK4 of the same order, but asks for the forces of a stage by a callback that a whole process shares.
 """
 
 from __future__ import annotations
