@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy import signal
 from scipy.linalg import expm
 
+from flightstack.params.vehicle import load_vehicle
 from gcs_cli.paper.linear import continuous, tables
 from gcs_cli.paper.linear.exponential import exponential
 from gcs_cli.paper.linear.gains import (
@@ -33,6 +34,7 @@ from gcs_cli.paper.linear.small_signal import (
     fly_attitude,
     fly_position,
     small_case,
+    spin_up_lead_s,
 )
 from gcs_cli.paper.linear.steps import SecondOrder, StepFigures, exact_figures, read_figures
 
@@ -302,6 +304,16 @@ def test_spin_up_torque_takes_the_papers_yaw_gains_their_stability_at_1_khz() ->
     """The paper leaves out Jr Ωr'; a plant that has it needs 1.76 kHz, with 5 ms of lag and no delay."""
     onset = find_onset("pid", "paper", SPIN_UP, "yaw")
     assert onset.predicted_hz == pytest.approx(1759.4, abs=0.1)
+
+
+@pytest.mark.parametrize("lag_s", [0.005, 0.01, 0.02])
+def test_slower_motors_need_a_lower_rate_against_the_spin_up_torque(flown, lag_s: float) -> None:
+    """Kd lead/(2 lag): a step of the demand turns the body by its lead over its lag, and twice back is too far."""
+    law, lead_s = flown["pid", "paper"].attitude["yaw"], spin_up_lead_s(load_vehicle("paper_quad"))
+    lowest = lowest_stable_hz(
+        lambda hz: spectral_radius(AttitudeTick(law, hz, Actuators(0, lag_s, lead_s)).closed())
+    )
+    assert lowest == pytest.approx(law.kd * lead_s / (2.0 * lag_s), rel=0.002)  # 0.001 seen
 
 
 # ---------------------------------------------------------------------- gains and tables
