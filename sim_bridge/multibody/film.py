@@ -20,6 +20,11 @@ PALETTE_FRAMES = 8
 """Pictures that a GIF takes its colours from, before the first one is written."""
 
 _COLOURS = 255
+_STRIP_SHARE = 6
+_SELDOM = (
+    (240, 200, 40), (230, 40, 160), (40, 120, 235), (235, 90, 25),
+    (130, 180, 235), (250, 250, 250), (90, 90, 90), (20, 25, 32),
+)  # fmt: skip
 _SHEET_GAP_PX = 6
 _GIF_TICK_S = 0.01
 _GIF_SHORTEST_TICKS = 2  # players take less for a mistake and slow down
@@ -92,14 +97,23 @@ def _write_mp4(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
 def _write_gif(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
     """One palette for all frames, taken from some of them, so that colours do not flicker."""
     chosen = [frame_at(round(i * (count - 1) / PALETTE_FRAMES)) for i in range(min(PALETTE_FRAMES, count))]
-    palette = sheet(chosen).quantize(_COLOURS, Image.Quantize.MEDIANCUT)
-    flat = (
-        frame_at(index).quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
-        for index in range(count)
-    )
+    palette = _palette(chosen)
+    flat = (frame_at(index).quantize(palette=palette, dither=Image.Dither.NONE) for index in range(count))
     next(flat).save(
         path, "GIF", save_all=True, append_images=flat, duration=gif_durations_ms(count, fps), loop=0
     )
+
+
+def _palette(images: Sequence[Image.Image]) -> Image.Image:
+    """Return an image with the colours of all, and those of marks and words, which cover too little to count."""
+    pictures = sheet(images)
+    strip = max(1, pictures.height // _STRIP_SHARE)
+    whole = Image.new("RGB", (pictures.width, pictures.height + strip))
+    whole.paste(pictures)
+    for index, colour in enumerate(_SELDOM):
+        begin, end = (pictures.width * place // len(_SELDOM) for place in (index, index + 1))
+        whole.paste(colour, (begin, pictures.height, end, pictures.height + strip))
+    return whole.quantize(_COLOURS, Image.Quantize.MEDIANCUT)
 
 
 def gif_durations_ms(count: int, fps: float) -> list[int]:

@@ -14,18 +14,20 @@ _PANEL = (14, 20, 28, 178)
 _TEXT, _FAINT = (244, 246, 248, 255), (176, 188, 200, 255)
 _EMPTY = (58, 68, 80, 255)
 _SLOW, _FAST = (120, 176, 226), (255, 116, 40)
-_SMALLEST_PX = 160
+_LEAST_UNIT = 0.5  # of the sizes for 1280x720: smaller letters cannot be read
+_LEAST_WIDTH_PX, _LEAST_HEIGHT_PX = 300, 170
 """A picture narrower or lower than this has no room for words."""
+_LONGEST_TITLE = 40
 
 
 class Overlay:
     """Writes on the pictures of one flight; ``largest_rad_s`` are the speeds of full bars."""
 
     def __init__(self, title: str, largest_rad_s: Sequence[float], width: int, height: int) -> None:
-        self._title = title
+        self._title = title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 1]}…"
         self._largest = tuple(largest_rad_s)
-        self._unit = min(width / 1280.0, height / 720.0)
-        self._fits = min(width, height) >= _SMALLEST_PX
+        self._unit = max(_LEAST_UNIT, min(width / 1280.0, height / 720.0))
+        self._fits = width >= _LEAST_WIDTH_PX and height >= _LEAST_HEIGHT_PX
         self._font = self._sized(20.0)
         self._small = self._sized(15.0)
 
