@@ -38,7 +38,8 @@ class Flown(NamedTuple):
 
 def default_jobs() -> int:
     """Return how many processes fly at once unless told."""
-    return max(1, min(MOST_JOBS, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1))
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return min(MOST_JOBS, usable or 1)
 
 
 def entry_of(recording: Recording) -> dict[str, Any]:
