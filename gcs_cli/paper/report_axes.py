@@ -10,14 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.contract import FloatArray
-from gcs_cli.report_chart import Line, decimated, finite_runs
+from gcs_cli.paper.report_curves import Frame, Mark, curve, drawn_mark, inside
+from gcs_cli.report_chart import Line
 from gcs_cli.report_svg import (
     Scale,
-    circle,
     decade_ticks,
     multiples,
     nice_ticks,
-    polyline,
     segment,
     text,
     tick_text,
@@ -28,8 +27,6 @@ SIZE = (480, 250)
 """Of a chart that shares its row with another one; on a phone it has the row for itself and is still read."""
 LEFT, RIGHT, TOP, BOTTOM = 60, 16, 12, 38
 _PIXELS_PER_X_TICK, _PIXELS_PER_Y_TICK = 62.0, 40.0
-_BUCKETS_PER_PIXEL = 0.6  # two points each
-_CROSS = 4.0
 
 
 class Axis(NamedTuple):
@@ -41,27 +38,12 @@ class Axis(NamedTuple):
     log: bool = False
 
 
-class Mark(NamedTuple):
-    """A point: a cross, or a dot where ``dot``; pointing at it shows ``hint``."""
-
-    x: float
-    y: float
-    style: str
-    hint: str = ""
-    dot: bool = False
-
-
 class Guide(NamedTuple):
     """A straight line across the chart at one value, with a label at its end."""
 
     label: str
     at: float
     upright: bool = False
-
-
-class _Frame(NamedTuple):
-    x: Scale
-    y: Scale
 
 
 def spanning(
@@ -111,20 +93,20 @@ def chart(
             f'<svg viewBox="0 0 {size[0]} {size[1]}" role="img" aria-label="{escape(name)}">',
             *_grid(frame, size, (x.label, y.label)),
             *_guides(guides, frame, size),
-            *(part for line in lines for part in _curve(line, frame)),
-            *(_mark(mark, frame) for mark in marks if _inside(mark, frame)),
+            *(part for line in lines for part in curve(line, frame)),
+            *(drawn_mark(mark, frame) for mark in marks if inside(mark, frame)),
             "</svg>",
         )
     )
 
 
-def _frame(x: Axis, y: Axis, size: tuple[int, int]) -> _Frame:
-    return _Frame(
+def _frame(x: Axis, y: Axis, size: tuple[int, int]) -> Frame:
+    return Frame(
         Scale(x.low, x.high, LEFT, size[0] - RIGHT, x.log), Scale(y.low, y.high, size[1] - BOTTOM, TOP, y.log)
     )
 
 
-def _equal(x: Axis, y: Axis, size: tuple[int, int]) -> _Frame:
+def _equal(x: Axis, y: Axis, size: tuple[int, int]) -> Frame:
     width, height = size[0] - RIGHT - LEFT, size[1] - BOTTOM - TOP
     unit = max((x.high - x.low) / width, (y.high - y.low) / height)
     x_middle, y_middle = 0.5 * (x.low + x.high), 0.5 * (y.low + y.high)
@@ -146,7 +128,7 @@ def _ticks(scale: Scale, pixels: float) -> list[float]:
     return ticks
 
 
-def _grid(frame: _Frame, size: tuple[int, int], labels: tuple[str, str]) -> Iterator[str]:
+def _grid(frame: Frame, size: tuple[int, int], labels: tuple[str, str]) -> Iterator[str]:
     bottom, right = size[1] - BOTTOM, size[0] - RIGHT
     per_metre = abs(frame.x.end - frame.x.start) / (frame.x.high - frame.x.low)
     same_unit = abs(per_metre * (frame.y.high - frame.y.low) / (bottom - TOP) - 1.0) < 1e-6
@@ -168,7 +150,7 @@ def _grid(frame: _Frame, size: tuple[int, int], labels: tuple[str, str]) -> Iter
     yield text("label", 0.5 * (LEFT + right), size[1] - 5, labels[0])
 
 
-def _guides(guides: Sequence[Guide], frame: _Frame, size: tuple[int, int]) -> Iterator[str]:
+def _guides(guides: Sequence[Guide], frame: Frame, size: tuple[int, int]) -> Iterator[str]:
     for guide in guides:
         scale = frame.x if guide.upright else frame.y
         if not scale.low <= guide.at <= scale.high:
@@ -180,52 +162,3 @@ def _guides(guides: Sequence[Guide], frame: _Frame, size: tuple[int, int]) -> It
         else:
             yield segment("level", LEFT, at, size[0] - RIGHT, at)
             yield text("level-label", size[0] - RIGHT - 3, at - 4, guide.label)
-
-
-def _curve(line: Line, frame: _Frame) -> Iterator[str]:
-    x, y, left_at = _until_it_leaves(line, frame)
-    buckets = int(_BUCKETS_PER_PIXEL * (frame.x.end - frame.x.start))
-    yield f"<g><title>{escape(line.label)}</title>"
-    for run_x, run_y in finite_runs(x, y):
-        kept_x, kept_y = _thinned(run_x, run_y, frame, buckets)
-        yield polyline(frame.x.pixels(kept_x), frame.y.pixels(kept_y), line.style)
-    if left_at is not None:
-        yield _mark(Mark(*left_at, line.style, f"{line.label}: leaves the picture"), frame)
-    yield "</g>"
-
-
-def _thinned(x: FloatArray, y: FloatArray, frame: _Frame, buckets: int) -> tuple[FloatArray, FloatArray]:
-    """Keep the extremes where x rises; of a path that turns, the points that move by half a pixel or more."""
-    if np.all(np.diff(x) >= 0.0):
-        return decimated(x, y, buckets)
-    pixels = np.round(2.0 * np.column_stack((frame.x.pixels(x), frame.y.pixels(y))))
-    moved = np.concatenate(([True], (np.diff(pixels, axis=0) != 0.0).any(axis=1)))
-    moved[-1] = True
-    return x[moved], y[moved]
-
-
-def _until_it_leaves(line: Line, frame: _Frame) -> tuple[FloatArray, FloatArray, tuple[float, float] | None]:
-    within = (
-        (line.x >= frame.x.low)
-        & (line.x <= frame.x.high)
-        & (line.y >= frame.y.low)
-        & (line.y <= frame.y.high)
-    ) | ~(np.isfinite(line.x) & np.isfinite(line.y))
-    if within.all():
-        return line.x, line.y, None
-    end = int(np.argmin(within))
-    last = (float(line.x[end - 1]), float(line.y[end - 1])) if end and np.isfinite(line.y[end - 1]) else None
-    return line.x[:end], line.y[:end], last
-
-
-def _inside(mark: Mark, frame: _Frame) -> bool:
-    return frame.x.low <= mark.x <= frame.x.high and frame.y.low <= mark.y <= frame.y.high
-
-
-def _mark(mark: Mark, frame: _Frame) -> str:
-    x, y = frame.x.pixel(mark.x), frame.y.pixel(mark.y)
-    if mark.dot:
-        return circle(f"dot {mark.style}", x, y, 3.5, mark.hint)
-    title = f"<title>{escape(mark.hint)}</title>" if mark.hint else ""
-    d = f"M{x - _CROSS:.1f},{y - _CROSS:.1f}l{2 * _CROSS},{2 * _CROSS}m0,{-2 * _CROSS}l{-2 * _CROSS},{2 * _CROSS}"
-    return f'<path class="cross {mark.style}" d="{d}">{title}</path>'

@@ -1,4 +1,4 @@
-"""The linear analysis as parts of the report: poles, Bode plots, margins, lowest rates, onset in simulation. Pure."""
+"""The linear analysis as parts of the report: poles, Bode plots and margins. Pure."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from gcs_cli.paper.cases import CONTENDERS
 from gcs_cli.paper.linear.gains import AttitudeGains
 from gcs_cli.paper.linear.margins import response
 from gcs_cli.paper.linear.sampled import Actuators, AttitudeTick
-from gcs_cli.paper.report_axes import Axis, Guide, Mark, chart, spanning
+from gcs_cli.paper.report_axes import Axis, Guide, chart, spanning
+from gcs_cli.paper.report_curves import Mark
 from gcs_cli.paper.report_flights import STEP_SIZE
 from gcs_cli.paper.report_labels import (
     ANGLES,
     AXES,
     AXIS_TITLES,
-    LABELS,
     STYLES,
     UNKNOWN,
     anchored,
@@ -28,6 +27,7 @@ from gcs_cli.paper.report_labels import (
     row,
     wide_table,
 )
+from gcs_cli.paper.report_onset import loop_name, loop_title, onset_section
 from gcs_cli.report_chart import Line
 from gcs_cli.report_plots import section
 
@@ -36,7 +36,7 @@ BODE_HZ = 1000.0
 _LEAST_SPAN = 4.0  # /s: of a pole map whose poles are all real
 _POINTS = 360
 _LOWEST_RAD_S = 1.0
-_NAMES = {(contender.controller, contender.gains): contender.name for contender in CONTENDERS}
+
 
 Loops = Sequence[Mapping[str, Any]]
 
@@ -47,7 +47,7 @@ def linear_sections(linear: Mapping[str, Any], onset: Sequence[Mapping[str, Any]
         yield anchored("linear", section("Linear analysis", f'<p class="none">Left out: {escape(why)}</p>'))
         return
     loops: Loops = linear["loops"]
-    legend = [(_title(loop), _style(loop), False) for loop in loops]
+    legend = [(loop_title(loop), _style(loop), False) for loop in loops]
     poles = "".join(_pole_map(loops, axis) for axis in AXES)
     note = (
         "Continuous loops at hover. Attitude: feedback alone, without feed-forward and integral of the outer loop. x "
@@ -64,9 +64,7 @@ def linear_sections(linear: Mapping[str, Any], onset: Sequence[Mapping[str, Any]
     title = "Linear analysis: open loops"
     yield anchored("bode", section(title, f'<div class="pair">{bode}</div>', legend, note))
     yield anchored("margins", section("Linear analysis: margins", margins_table(loops), note=_MARGINS_NOTE))
-    yield anchored(
-        "onset", section("Lowest stable rate of the inner loop", onset_table(onset), note=_ONSET_NOTE)
-    )
+    yield onset_section(onset)
 
 
 _MARGINS_NOTE = (
@@ -74,23 +72,10 @@ _MARGINS_NOTE = (
     "ωn and ζ are what the proportional and derivative gain alone would place; ζ above 1: two real poles. Motor lag "
     f"borne: what ends stability at {BODE_HZ:g} Hz without delay."
 )
-_ONSET_NOTE = (
-    "Predicted: the rate at which an eigenvalue of the sampled loop leaves the unit circle. Simulated: real loops and "
-    "plant in flight, kicked by 10⁻⁷ rad/s about one axis; the lowest rate at which the kick dies away, found by "
-    "bisection without knowing the prediction."
-)
-
-
-def _name(loop: Mapping[str, Any]) -> str:
-    return _NAMES.get((loop["controller"], loop["gains"]), "")
-
-
-def _title(loop: Mapping[str, Any]) -> str:
-    return LABELS.get(_name(loop), f"{loop['controller']}, {loop['gains']}")
 
 
 def _style(loop: Mapping[str, Any]) -> str:
-    return STYLES.get(_name(loop), "s6")
+    return STYLES.get(loop_name(loop), "s6")
 
 
 def _pole_map(loops: Loops, axis: str) -> str:
@@ -98,7 +83,7 @@ def _pole_map(loops: Loops, axis: str) -> str:
     for loop in loops:
         for real, imaginary in loop["axes"][axis]["poles"]:
             sign = "+" if imaginary >= 0.0 else "−"
-            hint = f"{_title(loop)}: {number(real)} {sign} {number(abs(imaginary))} j /s"
+            hint = f"{loop_title(loop)}: {number(real)} {sign} {number(abs(imaginary))} j /s"
             marks.append(Mark(real, imaginary, _style(loop), hint))
     real, imaginary = (np.array([mark[index] for mark in marks]) for index in (0, 1))
     drawn = chart(
@@ -122,8 +107,8 @@ def _bode(loops: Loops, axis: str) -> str:
         values = response(AttitudeTick(law, BODE_HZ, Actuators(1)).open(), frequency * dt_s)
         turned = np.degrees(np.unwrap(np.angle(values)))
         turned -= 360.0 * np.round((turned[0] + 180.0) / 360.0)  # begins between −360° and 0°
-        gain.append(Line(_title(loop), frequency, 20.0 * np.log10(np.abs(values)), _style(loop)))
-        phase.append(Line(_title(loop), frequency, turned, _style(loop)))
+        gain.append(Line(loop_title(loop), frequency, 20.0 * np.log10(np.abs(values)), _style(loop)))
+        phase.append(Line(loop_title(loop), frequency, turned, _style(loop)))
     along = Axis("frequency [rad/s]", _LOWEST_RAD_S, 1.25 * np.pi * BODE_HZ, log=True)
     heading = f'<h3 class="plant">{escape(AXIS_TITLES[axis])}</h3>'
     above = chart(
@@ -143,7 +128,7 @@ def margins_table(loops: Loops) -> str:
     for axis in ANGLES:
         for index, loop in enumerate(loops):
             of = loop["axes"][axis]
-            head = f"<th>{escape(AXIS_TITLES[axis]) if not index else ''}</th><td>{escape(_title(loop))}</td>"
+            head = f"<th>{escape(AXIS_TITLES[axis]) if not index else ''}</th><td>{escape(loop_title(loop))}</td>"
             mode = cell(fixed(of["natural_rad_s"], 1)) + cell(fixed(of["damping"], 2))
             figures = "".join(_margin_cell(_sampled(of)["margins"].get(rate)) for rate in rates)
             poles = f"<td>{escape(_poles(of['poles']))}</td>"
@@ -184,33 +169,3 @@ def _poles(poles: Sequence[Sequence[float]]) -> str:
             continue  # told with its conjugate
         told.append(number(real) if imaginary == 0.0 else f"{number(real)} ± {number(imaginary)} j")
     return ", ".join(told)
-
-
-def onset_table(onset: Sequence[Mapping[str, Any]]) -> str:
-    """Return predicted and simulated rates of each setting, axis and loop."""
-    if not onset:
-        return '<p class="none">Left out.</p>'
-    rows, before = [], ""
-    for entry in sorted(onset, key=lambda entry: _place(onset, entry)):
-        new = entry["setting"] != before
-        before = entry["setting"]
-        head = f"<th>{escape(before) if new else ''}</th><td>{escape(AXIS_TITLES[entry['axis']])}</td>"
-        rates = _rate_cell(entry["predicted_hz"]) + _rate_cell(entry["simulated_hz"])
-        apart = cell(_percent(entry["difference_percent"]))
-        rows.append(row(f"{head}<td>{escape(_title(entry))}</td>{rates}{apart}", new))
-    return wide_table(
-        ("rotors and delay", "axis", "controller", "#predicted", "#simulated", "#difference"), rows
-    )
-
-
-def _place(onset: Sequence[Mapping[str, Any]], entry: Mapping[str, Any]) -> tuple[int, int]:
-    settings = list(dict.fromkeys(one["setting"] for one in onset))
-    return settings.index(entry["setting"]), AXES.index(entry["axis"])
-
-
-def _rate_cell(rate_hz: float | None) -> str:
-    return '<td class="n bad">none up to 2 kHz</td>' if rate_hz is None else cell(f"{fixed(rate_hz, 1)} Hz")
-
-
-def _percent(value: float | None) -> str:
-    return UNKNOWN if value is None else f"{fixed(value, 2)} %"

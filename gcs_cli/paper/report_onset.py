@@ -1,0 +1,75 @@
+"""Where instability sets in, predicted and simulated, as a part of the report. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from gcs_cli.paper.cases import CONTENDERS
+from gcs_cli.paper.report_labels import (
+    AXES,
+    AXIS_TITLES,
+    LABELS,
+    UNKNOWN,
+    anchored,
+    cell,
+    fixed,
+    row,
+    wide_table,
+)
+from gcs_cli.report_plots import section
+
+_NAMES = {(contender.controller, contender.gains): contender.name for contender in CONTENDERS}
+_ONSET_NOTE = (
+    "Predicted: the rate at which an eigenvalue of the sampled loop leaves the unit circle. Simulated: real loops and "
+    "plant in flight, kicked by 10⁻⁷ rad/s about one axis; the lowest rate at which the kick dies away, found by "
+    "bisection without knowing the prediction."
+)
+
+
+def onset_section(onset: Sequence[Mapping[str, Any]]) -> str:
+    """Return predicted and simulated rates as a section."""
+    return anchored(
+        "onset", section("Lowest stable rate of the inner loop", onset_table(onset), note=_ONSET_NOTE)
+    )
+
+
+def loop_name(loop: Mapping[str, Any]) -> str:
+    """Return the contender that has the controller and gains of a loop or onset; empty if none has."""
+    return _NAMES.get((loop["controller"], loop["gains"]), "")
+
+
+def loop_title(loop: Mapping[str, Any]) -> str:
+    """Return what a loop, or an onset, is called: the contender that has its controller and gains."""
+    return LABELS.get(loop_name(loop), f"{loop['controller']}, {loop['gains']}")
+
+
+def onset_table(onset: Sequence[Mapping[str, Any]]) -> str:
+    """Return predicted and simulated rates of each setting, axis and loop."""
+    if not onset:
+        return '<p class="none">Left out.</p>'
+    rows, before = [], ""
+    for entry in sorted(onset, key=lambda entry: _place(onset, entry)):
+        new = entry["setting"] != before
+        before = entry["setting"]
+        head = f"<th>{escape(before) if new else ''}</th><td>{escape(AXIS_TITLES[entry['axis']])}</td>"
+        rates = _rate_cell(entry["predicted_hz"]) + _rate_cell(entry["simulated_hz"])
+        apart = cell(_percent(entry["difference_percent"]))
+        rows.append(row(f"{head}<td>{escape(loop_title(entry))}</td>{rates}{apart}", new))
+    return wide_table(
+        ("rotors and delay", "axis", "controller", "#predicted", "#simulated", "#difference"), rows
+    )
+
+
+def _place(onset: Sequence[Mapping[str, Any]], entry: Mapping[str, Any]) -> tuple[int, int]:
+    settings = list(dict.fromkeys(one["setting"] for one in onset))
+    return settings.index(entry["setting"]), AXES.index(entry["axis"])
+
+
+def _rate_cell(rate_hz: float | None) -> str:
+    return '<td class="n bad">none up to 2 kHz</td>' if rate_hz is None else cell(f"{fixed(rate_hz, 1)} Hz")
+
+
+def _percent(value: float | None) -> str:
+    return UNKNOWN if value is None else f"{fixed(value, 2)} %"
