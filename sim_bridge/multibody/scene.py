@@ -14,7 +14,6 @@ from sim_bridge.multibody.landmarks import add_landmarks
 from sim_bridge.multibody.usual_parts import foot_z_m
 from sim_bridge.multibody.xml import add, paint_only, section
 
-CAMERAS = ("chase", "fixed", "top", "side")
 PAD_M = 4.0
 """Half the side of the landing pad."""
 GRASS_TILE_M = 20.0
@@ -72,7 +71,7 @@ def _materials(asset: Element) -> None:
             asset, "texture", name=name, type="2d", builtin="flat", width=size, height=size,
             rgb1=colour, rgb2=colour,
         )  # fmt: skip
-    repeat = 2.0 / GRASS_TILE_M  # pictures of a plane repeat in units of two metres... of its half sizes
+    repeat = 2.0 / GRASS_TILE_M  # at 1 a picture covers two metres
     add(asset, "material", name="grass", texture="grass", texuniform="true", texrepeat=(repeat, repeat),
         specular=0.0, shininess=0.0, reflectance=0.0)  # fmt: skip
     add(asset, "material", name="mown", texture="mown", texrepeat=(8.0, 1.0), specular=0.0, shininess=0.0)
