@@ -26,7 +26,7 @@ def test_json_has_the_documented_keys(capsys: pytest.CaptureFixture[str]) -> Non
     assert [len(value) for value in list(state.values())[1:]] == [3, 3, 4, 3, 3, 4]
 
 
-@pytest.mark.parametrize("plant", ["rigid", "paper"])
+@pytest.mark.parametrize("plant", ["rigid", "paper", "multibody"])
 def test_start_is_given_back_after_no_time(capsys: pytest.CaptureFixture[str], plant: str) -> None:
     state = fly(
         capsys, "--plant", plant, "--rotors", "-5,6,7,8", "--seconds", "0", "--no-lag", "--pos", "1,2,-3",
