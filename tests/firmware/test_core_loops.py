@@ -170,6 +170,19 @@ def test_an_unsound_tick_repeats_the_last_sound_one(real: str) -> None:
     assert np.array_equal(made[1], made[0])
 
 
+def test_a_reset_at_an_unsound_state_repeats_nothing() -> None:
+    _, c = both("pid", load_vehicle("x_quad"))
+    state, setpoint, target, flags = sequence(40, 3, 10.0)
+    flags[:] = OUTER_DUE
+    flags[0] = flags[-1] = RESET | OUTER_DUE
+    state[-1, 0] = math.nan
+    rows, status = c.run(state, setpoint, target, flags)
+    assert np.count_nonzero(rows[-2]) > 20
+    assert status[-1] == LoopStatus.INPUT_NOT_FINITE
+    assert np.array_equal(rows[-1, :4], state[-1, 6:10])
+    assert not rows[-1, 4:].any()
+
+
 def test_a_setpoint_that_is_no_number_keeps_the_target() -> None:
     _, c = both("pid", load_vehicle("x_quad"))
     ticks = level(6, OUTER_DUE)

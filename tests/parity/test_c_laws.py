@@ -8,6 +8,7 @@ the same inputs go to both, because all of them fit in float32. The number measu
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from typing import NamedTuple
 
@@ -216,13 +217,29 @@ def askew() -> Vehicle:
     return multirotor(places, [1, -1, 1, -1, 1, -1])
 
 
+def with_last_rotor(**changed: float) -> Vehicle:
+    """Return four rotors, the last of them another one than the rest."""
+    vehicle = load_vehicle("x_quad")
+    *rest, last = vehicle.rotors
+    return dataclasses.replace(vehicle, rotors=(*rest, dataclasses.replace(last, **changed)))
+
+
+def unwilling() -> Vehicle:
+    """Return four rotors of which one has to pull downwards in a hover: its share of the thrust is negative."""
+    return multirotor([(0.3, 0.0), (0.1, 0.0), (-0.35, 0.2), (-0.35, -0.2)], [1, 1, -1, -1])
+
+
 VEHICLES = {
     "plus": lambda: load_vehicle("paper_quad"),
     "cross": lambda: load_vehicle("x_quad"),
     "ideal": lambda: load_vehicle("x_quad").with_ideal_rotors(),
     "askew": askew,
     "octo": lambda: ring(8, first_deg=22.5),
+    "weak": lambda: with_last_rotor(max_speed_rad_s=0.9 * load_vehicle("x_quad").rotors[-1].max_speed_rad_s),
+    "eager": lambda: with_last_rotor(min_speed_rad_s=2.0 * load_vehicle("x_quad").rotors[-1].min_speed_rad_s),
+    "unwilling": unwilling,
 }
+LIFTING = [name for name in VEHICLES if name != "unwilling"]
 
 
 MIXER_FLOAT_ULPS = {"squares": 16, "thrust": 6, "torque": 8, "relative speed": 32}
@@ -281,7 +298,7 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
     )
 
 
-@pytest.mark.parametrize("name", VEHICLES)
+@pytest.mark.parametrize("name", LIFTING)
 def test_mixer_in_double_is_pythons_to_1e_12_and_has_its_bits_unless_thrust_is_limited(name: str) -> None:
     made = mixed("double", name)
     unlimited = ~(made.python_saturation[:, :3] != 0.0).any(axis=1)
@@ -295,7 +312,7 @@ def test_mixer_in_double_is_pythons_to_1e_12_and_has_its_bits_unless_thrust_is_l
     assert not made.beyond.any()
 
 
-@pytest.mark.parametrize("name", VEHICLES)
+@pytest.mark.parametrize("name", LIFTING)
 def test_mixer_in_float_is_near_and_takes_no_rounding_for_a_limit(name: str) -> None:
     made = mixed("float", name)
     for quantity, compared in made.quantities.items():
@@ -304,6 +321,12 @@ def test_mixer_in_float_is_near_and_takes_no_rounding_for_a_limit(name: str) -> 
     c, expected = made.saturation, made.python_saturation
     assert not np.any((c != 0.0) & (c != expected))
     assert np.count_nonzero(c != expected) < 10  # a limit by less than the rounding: 5 found at most
+
+
+def test_a_rotor_with_a_negative_share_of_the_thrust_is_given_pythons_speed() -> None:
+    made = mixed("double", "unwilling")
+    assert all(np.array_equal(compared.c, compared.python) for compared in made.quantities.values())
+    assert np.array_equal(made.saturation, made.python_saturation)
 
 
 def test_the_mixers_samples_reach_every_limit_both_ways() -> None:

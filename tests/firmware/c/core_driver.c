@@ -201,6 +201,7 @@ void drive_set_integral(fs_loops *loops, fs_real value)
 void drive_rate_groups(uint32_t divisor, uint32_t count, uint16_t *due)
 {
     fs_rate_groups groups;
+    memset(&groups, 0x5A, sizeof groups);
     fs_rate_groups_init(&groups, (uint16_t)divisor);
     for (uint32_t i = 0; i < count; i++) {
         due[i] = fs_rate_groups_tick(&groups);
