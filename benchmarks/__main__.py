@@ -11,10 +11,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks import ground_load, one_process, real_time, report, round_trip, step_costs, three_processes
+from benchmarks import (
+    emulated,
+    ground_load,
+    one_process,
+    plants,
+    real_time,
+    report,
+    round_trip,
+    step_costs,
+    three_processes,
+)
 from benchmarks.measure import OtherLoad
 
-SECTIONS = ("steps", "flights", "realtime", "load", "start")
+SECTIONS = ("steps", "flights", "emulated", "multibody", "realtime", "load", "start")
 
 
 def _arguments() -> argparse.Namespace:
@@ -50,6 +60,14 @@ def main() -> int:
         results["three_processes"] = _measured(
             "flights of three processes",
             lambda: three_processes.flights((500.0, 250.0), 2 if quick else 7),
+        )
+    if "emulated" in wanted:
+        results["emulated"] = _measured(
+            "flights with loops on an emulated processor", lambda: emulated.flights(1 if quick else 3)
+        )
+    if "multibody" in wanted:
+        results["plants"] = _measured(
+            "flights with each plant", lambda: plants.plants(2 if quick else 5, seconds)
         )
     if "realtime" in wanted:
         results["lateness"] = _measured(

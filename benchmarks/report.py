@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from benchmarks.emulated import Flown
 from benchmarks.ground_load import Seen
 from benchmarks.measure import Figure, short
+from benchmarks.plants import PlantCost
 from benchmarks.real_time import PERCENTILES
 from benchmarks.round_trip import WAYS
 from benchmarks.step_costs import Part
@@ -16,6 +18,7 @@ from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
 
 # on a machine of the same kind: PX4 with an external simulator, ArduCopter's SITL in one process
 PEERS = {500.0: ("≥ 20", "PX4 10"), 250.0: ("≥ 40", "PX4 18–23")}
+PLANT_FLOORS = {"rigid": "≥ 20", "multibody": "≥ 15"}
 ONE_PROCESS = ("≥ 60, goal 150", "ArduCopter 70–76")
 
 
@@ -28,6 +31,10 @@ def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
     )
     if "three_processes" in results:
         yield _flights(results) + "\n"
+    if "emulated" in results:
+        yield _emulated(results["emulated"]) + "\n"
+    if "plants" in results:
+        yield _plants(results["plants"]) + "\n"
     if "costs" in results:
         yield _costs(results) + "\n"
     if "round_trips" in results:
@@ -50,6 +57,42 @@ def _flights(results: dict[str, Any]) -> str:
         rows.append((f"one process, {name}, 500 Hz", factor.text(), step_us.text(), *ONE_PROCESS))
     head = ("missions/square.plan", "× real time", "µs a step", "mark", "others")
     return table("FLIGHTS", head, rows)
+
+
+def _emulated(results: dict[str, Flown]) -> str:
+    plain_s = results["python"].minute_s.median
+    rows: list[Row] = [
+        (
+            f"--loops {loops}",
+            short(flown.simulated_s),
+            flown.wall_s.text(),
+            flown.minute_s.text(),
+            short(flown.minute_s.median / plain_s, 2),
+            flown.processor_s.text(),
+            "< 30" if loops == "emulated" else "",
+        )
+        for loops, flown in results.items()
+    ]
+    head = (
+        *("benchmarks/minute.plan, 500 Hz", "simulated, s", "wall, s"),
+        *("60 s of it, s", "× python", "processor, s", "mark"),
+    )
+    return table("FLIGHTS WITH OTHER LOOPS, three processes, log", head, rows)
+
+
+def _plants(results: dict[str, PlantCost]) -> str:
+    rows: list[Row] = [
+        (name, cost.factor.text(), cost.step_us.text(), PLANT_FLOORS[name], cost.physics_us.text())
+        for name, cost in results.items()
+    ]
+    head = (
+        "missions/square.plan, three processes, 500 Hz",
+        "× real time",
+        "µs a step",
+        "mark",
+        "µs a physics step",
+    )
+    return table("PLANTS", head, rows)
 
 
 def _costs(results: dict[str, Any]) -> str:
