@@ -36,6 +36,8 @@ PLANT = "paper"
 ground before takeoff, and flights that were one rounding apart rise at different times."""
 TRAJECTORY = "desired"
 _FIRST_INSTANCE = 90
+_INTERRUPTED = "interrupted"
+"""How the outcome of a flight begins that the user ended."""
 _LEAST_LEG_M = 0.3
 _LEAST_HEIGHT_M = 1.0
 _PARTS = ("verdict", "checks", "differences", "compared", "profile", "target", "stack")
@@ -67,7 +69,7 @@ def run(
     """Fly MIL, SIL and PIL with both controllers; leave each comparison in ``folder/pil-<controller>``.
 
     Without the tools of the emulated target the section is left out and says why; a board that was asked for and is
-    not there raises CliError. ``tell`` hears what is done next; ``instance``: of the ports, None for one that is free.
+    not there raises CliError, and Ctrl-C KeyboardInterrupt. ``tell`` hears what is done next; ``instance``: of the ports, None for one that is free.
     """
     why = problem(target)
     if why is not None:
@@ -138,6 +140,9 @@ def _fly(folder: Path, controller: str, target: str, plan: Plan, instance: int |
         )  # fmt: skip
         console = Console(file=io.StringIO())
         finished = run_pil(options, checked_plan(options), target, Path(workshop) / "flights", console)
+        outcomes = [flight["outcome"] for flight in finished.outcome.result["flights"].values()]
+        if any(outcome.startswith(_INTERRUPTED) for outcome in outcomes):
+            raise KeyboardInterrupt  # a flight takes Ctrl-C as a wish to land; here it ends the command
         if (kept / JSON_NAME).exists():
             shutil.rmtree(kept)
         if not kept.exists():

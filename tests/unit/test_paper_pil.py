@@ -15,6 +15,8 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly_options import DEFAULT_HOME
 from gcs_cli.paper import pil_section
 from gcs_cli.paper.trajectory import load_trajectory
+from gcs_cli.pil.result import Outcome
+from gcs_cli.pil.run import Finished
 
 
 def place(item: MissionItem) -> tuple[float, float, float]:
@@ -103,3 +105,22 @@ def test_no_time_of_the_machine_is_kept() -> None:
     first, second = (json.dumps(pil_section.repeatable(timed(seconds))) for seconds in (1.0, 2.5))
     assert first == second
     assert "the same" in first
+
+
+def test_ctrl_c_in_a_flight_ends_the_command_and_keeps_the_older_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def interrupted(_options: object, _plan: object, _target: str, out: Path, _console: object) -> Finished:
+        out.mkdir()
+        result = {"flights": {"MIL": {"outcome": "completed"}, "SIL": {"outcome": "interrupted"}}}
+        return Finished(out, Outcome(result, [], []), CliError("SIL: interrupted"))
+
+    older = tmp_path / "pil-pid" / "pil.json"
+    older.parent.mkdir()
+    older.write_text("older")
+    monkeypatch.setattr(pil_section, "check_there", lambda *_: None)
+    monkeypatch.setattr(pil_section, "run_pil", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        pil_section.run(tmp_path, instance=98)
+    assert older.read_text() == "older"
+    assert [path.name for path in tmp_path.iterdir()] == ["pil-pid"]
