@@ -69,7 +69,8 @@ def run(
     """Fly MIL, SIL and PIL with both controllers; leave each comparison in ``folder/pil-<controller>``.
 
     Without the tools of the emulated target the section is left out and says why; a board that was asked for and is
-    not there raises CliError, and Ctrl-C KeyboardInterrupt. ``tell`` hears what is done next; ``instance``: of the ports, None for one that is free.
+    not there raises CliError, and Ctrl-C KeyboardInterrupt. ``tell`` hears what is done next; ``instance`` shifts the
+    ports, None chooses free ones.
     """
     why = problem(target)
     if why is not None:
