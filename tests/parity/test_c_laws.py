@@ -217,11 +217,13 @@ def askew() -> Vehicle:
     return multirotor(places, [1, -1, 1, -1, 1, -1])
 
 
-def with_last_rotor(**changed: float) -> Vehicle:
-    """Return four rotors, the last of them another one than the rest."""
+def with_other_rotor(index: int, **factors: float) -> Vehicle:
+    """Return four rotors, one of which has some of its numbers multiplied."""
     vehicle = load_vehicle("x_quad")
-    *rest, last = vehicle.rotors
-    return dataclasses.replace(vehicle, rotors=(*rest, dataclasses.replace(last, **changed)))
+    rotors = list(vehicle.rotors)
+    changed = {name: factor * getattr(rotors[index], name) for name, factor in factors.items()}
+    rotors[index] = dataclasses.replace(rotors[index], **changed)
+    return dataclasses.replace(vehicle, rotors=tuple(rotors))
 
 
 def unwilling() -> Vehicle:
@@ -235,8 +237,8 @@ VEHICLES = {
     "ideal": lambda: load_vehicle("x_quad").with_ideal_rotors(),
     "askew": askew,
     "octo": lambda: ring(8, first_deg=22.5),
-    "weak": lambda: with_last_rotor(max_speed_rad_s=0.9 * load_vehicle("x_quad").rotors[-1].max_speed_rad_s),
-    "eager": lambda: with_last_rotor(min_speed_rad_s=2.0 * load_vehicle("x_quad").rotors[-1].min_speed_rad_s),
+    "weak": lambda: with_other_rotor(1, max_speed_rad_s=0.9),
+    "eager": lambda: with_other_rotor(3, min_speed_rad_s=2.0),
     "unwilling": unwilling,
 }
 LIFTING = [name for name in VEHICLES if name != "unwilling"]
