@@ -97,7 +97,10 @@ def test_what_is_wrong_is_one_sentence_with_file_key_and_range(tmp_path: Path, n
 
 
 def test_gains_that_are_not_there() -> None:
-    with pytest.raises(ConfigError, match=r"^soft: is neither a file nor built-in gains \(paper, tuned\)$"):
+    with pytest.raises(
+        ConfigError,
+        match=r"^soft: is neither a file nor built-in gains \(backstepping_poles, paper, tuned\)$",
+    ):
         open_gains("soft")
     with pytest.raises(ConfigError, match=r"^no/such.toml: cannot be read: No such file or directory$"):
         open_gains("no/such.toml")
