@@ -64,10 +64,8 @@ def _note_speeds(m: Record, d: Record, when: int) -> None:
     rotor, held, speed = m["rotor"], m["command"], m["rotor_speed"]
     for i in range(m["rotor_count"]):
         d["speed"][when, i] = speed[i]
-        late = held[i] - speed[i]
-        d["wanted"][when, i] = (
-            late * rotor[i, LAG_RATE] if late != 0.0 else 0.0
-        )  # never where there is no lag
+        rate = rotor[i, LAG_RATE]
+        d["wanted"][when, i] = (held[i] - speed[i]) * rate if rate < math.inf else 0.0
 
 
 @compiled

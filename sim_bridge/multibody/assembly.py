@@ -28,6 +28,7 @@ _DENSITY_LIMIT = math.log(3.0)
 _LEAST_ROTOR_SHARE = 1e-6
 """Of the vehicle's inertia: a rotor cannot be without any, even where the file says so."""
 
+_TAKEN = frozenset({"ground", "pad"})  # by the model and the scene
 _LEAST_KG, _LEAST_KG_M2 = 1e-9, 1e-14
 
 TOLERANCE = 1e-3
@@ -59,6 +60,9 @@ def assemble(vehicle: Vehicle) -> Assembly:
     """Return the tuned assembly of a vehicle; the same vehicle gives the same bits. Raises ConfigError for a mesh."""
     given = [placed for part in vehicle.parts for placed in place(vehicle, part)]
     names = {placed.part.name for placed in given}
+    if len(names) < len(given) or names & _TAKEN:
+        taken = next(placed.part.name for placed in given if _is_taken(placed.part.name, given))
+        raise ConfigError(vehicle.name, "part", f"{taken!r} is the name of two things: copies are numbered")
     tuned = [index for index, placed in enumerate(given) if placed.part.tune]
     usual_knobs = len(Knobs._fields) if vehicle.default_parts else 0
 
@@ -79,6 +83,10 @@ def assemble(vehicle: Vehicle) -> Assembly:
     if frame.mass_kg < _LEAST_KG or np.linalg.eigvalsh(frame.inertia_kg_m2)[0] < _LEAST_KG_M2:
         raise ConfigError(vehicle.name, "part", "nothing on the frame weighs anything: add parts to it")
     return Assembly(tuple(parts), of_all(vehicle, parts), _misses(vehicle, parts))
+
+
+def _is_taken(name: str, given: list[PlacedPart]) -> bool:
+    return name in _TAKEN or sum(placed.part.name == name for placed in given) > 1
 
 
 def _denser(placed: PlacedPart, factor: float) -> PlacedPart:

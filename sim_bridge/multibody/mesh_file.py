@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from flightstack.contract import FloatArray
 from flightstack.params.errors import ConfigError
+
+IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 
 _HEADER = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -61,11 +64,16 @@ def _read_obj(content: bytes) -> FloatArray:
     return np.array(corners)[np.array(triangles, dtype=np.int64).reshape(-1, 3)]
 
 
+def corners_and_faces(triangles: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the corners, each once, shape (m, 3), and the faces by their numbers, shape (n, 3)."""
+    corners, number = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    faces = number.reshape(-1, 3)
+    return corners, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]  # without those that have no area
+
+
 def _check_closed(file: Path, triangles: FloatArray) -> None:
     """Raise ConfigError unless every edge is passed once in each direction and the inside is inside."""
-    _, number = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    faces = number.reshape(-1, 3)
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]  # without those that have no area
+    _, faces = corners_and_faces(triangles)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     there, times = np.unique(edges, axis=0, return_counts=True)
     back = np.unique(there[:, ::-1], axis=0)

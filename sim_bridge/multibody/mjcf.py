@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, indent, tostring
 
+import numpy as np
+
 from flightstack.geometry import quaternion_from_euler
 from flightstack.params.assembly import Part
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
@@ -18,6 +20,7 @@ from sim_bridge.contact import FRICTION
 from sim_bridge.multibody import contact
 from sim_bridge.multibody.assembly import Assembly, assemble
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
+from sim_bridge.multibody.mesh_file import corners_and_faces, read_mesh
 from sim_bridge.multibody.placing import PlacedPart
 from sim_bridge.multibody.usual_parts import foot_z_m
 from sim_bridge.multibody.xml import add
@@ -124,12 +127,15 @@ def _model_size(part: Part) -> tuple[float, ...]:
 
 
 def _mesh_asset(asset: Element, part: Part) -> None:
-    if part.file is not None:
-        # the file's axes are the part's own, FRD; a mesh is turned, with its faces, not mirrored
-        add(
-            asset, "mesh", name=part.name, file=str(part.file), scale=_exact((part.scale,) * 3),
-            inertia="exact", refquat="0 1 0 0",
-        )  # fmt: skip
+    """Put the mesh itself into the model: it then needs no second file, and any STL will do."""
+    if part.file is None:
+        return
+    corners, faces = corners_and_faces(read_mesh(part.file) * part.scale)
+    turned = corners * np.array([1.0, -1.0, -1.0])
+    add(
+        asset, "mesh", name=part.name, vertex=_exact(turned.ravel().tolist()),
+        face=" ".join(map(str, faces.ravel().tolist())), inertia="exact",
+    )  # fmt: skip
 
 
 def _exact(values: Iterable[float]) -> str:

@@ -7,11 +7,14 @@ every stage and integrates with the classic Runge-Kutta method, in the same vari
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
 from flightstack.contract import FloatArray, Vector3
 from flightstack.geometry import quaternion_from_euler
+from flightstack.params.errors import ConfigError
 from flightstack.params.vehicle import Vehicle
 from sim_bridge import rotor_drive
 from sim_bridge.layout import DIVERGED, RecordArray
@@ -30,13 +33,22 @@ _FIRST_DEPTH_M = 1e-5
 _FRAME = 6  # degrees of freedom
 
 
+def _compiled(vehicle: Vehicle) -> Any:
+    """Return MuJoCo's model of a vehicle; raise ConfigError where its compiler refuses a part."""
+    try:
+        return mujoco.MjModel.from_xml_string(model_xml(vehicle, lean=True))
+    except ValueError as error:
+        first = str(error).partition("\n")[0].removeprefix("Error: ")
+        raise ConfigError(vehicle.name, "part", f"MuJoCo refuses the model: {first}") from None
+
+
 class MultibodyPlant(RecordPlant):
     """The vehicle's assembly on MuJoCo; see ``Plant`` for its methods."""
 
     def __init__(self, vehicle: Vehicle, options: PlantOptions) -> None:
         super().__init__(vehicle, options)
         self.assembly = assemble(vehicle)
-        self._model = mujoco.MjModel.from_xml_string(model_xml(vehicle, lean=True))
+        self._model = _compiled(vehicle)
         self._data = mujoco.MjData(self._model)
         self._softness_m = 0.0
         self._watched = NEAR
@@ -67,6 +79,7 @@ class MultibodyPlant(RecordPlant):
         mass = np.zeros((model.nv, model.nv))
         for row, column in zip(mass, columns, strict=True):
             mujoco.mj_mulM(model, data, row, column)
+        self._held[:] = 0.0  # what stood on the ground was the model, not yet the vehicle
         row = np.linalg.solve(mass[:_FRAME, :_FRAME], mass[:_FRAME, _FRAME:]).T
         d["gain"][:rotors, :rotors] = mass[_FRAME:, _FRAME:] - row @ mass[:_FRAME, _FRAME:]
         d["row"][:rotors] = row * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # FLU to FRD

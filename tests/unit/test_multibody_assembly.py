@@ -18,6 +18,8 @@ from flightstack.params.vehicle import BUILT_IN, Vehicle, load_vehicle
 from sim_bridge.multibody.assembly import TOLERANCE, assemble, mass_table
 from sim_bridge.multibody.mass import about_point, solid
 from sim_bridge.multibody.mjcf import model_xml
+from sim_bridge.plant import PlantOptions
+from sim_bridge.plants import make_plant
 from tests.support.rotor_sets import ring
 
 PAPER = load_vehicle("paper_quad")
@@ -174,7 +176,7 @@ def test_a_mesh_weighs_what_its_volume_does(tmp_path: Path, write: object) -> No
     assert own.inertia_kg_m2[0, 1] == pytest.approx(m * 0.06 * 0.04 / 36.0, rel=1e-5)
 
 
-@pytest.mark.parametrize("write", [write_stl, write_obj])
+@pytest.mark.parametrize("write", [write_stl, write_text_stl, write_obj])
 def test_a_mesh_replaces_a_shape_and_the_rest_is_tuned_around_it(tmp_path: Path, write: object) -> None:
     name = "wedge.obj" if write is write_obj else "wedge.stl"
     write(tmp_path / name)  # type: ignore[operator]
@@ -190,6 +192,13 @@ def test_a_mesh_replaces_a_shape_and_the_rest_is_tuned_around_it(tmp_path: Path,
     assert mass == pytest.approx(vehicle.mass_kg, rel=1e-7)
     assert np.abs(centre).max() < 1e-8
     assert np.allclose(inertia, np.diag(vehicle.inertia_kg_m2), rtol=0.0, atol=1e-9)
+
+
+def test_what_mujocos_compiler_refuses_is_one_sentence(tmp_path: Path) -> None:
+    write_obj(tmp_path / "wedge.obj")
+    speck = '[[part]]\nname = "speck"\nshape = "mesh"\nfile = "wedge.obj"\nscale = 1e-5\nmaterial = "wood"\n'
+    with pytest.raises(ConfigError, match="paper_quad: part: MuJoCo refuses the model: "):
+        make_plant(with_parts(tmp_path, speck), "multibody", PlantOptions())
 
 
 def test_parts_of_ones_own_are_taken_as_they_are(tmp_path: Path) -> None:
@@ -249,6 +258,16 @@ def test_a_frame_without_parts_is_refused(tmp_path: Path) -> None:
     disc = '[[part]]\nname = "disc"\nshape = "sphere"\nsize_m = [0.02]\nmaterial = "wood"\nmount = "rotor"\n'
     with pytest.raises(ConfigError, match="nothing on the frame weighs anything"):
         assemble(with_parts(tmp_path, disc, head="default_parts = false"))
+
+
+@pytest.mark.parametrize("name", ["ground", "motor_2"])
+def test_a_name_that_is_taken(tmp_path: Path, name: str) -> None:
+    ball = f'[[part]]\nname = "{name}"\nshape = "sphere"\nsize_m = [0.01]\nmaterial = "wood"\n'
+    motors = (
+        '[[part]]\nname = "motor"\nshape = "sphere"\nsize_m = [0.01]\nmaterial = "motor"\nmount = "arm"\n'
+    )
+    with pytest.raises(ConfigError, match=f"'{name}' is the name of two things"):
+        assemble(with_parts(tmp_path, ball + motors))
 
 
 def test_two_parts_of_one_name(tmp_path: Path) -> None:

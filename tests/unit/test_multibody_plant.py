@@ -306,7 +306,10 @@ def test_ideal_rotors_are_at_their_speeds_at_once() -> None:
     flight.command[:4] = (100.0, 200.0, 300.0, 400.0)
     flight.fly(1e-3)
     assert flight.plant.rotor_speeds_rad_s() == [100.0, 200.0, 300.0, 400.0]
-    assert np.isfinite(flight.state).all()
+    flight.plant.set_rotor_speeds((50.0,) * 4)  # which is not what they are told
+    assert flight.plant.acceleration_ned_m_s2().z == pytest.approx(
+        9.81 - 4.0 * 2500.0 * 2.93e-5 / 0.55, rel=1e-3
+    )  # the frame is tilted a little
 
 
 def test_numbers_that_run_away_end_the_flight_with_a_sentence() -> None:
