@@ -34,8 +34,9 @@ def floats(array: FloatArray) -> list[float]:
 
 def singles(values: list[float]) -> list[float]:
     """Return ``values`` with infinity in place of what single precision cannot hold."""
-    if any(abs(value) > _SINGLE_LIMIT for value in values):
-        return [math.copysign(math.inf, v) if abs(v) > _SINGLE_LIMIT else v for v in values]
+    for value in values:  # in every message: ``any`` takes twice as long
+        if abs(value) > _SINGLE_LIMIT:
+            return [math.copysign(math.inf, v) if abs(v) > _SINGLE_LIMIT else v for v in values]
     return values
 
 
