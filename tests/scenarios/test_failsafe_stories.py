@@ -273,3 +273,16 @@ def test_a_landing_in_wind_does_not_lean_on_the_ground() -> None:
         assert q[1] == q[2] == 0.0
         assert world.time_s - touched_s < 1.5
     assert abs(world.altitude) < 0.01
+
+
+def test_an_empty_battery_stops_the_rotors_and_nobody_says_that_they_follow_again() -> None:
+    world = World()
+    world.arm()
+    world.takeoff(20.0)
+    world.until(lambda: world.mode is Mode.HOLD)
+    world.inject("battery:level=0")
+    world.run(1.5)  # falling still
+    assert world.altitude > 2.0
+    assert any("A rotor does not follow its command" in text for text in world.texts), world.texts
+    world.run(4.0)
+    assert not any("All rotors follow" in text for text in world.texts), world.texts
