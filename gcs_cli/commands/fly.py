@@ -19,7 +19,7 @@ def fly(
     context: typer.Context,
     plan: Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)],
     controller: Annotated[str, typer.Option(help="pid, backstepping, or the name of one of yours.")] = "pid",
-    gains: Annotated[str, typer.Option(help="tuned, paper, or a TOML file.")] = "tuned",
+    gains: Annotated[str, typer.Option(help="tuned, paper, backstepping_poles, or a TOML file.")] = "tuned",
     plant: Annotated[str, typer.Option(help="rigid, multibody or paper.")] = "rigid",
     speed: Annotated[str, typer.Option(metavar="max|N", help="N times real time.")] = "max",
     inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop.")] = 500.0,

@@ -52,7 +52,7 @@ def fly(
     plan: Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)],
     target: TargetOption = "emulated",
     controller: Annotated[str, typer.Option(help="pid or backstepping.")] = "pid",
-    gains: Annotated[str, typer.Option(help="tuned, paper, or a TOML file.")] = "tuned",
+    gains: Annotated[str, typer.Option(help="tuned, paper, backstepping_poles, or a TOML file.")] = "tuned",
     vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
     plant: Annotated[str, typer.Option(help="rigid, multibody or paper.")] = "rigid",
     inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop.")] = 500.0,
