@@ -183,6 +183,16 @@ def test_a_reset_at_an_unsound_state_repeats_nothing() -> None:
     assert not rows[-1, 4:].any()
 
 
+def test_a_reset_at_an_attitude_that_is_no_number_leaves_no_target() -> None:
+    python, c = both("pid", load_vehicle("x_quad"))
+    ticks = level(4, OUTER_DUE)
+    ticks.states[1, 6] = math.nan
+    ticks.flags[1:] = RESET, 0, OUTER_DUE
+    (_, made), (_, expected) = c.run(*ticks), run_python(python, ticks)
+    assert made.tolist() == expected.tolist()
+    assert made[1:3].tolist() == [LoopStatus.INPUT_NOT_FINITE] * 2
+
+
 def test_a_setpoint_that_is_no_number_keeps_the_target() -> None:
     _, c = both("pid", load_vehicle("x_quad"))
     ticks = level(6, OUTER_DUE)

@@ -8,6 +8,7 @@ the same inputs go to both, because all of them fit in float32. The number measu
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 import functools
 from typing import NamedTuple
@@ -257,6 +258,8 @@ class Mixed(NamedTuple):
     wrenches: np.ndarray
     beyond: np.ndarray
     """Speeds that C wrote beyond the vehicle's rotors."""
+    ways: int
+    """Short ways that the mixer took itself to be fit for: 1 effectiveness undoes allocation, 2 rotors are alike."""
 
 
 def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
@@ -285,6 +288,7 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
     speeds, achieved = np.full((count, 8), np.nan, c.dtype), np.zeros((count, 4), c.dtype)
     saturation, relative = np.zeros((count, 4), c.dtype), np.zeros(count, c.dtype)
     c.call("drive_mixer", count, c.array(wrenches), flat, n, speeds, achieved, saturation, relative)
+    ways = int(c.library.drive_mixer_ways(flat.ctypes.data_as(ctypes.c_void_p)))
     py_speeds, py_achieved, py_relative = np.zeros((count, n)), np.zeros((count, 4)), np.zeros(count)
     python.mixer(wrenches, *rotors, py_speeds, py_achieved, py_relative)
     lag = wrenches - py_achieved
@@ -296,7 +300,7 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
         "relative speed": Compared(relative[:, None].astype(np.float64), py_relative[:, None]),
     }
     return Mixed(
-        quantities, np.sign(saturation), np.sign(lag) * (np.abs(lag) > 1e-9), wrenches, speeds[:, n:]
+        quantities, np.sign(saturation), np.sign(lag) * (np.abs(lag) > 1e-9), wrenches, speeds[:, n:], ways
     )
 
 
@@ -329,6 +333,15 @@ def test_a_rotor_with_a_negative_share_of_the_thrust_is_given_pythons_speed() ->
     made = mixed("double", "unwilling")
     assert all(np.array_equal(compared.c, compared.python) for compared in made.quantities.values())
     assert np.array_equal(made.saturation, made.python_saturation)
+
+
+WAYS = {"plus": 3, "cross": 3, "ideal": 3, "askew": 1, "octo": 3, "weak": 1, "eager": 1, "unwilling": 0}
+
+
+@pytest.mark.parametrize("real", ["float", "double"])
+@pytest.mark.parametrize("name", VEHICLES)
+def test_the_mixer_knows_which_short_ways_it_may_go(name: str, real: str) -> None:
+    assert mixed(real, name, 1).ways == WAYS[name]
 
 
 def test_the_mixers_samples_reach_every_limit_both_ways() -> None:

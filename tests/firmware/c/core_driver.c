@@ -98,6 +98,12 @@ void drive_mixer(uint32_t count, const fs_wrench *wrench, fs_mixer *mixer, uint3
     }
 }
 
+/* Which of its short ways a mixer may go: 1 effectiveness undoes allocation, 2 rotors are alike. */
+uint32_t drive_mixer_ways(const fs_mixer *mixer)
+{
+    return (mixer->is_inverse != 0U ? 1U : 0U) + (mixer->is_even != 0U ? 2U : 0U);
+}
+
 static void put_vector(fs_real *at, const fs_vector3 *v)
 {
     at[0] = v->x;
