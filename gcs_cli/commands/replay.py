@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import sys
 import tempfile
@@ -77,12 +76,19 @@ def _render(arguments: list[str]) -> int:
         try:
             code = child.wait()
         except KeyboardInterrupt:
-            child.send_signal(signal.SIGINT)
-            try:
-                code = child.wait(_PATIENCE_S)
-            except subprocess.TimeoutExpired:
-                child.kill()
-                code = FAILED
+            child.terminate()
+            if _ended(child) != FAILED:  # it had not got far enough to say so
+                raise
+            return FAILED
     if code < 0:
         raise CliError(f"sim-bridge render was killed by signal {-code}")
     return code
+
+
+def _ended(child: subprocess.Popen[bytes]) -> int:
+    """Wait for the end that was asked for, not for ever; return the exit code."""
+    try:
+        return child.wait(_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        return child.wait()
