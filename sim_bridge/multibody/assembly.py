@@ -29,6 +29,9 @@ _LEAST_ROTOR_SHARE = 1e-6
 """Of the vehicle's inertia: a rotor cannot be without any, even where the file says so."""
 
 _TAKEN = frozenset({"ground", "pad"})  # by the model and the scene
+_WEIGHTS = np.array([30.0] * 4 + [1.0] * 6)
+"""Where not all can be met, mass and centre of gravity come first: without them it does not even hover."""
+
 _LEAST_KG, _LEAST_KG_M2 = 1e-9, 1e-14
 
 TOLERANCE = 1e-3
@@ -112,10 +115,10 @@ def _rotor_inertia(vehicle: Vehicle, rotor: Rotor) -> float:
 def _miss_of(
     vehicle: Vehicle, build: Callable[[FloatArray], list[PlacedPart]]
 ) -> Callable[[FloatArray], FloatArray]:
-    """Return what must become zero: mass, centre of gravity, moments and products of inertia, as shares."""
+    """Return what must become zero: mass, centre of gravity, moments and products of inertia, as weighted shares."""
 
     def miss(x: FloatArray) -> FloatArray:
-        return _miss(vehicle, of_all(vehicle, build(x)))
+        return _WEIGHTS * _miss(vehicle, of_all(vehicle, build(x)))
 
     return miss
 

@@ -11,12 +11,13 @@ from flightstack.contract import FloatArray
 _ROUNDS = 40
 _STEP = 1e-6
 _MET = 1e-14
+_GOOD = 1e-6  # less is rounding, or a mesh of single precision
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 1e-3)  # of a step, the first that helps is taken
 _SMALLEST_RATIO = 1e-7  # of singular values: conditions that no knob moves are left alone
 
 
 def meet(miss: Callable[[FloatArray], FloatArray], limits: FloatArray) -> FloatArray:
-    """Return knobs x near zero, |x| ≤ ``limits``, with miss(x) = 0, or as near to it as steps lead.
+    """Return knobs x near zero, |x| ≤ ``limits``, with miss(x) = 0, or in the least squares where that cannot be.
 
     Each step is the shortest one, measured in units of the limits, to where the linearised conditions are met
     (Gauss-Newton with the pseudo-inverse). No randomness: the same conditions give the same bits.
@@ -35,7 +36,16 @@ def meet(miss: Callable[[FloatArray], FloatArray], limits: FloatArray) -> FloatA
                 break
         else:
             break
-    return x
+    return x if np.abs(rest).max() < _GOOD else _compromise(miss, x, limits)
+
+
+def _compromise(miss: Callable[[FloatArray], FloatArray], x: FloatArray, limits: FloatArray) -> FloatArray:
+    """Return the least squares within the limits, from ``x`` on, for conditions that cannot all be met."""
+    from scipy.optimize import least_squares  # noqa: PLC0415  # slow to load, and seldom needed
+
+    inside = np.clip(x, -0.99 * limits, 0.99 * limits)
+    found: FloatArray = least_squares(miss, inside, bounds=(-limits, limits), x_scale=limits, max_nfev=60).x
+    return found
 
 
 def _step(slope: FloatArray, rest: FloatArray, x: FloatArray, limits: FloatArray) -> FloatArray:

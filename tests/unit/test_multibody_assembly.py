@@ -20,7 +20,7 @@ from sim_bridge.multibody.mass import about_point, solid
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.plant import PlantOptions
 from sim_bridge.plants import make_plant
-from tests.support.rotor_sets import ring
+from tests.support.rotor_sets import multirotor
 
 PAPER = load_vehicle("paper_quad")
 BOTH_VEHICLES = pytest.mark.parametrize("name", ["paper_quad", "x_quad"])
@@ -142,13 +142,26 @@ def test_heavier_and_slower_vehicles_are_met_as_well(mass: float, inertia: float
 
 
 def test_tells_what_no_assembly_of_this_kind_can_have() -> None:
-    vehicle = ring(6)  # its moments leave no room for legs of this height
+    vehicle = replace(PAPER, leg_height_m=0.0)  # its moments ask for masses far above and below the rotors
     assembly = assemble(vehicle)
     assert assembly.worst_miss > 10.0 * TOLERANCE
-    mass, _, _ = compiled_whole(vehicle)  # it flies as it is built, and the table tells by how much it misses
-    assert abs(mass / vehicle.mass_kg - 1.0) == pytest.approx(assembly.misses["mass"], rel=1e-9)
+    _, centre, inertia = compiled_whole(vehicle)  # it flies as it is built, and tells by how much it misses
+    wanted = np.array(vehicle.inertia_kg_m2)
+    for axis, miss in zip("xyz", np.abs(np.diag(inertia) / wanted - 1.0), strict=True):
+        assert miss == pytest.approx(assembly.misses[f"I{axis}"], abs=1e-12)
+    assert assembly.misses["mass"] < TOLERANCE  # mass and centre of gravity come first: it hovers
+    assert np.abs(centre).max() < TOLERANCE
     assert "meet the vehicle file within" in assembly.worst_line()
     assert f"{assembly.misses['Ix']:.1e}" in mass_table(vehicle, assembly)
+
+
+def test_rotors_at_odd_places_are_met_by_moving_battery_and_avionics() -> None:
+    vehicle = multirotor([(0.25, 0.2), (-0.2, -0.25), (0.22, -0.2), (-0.25, 0.18)], [-1, -1, 1, 1])
+    assert assemble(vehicle).worst_miss < 1e-9  # measured: 4e-11
+    mass, centre, inertia = compiled_whole(vehicle)
+    assert mass == pytest.approx(vehicle.mass_kg, rel=1e-9)
+    assert np.abs(centre).max() < 1e-9
+    assert np.allclose(inertia, np.diag(vehicle.inertia_kg_m2), rtol=0.0, atol=1e-10)
 
 
 def test_parts_do_not_touch_the_ground_before_the_feet() -> None:
