@@ -66,7 +66,10 @@ class MissionService:
 
     def _take_events(self) -> None:
         autopilot = self._autopilot
-        for event in self._server.events():
+        events = self._server.events()
+        if not events:  # most of the time: nor have the plans' numbers changed
+            return
+        for event in events:
             if isinstance(event, MissionReplaced):
                 self._setters[event.mission_type](event.items)
                 autopilot.say(NOTICE, f"{_name(event.mission_type)} loaded, items: {len(event.items)}")

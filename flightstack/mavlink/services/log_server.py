@@ -104,6 +104,8 @@ class LogServer:
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Return the messages to send now, each with the peer it goes to, fairly shared."""
+        if not self._clients:  # most of the time
+            return []
         self._forget_silent(now_s)
         sent: list[tuple[Hashable | None, Message]] = []
         allowance = self._pace.allowance(now_s)

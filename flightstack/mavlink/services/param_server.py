@@ -149,6 +149,8 @@ class ParamServer:
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Return the messages to send now, each with its peer; None means every peer that was heard."""
+        if not (self._changed or self._lists or self._answers or self._errors):  # most of the time
+            return []
         outbox: list[tuple[Hashable | None, Message]] = [*self._errors]
         self._errors.clear()
         outbox += [(peer, self._message(name)) for peer, name in self._answers]
