@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from flightstack import compiled as module
-from flightstack.compiled import as_tuple, compiled, is_own, specialise, store
+from flightstack.compiled import as_tuple, compiled, direct, is_own, specialise, store
 from flightstack.control.mixer import mix
 
 inner = None  # bound by ``specialise``
@@ -39,6 +39,28 @@ def test_a_template_is_bound_to_what_it_is_given() -> None:
     assert (one(3.0), two(3.0)) == (60.0, -1.5)
     assert one.__name__ == "template__one"
     assert inner is None
+
+
+@compiled
+def first(numbers: np.ndarray, scale: float) -> float:  # type: ignore[type-arg]
+    return numbers[0] * scale
+
+
+def test_a_kernel_called_directly_does_the_same_and_refuses_numbers_of_another_size() -> None:
+    numbers = np.array([3.0, 4.0])
+    kernel = direct(first, np.zeros(1), 1.0)
+    assert kernel(numbers, 2.0) == first(numbers, 2.0) == 6.0
+    assert kernel(numbers, 2) == 6.0
+    if "NUMBA_DISABLE_JIT" not in os.environ:
+        with pytest.raises(TypeError):
+            kernel(numbers.astype(np.float32), 2.0)
+
+
+def test_without_compilation_a_direct_kernel_is_the_function() -> None:
+    def plain(x: float) -> float:
+        return x
+
+    assert direct(plain, 1.0) is plain
 
 
 def test_division_by_zero_is_ieee() -> None:
