@@ -15,6 +15,7 @@ import imageio_ffmpeg
 import pytest
 from PIL import Image
 
+from flightstack.mavlink.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.params.vehicle import load_vehicle
 from flightstack.poses_file import write_poses
 from sim_bridge.__main__ import main
@@ -179,28 +180,42 @@ open(sys.argv[1], "wb").write(data)
 """
 
 
+def climb(simulator: Simulator) -> list[bytes]:
+    """Fly up for four seconds; return all states sent."""
+    actuators, frames = ActuatorsFrame(), []
+    actuators.set_rotor_count(4)
+    actuators.rotor_speed_rad_s[:4] = (240.0, 240.5, 241.0, 240.2)
+    for _ in range(2000):
+        frames.append(bytes(simulator.state_frame()))
+        actuators.seal(simulator.time_us, ARMED_FLAG | LOCKSTEP_FLAG)
+        simulator.apply(actuators)
+    return frames
+
+
 def test_a_live_window_hears_of_the_flight_and_does_not_change_it(tmp_path: Path) -> None:
     """A program in the window's place keeps what it gets; the states sent are those without it."""
-    assert READY == b"ready\n"
-    sent = {}
-    for watched in (False, True):
-        simulator = Simulator(load_vehicle("paper_quad"))
-        commands = simulator.frame.rotor_speed_rad_s.astype(float) * 0.0 + 250.0
-        frames = []
-        view = LiveView(str(tmp_path / "heard"), (sys.executable, "-c", _WINDOW)) if watched else None
-        for step in range(200):
-            simulator.plant.advance(commands, 0, 2)
-            frames.append(bytes(simulator.state_frame()))
-            if view is not None and step == 0:
-                watching = view.watching(simulator)
-                watching.__enter__()
-        if view is not None:
-            watching.__exit__(None, None, None)
-        sent[watched] = frames
-    assert sent[True] == sent[False]
+    alone = climb(Simulator(load_vehicle("paper_quad")))
+    watched = Simulator(load_vehicle("paper_quad"))
+    view = LiveView(str(tmp_path / "heard"), (sys.executable, "-c", _WINDOW))
+    with view.watching(watched):
+        assert climb(watched) == alone
     heard = (tmp_path / "heard").read_bytes()
+    assert len(set(alone)) == 2000
     assert heard
     assert len(heard) % SNAPSHOT.size == 0
+    for time_s, north, east, down, *_ in SNAPSHOT.iter_unpack(heard):
+        assert 0.0 <= time_s <= 4.0
+        assert down <= 0.001
+        assert abs(north) + abs(east) < 50.0
+
+
+def test_a_window_that_goes_away_is_forgotten(tmp_path: Path) -> None:
+    view = LiveView("", (sys.executable, "-c", "print('ready', flush=True)"))
+    simulator = Simulator(load_vehicle("paper_quad"))
+    with view.watching(simulator):
+        while view.write(bytes(SNAPSHOT.size)):  # until the program has ended
+            pass
+        assert len(climb(simulator)) == 2000
 
 
 def test_a_window_that_cannot_open_says_why() -> None:
