@@ -8,14 +8,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from flightstack import __version__
 from flightstack.autopilot import Autopilot
 from flightstack.clock import LoopTiming, Rates, rates
 from flightstack.commands import VehicleContext
 from flightstack.config import StackConfig
-from flightstack.contract import FloatArray, LoopRow
 from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import load_controller
 from flightstack.firmware.c_loops import LoopsSetup
@@ -102,7 +99,7 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
         simulator.rotor_speed_rad_s,
         simulator,
     )
-    warm_up(backend, autopilot.now.setpoint, simulator)
+    backend.warm_up(simulator.state, autopilot.now.setpoint, simulator.rotor_speed_rad_s)
     autopilot.supervisor.warm_up()
     connect_parameters(params, autopilot, backend, recorder)
     timing = LoopTiming(round(1e9 / pace.inner_hz))
@@ -113,11 +110,3 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
     return Stack(
         vehicle, pace, simulator, autopilot, ground, recorder, timing, report, params, loaded, backend
     )
-
-
-def warm_up(backend: ControlBackend, setpoint: FloatArray, simulator: SimulatorLink) -> None:
-    """Compile the loops now, or load them from the cache: the first tick must not take a second."""
-    row = np.zeros(LoopRow.SIZE)
-    for _ in range(2):  # the second time, they know their arrays
-        backend.step(simulator.state, setpoint, simulator.rotor_speed_rad_s, True, row)
-    backend.reset(simulator.state)

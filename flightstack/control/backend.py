@@ -32,6 +32,9 @@ class ControlBackend(Protocol):
     def set_parameter(self, name: str, value: float) -> None:
         """Change a parameter, checked by its declaration, from the next tick on; raise KeyError if unknown."""
 
+    def warm_up(self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray) -> None:
+        """Do what takes time once, on the arrays that ``step`` will get: the first tick must not take a second."""
+
     def reset(self, state: FloatArray) -> None:
         """Forget the past: integrators zero, the reference at the present attitude, at rest."""
 

@@ -307,6 +307,13 @@ class PythonLoops:
         """Change a parameter from the next tick on; raise KeyError if unknown."""
         self._parameters.set(name, value)
 
+    def warm_up(self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray) -> None:
+        """Compile the kernels for these arrays, or load them from the cache."""
+        row = np.zeros(LoopRow.SIZE)
+        for _ in range(2):  # the second time, they know their arrays
+            self.step(state, setpoint, rotor_speed_rad_s, True, row)
+        self.reset(state)
+
     def reset(self, state: FloatArray) -> None:
         """Forget the past: integrators zero, the reference at the present attitude, at rest."""
         self._position_memory[:] = 0.0

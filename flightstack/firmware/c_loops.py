@@ -101,6 +101,10 @@ class CLoops:
             raise KeyError(name)
         self.computer.set(name, value)
 
+    def warm_up(self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray) -> None:
+        """Begin at ``state``; the core was compiled before, and a target counts only steps that are flown."""
+        self.reset(state)
+
     def reset(self, state: FloatArray) -> None:
         """Forget the past: integrators zero, the reference at the present attitude, at rest."""
         self._pending = LoopFlags.RESET
