@@ -68,14 +68,17 @@ def flown_vehicle(case: Case) -> Vehicle:
     )
 
 
-def make_loops(case: Case) -> PythonLoops:
-    """Return the loops of the case as the flight stack makes them; raise ConfigError."""
+def make_loops(case: Case, outer_hz: float | None = None) -> PythonLoops:
+    """Return the loops of the case as the flight stack makes them; ``outer_hz`` in place of its own.
+
+    Raise ConfigError.
+    """
     return PythonLoops(
         controlled_vehicle(case),
         load_controller(case.controller),
         open_gains(case.gains),
         case.inner_hz,
-        case.outer_hz,
+        case.outer_hz if outer_hz is None else outer_hz,
         math.radians(Behaviour().max_tilt_deg),
     )
 

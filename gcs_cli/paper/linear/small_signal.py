@@ -29,6 +29,8 @@ from gcs_cli.paper.linear.gains import (
 from gcs_cli.paper.linear.sampled import Actuators
 from gcs_cli.paper.types import Case
 
+VELOCITY_AT, RATES_AT = 3, 10
+"""Columns of the state: velocity NED, body rates FRD."""
 ARMED = 2
 """FS_ACTUATORS: the rotors turn."""
 STEP_RAD, STEP_M = 1e-4, 1e-4
@@ -81,6 +83,13 @@ def spin_up_lead_s(vehicle: Vehicle) -> float:
     return rotor.inertia_kg_m2 / (2.0 * rotor.torque_coefficient_n_m_s2 * speed)
 
 
+class End(NamedTuple):
+    """A flight ends early where the magnitude of a column of the state is not below ``above``."""
+
+    column: int
+    above: float
+
+
 class Flight(NamedTuple):
     """One row for each inner tick, before the loops ran."""
 
@@ -96,8 +105,8 @@ def fly_attitude(case: Case, ticks: int, axis: str, *, step_rad: float = 0.0, ki
 
     The kick is a torque over the first tick that turns the vehicle by ``kick_rad_s``. The attitude loop of a case
     whose outer rate is its inner rate gets the step at once. ``alone`` gives the other axes gains that are stable at
-    any rate: an unstable one would grow out of rounding and shake this one. The flight ends where a rate is larger
-    than ``ends_at_rad_s``.
+    any rate: an unstable one would grow out of rounding and shake this one. The flight ends where the axis turns
+    faster than ``ends_at_rad_s``.
     """
     target = np.zeros(ATTITUDE_TARGET_SIZE)
     angles = [step_rad if name == axis else 0.0 for name in ATTITUDE_AXES]
@@ -109,7 +118,8 @@ def fly_attitude(case: Case, ticks: int, axis: str, *, step_rad: float = 0.0, ki
             name: value for other in others for name, value in _quiet(case.controller, other).items()
         }
     kick = _kicked(case, axis, kick_rad_s) if kick_rad_s else None
-    return _fly(case, ticks, target, parameters, kick, ends_at_rad_s)
+    ends = End(RATES_AT + ATTITUDE_AXES.index(axis), ends_at_rad_s)
+    return _fly(case, ticks, target, parameters, first_command=kick, ends=ends)
 
 
 def _quiet(controller: str, axis: str) -> dict[str, float]:
@@ -120,11 +130,23 @@ def _quiet(controller: str, axis: str) -> dict[str, float]:
     return {f"PID_{axis}_P": 1.0, f"PID_{axis}_I": 0.0, f"PID_{axis}_D": 1.0}
 
 
-def fly_position(case: Case, ticks: int, axis: str, step_m: float = STEP_M) -> Flight:
-    """Let all loops answer a step of the position setpoint on one axis, with the reference filter."""
-    setpoint = np.zeros(SETPOINT_SIZE)
-    setpoint[POSITION_AXES.index(axis)] = step_m
-    return _fly(case, ticks, setpoint, {})
+def fly_position(case: Case, ticks: int, axis: str, step_m: float = STEP_M, *, divisor: int | None = None,
+                 alone: bool = False, ends_at_m_s: float = math.inf) -> Flight:  # fmt: skip
+    """Let all loops answer a step of the position setpoint on one axis, with the reference filter.
+
+    ``divisor`` is how many inner ticks make an outer period, None for the case's: the outer rate need be no whole
+    number. ``alone`` gives height, or x and y, gains that are stable at any rate, whichever the axis is not. The
+    flight ends where the axis moves faster than ``ends_at_m_s``.
+    """
+    setpoint, column = np.zeros(SETPOINT_SIZE), POSITION_AXES.index(axis)
+    setpoint[column] = step_m
+    parameters = _quiet_position("XY" if axis == "z" else "Z") if alone else {}
+    ends = End(VELOCITY_AT + column, ends_at_m_s)
+    return _fly(case, ticks, setpoint, parameters, divisor=divisor, ends=ends)
+
+
+def _quiet_position(loop: str) -> dict[str, float]:
+    return {f"POS_{loop}_P": 0.05, f"POS_{loop}_I": 0.0, f"POS_{loop}_D": 0.5}
 
 
 def _kicked(case: Case, axis: str, rate_rad_s: float) -> FloatArray:
@@ -139,11 +161,12 @@ def _kicked(case: Case, axis: str, rate_rad_s: float) -> FloatArray:
     return command
 
 
-def _fly(case: Case, ticks: int, wanted: FloatArray, parameters: dict[str, float],
-         first_command: FloatArray | None = None, ends_at_rad_s: float = math.inf) -> Flight:  # fmt: skip
+def _fly(case: Case, ticks: int, wanted: FloatArray, parameters: dict[str, float], *, ends: End,
+         divisor: int | None = None, first_command: FloatArray | None = None) -> Flight:  # fmt: skip
     """Fly a constant attitude target (5,) or setpoint (11,); ``first_command`` replaces that of the first tick."""
-    loops, (plant, steps) = make_loops(case), make_plant(case)
-    is_target, divisor = len(wanted) == ATTITUDE_TARGET_SIZE, round(case.inner_hz / case.outer_hz)
+    every = divisor or round(case.inner_hz / case.outer_hz)
+    loops, (plant, steps) = make_loops(case, case.inner_hz / every), make_plant(case)
+    is_target = len(wanted) == ATTITUDE_TARGET_SIZE
     for name, value in parameters.items():
         loops.set_parameter(name, value)
     state, speeds = plant.output[0]["state"], plant.output[0]["rotor_speed"]
@@ -153,7 +176,7 @@ def _fly(case: Case, ticks: int, wanted: FloatArray, parameters: dict[str, float
     waiting = [hover] * case.delay_steps
     row, states = np.zeros(LoopRow.SIZE), np.empty((ticks, STATE_SIZE))
     for tick in range(ticks):
-        outer_due = tick % divisor == 0
+        outer_due = tick % every == 0
         states[tick] = state
         if is_target and outer_due:
             loops.set_attitude_target(wanted)
@@ -161,7 +184,7 @@ def _fly(case: Case, ticks: int, wanted: FloatArray, parameters: dict[str, float
         waiting.append(row[LoopRow.ROTOR_COMMAND].copy())
         command = waiting.pop(0)
         plant.advance(command if tick or first_command is None else first_command, ARMED, steps)
-        if not max(abs(state[10]), abs(state[11]), abs(state[12])) < ends_at_rad_s:
+        if not abs(state[ends.column]) < ends.above:
             states = states[: tick + 1]
             break
     return Flight(np.arange(len(states)) / case.inner_hz, states)
