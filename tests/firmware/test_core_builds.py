@@ -171,7 +171,8 @@ def test_every_parameter_starts_at_its_default_and_takes_its_range(real: str) ->
         assert loops.get(number.name) == tiny(given)  # to the last bit
     for number in TARGET_NUMBERS:  # each alone: setting one changes no other
         before = [loops.get(other.name) for other in TARGET_NUMBERS if other is not number]
-        for value in (number.low, number.high):
+        between = [] if number.is_whole else [number.high - (number.high - number.low) / 3.0]
+        for value in (number.low, *between, number.high):
             assert loops.set(number.name, value) == 0
             assert loops.get(number.name) == tiny(value)
         beyond = [

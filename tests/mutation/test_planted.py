@@ -106,6 +106,17 @@ def test_a_status_bit_of_another_axis(plant: Plant) -> None:
     assert caught(test_core_loops.test_a_shaken_vehicle_is_answered_as_by_python, "four")
 
 
+def test_a_short_way_that_is_allowed_by_thrust_alone(plant: Plant) -> None:
+    """Of effectiveness times allocation the first row is looked at: nothing that flies today has another one wrong."""
+    right = "for (row = 0U; row < 4U; row++) {"
+    plant("core/fs_mixer.c", right, right.replace("4U", "1U"))
+    assert not caught(test_c_laws.test_the_mixer_knows_which_short_ways_it_may_go, "cross", "double")
+    assert caught(
+        test_c_laws.test_each_number_of_effectiveness_times_allocation_is_looked_at, "double", 1e-12
+    )
+    assert caught(test_c_laws.test_what_allocation_does_beside_the_demand_is_told_as_achieved)
+
+
 def test_swapped_fields_of_a_message(plant: Plant, tmp_path: Path) -> None:
     count, index = (
         "m->param_count = fs_get_u16(payload, length, {});",

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from flightstack.control.mixer import mixer_for
+from flightstack.control.mixer import Mixer, mixer_for
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from tests.firmware import core_reference as python
 from tests.firmware.core_samples import Samples
@@ -262,6 +262,17 @@ class Mixed(NamedTuple):
     """Short ways that the mixer took itself to be fit for: 1 effectiveness undoes allocation, 2 rotors are alike."""
 
 
+def mixer_of_c(c: Core, rotors: Mixer) -> np.ndarray:
+    """Return memory of an fs_mixer with these numbers, and nothing derived yet."""
+    flat, n = np.zeros(c.library.drive_sizes(3) // c.dtype.itemsize, c.dtype), rotors.spin.size
+    flat[: 4 * n] = rotors.allocation.ravel()
+    for axis in range(4):
+        flat[32 + 8 * axis : 32 + 8 * axis + n] = rotors.effectiveness[axis]
+    for place, values in enumerate((rotors.low, rotors.high, rotors.spin)):
+        flat[64 + 8 * place : 64 + 8 * place + n] = values
+    return flat
+
+
 def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
     vehicle = VEHICLES[name]()
     s = Samples(count, 5)
@@ -279,12 +290,7 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
         vehicle
     )  # not narrowed: with float the rounding of these numbers is part of the difference
     c = core(real)
-    flat = np.zeros(c.library.drive_sizes(3) // c.dtype.itemsize, c.dtype)
-    flat[: 4 * n] = rotors.allocation.ravel()
-    for axis in range(4):
-        flat[32 + 8 * axis : 32 + 8 * axis + n] = rotors.effectiveness[axis]
-    for place, values in enumerate((rotors.low, rotors.high, rotors.spin)):
-        flat[64 + 8 * place : 64 + 8 * place + n] = values
+    flat = mixer_of_c(c, rotors)
     speeds, achieved = np.full((count, 8), np.nan, c.dtype), np.zeros((count, 4), c.dtype)
     saturation, relative = np.zeros((count, 4), c.dtype), np.zeros(count, c.dtype)
     c.call("drive_mixer", count, c.array(wrenches), flat, n, speeds, achieved, saturation, relative)
@@ -342,6 +348,55 @@ WAYS = {"plus": 3, "cross": 3, "ideal": 3, "askew": 1, "octo": 3, "weak": 1, "ea
 @pytest.mark.parametrize("name", VEHICLES)
 def test_the_mixer_knows_which_short_ways_it_may_go(name: str, real: str) -> None:
     assert mixed(real, name, 1).ways == WAYS[name]
+
+
+def undoes(real: str, rotors: Mixer) -> bool:
+    """Whether the mixer in C finds that effectiveness undoes allocation, and that every rotor lifts."""
+    c, n = core(real), rotors.spin.size
+    flat = mixer_of_c(c, rotors)
+    c.call("drive_mixer", 0, flat, flat, n, flat, flat, flat, flat)  # derives, and mixes nothing
+    return bool(c.library.drive_mixer_ways(flat.ctypes.data_as(ctypes.c_void_p)) & 1)
+
+
+@pytest.mark.parametrize(("real", "fault"), [("float", 1e-5), ("double", 1e-12)])
+def test_each_number_of_effectiveness_times_allocation_is_looked_at(real: str, fault: float) -> None:
+    """One of the sixteen is off by ten times what rounding could make of it, the others are as they were."""
+    rotors = mixer_for(load_vehicle("x_quad"))
+    assert undoes(real, rotors)
+    for row, column in np.ndindex(4, 4):
+        most = np.abs(rotors.effectiveness[row]).max() * np.abs(rotors.allocation[:, column]).sum()
+        for sign in (-1.0, 1.0):
+            off = rotors.allocation.copy()
+            off[:, column] += sign * fault * most * rotors.allocation[:, row]
+            assert not undoes(real, rotors._replace(allocation=off)), (row, column, sign)
+
+
+def test_what_allocation_does_beside_the_demand_is_told_as_achieved() -> None:
+    """A rotor that turns the vehicle more than allocation knows: thrust and tilt are right, and yaw is not."""
+    rotors = mixer_for(load_vehicle("x_quad"))
+    effectiveness = rotors.effectiveness.copy()
+    effectiveness[3, 0] *= 1.5
+    rotors, wrenches = rotors._replace(effectiveness=effectiveness), np.array([[10.0, 0.1, 0.2, 0.0]])
+    c, n = core("double"), rotors.spin.size
+    speeds, achieved, saturation = np.zeros((1, 8)), np.zeros((1, 4)), np.zeros((1, 4))
+    c.call("drive_mixer", 1, wrenches, mixer_of_c(c, rotors), n, speeds, achieved, saturation, np.zeros(1))
+    py_speeds, py_achieved = np.zeros((1, n)), np.zeros((1, 4))
+    python.mixer(wrenches, *rotors, py_speeds, py_achieved, np.zeros(1))
+    assert np.array_equal(achieved, py_achieved)
+    assert achieved[0, :3] == pytest.approx(wrenches[0, :3], rel=1e-12)
+    assert abs(achieved[0, 3]) > 0.01
+    assert saturation[0, 3] == -achieved[0, 3]
+
+
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_a_rotor_that_lifts_nothing_bars_the_short_way(real: str) -> None:
+    """Though effectiveness undoes allocation: no thrust brings such a rotor between its limits."""
+    rotors = mixer_for(load_vehicle("x_quad"))
+    share = np.array([[1.0, 1, 1, 1], [1, -1, 1, -1], [1, 1, -1, -1], [0, -1, -1, 1]])
+    rotors = rotors._replace(allocation=share, effectiveness=np.linalg.inv(share))
+    assert not undoes(real, rotors)
+    share[3, 0] = 0.25
+    assert undoes(real, rotors._replace(effectiveness=np.linalg.inv(share)))
 
 
 def test_the_mixers_samples_reach_every_limit_both_ways() -> None:
