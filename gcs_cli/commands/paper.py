@@ -25,7 +25,7 @@ def paper(
         str | None,
         typer.Option(
             metavar="TARGET",
-            help="Run the loops on a board: serial:DEVICE[:BAUD].  [default: an emulated one]",
+            help="Run the loops on a board: serial:DEVICE[:BAUD].  [default: an emulated Cortex-M4F]",
             show_default=False,
         ),
     ] = None,
