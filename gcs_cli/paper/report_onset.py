@@ -23,15 +23,17 @@ from gcs_cli.report_plots import section
 _NAMES = {(contender.controller, contender.gains): contender.name for contender in CONTENDERS}
 _ONSET_NOTE = (
     "Predicted: the rate at which an eigenvalue of the sampled loop leaves the unit circle. Simulated: real loops and "
-    "plant in flight, kicked by 10⁻⁷ rad/s about one axis; the lowest rate at which the kick dies away, found by "
-    "bisection without knowing the prediction."
+    "plant in flight, kicked by 10⁻⁷ rad/s about one axis, or told to go 10⁻⁷ m; the lowest rate at which that dies "
+    "away, found by bisection without knowing the prediction. Roll, pitch, yaw: the rate of the inner loop. x, y, z: "
+    "that of the outer loop, whose period is a whole number of inner ticks; between the last that is stable and the "
+    "first that is not, the growth is interpolated."
 )
 
 
 def onset_section(onset: Sequence[Mapping[str, Any]]) -> str:
     """Return predicted and simulated rates as a section."""
     return anchored(
-        "onset", section("Lowest stable rate of the inner loop", onset_table(onset), note=_ONSET_NOTE)
+        "onset", section("Lowest stable rates, predicted and simulated", onset_table(onset), note=_ONSET_NOTE)
     )
 
 
@@ -49,11 +51,12 @@ def onset_table(onset: Sequence[Mapping[str, Any]]) -> str:
     """Return predicted and simulated rates of each setting, axis and loop."""
     if not onset:
         return '<p class="none">Left out.</p>'
-    rows, before = [], ""
+    rows, before, last = [], "", ""
     for entry in sorted(onset, key=lambda entry: _place(onset, entry)):
-        new = entry["setting"] != before
-        before = entry["setting"]
-        head = f"<th>{escape(before) if new else ''}</th><td>{escape(AXIS_TITLES[entry['axis']])}</td>"
+        new, turn = entry["setting"] != before, entry["axis"] != last
+        before, last = entry["setting"], entry["axis"]
+        axis = AXIS_TITLES[last] if new or turn else ""
+        head = f"<th>{escape(before) if new else ''}</th><td>{escape(axis)}</td>"
         rates = _rate_cell(entry["predicted_hz"]) + _rate_cell(entry["simulated_hz"])
         apart = cell(_percent(entry["difference_percent"]))
         rows.append(row(f"{head}<td>{escape(loop_title(entry))}</td>{rates}{apart}", new))
@@ -68,8 +71,8 @@ def _place(onset: Sequence[Mapping[str, Any]], entry: Mapping[str, Any]) -> tupl
 
 
 def _rate_cell(rate_hz: float | None) -> str:
-    return '<td class="n bad">none up to 2 kHz</td>' if rate_hz is None else cell(f"{fixed(rate_hz, 1)} Hz")
+    return '<td class="n bad">none up to 2 kHz</td>' if rate_hz is None else cell(f"{fixed(rate_hz, 2)} Hz")
 
 
 def _percent(value: float | None) -> str:
-    return UNKNOWN if value is None else f"{fixed(value, 2)} %"
+    return UNKNOWN if value is None else f"{fixed(value, 3)} %"

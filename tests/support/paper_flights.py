@@ -45,6 +45,7 @@ def linear_part() -> dict[str, Any]:
         "crossover_rad_s": 1.0,
         "delay_s": 0.1,
     }
+    rates = {"250": None, "1000": margin}
     axis = {
         "gains": law,
         "natural_rad_s": 10.0,
@@ -52,15 +53,23 @@ def linear_part() -> dict[str, Any]:
         "poles": [[-8.0, -6.0], [-8.0, 6.0]],
         "largest_lag_s": 0.0219,
         "sampled": [
-            {
-                "actuators": "ideal rotors, one step of delay",
-                "margins": {"250": None, "1000": margin},
-                "lowest_stable_hz": 123.4,
-            }
+            {"actuators": "motor lag", "margins": rates, "lowest_stable_hz": 123.4},
+            {"actuators": "motor lag with spin-up torque", "margins": {"250": None, "1000": None},
+             "lowest_stable_hz": 1759.4},
+            {"actuators": "ideal rotors, one step of delay", "margins": rates, "lowest_stable_hz": 222.2},
+        ],
+    }  # fmt: skip
+    outer = {
+        **axis,
+        "slowest": {"natural_rad_s": 3.49, "damping": 0.41},
+        "step": {"overshoot_percent": 24.7, "peak_s": 1.0, "rise_s": 0.4, "settling_s": 2.48},
+        "sampled": [
+            {"actuators": "motor lag", "margins": {"1000/250": margin}, "lowest_stable_outer_hz": 6.08},
         ],
     }
-    axes = dict.fromkeys(("roll", "pitch", "yaw", "x", "y", "z"), axis)
-    return {"loops": [{"controller": "pid", "gains": "paper", "axes": axes}]}
+    axes = dict.fromkeys(("roll", "pitch", "yaw"), axis) | dict.fromkeys(("x", "y", "z"), outer)
+    loops = [{"controller": "pid", "gains": "paper", "axes": axes}]
+    return {"motor_lag_s": 0.005, "spin_up_lead_s": 0.204, "loops": loops}
 
 
 def onset_part() -> list[dict[str, Any]]:

@@ -20,11 +20,18 @@ from gcs_cli.paper.linear.gains import (
     ATTITUDE_AXES,
     AttitudeGains,
     Gains,
+    PositionGains,
     ReferenceFilter,
     backstepping_gains,
 )
 from gcs_cli.paper.linear.instability import IDEAL, LAGGING, SPIN_UP, find_onset
 from gcs_cli.paper.linear.margins import closed, lowest_stable_hz, margins, response, spectral_radius
+from gcs_cli.paper.linear.outer_onset import (
+    find_outer_onset,
+    longest_period,
+    lowest_outer_hz,
+    period_of,
+)
 from gcs_cli.paper.linear.sampled import Actuators, AttitudeTick, Rates
 from gcs_cli.paper.linear.small_signal import (
     STEP_M,
@@ -185,7 +192,7 @@ def test_margins_end_stability_where_they_say(flown, loop: tuple[str, str], axis
     if axis == "roll":
         opened, dt_s = AttitudeTick(gains.attitude[axis], 1000.0, actuators).open(), 1e-3
     else:
-        opened, dt_s = tables.period_of(gains, axis, rates, actuators).open(), 4e-3
+        opened, dt_s = period_of(gains, axis, rates, actuators).open(), 4e-3
     found = margins(opened, dt_s)
     assert found is not None
     assert found.gain_db is not None
@@ -217,7 +224,7 @@ def test_sampled_poles_tend_to_the_continuous_ones(flown) -> None:
     gains = flown["backstepping", "paper"]
     law = gains.attitude["pitch"]
     loop = continuous.position_loop(gains.position["x"], continuous.tilt_loop(law, gains.reference))
-    period = tables.period_of(gains, "x", Rates(20_000.0, 20_000.0), Actuators())
+    period = period_of(gains, "x", Rates(20_000.0, 20_000.0), Actuators())
     values = np.linalg.eigvals(period.closed())
     found = continuous.ordered(np.log(values[np.abs(values) > 0.5].astype(complex)) * 20_000.0)
     assert len(found) == len(loop.poles())
@@ -263,7 +270,7 @@ def test_real_cascades_move_as_the_sampled_ones(
 ) -> None:
     """Two rates, target moved in a line, reference filter, delay and lag: tick for tick within a millionth."""
     case = small_case(*loop, 1000, lag_s=lag_s, delay_steps=delay_steps, divisor=4)
-    period = tables.period_of(flown[loop], axis, Rates(1000.0, 250.0), actuators_of(case, axis))
+    period = period_of(flown[loop], axis, Rates(1000.0, 250.0), actuators_of(case, axis))
     expected = period.step_response(300)
     flight = fly_position(case, len(expected), axis, STEP_M)
     found = flight.states[:, "xyz".index(axis)] / STEP_M
@@ -279,7 +286,7 @@ def test_cascade_settles_as_its_closed_form(flown) -> None:
         gains.position["x"], continuous.tilt_loop(gains.attitude["pitch"], gains.reference)
     )
     expected = exact_figures(loop)
-    period = tables.period_of(gains, "x", Rates(1000.0, 250.0), Actuators())
+    period = period_of(gains, "x", Rates(1000.0, 250.0), Actuators())
     found = read_figures(np.arange(4000) / 1000.0, period.step_response(1000))
     assert expected is not None
     assert found.overshoot_percent == pytest.approx(expected.overshoot_percent, abs=0.5)
@@ -298,6 +305,32 @@ def test_onset_is_predicted_with_motor_lag_and_spin_up_torque(setting, axis: str
     onset = find_onset("pid", "paper", setting, axis)
     assert onset.difference_percent is not None
     assert abs(onset.difference_percent) < 0.1  # 0.0005 % seen
+
+
+@pytest.mark.parametrize("loop", tables.LOOPS[:3], ids="-".join)
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_onset_of_the_outer_loops_is_at_the_predicted_rate(loop: tuple[str, str], axis: str) -> None:
+    """Real cascades with motors of 5 ms, an outer period of so many ticks of 1 kHz: 0.005 % seen."""
+    onset = find_outer_onset(*loop, axis)
+    assert onset.difference_percent is not None
+    assert abs(onset.difference_percent) < 0.1
+    assert 3.0 < onset.predicted_hz < 7.0
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"),
+    [(0.5, None), (1.0, None), (1.25, 1.25), (2.0, 2.0), (3.5, 3.5), (100.75, 100.75), (5000.0, 1024.0)],
+)
+def test_longest_period_is_where_growth_passes_zero(limit: float, expected: float | None) -> None:
+    """Growth straight in the period, so that to interpolate is exact; what never grows ends at the largest divisor."""
+    assert longest_period(lambda divisor: divisor - limit) == expected
+
+
+def test_outer_loop_of_a_damped_double_integrator_ends_at_two_over_its_damping() -> None:
+    """v' = −kd v, held over T: 1 − kd T leaves the unit circle at kd T = 2, with kp = 0 nearly so."""
+    gains = flown_gains("pid", "paper")
+    slow = gains._replace(position={**gains.position, "z": PositionGains(1e-9, 0.0, 20.0)})
+    assert lowest_outer_hz(slow, "z", Actuators()) == pytest.approx(10.0, rel=1e-4)
 
 
 def test_spin_up_torque_takes_the_papers_yaw_gains_their_stability_at_1_khz() -> None:

@@ -11,11 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.contract import STATE_SIZE, FloatArray
+from flightstack.contract import FloatArray
 from gcs_cli.paper.linear.gains import ATTITUDE_AXES
 from gcs_cli.paper.linear.margins import lowest_stable_hz, spectral_radius
 from gcs_cli.paper.linear.sampled import AttitudeTick
-from gcs_cli.paper.linear.small_signal import actuators_of, flown_gains, fly_attitude, small_case
+from gcs_cli.paper.linear.small_signal import (
+    RATES_AT,
+    actuators_of,
+    flown_gains,
+    fly_attitude,
+    small_case,
+)
 from gcs_cli.paper.types import Case
 
 LOWEST_HZ, HIGHEST_HZ = 5, 2000
@@ -84,15 +90,18 @@ def growth(case: Case, axis: str) -> float:
     """Return by how much, as a logarithm, a small kick about ``axis`` grows in one inner tick, in the end."""
     ticks = max(FEWEST_TICKS, math.ceil(LEAST_S * case.inner_hz))
     flight = fly_attitude(case, ticks, axis, kick_rad_s=KICK_RAD_S, alone=True, ends_at_rad_s=GROWN_RAD_S)
-    return _growth(np.abs(flight.states[1:, STATE_SIZE - 3 + ATTITUDE_AXES.index(axis)]))
+    return growth_of(np.abs(flight.states[1:, RATES_AT + ATTITUDE_AXES.index(axis)]), KICK_RAD_S)
 
 
-def _growth(rates: FloatArray) -> float:
-    """Compare the largest rates of the middle and of the last third, before they decay into rounding."""
+def growth_of(rates: FloatArray, kick: float) -> float:
+    """Return the growth in one tick, as a logarithm, of magnitudes that ``kick`` began, shape (n,).
+
+    The largest rates of the middle and of the last third are compared, before they decay into rounding.
+    """
     audible = np.flatnonzero(rates > DECAYED_RAD_S)
     third = (int(audible[-1]) + 1) // 3 if audible.size else 0
     if third < 4:  # too quick for thirds: only the direction counts
-        return 1.0 if rates[-1] > KICK_RAD_S else -1.0
+        return 1.0 if rates[-1] > kick else -1.0
     return math.log(rates[2 * third : 3 * third].max() / rates[third : 2 * third].max()) / third
 
 

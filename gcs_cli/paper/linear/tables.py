@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from flightstack.params.vehicle import DEFAULT_VEHICLE, GRAVITY_M_S2, load_vehicle
+from flightstack.params.vehicle import DEFAULT_VEHICLE, load_vehicle
 from gcs_cli.paper.linear.continuous import (
     DIRECT,
     attitude_loop,
@@ -22,14 +22,8 @@ from gcs_cli.paper.linear.continuous import (
 from gcs_cli.paper.linear.gains import ATTITUDE_AXES, POSITION_AXES, AttitudeGains, Gains
 from gcs_cli.paper.linear.instability import SETTINGS, find_onset
 from gcs_cli.paper.linear.margins import Margins, lowest_stable_hz, margins, spectral_radius
-from gcs_cli.paper.linear.sampled import (
-    Actuators,
-    AttitudeTick,
-    HorizontalPeriod,
-    Period,
-    Rates,
-    VerticalPeriod,
-)
+from gcs_cli.paper.linear.outer_onset import TILT_OF, find_outer_onset, lowest_outer_hz, period_of
+from gcs_cli.paper.linear.sampled import Actuators, AttitudeTick, Rates
 from gcs_cli.paper.linear.small_signal import flown_gains, spin_up_lead_s
 from gcs_cli.paper.linear.steps import exact_figures
 
@@ -37,9 +31,6 @@ LOOPS = (("pid", "paper"), ("backstepping", "paper"), ("pid", "tuned"), ("backst
 """Controllers with their gains files; the linear PD with backstepping's poles is backstepping here."""
 INNER_RATES_HZ = (250.0, 500.0, 1000.0)
 CASCADE_RATES = (Rates(250.0, 50.0), Rates(500.0, 100.0), Rates(1000.0, 250.0))
-TILT_OF = {"x": "pitch", "y": "roll"}
-"""The attitude axis inside each horizontal loop."""
-LARGEST_DIVISOR = 1024
 _SHORTEST_LAG_S = 1e-3
 _DIGITS = 10
 
@@ -64,13 +55,12 @@ def results() -> dict[str, Any]:
 
 
 def onset() -> list[dict[str, Any]]:
-    """Return the lowest stable inner rates that simulation finds beside the predicted ones."""
+    """Return the lowest stable rates that simulation finds beside the predicted ones: inner, then outer loops."""
     found = []
     for controller, gains in LOOPS:
-        for setting in SETTINGS:
-            for axis in setting.axes:
-                one = find_onset(controller, gains, setting, axis)
-                found.append(_plain(one._asdict() | {"difference_percent": one.difference_percent}))
+        ones = [find_onset(controller, gains, setting, axis) for setting in SETTINGS for axis in setting.axes]
+        ones += [find_outer_onset(controller, gains, axis) for axis in POSITION_AXES]
+        found += [_plain(one._asdict() | {"difference_percent": one.difference_percent}) for one in ones]
     return found
 
 
@@ -171,14 +161,6 @@ def _margins(found: Margins | None) -> dict[str, Any] | None:
     return None if found is None else _plain(found._asdict())
 
 
-def period_of(gains: Gains, axis: str, rates: Rates, actuators: Actuators) -> Period:
-    """Return the sampled loop of a position axis."""
-    if axis == "z":
-        return VerticalPeriod(gains.position[axis], rates, actuators)
-    law = gains.attitude[TILT_OF[axis]]
-    return HorizontalPeriod(gains.position[axis], law, gains.reference, rates, actuators, GRAVITY_M_S2)
-
-
 def _position_axis(gains: Gains, axis: str) -> dict[str, Any]:
     law = gains.position[axis]
     inner = DIRECT if axis == "z" else tilt_loop(gains.attitude[TILT_OF[axis]], gains.reference)
@@ -194,7 +176,7 @@ def _position_axis(gains: Gains, axis: str) -> dict[str, Any]:
                 )
                 for rates in CASCADE_RATES
             },
-            "lowest_stable_outer_hz": _rounded(_lowest_outer_hz(gains, axis, actuators)),
+            "lowest_stable_outer_hz": _rounded(lowest_outer_hz(gains, axis, actuators)),
         }
         for name, actuators in actuator_settings(axis)
     ]
@@ -207,26 +189,6 @@ def _position_axis(gains: Gains, axis: str) -> dict[str, Any]:
         "step": _figures(loop),
         "sampled": sampled,
     }
-
-
-def _lowest_outer_hz(gains: Gains, axis: str, actuators: Actuators) -> float | None:
-    """Return the lowest outer rate that is stable below an inner rate of 1 kHz divided by a whole number.
-
-    Sought by doubling the divisor until the loop is unstable, then by bisection.
-    """
-    inner_hz = INNER_RATES_HZ[-1]
-
-    def is_sound(divisor: int) -> bool:
-        rates = Rates(inner_hz, inner_hz / divisor)
-        return spectral_radius(period_of(gains, axis, rates, actuators).closed()) < 1.0
-
-    sound, unsound = 0, 1
-    while is_sound(unsound) and unsound < LARGEST_DIVISOR:
-        sound, unsound = unsound, 2 * unsound
-    while unsound - sound > 1:
-        middle = (sound + unsound) // 2
-        sound, unsound = (middle, unsound) if is_sound(middle) else (sound, middle)
-    return inner_hz / sound if sound else None
 
 
 def _without_reference_rate() -> dict[str, Any]:
