@@ -180,11 +180,31 @@ def test_inertia_has_no_half() -> None:
 
 
 def test_potential_energy_as_printed_has_no_weight() -> None:
-    """The printed V holds ∫x dm, ∫y dm, ∫z dm, which vanish at the centre of gravity: nothing falls."""
-    offsets = sp.symbols("S_x S_y S_z")
-    printed = G * (ROTATION[2, :] * sp.Matrix(offsets))[0]
-    assert printed.subs(dict.fromkeys(offsets, 0)) == 0
-    assert position_rows()[2].subs(U[0], 0) == G
+    """Two masses on a body in NED: V = −g Σ m (z + (R r)_z). The printed V has the second part alone: nothing falls."""
+    masses = sp.symbols("m_1 m_2", positive=True)
+    places = [sp.Matrix(sp.symbols(f"x_{i} y_{i} z_{i}")) for i in (1, 2)]
+    z, fall = sp.symbols("z v_z")
+    heights = [z + (ROTATION * place)[2] for place in places]
+    whole = -sum(G * mass * height for mass, height in zip(masses, heights, strict=True))
+    offsets = sum((mass * place for mass, place in zip(masses, places, strict=True)), sp.zeros(3, 1))
+    printed = -G * (ROTATION[2, :] * offsets)[0]
+    kinetic = sum(masses) * fall**2 / 2
+
+    def falling(potential: sp.Expr) -> sp.Expr:
+        """Lagrange's z'' of a body that only falls: (∂L/∂z)/(∂²L/∂ż²)."""
+        lagrangian = kinetic - potential
+        return sp.simplify(lagrangian.diff(z) / lagrangian.diff(fall, 2))
+
+    assert sp.expand(whole - printed + sum(masses) * G * z) == 0  # m g z is what is missing
+    assert falling(whole) == position_rows()[2].subs(U[0], 0)
+    assert falling(printed) == 0
+    for angle in ANGLES:  # both turn a body that does not hang in its centre of gravity, in the same way
+        assert sp.expand(whole.diff(angle) - printed.diff(angle)) == 0
+    assert printed.diff(phi) != 0
+    balanced = {
+        place: -masses[0] / masses[1] * other for place, other in zip(places[1], places[0], strict=True)
+    }
+    assert sp.simplify(printed.diff(phi).subs(balanced)) == 0  # in the centre of gravity no moment is left
 
 
 def test_pitch_of_equation_6_as_printed_halves_the_gain_and_leaks_roll() -> None:
