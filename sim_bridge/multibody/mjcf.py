@@ -1,14 +1,13 @@
 """The assembly of a vehicle as a MuJoCo model (MJCF).
 
 Names: body and free joint "vehicle"; for each rotor, in the order of the vehicle file from 1, the body and hinge
-"rotor_1" and the site "hub_1" on the frame; geoms are called as the parts; the plane "ground" is where the feet of a
-vehicle are that stands at the origin. A hinge turns about the rotor's own sense of rotation: its speed is positive in
-flight. Inertia comes from the geoms.
+"rotor_1", the site "rotor_1" on it and the site "hub_1" on the frame; geoms are called as the parts; the plane
+"ground" is where the feet of a vehicle are that stands at the origin. A hinge turns about the rotor's own sense of
+rotation: its speed is positive in flight. Inertia comes from the geoms.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from xml.etree.ElementTree import Element, indent, tostring
 
 import numpy as np
@@ -18,12 +17,13 @@ from flightstack.params.assembly import Part
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from sim_bridge.contact import FRICTION
 from sim_bridge.multibody import contact
+from sim_bridge.multibody.actuators import add_actuators
 from sim_bridge.multibody.assembly import Assembly, assemble
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.mesh_file import corners_and_faces, read_mesh
 from sim_bridge.multibody.placing import PlacedPart
 from sim_bridge.multibody.usual_parts import foot_z_m
-from sim_bridge.multibody.xml import add
+from sim_bridge.multibody.xml import add, exact
 
 _COLOURS = {
     "carbon": "0.12 0.12 0.13 1",
@@ -47,11 +47,12 @@ _SEEN, _HIDDEN = 1, 3  # groups of geoms: viewers show 0 to 2
 def model_xml(vehicle: Vehicle, *, scene: bool = False, lean: bool = False) -> str:
     """Return the model of a vehicle and the ground as MJCF, angles in radians, in full precision.
 
-    ``scene`` adds sky, landmarks, light and cameras; ``lean`` leaves out, once their inertia is counted, the geoms
-    that touch nothing. Raises ConfigError for a mesh that is not a solid.
+    ``scene`` adds sky, landmarks, light and cameras; ``lean`` leaves out the actuators, whose work the
+    multibody plant does, and, once their inertia is counted, the geoms that touch nothing. Raises ConfigError for a
+    mesh that is not a solid.
     """
     assembly = assemble(vehicle)
-    solref = _exact(contact.reference(vehicle, _STEP_S))
+    solref = exact(contact.reference(vehicle, _STEP_S))
     root = Element("mujoco", model=vehicle.name)
     add(root, "compiler", angle="radian", inertiafromgeom="auto", discardvisual="true" if lean else "false")
     option = add(
@@ -68,11 +69,13 @@ def model_xml(vehicle: Vehicle, *, scene: bool = False, lean: bool = False) -> s
     if not scene:
         add(world, "light", pos="0 0 20", dir="0.2 -0.2 -1", directional="true")
     add(
-        world, "geom", name="ground", type="plane", size="0 0 1", pos=_exact((0.0, 0.0, -foot_z_m(vehicle))),
+        world, "geom", name="ground", type="plane", size="0 0 1", pos=exact((0.0, 0.0, -foot_z_m(vehicle))),
         rgba="0.45 0.5 0.42 1", contype=0, conaffinity=1, friction=f"{FRICTION} 0.005 0.0001",
         solref=solref, solimp=contact.IMPEDANCE,
     )  # fmt: skip
     _vehicle(world, vehicle, assembly, solref, scene)
+    if not lean:
+        add_actuators(root, vehicle)
     if scene:
         from sim_bridge.multibody.scene import decorate  # noqa: PLC0415  # the view's; not needed to fly
 
@@ -88,10 +91,11 @@ def _vehicle(world: Element, vehicle: Vehicle, assembly: Assembly, solref: str, 
         if placed.body == 0:
             _geom(body, placed, solref, _SEEN)
     for number, rotor in enumerate(vehicle.rotors, start=1):
-        hub = _exact(flip_vector(rotor.position_frd_m))
+        hub = exact(flip_vector(rotor.position_frd_m))
         add(body, "site", name=f"hub_{number}", pos=hub, size=0.003, group=4)
         spinning = add(body, "body", name=f"rotor_{number}", pos=hub)
         add(spinning, "joint", name=f"rotor_{number}", type="hinge", axis=f"0 0 {-rotor.spin}")
+        add(spinning, "site", name=f"rotor_{number}", size=0.003, group=4)
         for placed in assembly.parts:
             if placed.body == number:
                 _geom(spinning, placed, solref, _HIDDEN if scene else _SEEN)
@@ -103,16 +107,16 @@ def _geom(body: Element, placed: PlacedPart, solref: str, group: int) -> None:
     if part.shape == "mesh":
         attributes["mesh"] = part.name
     else:
-        attributes["size"] = _exact(_model_size(part))
+        attributes["size"] = exact(_model_size(part))
     if part.material:
         attributes["material"] = part.material
     else:
         attributes["rgba"] = _PLAIN
     if any(part.euler_rad):
-        attributes["quat"] = _exact(flip_quaternion(quaternion_from_euler(*part.euler_rad)))
+        attributes["quat"] = exact(flip_quaternion(quaternion_from_euler(*part.euler_rad)))
     touches = placed.touches
     add(
-        body, "geom", **attributes, pos=_exact(flip_vector(part.position_frd_m)),
+        body, "geom", **attributes, pos=exact(flip_vector(part.position_frd_m)),
         density=repr(part.density_kg_m3), group=group, contype=1 if touches else 0, conaffinity=0,
         **({"friction": f"{FRICTION} 0.005 0.0001", "solref": solref, "solimp": contact.IMPEDANCE}
            if touches else {}),
@@ -133,10 +137,6 @@ def _mesh_asset(asset: Element, part: Part) -> None:
     corners, faces = corners_and_faces(read_mesh(part.file) * part.scale)
     turned = corners * np.array([1.0, -1.0, -1.0])
     add(
-        asset, "mesh", name=part.name, vertex=_exact(turned.ravel().tolist()),
+        asset, "mesh", name=part.name, vertex=exact(turned.ravel().tolist()),
         face=" ".join(map(str, faces.ravel().tolist())), inertia="exact",
     )  # fmt: skip
-
-
-def _exact(values: Iterable[float]) -> str:
-    return " ".join(repr(float(value) + 0.0) for value in values)

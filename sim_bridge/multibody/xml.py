@@ -19,6 +19,11 @@ def text(value: Value) -> str:
     return " ".join(f"{number:.9g}" for number in value)
 
 
+def exact(values: Iterable[float]) -> str:
+    """Write numbers so that they are read back to the last bit."""
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
 def add(parent: Element, tag: str, **attributes: Value) -> Element:
     """Append an element; a trailing underscore of a name is left out, as in ``class_``.
 

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
+from flightstack.contract import Vector3
+from flightstack.mavlink.hot_frames import ARMED_FLAG
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.errors import CliError
 from gcs_cli.fly_options import FlyOptions, checked_plan
 from sim_bridge.__main__ import main
+from sim_bridge.multibody.mjcf import model_xml
+from sim_bridge.multibody.plant import MultibodyPlant
+from sim_bridge.plant import InitialState, PlantOptions
 
 SQUARE = Path(__file__).resolve().parents[2] / "missions" / "square.plan"
 
@@ -47,6 +53,60 @@ def test_names_are_those_that_are_promised(capsys: pytest.CaptureFixture[str]) -
             assert joint.axis.tolist() == [0.0, 0.0, -float(rotor.spin)]
             x, y, z = rotor.position_frd_m
             assert model.body(f"rotor_{number}").pos.tolist() == [x, -y, -z]
+
+
+@pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
+def test_any_mujoco_hovers_with_the_keyframe(vehicle: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing but MuJoCo and the file: the controls of the keyframe carry the vehicle and keep its rotors turning."""
+    assert main(["export-mjcf", "--vehicle", vehicle]) == 0
+    model = mujoco.MjModel.from_xml_string(capsys.readouterr().out)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("hover").id)
+    start, speeds = data.qpos[:7].copy(), data.qvel[6:].copy()
+    loaded = load_vehicle(vehicle)
+    carried = sum(
+        rotor.thrust_coefficient_n_s2 * speed**2
+        for rotor, speed in zip(loaded.rotors, speeds.tolist(), strict=True)
+    )
+    assert carried == pytest.approx(loaded.weight_n, rel=1e-12)
+    for _ in range(5000):
+        mujoco.mj_step(model, data)
+    assert np.abs(data.qpos[:7] - start).max() < 1e-8  # measured: 1.4e-11
+    assert np.abs(data.qvel[6:] - speeds).max() < 1e-6
+    # a newton less, and it sinks
+    data.ctrl[0] -= 1.0
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+    assert data.qpos[2] < start[2] - 0.01
+
+
+@pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
+def test_the_actuators_do_to_the_model_what_the_plant_does(vehicle: str) -> None:
+    """In a wild state, rotors speeding up: thrusts b·Ω² and the plant's own drive torques give its accelerations."""
+    loaded = replace(load_vehicle(vehicle), linear_drag_n_s_m=(0.0, 0.0, 0.0))
+    speeds = (300.0, 250.0, 350.0, 280.0)
+    wild = InitialState(
+        Vector3(1.0, 2.0, -30.0), Vector3(3.0, -1.0, 2.0), Vector3(0.4, -0.3, 1.0), Vector3(2.0, -3.0, 1.0)
+    )
+    plant = MultibodyPlant(loaded, PlantOptions(initial=wild, limits=False, battery=None))
+    plant.set_rotor_speeds(speeds)
+    command = np.zeros(8)
+    command[:4] = np.add(speeds, (40.0, -20.0, 10.0, 30.0))
+    plant.advance(command, ARMED_FLAG, 3)
+    plant.acceleration_ned_m_s2()
+    flown = plant._data
+    model = mujoco.MjModel.from_xml_string(model_xml(loaded))
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = flown.qpos, flown.qvel
+    for number, rotor in enumerate(loaded.rotors, start=1):
+        speed = data.qvel[5 + number]
+        data.actuator(f"thrust_{number}").ctrl = rotor.thrust_coefficient_n_s2 * speed**2
+        data.actuator(f"drive_{number}").ctrl = flown.qfrc_applied[5 + number]
+    model.actuator_ctrllimited[:] = 0  # the plant here has no limits either
+    mujoco.mj_forward(model, data)
+    assert np.abs(data.qacc[:3]).max() > 1.0
+    assert np.abs(data.qacc[6:]).max() > 500.0
+    assert np.allclose(data.qacc, flown.qacc, rtol=1e-9, atol=1e-9)
 
 
 def test_a_file_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
