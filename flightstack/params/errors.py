@@ -9,3 +9,8 @@ class ConfigError(Exception):
     def __init__(self, file: object, key: str, problem: str) -> None:
         where = f"{file}: {key}: " if key else f"{file}: "
         super().__init__(where + problem)
+        self._parts = (str(file), key, problem)
+
+    def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
+        """Travel between processes: an exception is else made anew from its text alone, and this one takes three."""
+        return type(self), self._parts

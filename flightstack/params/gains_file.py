@@ -22,7 +22,7 @@ def built_in_gains() -> list[str]:
 def open_gains(name_or_path: str) -> Table:
     """Open a gains file by the name of a built-in one or by path; raise ConfigError."""
     path = Path(name_or_path)
-    if not path.suffix and not path.exists():
+    if not path.suffix and not path.is_file():  # a directory of that name is in nobody's way
         if name_or_path not in built_in_gains():
             known = ", ".join(built_in_gains())
             raise ConfigError(name_or_path, "", f"is neither a file nor built-in gains ({known})")

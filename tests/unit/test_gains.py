@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 import re
 from pathlib import Path
 
@@ -104,3 +105,20 @@ def test_gains_that_are_not_there() -> None:
         open_gains("soft")
     with pytest.raises(ConfigError, match=r"^no/such.toml: cannot be read: No such file or directory$"):
         open_gains("no/such.toml")
+
+
+def test_a_directory_of_that_name_is_in_nobodys_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "paper").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert open_gains("paper").text("description") == open_gains(str(BUILT_IN / "paper.toml")).text(
+        "description"
+    )
+    (tmp_path / "soft").write_text(TUNED)
+    make("soft")  # a file without a suffix is one
+
+
+def test_the_error_of_a_file_travels_between_processes() -> None:
+    error = ConfigError(Path("my.toml"), "position.kp", "is missing")
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is ConfigError
+    assert str(again) == str(error) == "my.toml: position.kp: is missing"
