@@ -12,8 +12,10 @@ from gcs_cli.paper.types import Case
 SMALL_ANGLE, RIGID, MULTIBODY = "paper", "rigid", "multibody"
 DESIRED, SMOOTH, HARD = "desired", "smooth", "hard"
 PATHS = (DESIRED, SMOOTH, HARD)
-STEPS = ("step_roll", "step_pitch", "step_yaw", "step_x", "step_y", "step_z")
-PLAIN, IDEAL = "plain", "ideal"
+ATTITUDE_STEPS = ("step_roll", "step_pitch", "step_yaw")
+POSITION_STEPS = ("step_x", "step_y", "step_z")
+STEPS = (*ATTITUDE_STEPS, *POSITION_STEPS)
+PLAIN, IDEAL, NO_LIMITS, NO_LAG, SHAPED = "plain", "ideal", "no_limits", "lag_0", "shaped"
 
 
 class Contender(NamedTuple):
@@ -36,6 +38,7 @@ class Condition(NamedTuple):
 
 PID, BACKSTEPPING, POLES = "pid", "backstepping", "poles"
 TUNED_PID, TUNED_BACKSTEPPING = "tuned_pid", "tuned_backstepping"
+RATE_FED_PID = "rate_fed_pid"
 
 CONTENDERS = (
     Contender(PID, "PID, Table II", "pid", "paper"),
@@ -43,11 +46,17 @@ CONTENDERS = (
     Contender(POLES, "linear PD with backstepping's poles", "pid", "backstepping_poles"),
     Contender(TUNED_PID, "PID, own gains", "pid", "tuned"),
     Contender(TUNED_BACKSTEPPING, "backstepping, own gains", "backstepping", "tuned"),
+    Contender(RATE_FED_PID, "PID, Table II, rate fed ahead", "pid", "paper_rate_fed"),
 )
 
 CONDITIONS = (
     Condition(PLAIN, "Table I, motors of 5 ms, thrust to weight 2", {}),
-    Condition(IDEAL, "no rotor limits, no motor lag: as the paper assumes", {"limits": False, "lag_s": 0.0}),
+    Condition(NO_LIMITS, "no rotor limits, motors of 5 ms", {"limits": False}),
+    Condition(
+        IDEAL,
+        "ideal rotors, as the paper assumes: no limits, no lag, no spin-up torque",
+        {"limits": False, "lag_s": 0.0},
+    ),
     Condition("force", "sustained wind force of 0.5 N to the north", {"force_ned_n": Vector3(0.5, 0.0, 0.0)}),
     Condition(
         "torque",
@@ -57,13 +66,17 @@ CONDITIONS = (
     Condition("mass_more", "mass +20 %", {"mass_factor": 1.2}),
     Condition("inertia_more", "inertia +30 %", {"inertia_factor": 1.3}),
     Condition("inertia_less", "inertia −30 %", {"inertia_factor": 0.7}),
-    Condition("lag_0", "motors without lag", {"lag_s": 0.0}),
+    Condition(NO_LAG, "rotor speeds imposed: no motor lag, no spin-up torque", {"lag_s": 0.0}),
     Condition("lag_10", "motor lag of 10 ms", {"lag_s": 0.010}),
     Condition("lag_20", "motor lag of 20 ms", {"lag_s": 0.020}),
     Condition("delay", "one more inner period of delay, 1 ms", {"delay_steps": 1}),
     Condition("slow", "inner loop at 500 Hz", {"inner_hz": 500}),
     Condition("twice", "the trajectory at twice its size", {"scale": 2.0}),
+    Condition(SHAPED, "setpoints through a reference model: 3 rad/s, damping 1, 4.5 m/s²", {"shaped": True}),
 )
+NUDGE = Condition("nudge", "a push of 10⁻¹² N", {"force_ned_n": Vector3(1e-12, 0.0, 0.0)})
+"""Beside the plain flight it shows what the loops make of a difference as small as rounding."""
+_PAIR = [contender for contender in CONTENDERS if contender.name in (PID, BACKSTEPPING)]
 
 
 def key(contender: str, trajectory: str, condition: str = PLAIN, plant: str = SMALL_ANGLE) -> str:
@@ -104,10 +117,21 @@ def matrix(
 
 
 def all_cases(multibody: bool) -> list[Case]:
-    """Return every experiment of ``gcs paper``: paths in all conditions, steps plain and with ideal rotors."""
-    simple = [condition for condition in CONDITIONS if condition.name in (PLAIN, IDEAL)]
-    cases = matrix(PATHS, (SMALL_ANGLE, RIGID))
-    cases += matrix(STEPS, (SMALL_ANGLE, RIGID), conditions=simple)
+    """Return every experiment of ``gcs paper``.
+
+    Paths in all conditions; steps plain, with ideal rotors and through the reference model, which smooth paths do not
+    need; on the multibody plant the desired trajectory, and with the paper's gains everything else that is plain.
+    """
+    paths = [condition for condition in CONDITIONS if condition.name != SHAPED]
+    steps = [condition for condition in CONDITIONS if condition.name in (PLAIN, IDEAL, SHAPED)]
+    plain, shaped = CONDITIONS[:1], CONDITIONS[-1:]
+    both = (SMALL_ANGLE, RIGID)
+    cases = matrix(PATHS, both, conditions=paths) + matrix((HARD,), both, conditions=shaped)
+    cases += matrix(ATTITUDE_STEPS, both, conditions=steps[:-1]) + matrix(
+        POSITION_STEPS, both, conditions=steps
+    )
+    cases += matrix((DESIRED,), (RIGID,), conditions=(NUDGE,))
     if multibody:
-        cases += matrix((DESIRED,), (MULTIBODY,), conditions=simple[:1])
+        cases += matrix((DESIRED,), (MULTIBODY,), conditions=plain)
+        cases += matrix((SMOOTH, HARD, *STEPS), (MULTIBODY,), _PAIR, plain)
     return cases

@@ -24,7 +24,15 @@ from flightstack.geometry_bulk import euler_from_quaternions
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
-from gcs_cli.paper.trajectory import ATTITUDE, Trajectory, load_trajectory, sample, setpoints
+from gcs_cli.paper.endings import ending
+from gcs_cli.paper.trajectory import (
+    ATTITUDE,
+    Trajectory,
+    load_trajectory,
+    sample,
+    setpoints,
+    shaped_setpoints,
+)
 from gcs_cli.paper.types import Case, Recording
 from sim_bridge.disturbance import Disturbance
 from sim_bridge.layout import DIVERGED, OUTPUT
@@ -33,10 +41,7 @@ from sim_bridge.simulator import Simulator
 
 PHYSICS_HZ = 1000.0
 """A plant's step is at most its inverse, as in the simulator."""
-FARTHEST_M = 10.0
-"""A vehicle so far from its reference has lost its way: the flight counts as crashed."""
 _ARMED = 2  # FS_ACTUATORS
-_UPRIGHT = 0.0  # least cosine of the tilt: a vehicle on its side has turned over
 
 
 class Rows(NamedTuple):
@@ -110,7 +115,7 @@ def hover_speeds(case: Case) -> tuple[float, ...]:
 def fly(case: Case) -> Recording:
     """Fly the case and return what it recorded: the same bits for the same case; raise ConfigError.
 
-    A crash ends a recording and is no error: ``ended_s`` and ``ended_why`` tell of it.
+    A crash ends a recording and is no error, and so does a loss of control: ``ended_s`` and ``ended_why`` tell of it.
     """
     trajectory = load_trajectory(case.trajectory)
     return _recording(case, trajectory, fly_rows(case, trajectory))
@@ -157,7 +162,8 @@ def _padded(speeds: tuple[float, ...]) -> FloatArray:
 def _wanted(case: Case, trajectory: Trajectory, time_s: FloatArray) -> FloatArray:
     """What the loops are asked at each outer tick: setpoints (n, 11), or attitude targets (n, 5)."""
     if trajectory.kind != ATTITUDE:
-        return setpoints(trajectory, time_s, case.scale)
+        shape = shaped_setpoints if case.shaped else setpoints
+        return shape(trajectory, time_s, case.scale)
     weight_n = load_vehicle(case.vehicle).weight_n
     rows = np.zeros((len(time_s), ATTITUDE_TARGET_SIZE))
     for row, (roll, pitch, yaw) in zip(
@@ -172,7 +178,8 @@ def _recording(case: Case, trajectory: Trajectory, rows: Rows) -> Recording:
     flown = rows.loops
     time_s = np.arange(len(flown)) / case.inner_hz
     reference = _reference(case, trajectory, time_s)
-    count, ended_why = _end(flown, reference, rows.diverged)
+    end = ending(flown[:, LoopRow.STATE], reference, rows.diverged, case.inner_hz)
+    count = end.ticks
     state = flown[:count, LoopRow.STATE]
     rotors = len(load_vehicle(case.vehicle).rotors)
     speed_at = LoopRow.ROTOR_SPEED.start
@@ -189,8 +196,9 @@ def _recording(case: Case, trajectory: Trajectory, rows: Rows) -> Recording:
         flown[:count, LoopRow.WRENCH_ACHIEVED],
         flown[:count, speed_at : speed_at + rotors],
         flown[:count, LoopRow.STATUS].astype(np.int64),
-        None if not ended_why else count / case.inner_hz,
-        ended_why,
+        None if not end.how else count / case.inner_hz,
+        end.why,
+        end.how,
     )
 
 
@@ -202,18 +210,6 @@ def _reference(case: Case, trajectory: Trajectory, time_s: FloatArray) -> FloatA
     reference = np.full((len(time_s), 4), math.nan)
     reference[:, 3] = value[:, 2]
     return reference
-
-
-def _end(flown: FloatArray, reference: FloatArray, diverged: bool) -> tuple[int, str]:
-    """Return how many ticks count, and why the flight ended before its time, or nothing."""
-    count, why = len(flown), "the numbers of the plant ran away" if diverged else ""
-    x, y = flown[:, 7], flown[:, 8]
-    upset = np.flatnonzero(1.0 - 2.0 * (x * x + y * y) < _UPRIGHT)
-    lost = np.flatnonzero(np.linalg.norm(flown[:, :3] - reference[:, :3], axis=1) > FARTHEST_M)
-    for ticks, reason in ((upset, "turned over"), (lost, f"{FARTHEST_M:g} m away from its reference")):
-        if len(ticks) and ticks[0] < count:
-            count, why = int(ticks[0]), reason
-    return count, why
 
 
 def _euler(quaternions: FloatArray) -> FloatArray:

@@ -12,19 +12,32 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from gcs_cli.paper.cases import DESIRED, IDEAL, PLAIN, condition_of
+from gcs_cli.errors import CliError
+from gcs_cli.paper.cases import (
+    DESIRED,
+    IDEAL,
+    NO_LIMITS,
+    NUDGE,
+    PLAIN,
+    SHAPED,
+    STEPS,
+    condition_of,
+)
 from gcs_cli.paper.closed_loop import fly
 from gcs_cli.paper.metrics import effort, measure, path_metrics
-from gcs_cli.paper.types import Case, Recording
+from gcs_cli.paper.types import AxisMetrics, Case, Recording
 
 MOST_JOBS = 8
 THIN = 4
 """Of a recording that is only drawn, every so many ticks are kept: 250 Hz."""
-_DRAWN = (PLAIN, IDEAL)
+FULL = (DESIRED, *STEPS)
+"""What is kept tick by tick: plants are compared along the one, and the others are quick."""
+_DRAWN = (PLAIN, IDEAL, NO_LIMITS, SHAPED, NUDGE.name)
 
 
 class Flown(NamedTuple):
@@ -45,16 +58,20 @@ def default_jobs() -> int:
 def entry_of(recording: Recording) -> dict[str, Any]:
     """Return what results.json holds of a case."""
     path = path_metrics(recording)
-    ended = {"time_s": recording.ended_s, "why": recording.ended_why}
+    ended = {"time_s": recording.ended_s, "why": recording.ended_why, "how": recording.ended_how}
     return {
         **recording.case._asdict(),
         "force_ned_n": list(recording.case.force_ned_n),
         "torque_frd_n_m": list(recording.case.torque_frd_n_m),
-        "metrics": {name: axis._asdict() for name, axis in measure(recording).items()},
+        "metrics": {name: _plain(axis) for name, axis in measure(recording).items()},
         "path": None if path is None else path._asdict(),
         "effort": effort(recording)._asdict(),
         "ended": None if recording.ended_s is None else ended,
     }
+
+
+def _plain(axis: AxisMetrics) -> dict[str, Any]:
+    return {**axis._asdict(), "moves": [move._asdict() for move in axis.moves]}
 
 
 def thinned(recording: Recording, every: int = THIN) -> Recording:
@@ -74,8 +91,8 @@ def experiment(case: Case) -> tuple[dict[str, Any], Recording | None]:
     condition = condition_of(case)
     if condition not in _DRAWN:
         return entry, None
-    if case.trajectory == DESIRED and condition == PLAIN:
-        return entry, recording  # plants are compared tick by tick
+    if case.trajectory in FULL and condition != IDEAL:
+        return entry, recording
     return entry, thinned(recording)
 
 
@@ -122,6 +139,8 @@ def _in_processes(
         for future in as_completed(waiting):
             found[waiting[future]] = future.result()
             tell(len(found), len(cases))
+    except BrokenProcessPool:
+        raise CliError("a process that flew experiments was ended from outside; --jobs 1 needs none") from None
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
     return found

@@ -3,9 +3,11 @@
 A move of an axis is what lies between two holds of its reference (nearly a second or longer without a change); a
 step is a move that takes no time. Its response is scaled to 0 before and 1 after it. Over the moves of an axis
 
-* overshoot is the largest share by which the response passes 1 before the next move begins: the worst of all moves;
+* overshoot is the largest share by which the response passes 1 before the next move begins. It is told of each move,
+  and the largest and the median of them all. A move counts only if the axis was at rest when it began, within 2 % of
+  the move of its place and slower than 2 % of the move per second: else what is left of the move before would count;
 * rise time, from 10 to 90 %, and settling time, from the move's begin until the response stays within 2 % of 1, are
-  those of the last move, which has the time to settle; None where it does not rise or settle.
+  those of the last such move that is watched for 4 s or more; None without one, or where it does not rise or settle.
 
 Crossings are interpolated between ticks. Errors are actual minus reference; the steady-state error is the mean of the
 last second. A reference without holds (the attitude that the outer loop asks for) has errors only.
@@ -19,11 +21,16 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.contract import FloatArray, LoopStatus
-from gcs_cli.paper.types import AxisMetrics, Recording
+from gcs_cli.paper.types import AxisMetrics, MoveMetrics, Recording
 
 HOLD_S = 0.9
 """A reference that rests so long is held; what it does between two holds is one move, or none if it comes back."""
 SETTLED = 0.02
+AT_REST_PER_S = 0.02
+"""An axis that moves by less of the coming move in a second is at rest."""
+WATCHED_S = 4.0
+"""So long a response is watched to tell when it settles."""
+_SPEED_OVER_S = 0.05
 LOW, HIGH = 0.1, 0.9
 STEADY_S = 1.0
 _SMALLEST_MOVE = 1e-9
@@ -91,16 +98,45 @@ def axis_metrics(time_s: FloatArray, actual: FloatArray, reference: FloatArray) 
     """Return the figures of one axis; all arrays of shape (n,), n at least 1, equally spaced in time."""
     error = actual - reference
     steady = error[time_s > time_s[-1] - STEADY_S]
-    overshoot, rise_s, settling_s = None, None, None
-    for move in moves(time_s, reference):
-        share = (actual[move.begin : move.end] - move.start) / (move.target - move.start)
-        passed_s = time_s[move.begin : move.end] - time_s[move.begin]
-        most = max(0.0, 100.0 * (float(share.max()) - 1.0))
-        overshoot = most if overshoot is None else max(overshoot, most)
-        rise_s, settling_s = rise_time_s(passed_s, share), settling_time_s(passed_s, share)
+    found = moves(time_s, reference)
+    counted = [move for move in found if began_at_rest(time_s, actual, move)]
+    told = [_overshoot(time_s, actual, move, move in counted) for move in found]
+    over = [one.overshoot_percent for one in told if one.overshoot_percent is not None]
+    rise_s, settling_s = None, None
+    for move in counted:
+        if _watched_s(time_s, move) > WATCHED_S - _SPEED_OVER_S:
+            passed_s, share = time_s[move.begin : move.end] - time_s[move.begin], _share(actual, move)
+            rise_s, settling_s = rise_time_s(passed_s, share), settling_time_s(passed_s, share)
     return AxisMetrics(
-        overshoot, rise_s, settling_s, float(steady.mean()), _rms(error), float(np.abs(error).max())
-    )
+        max(over, default=None), rise_s, settling_s,
+        float(steady.mean()), _rms(error), float(np.abs(error).max()),
+        float(np.median(over)) if over else None, tuple(told),
+    )  # fmt: skip
+
+
+def began_at_rest(time_s: FloatArray, actual: FloatArray, move: Move) -> bool:
+    """Tell whether the axis was at rest at its place when the move began; ``actual`` has shape (n,)."""
+    size = abs(move.target - move.start)
+    since = max(0, int(np.searchsorted(time_s, time_s[move.begin] - _SPEED_OVER_S)))
+    early, late = np.array_split(actual[since : move.begin], 2)  # means, so that a shiver in place is rest
+    if not early.size or not late.size:
+        return abs(float(actual[move.begin - 1]) - move.start) <= SETTLED * size
+    moved_s = 0.5 * float(time_s[move.begin] - time_s[since])
+    error, moved = abs(float(late.mean()) - move.start), abs(float(late.mean() - early.mean()))
+    return error <= SETTLED * size and moved <= AT_REST_PER_S * size * moved_s
+
+
+def _overshoot(time_s: FloatArray, actual: FloatArray, move: Move, counts: bool) -> MoveMetrics:
+    over = max(0.0, 100.0 * (float(_share(actual, move).max()) - 1.0)) if counts else None
+    return MoveMetrics(float(time_s[move.begin]), _watched_s(time_s, move), move.target - move.start, over)
+
+
+def _share(actual: FloatArray, move: Move) -> FloatArray:
+    return (actual[move.begin : move.end] - move.start) / (move.target - move.start)
+
+
+def _watched_s(time_s: FloatArray, move: Move) -> float:
+    return float(time_s[move.end - 1] - time_s[move.begin])
 
 
 def moves(time_s: FloatArray, reference: FloatArray) -> list[Move]:

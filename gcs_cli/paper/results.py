@@ -1,4 +1,9 @@
-"""The content of results.json. All of it repeats bit for bit: no time of a clock, nothing of the machine. Pure."""
+"""The content of results.json. It holds no time of a clock and no name of a machine. Pure.
+
+The same command on the same machine writes the same bits. Another processor, or other versions of the numerical
+libraries, may differ in the last digits of what was flown, and more where a loop magnifies rounding; the linear
+analysis is rounded to ten digits.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +39,9 @@ def results_of(flown: Flown, left_out: Mapping[str, str]) -> dict[str, Any]:
         "conditions": {condition.name: condition.label for condition in CONDITIONS},
         "trajectories": {name: _about(name) for name in names},
         "cases": flown.entries,
-        "comparisons": {"claims": claims(flown.entries), "xy": comparisons.xy(flown.entries)},
+        "comparisons": {"claims": claims(flown.entries, {}), "xy": comparisons.xy(flown.entries)},
         "plants": plants.comparisons(flown.recordings),
+        "plants_elsewhere": plants.other_trajectories(flown.recordings),
         "linear": {},
         "onset": [],
         "pil": {},

@@ -26,6 +26,9 @@ FOLDER = Path(__file__).parent / "trajectories"
 SHAPES = ("step", "ramp", "smooth", "sine", "cosine")
 POSITION, ATTITUDE = "position", "attitude"
 
+MODEL_RAD_S, MODEL_DAMPING, MODEL_M_S2 = 3.0, 1.0, 4.5
+"""The reference model: natural frequency, damping, and the most that it accelerates, horizontally and vertically."""
+
 _LONGEST_S = 600.0
 _FARTHEST_M, _FARTHEST_DEG = 1e3, 3600.0
 _SAME_TIME_S = 1e-9
@@ -173,4 +176,23 @@ def setpoints(trajectory: Trajectory, time_s: FloatArray, scale: float = 1.0) ->
     rows = np.zeros((len(time_s), SETPOINT_SIZE))
     rows[:, 0:3], rows[:, 3:6], rows[:, 6:9] = at.value[:, :3], at.rate[:, :3], at.acceleration[:, :3]
     rows[:, 9], rows[:, 10] = at.value[:, 3], at.rate[:, 3]
+    return rows
+
+
+def shaped_setpoints(trajectory: Trajectory, time_s: FloatArray, scale: float = 1.0) -> FloatArray:
+    """Return setpoints whose position follows the trajectory's through the reference model, shape (n, 11).
+
+    They are what our own gains are meant to fly: a step becomes a path with a velocity and an acceleration to feed
+    ahead. ``time_s`` is equally spaced; the heading stays as it is.
+    """
+    rows = setpoints(trajectory, time_s, scale)
+    step_s = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 0.0
+    position, velocity = rows[0, 0:3].copy(), np.zeros(3)
+    for row in rows:
+        wanted = MODEL_RAD_S**2 * (row[0:3] - position) - 2.0 * MODEL_DAMPING * MODEL_RAD_S * velocity
+        wanted[:2] *= min(1.0, MODEL_M_S2 / max(float(np.linalg.norm(wanted[:2])), MODEL_M_S2))
+        wanted[2] = min(max(float(wanted[2]), -MODEL_M_S2), MODEL_M_S2)
+        row[0:3], row[3:6], row[6:9] = position, velocity, wanted
+        velocity = velocity + step_s * wanted
+        position = position + step_s * velocity
     return rows

@@ -22,7 +22,7 @@ class Case(NamedTuple):
     controller: str = "pid"
     """Or "backstepping"."""
     gains: str = "paper"
-    """A gains file: paper, tuned, backstepping_poles."""
+    """A gains file: paper, paper_rate_fed, tuned, backstepping_poles."""
     plant: str = "paper"
     """paper (small angles), rigid, multibody."""
     limits: bool = True
@@ -41,6 +41,8 @@ class Case(NamedTuple):
     """Further inner steps between a state and the actuators that answer it."""
     scale: float = 1.0
     """Of all displacements of the trajectory."""
+    shaped: bool = False
+    """Setpoints pass a reference model that feeds velocity and acceleration ahead, as guidance does in flight."""
     vehicle: str = "paper_quad"
 
 
@@ -71,8 +73,22 @@ class Recording(NamedTuple):
     status: IntArray
     """Shape (n,): bits of ``LoopStatus``."""
     ended_s: float | None
-    """Time of the crash or divergence; None: flew to its end."""
+    """Time of the crash, or of the loss of control; None: flew to its end."""
     ended_why: str
+    ended_how: str = ""
+    """"crashed" or "lost" (control, though it flew on); empty: flew to its end."""
+
+
+class MoveMetrics(NamedTuple):
+    """One move of an axis and how far the response overshot it."""
+
+    at_s: float
+    watched_s: float
+    """Until the next move begins, or the flight ends."""
+    by: float
+    """Metres or radians."""
+    overshoot_percent: float | None
+    """None where the axis was not yet at rest when the move began: what is left of the move before would count."""
 
 
 class AxisMetrics(NamedTuple):
@@ -82,8 +98,11 @@ class AxisMetrics(NamedTuple):
     """
 
     overshoot_percent: float | None
+    """The largest of all moves that began at rest."""
     rise_time_s: float | None
     settling_time_s: float | None
     steady_state_error: float
     rms_error: float
     max_error: float
+    overshoot_median_percent: float | None = None
+    moves: tuple[MoveMetrics, ...] = ()

@@ -37,7 +37,7 @@ def without(table: str) -> str:
 @pytest.mark.parametrize("controller", [PID, BACKSTEPPING], ids=lambda controller: controller.name)
 @pytest.mark.parametrize("name", built_in_gains())
 def test_built_in_gains_fit_both_controllers(name: str, controller) -> None:
-    assert built_in_gains() == ["backstepping_poles", "paper", "tuned"]
+    assert built_in_gains() == ["backstepping_poles", "paper", "paper_rate_fed", "tuned"]
     assert make(name, controller).name == "python"
 
 
@@ -100,7 +100,7 @@ def test_what_is_wrong_is_one_sentence_with_file_key_and_range(tmp_path: Path, n
 def test_gains_that_are_not_there() -> None:
     with pytest.raises(
         ConfigError,
-        match=r"^soft: is neither a file nor built-in gains \(backstepping_poles, paper, tuned\)$",
+        match=r"^soft: is neither a file nor built-in gains \(backstepping_poles, paper, paper_rate_fed, tuned\)$",
     ):
         open_gains("soft")
     with pytest.raises(ConfigError, match=r"^no/such.toml: cannot be read: No such file or directory$"):

@@ -108,16 +108,52 @@ def test_a_reference_without_a_rest_has_errors_alone() -> None:
     assert found.steady_state_error == pytest.approx(0.1)
 
 
-def test_overshoot_is_the_worst_of_the_moves_and_times_are_the_last_ones() -> None:
+def test_overshoot_is_told_of_each_move_and_times_of_the_last_one() -> None:
     reference = np.where(TIME_S >= 6.0, 3.0, np.where(TIME_S >= 1.0, 1.0, 0.0))
     actual = reference.copy()
     actual[1500:1600] = 1.25  # a quarter of the first move
     actual[6000:6200] = 1.0  # the second rises 0.2 s late
     actual[7000:7100] = 3.1  # a twentieth of the second
     found = axis_metrics(TIME_S, actual, reference)
+    assert [move.overshoot_percent for move in found.moves] == pytest.approx([25.0, 5.0])
+    assert [(move.at_s, move.by) for move in found.moves] == [(1.0, 1.0), (6.0, 2.0)]
     assert found.overshoot_percent == pytest.approx(25.0)
+    assert found.overshoot_median_percent == pytest.approx(15.0)
     assert found.settling_time_s == pytest.approx(1.1, abs=0.002)
     assert found.rise_time_s == pytest.approx(0.0, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("place", "speed", "counts"),
+    [(0.0, 0.0, True), (0.03, 0.0, True), (0.05, 0.0, False), (0.0, 0.03, True), (0.0, 0.05, False)],
+)
+def test_a_move_counts_only_if_the_axis_was_at_rest(place: float, speed: float, counts: bool) -> None:
+    """2 % of a move of 2 m: 4 cm, and 4 cm/s."""
+    reference = np.where(TIME_S >= 6.0, 3.0, np.where(TIME_S >= 1.0, 1.0, 0.0))
+    actual = reference.copy()
+    before = (TIME_S >= 5.0) & (TIME_S <= 6.0)
+    actual[before] = 1.0 + place + speed * (TIME_S[before] - 6.0)
+    actual[7000:7100] = 3.1
+    first, second = axis_metrics(TIME_S, actual, reference).moves
+    assert first.overshoot_percent is not None
+    assert (second.overshoot_percent is not None) is counts
+
+
+def test_a_loop_that_shivers_in_place_is_at_rest() -> None:
+    reference = np.where(TIME_S >= 6.0, 1.0, 0.0)
+    actual = reference + 1e-3 * np.where(np.arange(len(TIME_S)) % 2, 1.0, -1.0)
+    assert axis_metrics(TIME_S, actual, reference).moves[0].overshoot_percent is not None
+
+
+def test_nothing_settles_that_is_watched_for_less_than_four_seconds() -> None:
+    for until_s, told in ((4.9, False), (5.0, True)):
+        reference = np.where(np.logical_and(TIME_S >= 1.0, until_s > TIME_S), 1.0, 0.0)
+        actual = reference.copy()
+        actual[round(1e3 * until_s) - 100 :] += 0.3  # what comes then does not begin at rest
+        found = axis_metrics(TIME_S, actual, reference)
+        assert (found.rise_time_s is not None) is told
+        assert found.overshoot_percent == pytest.approx(30.0)
+        assert found.moves[1].overshoot_percent is None
 
 
 def test_a_zigzag_that_comes_back_is_no_move() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from flightstack.params.gains_file import BUILT_IN
 from gcs_cli.__main__ import main
 from gcs_cli.errors import CliError
 from gcs_cli.paper import comparisons, linear, pil_section, plants, run
@@ -20,9 +22,11 @@ from gcs_cli.paper.cases import (
     CONDITIONS,
     CONTENDERS,
     MULTIBODY,
+    NUDGE,
     PID,
     POLES,
     RIGID,
+    SHAPED,
     SMALL_ANGLE,
     all_cases,
     key,
@@ -30,11 +34,14 @@ from gcs_cli.paper.cases import (
 )
 from gcs_cli.paper.claims import claims
 from gcs_cli.paper.closed_loop import fly
+from gcs_cli.paper.comparisons import shared_overshoots
 from gcs_cli.paper.corrections import CORRECTIONS
 from gcs_cli.paper.experiments import entry_of, run_cases, thinned
+from gcs_cli.paper.linear.tables import actuator_settings
 from gcs_cli.paper.results import results_of, text_of
 from gcs_cli.paper.run import HTML_NAME, JSON_NAME, PaperOptions
 from gcs_cli.paper.tables import table_1, table_2, table_3
+from gcs_cli.paper.trajectory import trajectory_names
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 FEW = [
@@ -50,13 +57,33 @@ def test_keys_are_distinct_and_every_combination_is_there() -> None:
     by_key = {case.key: case for case in cases}
     for contender in CONTENDERS:
         for condition in CONDITIONS:
-            for trajectory in ("desired", "smooth", "hard"):
+            along = ("hard", "step_z") if condition.name == SHAPED else ("desired", "smooth", "hard")
+            for trajectory in along:
                 for plant in (SMALL_ANGLE, RIGID):
                     case = by_key[key(contender.name, trajectory, condition.name, plant)]
                     assert (case.controller, case.gains) == (contender.controller, contender.gains)
                     assert all(getattr(case, name) == value for name, value in condition.changes.items())
         assert key(contender.name, "desired", plant=MULTIBODY) in by_key
+    for name in (PID, BACKSTEPPING):
+        assert all(key(name, trajectory, plant=MULTIBODY) in by_key for trajectory in trajectory_names())
     assert {case.plant for case in all_cases(False)} == {SMALL_ANGLE, RIGID}
+
+
+def test_what_a_condition_changes_is_what_its_name_says() -> None:
+    changes = {condition.name: condition.changes for condition in CONDITIONS}
+    assert changes["no_limits"] == {"limits": False}
+    assert changes["ideal"] == {"limits": False, "lag_s": 0.0}
+    assert changes["lag_0"] == {"lag_s": 0.0}
+
+
+def test_the_rate_fed_pid_is_table_2_but_for_the_rate() -> None:
+    plain, fed = (
+        tomllib.loads((BUILT_IN / f"{name}.toml").read_text(encoding="utf-8"))
+        for name in ("paper", "paper_rate_fed")
+    )
+    assert fed["attitude_pid"].pop("rate_feedforward") == 1.0
+    assert plain["attitude_pid"].pop("rate_feedforward") == 0.0
+    assert {**fed, "description": ""} == {**plain, "description": ""}
 
 
 def test_tables_show_what_is_printed_and_what_flies() -> None:
@@ -105,16 +132,27 @@ def test_a_thinned_recording_has_every_so_many_rows() -> None:
 
 
 def case_entry(
-    overshoot: float, rms_m: float = 0.1, ended: bool = False, steady_m: float = 0.0, yaw_percent: float = 0.0
+    overshoot: float | None,
+    rms_m: float = 0.1,
+    how: str = "",
+    steady_m: float = 0.0,
+    yaw_percent: float = 0.0,
+    later: float | None = None,
 ) -> dict[str, Any]:
-    axis = {"overshoot_percent": overshoot, "steady_state_error": steady_m}
+    """A flight with a move of x and two of y; ``later`` overshoots that of the third move."""
+    moves = [move_entry(1.0, overshoot)], [move_entry(3.0, overshoot), move_entry(7.0, later)]
+    x, y = ({"moves": of, "steady_state_error": 0.0} for of in moves)
     path = dict.fromkeys(("max_error_m", "path_rms_m", "path_max_m", "beyond_m"), 0.1)
     return {
-        "ended": {"time_s": 1.0, "why": "turned over"} if ended else None,
+        "ended": {"time_s": 1.0, "why": "turned over", "how": how} if how else None,
         "path": {"rms_error_m": rms_m, **path},
-        "metrics": {"x": axis, "y": {**axis, "steady_state_error": 0.0}, "z": {"max_error": 0.13}},
+        "metrics": {"x": {**x, "steady_state_error": steady_m}, "y": y, "z": {"max_error": 0.13}},
         "effort": {"saturated_percent": {"yaw": yaw_percent}},
     }
+
+
+def move_entry(at_s: float, overshoot: float | None) -> dict[str, Any]:
+    return {"at_s": at_s, "watched_s": 2.0, "by": 1.0, "overshoot_percent": overshoot}
 
 
 def cases_with(**changed: dict[str, Any]) -> dict[str, Any]:
@@ -126,13 +164,13 @@ def cases_with(**changed: dict[str, Any]) -> dict[str, Any]:
 
 
 def verdicts(cases: dict[str, Any]) -> dict[str, bool]:
-    return {claim["name"]: claim["holds"] for claim in claims(cases)}
+    return {claim["name"]: claim["holds"] for claim in claims(cases, {})}
 
 
 def test_verdicts_follow_the_figures() -> None:
     alike = verdicts(cases_with())
     assert alike == {
-        "similar": True, "overshoot": False, "limits": False, "method": False, "torque": False, "stable": True,
+        "similar": True, "overshoot": False, "limits": False, "method": False, "torque": False, "survives": True,
     }  # fmt: skip
     assert verdicts(cases_with(backstepping=case_entry(18.9)))["overshoot"]
     assert not verdicts(cases_with(backstepping=case_entry(19.1)))["overshoot"]
@@ -142,38 +180,122 @@ def test_verdicts_follow_the_figures() -> None:
     assert verdicts(cases_with(pid=case_entry(20.0, steady_m=-0.01)))["torque"]
 
 
-def test_a_crash_is_told_and_decides_nothing_in_its_favour() -> None:
-    found = {claim["name"]: claim for claim in claims(cases_with(backstepping=case_entry(1.0, ended=True)))}
+def test_table_2_is_judged_with_its_rate_fed_ahead_too() -> None:
+    assert not verdicts(cases_with(rate_fed_pid=case_entry(20.0, rms_m=0.089)))["similar"]
+    fed = cases_with(backstepping=case_entry(15.0), rate_fed_pid=case_entry(14.0))
+    found = {claim["name"]: claim for claim in claims(fed, {})}
+    assert not found["overshoot"]["holds"]
+    assert not found["method"]["holds"]
+    assert "14.0 % with its rate fed ahead" in found["overshoot"]["words"]
+
+
+def test_only_moves_that_began_at_rest_with_all_are_compared() -> None:
+    one, other = case_entry(20.0, later=80.0), case_entry(10.0)
+    assert shared_overshoots([one, one]) == ([20.0, 20.0], [80.0, 80.0], 3)
+    assert shared_overshoots([one, other]) == ([20.0, 10.0], [20.0, 10.0], 2)
+    assert shared_overshoots([one, case_entry(None)]) is None
+    found = {claim["name"]: claim for claim in claims(cases_with(pid=case_entry(None)), {})}
+    assert not found["overshoot"]["holds"]
+    assert "No move began at rest with all of them" in found["overshoot"]["words"]
+
+
+@pytest.mark.parametrize(("how", "words"), [("crashed", "crashed"), ("lost", "lost control")])
+def test_a_crash_is_told_and_decides_nothing_in_its_favour(how: str, words: str) -> None:
+    found = {claim["name"]: claim for claim in claims(cases_with(backstepping=case_entry(1.0, how=how)), {})}
     assert not any(claim["holds"] for claim in found.values())
-    assert found["overshoot"]["words"] == "backstepping crashed on the small-angle plant: nothing to compare."
-    assert "nowhere" in found["stable"]["words"]
+    assert (
+        found["overshoot"]["words"] == f"Backstepping {words} on the small-angle plant: nothing to compare."
+    )
+    assert "the PID does not come to its end with: nothing" in found["survives"]["words"]
+    assert f"({words})" in found["survives"]["words"]
 
 
-def test_advantage_with_limits_alone_is_the_limits() -> None:
+def test_an_advantage_that_ends_with_the_limits_alone_is_theirs() -> None:
     cases = cases_with(backstepping=case_entry(15.0))
-    cases[key(BACKSTEPPING, "hard", "ideal")] = case_entry(19.5)
+    assert not verdicts(cases)["limits"]
+    cases[key(BACKSTEPPING, "hard", "ideal")] = case_entry(19.5)  # without lag, too: not judged
+    assert not verdicts(cases)["limits"]
+    cases[key(BACKSTEPPING, "hard", "no_limits")] = case_entry(19.5)
     assert verdicts(cases)["limits"]
+    cases[key(BACKSTEPPING, "hard", "plain")] = case_entry(19.5)
+    assert not verdicts(cases)["limits"]  # nothing to explain
+
+
+def linear_with(**backstepping: Any) -> dict[str, Any]:
+    """An analysis in which both controllers are alike, but for these figures of backstepping's roll loop."""
+
+    def loop(controller: str, changed: dict[str, Any]) -> dict[str, Any]:
+        alike = {"gain_db": 10.0, "phase_deg": 40.0, "lowest_hz": 300.0}
+        axes = {
+            axis: {
+                "sampled": [sampled(name, {**alike, **(changed if axis == "roll" else {})}) for name in named]
+            }
+            for axis, named in {"roll": FLOWN, "pitch": FLOWN, "yaw": (*FLOWN, *SPIN_UP)}.items()
+        }
+        return {"controller": controller, "gains": "paper", "axes": axes}
+
+    return {"loops": [loop("pid", {}), loop("backstepping", backstepping)]}
+
+
+FLOWN, SPIN_UP = ("motor lag",), ("motor lag with spin-up torque",)
+
+
+def sampled(name: str, of: dict[str, Any]) -> dict[str, Any]:
+    margins = {"gain_db": of["gain_db"], "phase_deg": of["phase_deg"]} if of["gain_db"] != "none" else None
+    return {"actuators": name, "margins": {"1000": margins}, "lowest_stable_hz": of["lowest_hz"]}
+
+
+@pytest.mark.parametrize(
+    ("changed", "holds"),
+    [
+        ({}, True),
+        ({"gain_db": 9.6, "phase_deg": 38.5, "lowest_hz": 310.0}, True),
+        ({"gain_db": 9.4}, False),
+        ({"phase_deg": 37.9}, False),
+        ({"lowest_hz": 316.0}, False),
+        ({"lowest_hz": None}, False),
+        ({"gain_db": None, "phase_deg": None}, True),
+        ({"gain_db": "none"}, False),
+        ({"gain_db": 20.0, "phase_deg": 60.0, "lowest_hz": 200.0}, True),
+    ],
+)
+def test_nearer_to_instability_is_told_by_margins_and_lowest_rates(
+    changed: dict[str, Any], holds: bool
+) -> None:
+    found = [claim for claim in claims({}, linear_with(**changed)) if claim["name"] == "stable"]
+    assert [claim["plant"] for claim in found] == [SMALL_ANGLE, RIGID]
+    for claim in found:
+        assert claim["holds"] is holds
+        assert claim["words"].endswith("nearer in none." if holds else "nearer in roll.")
+
+
+def test_the_analysis_has_what_the_claim_asks_for() -> None:
+    for axis in ("roll", "pitch", "yaw"):
+        names = {name for name, _ in actuator_settings(axis)}
+        assert names.issuperset(FLOWN if axis != "yaw" else FLOWN + SPIN_UP)
 
 
 def test_a_yaw_loop_that_saturates_is_told() -> None:
-    (claim, *_) = claims(cases_with(pid=case_entry(20.0, yaw_percent=80.4)))
-    assert claim["words"].endswith("The PID's yaw loop is at the rotors' limits in 80 % of the time.")
+    (claim, *_) = claims(cases_with(pid=case_entry(20.0, yaw_percent=80.4)), {})
+    assert claim["words"].endswith(
+        "The yaw loop of the PID as flown is at the rotors' limits in 80 % of the time."
+    )
     flights = {case.key: case_entry(20.0) for case in matrix(("desired",), (SMALL_ANGLE, RIGID))}
-    (claim,) = claims(flights)
+    (claim,) = claims(flights, {})
     assert claim["holds"]
     flights[key(PID, "desired", plant=RIGID)] = case_entry(20.0, yaw_percent=80.4)
-    (claim,) = claims(flights)
+    (claim,) = claims(flights, {})
     assert not claim["holds"]
     assert "80 % of the time on the rigid-body plant" in claim["words"]
 
 
 def test_a_table_without_flights_is_empty() -> None:
-    assert claims({}) == []
+    assert claims({}, {}) == []
     assert comparisons.xy({}) == {}
 
 
 def test_the_table_in_xy_has_none_for_a_crash() -> None:
-    table = comparisons.xy(cases_with(poles=case_entry(20.0, ended=True)))["hard"][SMALL_ANGLE]["plain"]
+    table = comparisons.xy(cases_with(poles=case_entry(20.0, how="crashed")))["hard"][SMALL_ANGLE]["plain"]
     assert table[POLES] is None
     assert table[PID]["overshoot_percent"] == 20.0
 
@@ -200,6 +322,25 @@ def test_the_bound_holds_the_multibody_plant() -> None:
         other = one._replace(position_ned_m=one.position_ned_m + np.array([away_m, 0.0, 0.0]))
         found = plants.comparisons(dict(zip(names, (one, other), strict=True)))
         assert found["rigid_multibody"][PID]["within_bounds"] is within
+        assert not found["rigid_multibody"][PID]["bound_decides"]  # nobody tried what rounding does
+
+
+def test_a_bound_decides_where_a_push_of_nothing_stays_nothing() -> None:
+    one = fly(FEW[0])
+    flights = {key(PID, "desired", plant=plant): one for plant in (RIGID, MULTIBODY)}
+    for away_m, decides in ((1e-9, True), (1e-3, False)):
+        nudged = one._replace(position_ned_m=one.position_ned_m + np.array([away_m, 0.0, 0.0]))
+        found = plants.comparisons({**flights, key(PID, "desired", NUDGE.name, RIGID): nudged})
+        assert found["rigid_multibody"][PID]["bound_decides"] is decides
+        assert found["rigid_multibody"][PID]["rounding"]["max_position_m"] == pytest.approx(away_m)
+
+
+def test_other_trajectories_are_compared_where_the_multibody_plant_flew_them() -> None:
+    one = fly(FEW[0])
+    flights = {key(PID, "step_roll", plant=plant): one for plant in (SMALL_ANGLE, RIGID)}
+    assert plants.other_trajectories(flights) == {}
+    found = plants.other_trajectories({**flights, key(PID, "step_roll", plant=MULTIBODY): one})
+    assert found["step_roll"]["rigid_multibody"][PID]["max_position_m"] == 0.0
 
 
 # ---------------------------------------------------------------- the command
