@@ -21,9 +21,13 @@ def export_mjcf(
     ] = None,
     scene: Annotated[bool, typer.Option("--scene", help="With sky, landmarks, light and cameras.")] = False,
 ) -> None:
-    """Write the multibody model of a vehicle as MJCF, and a table of its masses to stderr."""
+    """Write a vehicle's multibody model as MJCF.
+
+    A table of the masses goes to stderr.
+    """
     from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
-    from sim_bridge.multibody.assembly import TOLERANCE, assemble, mass_table  # noqa: PLC0415
+    from sim_bridge.multibody.assembly import TOLERANCE, assemble  # noqa: PLC0415
+    from sim_bridge.multibody.mass_table import mass_table  # noqa: PLC0415
     from sim_bridge.multibody.mjcf import model_xml  # noqa: PLC0415
 
     loaded = load_vehicle(vehicle)

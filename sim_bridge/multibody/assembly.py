@@ -79,8 +79,8 @@ def assemble(vehicle: Vehicle) -> Assembly:
             parts += [placed for placed in usual if placed.part.name not in names]
         return _with_rotor_inertia(vehicle, parts)
 
-    limits = np.array([*LIMITS[:usual_knobs], *[_DENSITY_LIMIT] * len(tuned)])
-    knobs = meet(_miss_of(vehicle, build), limits) if len(limits) else limits
+    ladder = [np.array([*limits[:usual_knobs], *[_DENSITY_LIMIT] * len(tuned)]) for limits in LIMITS]
+    knobs = meet(_miss_of(vehicle, build), ladder) if len(ladder[0]) else ladder[0]
     parts = build(knobs)
     frame = of_body(parts, 0)
     if frame.mass_kg < _LEAST_KG or np.linalg.eigvalsh(frame.inertia_kg_m2)[0] < _LEAST_KG_M2:
@@ -150,44 +150,3 @@ def _misses(vehicle: Vehicle, parts: list[PlacedPart]) -> dict[str, float]:
         wanted = _rotor_inertia(vehicle, rotor)
         misses[f"inertia of rotor {number}"] = abs(own / wanted - 1.0)
     return misses
-
-
-def mass_table(vehicle: Vehicle, assembly: Assembly) -> str:
-    """Return a table of the parts with material, density and mass, and of the whole beside the vehicle file."""
-    lines = [
-        f"{'part':<16}{'shape':<10}{'material':<13}{'kg/m³':>8}{'g':>10}{'x':>10}{'y':>10}{'z, m FRD':>10}"
-    ]
-    for placed in assembly.parts:
-        part, own = placed.part, placed.properties()
-        x, y, z = own.centre_m
-        if placed.body:
-            x, y, z = own.centre_m + np.array(vehicle.rotors[placed.body - 1].position_frd_m)
-        lines.append(
-            f"{part.name:<16}{part.shape:<10}{part.material:<13}{part.density_kg_m3:>8.0f}"
-            f"{own.mass_kg * 1e3:>10.2f}{x:>10.4f}{y:>10.4f}{z:>10.4f}"
-        )
-    whole = assembly.whole
-    moments = np.diag(whole.inertia_kg_m2)
-    lines.append("")
-    lines.append(f"{'':<24}{'assembly':>16}{'vehicle file':>16}{'miss':>10}")
-    rows = [("mass, kg", whole.mass_kg, vehicle.mass_kg, "mass")]
-    rows += [
-        (f"{name}, kg m²", float(value), wanted, name)
-        for name, value, wanted in zip(("Ix", "Iy", "Iz"), moments, vehicle.inertia_kg_m2, strict=True)
-    ]
-    rows += [
-        (f"centre of gravity {axis}, m", float(value), 0.0, f"centre of gravity {axis}")
-        for axis, value in zip("xyz", whole.centre_m, strict=True)
-    ]
-    rotors = assembly.misses
-    for number, rotor in enumerate(vehicle.rotors, start=1):
-        about_axis = float(of_body(assembly.parts, number).inertia_kg_m2[2, 2])
-        name = f"inertia of rotor {number}"
-        rows.append((f"rotor {number} J, kg m²", about_axis, rotor.inertia_kg_m2, name))
-    lines += [
-        f"{title:<24}{value:>16.8g}{wanted:>16.8g}{rotors[name]:>10.1e}"
-        for title, value, wanted, name in rows
-    ]
-    products = max(assembly.misses[name] for name in ("Ixy", "Ixz", "Iyz"))
-    lines.append(f"products of inertia are below {products:.1e} of the largest moment")
-    return "\n".join(lines)

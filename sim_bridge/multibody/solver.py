@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -16,11 +16,24 @@ _SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 1e-3)  # of a step, the first that h
 _SMALLEST_RATIO = 1e-7  # of singular values: conditions that no knob moves are left alone
 
 
-def meet(miss: Callable[[FloatArray], FloatArray], limits: FloatArray) -> FloatArray:
-    """Return knobs x near zero, |x| ≤ ``limits``, with miss(x) = 0, or in the least squares where that cannot be.
+def meet(miss: Callable[[FloatArray], FloatArray], ladder: Sequence[FloatArray]) -> FloatArray:
+    """Return knobs x near zero with miss(x) = 0, or in the least squares where that cannot be.
+
+    ``ladder`` holds limits of |x|, narrow ones first: the first within which all is met are taken, and the last where
+    nothing is. No randomness: the same conditions give the same bits.
+    """
+    for limits in ladder:
+        x, rest = _newton(miss, limits)
+        if np.abs(rest).max() < _GOOD:
+            return x
+    return _compromise(miss, x, limits)
+
+
+def _newton(miss: Callable[[FloatArray], FloatArray], limits: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return knobs within the limits and what is missed with them.
 
     Each step is the shortest one, measured in units of the limits, to where the linearised conditions are met
-    (Gauss-Newton with the pseudo-inverse). No randomness: the same conditions give the same bits.
+    (Gauss-Newton with the pseudo-inverse).
     """
     x = np.zeros(len(limits))
     rest = miss(x)
@@ -36,7 +49,7 @@ def meet(miss: Callable[[FloatArray], FloatArray], limits: FloatArray) -> FloatA
                 break
         else:
             break
-    return x if np.abs(rest).max() < _GOOD else _compromise(miss, x, limits)
+    return x, rest
 
 
 def _compromise(miss: Callable[[FloatArray], FloatArray], x: FloatArray, limits: FloatArray) -> FloatArray:

@@ -12,11 +12,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from flightstack.params.assembly import Part
+from flightstack.params.assembly import MATERIALS, Part
 from flightstack.params.errors import ConfigError
 from flightstack.params.vehicle import BUILT_IN, Vehicle, load_vehicle
-from sim_bridge.multibody.assembly import TOLERANCE, assemble, mass_table
+from sim_bridge.multibody.assembly import TOLERANCE, assemble
 from sim_bridge.multibody.mass import about_point, solid
+from sim_bridge.multibody.mass_table import mass_table, tuned_masses
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.plant import PlantOptions
 from sim_bridge.plants import make_plant
@@ -132,6 +133,27 @@ def test_no_inertia_is_written_by_hand_and_materials_keep_their_density(name: st
     assert "<inertial" not in model_xml(vehicle)
     densities = {placed.part.density_kg_m3 for placed in assemble(vehicle).parts if placed.body == 0}
     assert densities == {1600.0, 550.0, 2000.0, 1500.0, 4000.0, 1150.0}
+
+
+@pytest.mark.parametrize(("name", "most"), [("paper_quad", 1.6), ("x_quad", 3.0)])
+def test_masses_are_tuned_no_more_than_they_must(name: str, most: float) -> None:
+    """The paper's vehicle keeps every part near its usual mass; x_quad cannot, which the table shows."""
+    vehicle = load_vehicle(name)
+    assembly = assemble(vehicle)
+    factors = tuned_masses(vehicle, assembly)
+    on_frame = [factors[placed.part.name] for placed in assembly.parts if placed.body == 0]
+    assert max(on_frame) < most
+    assert min(on_frame) > 0.999 / most
+    assert max(on_frame) / min(on_frame) > 1.5  # not a table of ones
+    assert factors["column"] == pytest.approx(1.0)  # which no knob moves
+    table = mass_table(vehicle, assembly)
+    for part in ("plate", "motor_1", "propeller_1"):
+        line = next(line for line in table.splitlines() if line.startswith(part))
+        assert f" {factors[part]:.2f} " in line
+    # what turns has the density that its inertia asks for, whatever its material
+    propeller = next(placed for placed in assembly.parts if placed.part.name == "propeller_1")
+    assert propeller.part.density_kg_m3 == pytest.approx(factors["propeller_1"] * MATERIALS["propeller"])
+    assert "the density of what turns is free" in table
 
 
 @pytest.mark.parametrize(("mass", "inertia"), [(1.2, 1.0), (1.0, 0.7), (1.0, 1.3)])
