@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from gcs_cli.errors import USAGE, CliError
@@ -34,6 +36,28 @@ def fresh_directory(base: Path, name: str) -> Path:
         return _fresh(base, name)
     except OSError as error:
         raise CliError(f"{base}: the directory cannot be made: {error.strerror}", USAGE) from None
+
+
+@contextlib.contextmanager
+def results_directory(out: Path) -> Iterator[None]:
+    """Make a directory for results; take it away again when what follows fails before it has written anything.
+
+    Raise CliError (usage) when it cannot be made, or written to.
+    """
+    new = [folder for folder in (out, *out.parents) if not folder.exists()]
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if not os.access(out, os.W_OK | os.X_OK):
+            raise CliError(f"{out}: nothing can be written there: permission denied", USAGE)
+    except OSError as error:
+        raise CliError(f"{out}: the directory cannot be made: {error.strerror}", USAGE) from None
+    try:
+        yield
+    except BaseException:
+        with contextlib.suppress(OSError):  # of the first that holds something
+            for folder in new:
+                folder.rmdir()
+        raise
 
 
 def _fresh(base: Path, name: str) -> Path:

@@ -26,21 +26,21 @@ class LoopsChoice(NamedTuple):
         return self.kind in (HOST, EMULATED, SERIAL)
 
 
-def parse_loops(text: str) -> LoopsChoice:
-    """Read ``python``, ``c``, ``host``, ``emulated`` or ``serial:DEVICE[:BAUD]``; raise ConfigError."""
+def parse_loops(text: str, flag: str = "--loops") -> LoopsChoice:
+    """Read ``python``, ``c``, ``host``, ``emulated`` or ``serial:DEVICE[:BAUD]``; or ConfigError of ``flag``."""
     kind, _, rest = text.partition(":")
     if kind in (PYTHON, C, HOST, EMULATED) and not rest and not text.endswith(":"):
         return LoopsChoice(kind)
     if kind != SERIAL:
-        raise ConfigError("--loops", text, f"is none of {_KNOWN}")
+        raise ConfigError(flag, text, f"is none of {_KNOWN}")
     device, colon, ending = rest.rpartition(":")
     if not colon or not ending.isdecimal():  # a device's name may hold colons
         device, ending = rest, str(DEFAULT_BAUD)
     if not device:
-        raise ConfigError("--loops", text, "names no device: serial:/dev/ttyACM0 for instance")
+        raise ConfigError(flag, text, "names no device: serial:/dev/ttyACM0 for instance")
     baud = int(ending[:12])
     if baud < SLOWEST_BAUD:
-        raise ConfigError("--loops", text, f"has a baud rate too slow for a target: {SLOWEST_BAUD} at least")
+        raise ConfigError(flag, text, f"has a baud rate too slow for a target: {SLOWEST_BAUD} at least")
     if baud > 20_000_000:
-        raise ConfigError("--loops", text, "has a baud rate that no port has: 20000000 at most")
+        raise ConfigError(flag, text, "has a baud rate that no port has: 20000000 at most")
     return LoopsChoice(SERIAL, device, baud)

@@ -47,7 +47,8 @@ def fly(
         typer.Option(metavar="SPEC", help="As of sim-bridge, for example rotor:2:off@12.5; may be repeated."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Directory of the results.  [default: runs/<stamp>-<plan>]")
+        Path | None,
+        typer.Option("--out", "-o", help="Directory of the results.  [default: runs/<stamp>-<plan>]"),
     ] = None,
     vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
     instance: Annotated[int, typer.Option(help="Shifts all ports, to fly beside another one.")] = 0,

@@ -15,7 +15,8 @@ from gcs_cli.settings import JsonOption, settings_of
 def paper(
     context: typer.Context,
     out: Annotated[
-        Path, typer.Option(help="Directory of the results; those of a run before are replaced.")
+        Path,
+        typer.Option("--out", "-o", help="Directory of the results; those of a run before are replaced."),
     ] = Path("runs/paper"),
     no_pil: Annotated[bool, typer.Option("--no-pil", help="Leave out the loops on a target.")] = False,
     no_multibody: Annotated[
@@ -39,6 +40,7 @@ def paper(
     from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
     from gcs_cli.paper.printed import print_results  # noqa: PLC0415
     from gcs_cli.paper.run import HTML_NAME, PaperOptions, run  # noqa: PLC0415
+    from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
 
     if settings_of(context).connect is not None:
         raise CliError("paper flies vehicles of its own: leave --connect out", USAGE)
@@ -46,6 +48,7 @@ def paper(
         raise CliError("--port names a target for what --no-pil leaves out: give one of them", USAGE)
     options = PaperOptions(out, not no_pil, not no_multibody, jobs=jobs)
     if port is not None:
+        checked_target(port, flag="--port")
         options = options._replace(target=port)
     console = FlyConsole(stderr=as_json, highlight=False)
     results = run(options, console)

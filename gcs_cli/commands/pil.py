@@ -41,7 +41,8 @@ FailOverOption = Annotated[
     bool, typer.Option("--fail-over", help="Exit with 1 when a difference is over its limit.")
 ]
 OutOption = Annotated[
-    Path | None, typer.Option(help="Directory of the results.  [default: runs/<stamp>-<name>-pil]")
+    Path | None,
+    typer.Option("--out", "-o", help="Directory of the results.  [default: runs/<stamp>-<name>-pil]"),
 ]
 OpenOption = Annotated[bool, typer.Option("--open", help="Open the report afterwards.")]
 

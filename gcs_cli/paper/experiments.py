@@ -140,7 +140,9 @@ def _in_processes(
             found[waiting[future]] = future.result()
             tell(len(found), len(cases))
     except BrokenProcessPool:
-        raise CliError("a process that flew experiments was ended from outside; --jobs 1 needs none") from None
+        raise CliError(
+            "a process that flew experiments was ended from outside; --jobs 1 needs none"
+        ) from None
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
     return found

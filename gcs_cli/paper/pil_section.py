@@ -115,6 +115,14 @@ def mission_along(trajectory: Trajectory) -> Plan:
     return Plan(tuple(items), DEFAULT_HOME)
 
 
+def clear(folder: Path) -> None:
+    """Take away what a run before has left in ``folder``: it is not what the new results tell of."""
+    for controller in CONTROLLERS:
+        kept = folder / f"pil-{controller}"
+        if (kept / JSON_NAME).exists():
+            shutil.rmtree(kept, ignore_errors=True)
+
+
 def _item(command: Command, place: tuple[float, float, float, float]) -> MissionItem:
     north, east, down, yaw = place
     there = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, down))

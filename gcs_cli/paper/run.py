@@ -14,14 +14,16 @@ from typing import Any, NamedTuple
 from rich.console import Console
 
 from flightstack.atomic_file import write_text_atomically
-from gcs_cli.errors import FAILED, USAGE, CliError
+from gcs_cli.errors import FAILED, CliError
 from gcs_cli.paper import linear, pil_section, report_pictures
 from gcs_cli.paper.cases import MULTIBODY, all_cases
+from gcs_cli.paper.checks import check
 from gcs_cli.paper.experiments import Flown, default_jobs, run_cases
 from gcs_cli.paper.report import render
 from gcs_cli.paper.report_pictures import Picture
 from gcs_cli.paper.results import results_of, text_of
 from gcs_cli.paper.types import Case
+from gcs_cli.run_directory import results_directory
 from gcs_cli.transfer_bar import step_bar
 
 JSON_NAME, HTML_NAME = "results.json", "report.html"
@@ -43,21 +45,25 @@ class PaperOptions(NamedTuple):
 
 def run(options: PaperOptions, console: Console, cases: Sequence[Case] | None = None) -> dict[str, Any]:
     """Do it all and return the results; ``cases`` in place of the whole matrix. Raise CliError, ConfigError."""
-    _make_directory(options.out)
-    if options.pil and options.target != pil_section.EMULATED:
-        why = pil_section.problem(options.target)
-        if why is not None:  # before minutes are spent on the rest
-            raise CliError(why, USAGE)
     left_out = {} if options.pil else {"pil": NOT_WANTED}
     if not options.multibody:
         left_out[MULTIBODY] = NOT_WANTED
     elif importlib.util.find_spec("mujoco") is None:
         left_out[MULTIBODY] = NO_MUJOCO
     chosen = all_cases(MULTIBODY not in left_out) if cases is None else cases
+    check(chosen, options.target if options.pil else None)
+    with results_directory(options.out):
+        return _run(options, console, chosen, left_out)
+
+
+def _run(
+    options: PaperOptions, console: Console, chosen: Sequence[Case], left_out: dict[str, str]
+) -> dict[str, Any]:
     flown = _fly(chosen, options.jobs or default_jobs(), console)
     parts = {part: work for part, work in _parts(options).items() if part not in left_out}
     results = results_of(flown, {**left_out, **dict.fromkeys(parts, NOT_REACHED)})
     _write(options.out, results, flown)
+    pil_section.clear(options.out)  # of a run before
     for part, (words, work) in parts.items():
         with console.status(words):
             results[part] = found = work()
@@ -82,13 +88,6 @@ def _parts(options: PaperOptions) -> dict[str, tuple[str, Callable[[], Any]]]:
         "onset": ("onset of instability", linear.onset),
         "pil": ("processor in the loop", lambda: pil_section.run(options.out, options.target)),
     }
-
-
-def _make_directory(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CliError(f"{out}: the directory cannot be made: {error.strerror}", USAGE) from None
 
 
 def _fly(cases: Sequence[Case], jobs: int, console: Console) -> Flown:

@@ -26,12 +26,15 @@ _SERIAL_MEANING = (
 _STAGES = "MIL: the loops in Python, float64. SIL: the loops in C, float32, inside the flight stack. "
 
 
-def checked_target(text: str, more: tuple[str, ...] = ()) -> LoopsChoice:
-    """Read ``emulated``, ``host``, ``serial:DEVICE[:BAUD]`` or one of ``more``; raise CliError (usage), ConfigError."""
+def checked_target(text: str, more: tuple[str, ...] = (), flag: str = "--target") -> LoopsChoice:
+    """Read ``emulated``, ``host``, ``serial:DEVICE[:BAUD]`` or one of ``more``; raise CliError (usage), ConfigError.
+
+    ``flag`` is what the user wrote before it, for the sentence.
+    """
     if text.partition(":")[0] not in (HOST, EMULATED, SERIAL, *more):
         known = ", ".join([EMULATED, HOST, *more])
-        raise CliError(f"--target {text}: expected {known} or serial:DEVICE[:BAUD]", USAGE)
-    return parse_loops(text)
+        raise CliError(f"{flag} {text}: expected {known} or serial:DEVICE[:BAUD]", USAGE)
+    return parse_loops(text, flag)
 
 
 def check_there(target: LoopsChoice, controller: str) -> None:
