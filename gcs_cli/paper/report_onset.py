@@ -21,6 +21,7 @@ from gcs_cli.paper.report_labels import (
 from gcs_cli.report_plots import section
 
 _NAMES = {(contender.controller, contender.gains): contender.name for contender in CONTENDERS}
+_COLUMNS = ("axis", "controller", "#predicted", "#simulated", "#difference")
 _ONSET_NOTE = (
     "Predicted: the rate at which an eigenvalue of the sampled loop leaves the unit circle. Simulated: real loops and "
     "plant in flight, kicked by 10⁻⁷ rad/s about one axis, or told to go 10⁻⁷ m; the lowest rate at which that dies "
@@ -48,21 +49,20 @@ def loop_title(loop: Mapping[str, Any]) -> str:
 
 
 def onset_table(onset: Sequence[Mapping[str, Any]]) -> str:
-    """Return predicted and simulated rates of each setting, axis and loop."""
+    """Return predicted and simulated rates of each axis and loop, below a line for each setting of rotors and delay."""
     if not onset:
         return '<p class="none">Left out.</p>'
     rows, before, last = [], "", ""
     for entry in sorted(onset, key=lambda entry: _place(onset, entry)):
-        new, turn = entry["setting"] != before, entry["axis"] != last
-        before, last = entry["setting"], entry["axis"]
-        axis = AXIS_TITLES[last] if new or turn else ""
-        head = f"<th>{escape(before) if new else ''}</th><td>{escape(axis)}</td>"
+        if entry["setting"] != before:
+            before, last = entry["setting"], ""
+            rows.append(row(f'<th colspan="{len(_COLUMNS)}">{escape(before)}</th>', begins=True))
+        turn, last = entry["axis"] != last, entry["axis"]
+        head = f"<th>{escape(AXIS_TITLES[last] if turn else '')}</th>"
         rates = _rate_cell(entry["predicted_hz"]) + _rate_cell(entry["simulated_hz"])
         apart = cell(_percent(entry["difference_percent"]))
-        rows.append(row(f"{head}<td>{escape(loop_title(entry))}</td>{rates}{apart}", new))
-    return wide_table(
-        ("rotors and delay", "axis", "controller", "#predicted", "#simulated", "#difference"), rows
-    )
+        rows.append(row(f"{head}<td>{escape(loop_title(entry))}</td>{rates}{apart}"))
+    return wide_table(_COLUMNS, rows, style="grouped")
 
 
 def _place(onset: Sequence[Mapping[str, Any]], entry: Mapping[str, Any]) -> tuple[int, int]:
