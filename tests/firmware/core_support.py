@@ -105,6 +105,10 @@ class Core:
         """Return values as a contiguous array of the core's type, a copy."""
         return np.array(values, dtype=self.dtype, order="C")
 
+    def unwritten(self, *shape: int) -> np.ndarray:
+        """Return room for results of the core's type: what is left out shows as NaN."""
+        return np.full(shape, np.nan, self.dtype)
+
     def call(self, name: str, *arguments: Any) -> None:
         """Call a function of the driver; arrays are passed by address and may be written."""
         given = [

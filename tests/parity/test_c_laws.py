@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import dataclasses
 import functools
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -68,7 +69,7 @@ def position(real: str) -> dict[str, Compared]:
     )
     memory, dt_s, saturation = s.normal(3, 1.0), s.uniform(DT_S), s.choice(1, [-1.0, 0.0, 1.0])
     c = core(real)
-    c_memory, c_target = c.array(memory), np.zeros((COUNT, 5), c.dtype)
+    c_memory, c_target = c.array(memory), c.unwritten(COUNT, 5)
     c.call(
         "drive_position", COUNT, c_memory, c.array(states), c.array(setpoints), c.array(params), c.array(dt_s),
         c.array(saturation), c_target,
@@ -100,21 +101,18 @@ def test_position_loop_in_float_is_near() -> None:
 # ------------------------------------------------------------------ attitude reference
 
 
-def reference(real: str) -> dict[str, Compared]:
+def reference(real: str, rate: float = 2.0, most: float = 10.0) -> dict[str, Compared]:
+    """``rate``: standard deviation of what is turned with, ``most``: the largest limit of it [rad/s]."""
     s = Samples(COUNT, 2)
     attitude = s.attitudes()
     start = s.near(attitude, 0.1)
     end = s.near(start, 0.05)
-    memory = np.hstack([s.near(start, 0.05), s.normal(3, 2.0)])
-    params = s.uniform((0.0, 120.0), (0.5, 1.5), (1.0, 10.0), (20.0, 300.0))
+    memory = np.hstack([s.near(start, 0.05), s.normal(3, rate)])
+    params = s.uniform((0.0, 120.0), (0.5, 1.5), (1.0, most), (20.0, 300.0))
     params[s.random.random(COUNT) < 0.05, 0] = 0.0  # no filter
     fraction, dt_s = s.uniform((0.0, 1.2)), s.uniform(DT_S)
     c = core(real)
-    c_memory, c_reference, c_error = (
-        c.array(memory),
-        np.zeros((COUNT, 10), c.dtype),
-        np.zeros((COUNT, 3), c.dtype),
-    )
+    c_memory, c_reference, c_error = c.array(memory), c.unwritten(COUNT, 10), c.unwritten(COUNT, 3)
     c.call(
         "drive_reference", COUNT, c_memory, c.array(start), c.array(end), c.array(fraction), c.array(params),
         c.array(dt_s), c.array(attitude), c_reference, c_error,
@@ -147,6 +145,14 @@ def test_attitude_reference_in_double_is_pythons_to_1e_12() -> None:
         assert compared.relative() < 1e-12, name  # measured 2e-14
 
 
+def test_attitude_reference_turns_far_in_a_step_as_in_python() -> None:
+    """Half a radian and more, beyond what is summed up without a norm."""
+    for name, compared in reference("double", rate=30.0, most=60.0).items():
+        assert compared.relative() < 1e-12, name
+    for name, compared in reference("float", rate=30.0, most=60.0).items():
+        assert compared.full_scale_ulps().max() < REFERENCE_FLOAT_ULPS[name], name
+
+
 def test_attitude_reference_in_float_is_near() -> None:
     for name, compared in reference("float").items():
         assert compared.full_scale_ulps().max() < REFERENCE_FLOAT_ULPS[name], name
@@ -176,7 +182,7 @@ def pid(real: str) -> dict[str, Compared]:
         *[(0.0, 400.0)] * 3, *[(0.0, 300.0)] * 3, *[(0.0, 40.0)] * 3, *[(0.0, 1.0)] * 2, *INERTIAS
     )
     c = core(real)
-    c_memory, c_torque = c.array(memory), np.zeros((COUNT, 3), c.dtype)
+    c_memory, c_torque = c.array(memory), c.unwritten(COUNT, 3)
     c.call("drive_pid", COUNT, c_memory, c.array(inputs), c.array(params), c.array(dt_s), c_torque)
     py_memory, py_torque = memory.copy(), np.zeros((COUNT, 3))
     python.pid(py_memory, inputs, params, dt_s, py_torque)
@@ -191,7 +197,7 @@ def backstepping(real: str) -> dict[str, Compared]:
     inputs = attitude_inputs(s)
     params = s.uniform(*[(0.0, 40.0)] * 6, *[(0.0, 1.0)] * 2, *INERTIAS, (0.0, 1e-4))
     c = core(real)
-    c_torque, py_torque = np.zeros((COUNT, 3), c.dtype), np.zeros((COUNT, 3))
+    c_torque, py_torque = c.unwritten(COUNT, 3), np.zeros((COUNT, 3))
     c.call("drive_backstepping", COUNT, c.array(inputs), c.array(params), c_torque)
     python.backstepping(inputs, params, py_torque)
     return {"torque": Compared(c_torque.astype(np.float64), py_torque)}
@@ -291,8 +297,8 @@ def mixed(real: str, name: str, count: int = COUNT // 5) -> Mixed:
     )  # not narrowed: with float the rounding of these numbers is part of the difference
     c = core(real)
     flat = mixer_of_c(c, rotors)
-    speeds, achieved = np.full((count, 8), np.nan, c.dtype), np.zeros((count, 4), c.dtype)
-    saturation, relative = np.zeros((count, 4), c.dtype), np.zeros(count, c.dtype)
+    speeds, achieved, saturation = c.unwritten(count, 8), c.unwritten(count, 4), c.unwritten(count, 4)
+    relative = c.unwritten(count)
     c.call("drive_mixer", count, c.array(wrenches), flat, n, speeds, achieved, saturation, relative)
     ways = int(c.library.drive_mixer_ways(flat.ctypes.data_as(ctypes.c_void_p)))
     py_speeds, py_achieved, py_relative = np.zeros((count, n)), np.zeros((count, 4)), np.zeros(count)
@@ -348,6 +354,54 @@ WAYS = {"plus": 3, "cross": 3, "ideal": 3, "askew": 1, "octo": 3, "weak": 1, "ea
 @pytest.mark.parametrize("name", VEHICLES)
 def test_the_mixer_knows_which_short_ways_it_may_go(name: str, real: str) -> None:
     assert mixed(real, name, 1).ways == WAYS[name]
+
+
+def edge_wrenches(rotors: Mixer, rounding: float) -> np.ndarray:
+    """Wrenches at which a rotor is within 40 roundings of a limit, with next to no yaw or none."""
+    made = []
+    for tilt, steps in itertools.product((0.0, 0.3, -0.7), range(-40, 41)):
+        lift = np.array([rotors.high, rotors.low]) - rotors.allocation[:, 1] * tilt
+        for thrust in (lift / rotors.allocation[:, 0]).ravel() * (1.0 + steps * rounding):
+            made += [[thrust, tilt, 0.0, yaw] for yaw in (0.0, 1e-9, -1e-9)]
+    return np.array(made)
+
+
+@pytest.mark.parametrize(("real", "apart"), [("float", 3.0), ("double", 24.0)])  # measured 1.5 and 11.5
+@pytest.mark.parametrize("name", LIFTING)
+def test_no_rotor_is_asked_for_more_than_it_can_do_however_near_it_is(
+    name: str, real: str, apart: float
+) -> None:
+    rotors, c = mixer_for(VEHICLES[name]()), core(real)
+    rounding = float(np.finfo(c.dtype).eps)
+    wrenches = c.array(edge_wrenches(rotors, rounding)).astype(np.float64)
+    count, n = len(wrenches), rotors.spin.size
+    speeds, saturation = c.unwritten(count, 8), c.unwritten(count, 4)
+    rest = c.unwritten(count, 4), saturation, c.unwritten(count)
+    c.call("drive_mixer", count, c.array(wrenches), mixer_of_c(c, rotors), n, speeds, *rest)
+    turning, expected, achieved = speeds[:, :n].astype(np.float64), np.zeros((count, n)), np.zeros((count, 4))
+    python.mixer(wrenches, *rotors, expected, achieved, np.zeros(count))
+    lag = wrenches - achieved
+    told = saturation != 0.0  # rounding is taken for no limit
+    assert np.array_equal(np.sign(saturation)[told], (np.sign(lag) * (np.abs(lag) > 1e-9))[told])
+    squares, expected = turning * np.abs(turning), expected * np.abs(expected)
+    assert (
+        squares <= rotors.high + rounding * np.abs(rotors.high)
+    ).all()  # measured 0.45 of it: the root's own
+    assert (squares >= rotors.low - rounding * np.abs(rotors.low)).all()
+    assert np.abs(squares - expected).max() < apart * rounding * np.abs(rotors.high).max()
+
+
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_a_slow_rotor_turns_the_way_it_is_asked_to(real: str) -> None:
+    """Ideal rotors turn both ways; here slower than 1 rad/s, where a square is less than its root."""
+    rotors, c = mixer_for(VEHICLES["ideal"]()), core(real)
+    square = np.linspace(-0.9, 0.9, 7)
+    wrenches = np.zeros((7, 4))
+    wrenches[:, 0] = square / rotors.allocation[0, 0]
+    speeds, rest = c.unwritten(7, 8), [c.unwritten(7, 4), c.unwritten(7, 4), c.unwritten(7)]
+    c.call("drive_mixer", 7, c.array(wrenches), mixer_of_c(c, rotors), rotors.spin.size, speeds, *rest)
+    expected = np.sign(square) * np.sqrt(np.abs(square))
+    assert speeds[:, :4] == pytest.approx(np.tile(expected[:, None], 4), rel=1e-6, abs=1e-6)
 
 
 def undoes(real: str, rotors: Mixer) -> bool:
