@@ -16,14 +16,26 @@ _BUCKETS_PER_PIXEL = 0.6  # two points each
 _CROSS = 4.0
 
 
+_SHAPES = {
+    "s2": "M0,-5v10M-5,0h10",  # plus
+    "s3": "M0,-5l4,5l-4,5l-4,-5z",  # diamond
+    "s4": "M-4,-4h8v8h-8z",  # square
+    "s5": "M0,-5l4.8,8.4h-9.6z",  # triangle
+    "s6": "M-4.5,0a4.5,4.5,0,1,0,9,0a4.5,4.5,0,1,0,-9,0",  # circle
+}
+"""By style, around the point; a cross for the others. They let see what lies on top of each other."""
+
+
 class Mark(NamedTuple):
-    """A point: a cross, or a dot where ``dot``; pointing at it shows ``hint``."""
+    """A point, pointing at which shows ``hint``: a cross, a dot where ``dot``."""
 
     x: float
     y: float
     style: str
     hint: str = ""
     dot: bool = False
+    own_shape: bool = False
+    """Drawn in the shape of its style in place of a cross."""
 
 
 class Frame(NamedTuple):
@@ -81,5 +93,9 @@ def drawn_mark(mark: Mark, frame: Frame) -> str:
     if mark.dot:
         return circle(f"dot {mark.style}", x, y, 3.5, mark.hint)
     title = f"<title>{escape(mark.hint)}</title>" if mark.hint else ""
+    shape = _SHAPES.get(mark.style) if mark.own_shape else None
+    if shape is not None:
+        place = f"translate({x:.1f} {y:.1f})"
+        return f'<path class="cross {mark.style}" transform="{place}" d="{shape}">{title}</path>'
     d = f"M{x - _CROSS:.1f},{y - _CROSS:.1f}l{2 * _CROSS},{2 * _CROSS}m0,{-2 * _CROSS}l{-2 * _CROSS},{2 * _CROSS}"
     return f'<path class="cross {mark.style}" d="{d}">{title}</path>'

@@ -14,6 +14,8 @@ UNKNOWN = "–"
 LABELS = {contender.name: contender.label for contender in CONTENDERS}
 STYLES = {contender.name: f"s{index + 1}" for index, contender in enumerate(CONTENDERS)}
 """A colour and a dash pattern of its own for each contender."""
+OTHER_STYLE = "s8"
+"""Of what is no contender."""
 REFERENCE = "ref"
 PLANTS = {
     cases.SMALL_ANGLE: "small-angle model",
@@ -30,7 +32,7 @@ AXES = ("roll", "pitch", "yaw", "x", "y", "z")
 AXIS_TITLES = {
     "x": "x (north)",
     "y": "y (east)",
-    "z": "z (down)",
+    "z": "height −z",
     "roll": "roll φ",
     "pitch": "pitch θ",
     "yaw": "yaw ψ",

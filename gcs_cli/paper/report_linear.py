@@ -12,16 +12,15 @@ from gcs_cli.paper.linear.gains import AttitudeGains
 from gcs_cli.paper.linear.margins import response
 from gcs_cli.paper.linear.sampled import Actuators, AttitudeTick
 from gcs_cli.paper.report_axes import Axis, Guide, chart, spanning
-from gcs_cli.paper.report_curves import Mark
 from gcs_cli.paper.report_flights import STEP_SIZE
-from gcs_cli.paper.report_labels import ANGLES, AXES, AXIS_TITLES, STYLES, anchored, number
+from gcs_cli.paper.report_labels import ANGLES, AXIS_TITLES, anchored
 from gcs_cli.paper.report_margins import SPIN_UP_TITLE, Loops, margin_sections, own_feedback
-from gcs_cli.paper.report_onset import loop_name, loop_title, onset_section
+from gcs_cli.paper.report_onset import loop_title, onset_section
+from gcs_cli.paper.report_poles import loop_style, pole_maps
 from gcs_cli.report_chart import Line
 from gcs_cli.report_plots import section
 
 BODE_HZ = 1000.0
-_LEAST_SPAN = 4.0  # /s: of a pole map whose poles are all real
 _POINTS = 360
 _LOWEST_RAD_S = 1.0
 
@@ -32,15 +31,14 @@ def linear_sections(linear: Mapping[str, Any], onset: Sequence[Mapping[str, Any]
         yield anchored("linear", section("Linear analysis", f'<p class="none">Left out: {escape(why)}</p>'))
         return
     loops: Loops = linear["loops"]
-    legend = [(loop_title(loop), _style(loop), False) for loop in loops]
-    poles = "".join(_pole_map(loops, axis) for axis in AXES)
+    legend = [(loop_title(loop), loop_style(loop), False) for loop in loops]
     note = (
         "Continuous loops at hover. Attitude: feedback alone, without feed-forward and integral of the outer loop. x "
         "and y: with reference filter and attitude loop inside. The linear PD has backstepping's poles by "
         "construction; the paper's controllers share one height loop; a rate that is fed ahead moves no pole of an "
-        "attitude, but those of x and y. Pointing at a cross shows its numbers."
+        "attitude, but those of x and y. Pointing at a pole shows its numbers."
     )
-    body = f'<div class="pair">{poles}</div>'
+    body = f'<div class="pair">{pole_maps(loops)}</div>'
     yield anchored("linear", section("Linear analysis: poles", body, legend, note))
     flown = Actuators(0, linear["motor_lag_s"])
     spinning = flown._replace(lead_s=linear["spin_up_lead_s"])
@@ -58,30 +56,6 @@ def linear_sections(linear: Mapping[str, Any], onset: Sequence[Mapping[str, Any]
     yield onset_section(onset)
 
 
-def _style(loop: Mapping[str, Any]) -> str:
-    return STYLES.get(loop_name(loop), "s6")
-
-
-def _pole_map(loops: Loops, axis: str) -> str:
-    marks = []
-    for loop in loops:
-        for real, imaginary in loop["axes"][axis]["poles"]:
-            sign = "+" if imaginary >= 0.0 else "−"
-            hint = f"{loop_title(loop)}: {number(real)} {sign} {number(abs(imaginary))} j /s"
-            marks.append(Mark(real, imaginary, _style(loop), hint))
-    real, imaginary = (np.array([mark[index] for mark in marks]) for index in (0, 1))
-    drawn = chart(
-        f"Poles of {axis}",
-        spanning("real part [1/s]", [real, np.zeros(1)], least=_LEAST_SPAN),
-        spanning("imaginary part [1/s]", [imaginary], least=_LEAST_SPAN),
-        [],
-        marks=marks,
-        guides=[Guide("", 0.0, upright=True)],
-        size=STEP_SIZE,
-    )
-    return f'<div><h3 class="plant">{escape(AXIS_TITLES[axis])}</h3>{drawn}</div>'
-
-
 def _bode(loops: Loops, axis: str, actuators: Actuators, title: str) -> str:
     dt_s = 1.0 / BODE_HZ
     frequency = np.geomspace(_LOWEST_RAD_S, 0.999 * np.pi * BODE_HZ, _POINTS)
@@ -91,8 +65,8 @@ def _bode(loops: Loops, axis: str, actuators: Actuators, title: str) -> str:
         values = response(AttitudeTick(law, BODE_HZ, actuators).open(), frequency * dt_s)
         turned = np.degrees(np.unwrap(np.angle(values)))
         turned -= 360.0 * np.round((turned[0] + 180.0) / 360.0)  # begins between −360° and 0°
-        gain.append(Line(loop_title(loop), frequency, 20.0 * np.log10(np.abs(values)), _style(loop)))
-        phase.append(Line(loop_title(loop), frequency, turned, _style(loop)))
+        gain.append(Line(loop_title(loop), frequency, 20.0 * np.log10(np.abs(values)), loop_style(loop)))
+        phase.append(Line(loop_title(loop), frequency, turned, loop_style(loop)))
     along = Axis("frequency [rad/s]", _LOWEST_RAD_S, 1.25 * np.pi * BODE_HZ, log=True)
     heading = f'<h3 class="plant">{escape(title)}</h3>'
     above = chart(
