@@ -6,17 +6,21 @@ import json
 import math
 import os
 import sys
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from flightstack.contract import Vector3
 from flightstack.params.errors import ConfigError
-from sim_bridge import arguments
+from sim_bridge import arguments, options
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.export_command import export_mjcf
 from sim_bridge.live_view import LiveView
 from sim_bridge.render_command import render, require
+
+if TYPE_CHECKING:
+    from sim_bridge.plant import InitialState
+    from sim_bridge.server import ServerOptions
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None)
 
@@ -24,16 +28,6 @@ app = typer.Typer(add_completion=False, rich_markup_mode=None)
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
 _ZERO = "0,0,0"
-_VehicleOption = Annotated[str, typer.Option(help="Built-in vehicle (paper_quad, x_quad) or a TOML file.")]
-_PlantOption = Annotated[str, typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")]
-_WindOption = Annotated[str, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")]
-_GustOption = Annotated[float, typer.Option(help="Standard deviation of the gusts, m/s.")]
-_ForceOption = Annotated[str, typer.Option(metavar="N,E,D", help="Constant external force, N.")]
-_TorqueOption = Annotated[str, typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")]
-_TorqueGustOption = Annotated[
-    float, typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
-]
-_SeedOption = Annotated[int, typer.Option(help="Seed of the gusts.")]
 
 
 def _disturbance(wind: str, gust: float, force: str, torque: str, torque_gust: float) -> Any:
@@ -51,51 +45,27 @@ def _disturbance(wind: str, gust: float, force: str, torque: str, torque_gust: f
 @app.callback(invoke_without_command=True)
 def run(
     context: typer.Context,
-    vehicle: _VehicleOption = "paper_quad",
-    plant: _PlantOption = "rigid",
-    speed: Annotated[
-        str, typer.Option(metavar="max|N", help="N times real time, or as fast as it goes.")
-    ] = "1",
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[
-        int | None, typer.Option(help="TCP port; 0 takes a free one.  [default: 4560 + instance]")
-    ] = None,
-    instance: Annotated[int, typer.Option(help="Number of the vehicle, from 0.")] = 0,
-    seed: _SeedOption = 1,
-    wind: _WindOption = "0,0",
-    gust: _GustOption = 0.0,
-    force: _ForceOption = _ZERO,
-    torque: _TorqueOption = _ZERO,
-    torque_gust: _TorqueGustOption = 0.0,
-    ideal_rotors: Annotated[bool, typer.Option("--ideal-rotors", help="No rotor lag, no limits.")] = False,
-    physics_hz: Annotated[float, typer.Option(help="Lowest rate of the integration steps.")] = 1000.0,
-    battery_start: Annotated[
-        float | None, typer.Option(metavar="PERCENT", help="Charge at the start.  [default: 100]")
-    ] = None,
-    battery_capacity: Annotated[
-        float | None, typer.Option(metavar="MAH", help="Capacity.  [default: the vehicle's]")
-    ] = None,
-    battery_drain: Annotated[
-        float | None, typer.Option(metavar="FACTOR", help="Let the charge fall so many times as fast.")
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="SPEC",
-            help="rotor:N:off, rotor:N:weak=SHARE, rotor:N:stuck=RAD_S, state:freeze, state:nan, state:drop or "
-            "battery:level=SHARE, each with @BEGIN or @BEGIN-END in seconds; may be repeated.",
-        ),
-    ] = None,
-    home: Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Where the vehicle stands.")] = (
-        "47.397742,8.545594,488.0"
-    ),
-    view: Annotated[bool, typer.Option("--view", help="Show the vehicle in a window.")] = False,
-    timeout: Annotated[
-        float | None,
-        typer.Option(
-            help="Seconds to wait for the flight stack.  [default: for ever to connect, then 30 to answer]"
-        ),
-    ] = None,
+    vehicle: options.Vehicle = "paper_quad",
+    plant: options.Plant = "rigid",
+    speed: options.Speed = "1",
+    host: options.Host = "127.0.0.1",
+    port: options.Port = None,
+    instance: options.Instance = 0,
+    seed: options.Seed = 1,
+    wind: options.Wind = "0,0",
+    gust: options.Gust = 0.0,
+    force: options.Force = _ZERO,
+    torque: options.Torque = _ZERO,
+    torque_gust: options.TorqueGust = 0.0,
+    ideal_rotors: options.IdealRotors = False,
+    physics_hz: options.PhysicsHz = 1000.0,
+    battery_start: options.BatteryStart = None,
+    battery_capacity: options.BatteryCapacity = None,
+    battery_drain: options.BatteryDrain = None,
+    fault: options.Faults = None,
+    home: options.Home = "47.397742,8.545594,488.0",
+    view: options.View = False,
+    timeout: options.Timeout = None,
 ) -> None:
     """Simulate a vehicle for one flight stack that connects over TCP; Ctrl-C ends."""
     if context.invoked_subcommand is not None:
@@ -105,18 +75,15 @@ def run(
     arguments.in_range("--seed", seed, 0, 2**63)
     from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
     from sim_bridge.plant import PlantOptions  # noqa: PLC0415
-    from sim_bridge.server import ServerOptions, serve  # noqa: PLC0415
-    from sim_bridge.simulator import FASTEST_PHYSICS_HZ, SLOWEST_PHYSICS_HZ  # noqa: PLC0415
+    from sim_bridge.server import ServerOptions  # noqa: PLC0415
 
     loaded = load_vehicle(vehicle)
-    options = ServerOptions(
+    battery = arguments.battery(loaded, battery_start, battery_capacity, battery_drain)
+    disturbance = _disturbance(wind, gust, force, torque, torque_gust)
+    served = ServerOptions(
         vehicle=loaded,
         plant=plant,
-        plant_options=PlantOptions(
-            _disturbance(wind, gust, force, torque, torque_gust),
-            seed,
-            battery=arguments.battery(loaded, battery_start, battery_capacity, battery_drain),
-        ),
+        plant_options=PlantOptions(disturbance, seed, battery=battery),
         faults=arguments.faults(fault or [], loaded),
         home=arguments.home(home),
         speed=arguments.speed(speed),
@@ -124,69 +91,78 @@ def run(
         port=4560 + instance if port is None else int(arguments.in_range("--port", port, 0, 65535)),
         system_id=instance + 1,
         ideal_rotors=ideal_rotors,
-        physics_hz=arguments.in_range("--physics-hz", physics_hz, SLOWEST_PHYSICS_HZ, FASTEST_PHYSICS_HZ),
+        physics_hz=arguments.physics_hz(physics_hz),
         timeout_s=None if timeout is None else arguments.in_range("--timeout", timeout, 0.001, 1e6),
     )
-    if view:
-        require("sim-bridge --view")
-        options = options._replace(view=LiveView(vehicle))
+    raise typer.Exit(_serve(served, vehicle if view else None))
+
+
+def _serve(served: ServerOptions, viewed: str | None) -> int:
+    """Run the simulator, with a window on the vehicle ``viewed`` if there is one; return the exit code."""
+    from sim_bridge.server import serve  # noqa: PLC0415
+
+    if viewed is None:
+        return serve(served)
+    require("sim-bridge --view")
+    window = LiveView(viewed)
     try:
-        code = serve(options)
+        return serve(served._replace(view=window))
     finally:
-        if options.view is not None:
-            options.view.close()
-    raise typer.Exit(code)
+        window.close()
 
 
 @app.command("open-loop")
 def open_loop(
-    rotors: Annotated[str, typer.Option(metavar="W1,W2,…", help="Rotor speeds, rad/s, held constant.")],
-    seconds: Annotated[float, typer.Option(help="Time to fly.")],
-    vehicle: _VehicleOption = "paper_quad",
-    plant: _PlantOption = "rigid",
-    pos: Annotated[str, typer.Option(metavar="N,E,D", help="Position at the start, m.")] = _ZERO,
-    vel: Annotated[str, typer.Option(metavar="N,E,D", help="Velocity at the start, m/s.")] = _ZERO,
-    euler_deg: Annotated[str, typer.Option(metavar="ROLL,PITCH,YAW", help="Attitude at the start.")] = _ZERO,
-    rates: Annotated[str, typer.Option(metavar="P,Q,R", help="Body rates FRD at the start, rad/s.")] = _ZERO,
-    dt: Annotated[float, typer.Option(help="Step of the integration, s.")] = 0.001,
-    no_ground: Annotated[bool, typer.Option("--no-ground", help="Fly without a ground.")] = False,
-    no_lag: Annotated[
-        bool, typer.Option("--no-lag", help="Rotors turn at their speeds from the start.")
-    ] = False,
-    wind: _WindOption = "0,0",
-    gust: _GustOption = 0.0,
-    force: _ForceOption = _ZERO,
-    torque: _TorqueOption = _ZERO,
-    torque_gust: _TorqueGustOption = 0.0,
-    seed: _SeedOption = 1,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    rotors: options.Rotors,
+    seconds: options.Seconds,
+    vehicle: options.Vehicle = "paper_quad",
+    plant: options.Plant = "rigid",
+    pos: options.Position = _ZERO,
+    vel: options.Velocity = _ZERO,
+    euler_deg: options.EulerDeg = _ZERO,
+    rates: options.Rates = _ZERO,
+    dt: options.Step = 0.001,
+    no_ground: options.NoGround = False,
+    no_lag: options.NoLag = False,
+    wind: options.Wind = "0,0",
+    gust: options.Gust = 0.0,
+    force: options.Force = _ZERO,
+    torque: options.Torque = _ZERO,
+    torque_gust: options.TorqueGust = 0.0,
+    seed: options.Seed = 1,
+    as_json: options.Json = False,
 ) -> None:
     """Print the state after some time at constant rotor speeds (taken as given, without limits)."""
     arguments.plant(plant)
     arguments.in_range("--seconds", seconds, 0.0, 1e5)
     arguments.in_range("--dt", dt, 1e-6, 1.0)
     arguments.in_range("--seed", seed, 0, 2**63)
-    roll, pitch, yaw = (math.radians(angle) for angle in arguments.vector("--euler-deg", euler_deg))
-    position = arguments.vector("--pos", pos)
-    if position.z > 0.0 and not no_ground:
-        raise UsageProblemError(f"--pos: {position.z:g} m down is below the ground; add --no-ground")
+    initial = _initial(pos, vel, euler_deg, rates, no_ground)
     from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
-    from sim_bridge.plant import InitialState  # noqa: PLC0415
     from sim_bridge.server import complain  # noqa: PLC0415
 
     loaded = load_vehicle(vehicle)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
-    velocity, rates_frd = arguments.vector("--vel", vel), arguments.vector("--rates", rates)
     state = run_open_loop(
         OpenLoop(
-            loaded, plant, arguments.rotor_speeds(rotors, loaded),
-            InitialState(position, velocity, Vector3(roll, pitch, yaw), rates_frd),
+            loaded, plant, arguments.rotor_speeds(rotors, loaded), initial,
             seconds, dt, not no_ground, not no_lag, disturbance, seed,
         ),
         warn=complain,
     )  # fmt: skip
     _print(json.dumps(state) if as_json else _table(state))
+
+
+def _initial(pos: str, vel: str, euler_deg: str, rates: str, no_ground: bool) -> InitialState:
+    from sim_bridge.plant import InitialState  # noqa: PLC0415
+
+    roll, pitch, yaw = (math.radians(angle) for angle in arguments.vector("--euler-deg", euler_deg))
+    position = arguments.vector("--pos", pos)
+    if position.z > 0.0 and not no_ground:
+        raise UsageProblemError(f"--pos: {position.z:g} m down is below the ground; add --no-ground")
+    velocity, rates_frd = arguments.vector("--vel", vel), arguments.vector("--rates", rates)
+    return InitialState(position, velocity, Vector3(roll, pitch, yaw), rates_frd)
 
 
 app.command()(render)

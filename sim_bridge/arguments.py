@@ -16,10 +16,14 @@ from sim_bridge.plant_names import MULTIBODY, NO_MUJOCO, PLANT_NAMES
 _LONGEST_QUOTE = 60
 
 
+def _quoted(text: str) -> str:
+    return repr(text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…")
+
+
 def numbers(flag: str, text: str, counts: tuple[int, ...]) -> tuple[float, ...]:
     """Read finite numbers separated by commas, as many as one of ``counts``."""
     wanted = " or ".join(str(count) for count in counts)
-    shown = repr(text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…")
+    shown = _quoted(text)
     parts = text.split(",")
     try:
         values = tuple(float(part) for part in parts)
@@ -33,6 +37,19 @@ def numbers(flag: str, text: str, counts: tuple[int, ...]) -> tuple[float, ...]:
     for value in values:
         in_range(flag, value, -1e9, 1e9)
     return values
+
+
+def times(flag: str, text: str, most: int) -> tuple[float, ...]:
+    """Read one or more times [s] separated by commas, at most ``most``."""
+    count = text.count(",") + 1
+    if count > most:
+        raise UsageProblemError(f"{flag}: {count} times are too many, at most {most} are allowed")
+    try:
+        return numbers(flag, text, (count,))
+    except UsageProblemError:
+        raise UsageProblemError(
+            f"{flag}: {_quoted(text)} is not one or more times in seconds, separated by commas"
+        ) from None
 
 
 def vector(flag: str, text: str) -> Vector3:
@@ -74,6 +91,13 @@ def speed(text: str) -> float:
     except ValueError:
         raise UsageProblemError(f"--speed: {text!r} is neither a number nor max") from None
     return in_range("--speed", value, 1e-3, 1e4)
+
+
+def physics_hz(value: float) -> float:
+    """Check the rate of the integration steps."""
+    from sim_bridge.simulator import FASTEST_PHYSICS_HZ, SLOWEST_PHYSICS_HZ  # noqa: PLC0415  # slow to load
+
+    return in_range("--physics-hz", value, SLOWEST_PHYSICS_HZ, FASTEST_PHYSICS_HZ)
 
 
 def home(text: str) -> GeoPoint:
