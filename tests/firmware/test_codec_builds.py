@@ -27,6 +27,16 @@ SAME_EVERYWHERE = "1c6d29ce"
 """What codec_self_hash prints: on a host with gcc and clang, on a Cortex-M4, on an AVR, whose int has 16 bits."""
 
 
+def test_nothing_is_decided_by_memory_that_was_never_written(tmp_path: Path) -> None:
+    """MemorySanitizer, which clang alone has: a candidate frame lies on the stack and is filled in step by step."""
+    flags = ["-fsanitize=memory", "-fno-sanitize-recover=all", "-g", "-O1"]
+    program = compile_c(
+        tmp_path / "driver", [*SOURCES, SHIM, DRIVER], *flags, *WARNINGS, cc=compiler("clang")
+    )
+    done = subprocess.run([program], input=stream(11, 3_000), check=False, capture_output=True, timeout=120)
+    assert done.returncode == 0, done.stderr.decode()
+
+
 @pytest.mark.parametrize("name", ["gcc", "clang"])
 def test_nothing_undefined_happens(name: str, tmp_path: Path) -> None:
     """Parse, decode and encode a damaged stream in all eight ways; a sanitiser that sees a fault ends it."""

@@ -146,6 +146,14 @@ def test_a_parser_that_does_not_look_inside_what_was_bad(plant: Plant, tmp_path:
     assert caught(test_codec_parser.test_a_lost_octet_costs_no_other_frame, codec, 1)
 
 
+def test_a_length_that_was_never_written(plant: Plant, tmp_path: Path) -> None:
+    """What lay on the stack is as good as right, mostly: only MemorySanitizer tells."""
+    right = "candidate->size = FS_HEADER_V1;"
+    plant("mavlink/fs_parser.c", right, ";")
+    assert not caught(test_codec_builds.test_nothing_undefined_happens, "clang", tmp_path)
+    assert caught(test_codec_builds.test_nothing_is_decided_by_memory_that_was_never_written, tmp_path)
+
+
 SHIFTED = (
     "uint32_t high = fs_get_u16(payload, length, (uint16_t)(offset + 2U));\n\n    return low | (high << 16);"
 )
