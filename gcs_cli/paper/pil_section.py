@@ -31,9 +31,16 @@ from gcs_cli.pil.targets import check_there, checked_target, meaning
 EMULATED = "emulated"
 CONTROLLERS = ("pid", "backstepping")
 GAINS, INNER_HZ, OUTER_HZ = "paper", 1000.0, 250.0
-PLANT = "paper"
-"""The paper's own. On the rigid body, whose rotors react when they spin up, Table II's yaw loop oscillates on the
-ground before takeoff, and flights that were one rounding apart rise at different times."""
+PLANT, RIGID = "paper", "rigid"
+"""The paper's own, and the one with all angles and the spin-up torque."""
+FLOWN = (("pid", PLANT), ("backstepping", PLANT), ("backstepping", RIGID))
+"""Controllers, and the plants that they fly on."""
+WHY_SO = (
+    "It is a mission, as a pilot uploads it, and not the trajectory of Fig. 7 itself: the vehicle's own guidance flies "
+    "from waypoint to waypoint. The plant is the paper's; backstepping flies the rigid body as well, and the PID does "
+    "not: there, where rotors react when they spin up, Table II's yaw loop is unstable, oscillates on the ground "
+    "before takeoff, and lets flights that were one rounding apart rise at different times."
+)
 TRAJECTORY = "desired"
 _FIRST_INSTANCE = 90
 _INTERRUPTED = "interrupted"
@@ -46,7 +53,14 @@ _OF_FLIGHT = ("outcome", "loops", "ticks", "airborne_ticks", "sim_time_s")
 
 def left_out(why: str, target: str = EMULATED) -> dict[str, Any]:
     """Return what stands in ``results.json`` in place of the section, with the sentence why."""
-    return {"target": target, "why_left_out": why, "meaning": "", "mission": "", "controllers": {}}
+    return {
+        "target": target,
+        "why_left_out": why,
+        "meaning": "",
+        "mission": "",
+        "controllers": {},
+        "rigid": {},
+    }
 
 
 def problem(target: str = EMULATED) -> str | None:
@@ -66,7 +80,7 @@ def run(
     tell: Callable[[str], None] | None = None,
     instance: int | None = None,
 ) -> dict[str, Any]:
-    """Fly MIL, SIL and PIL with both controllers; leave each comparison in ``folder/pil-<controller>``.
+    """Fly MIL, SIL and PIL with both controllers; leave each comparison in a folder that ``folder_name`` names.
 
     Without the tools of the emulated target the section is left out and says why; a board that was asked for and is
     not there raises CliError, and Ctrl-C KeyboardInterrupt. ``tell`` hears what is done next; ``instance`` shifts the
@@ -78,25 +92,35 @@ def run(
             raise CliError(why, USAGE)
         return left_out(why, target)
     plan = mission_along(load_trajectory(TRAJECTORY))
-    controllers = {}
-    for controller in CONTROLLERS:
+    found: dict[str, dict[str, Any]] = {PLANT: {}, RIGID: {}}
+    for controller, plant in FLOWN:
         if tell is not None:
-            tell(f"processor in the loop: {controller}")
-        finished = _fly(folder, controller, target, plan, instance)
+            tell(f"processor in the loop: {controller}{'' if plant == PLANT else ', ' + plant}")
+        finished = _fly(folder, controller, target, plan, instance, plant)
         if finished.problem is not None and finished.problem.exit_code == USAGE:
             raise finished.problem
-        controllers[controller] = repeatable(finished.outcome.result)
+        found[plant][controller] = repeatable(finished.outcome.result)
     return {
         "target": target,
         "why_left_out": None,
         "meaning": meaning(checked_target(target)),
         "mission": _about(plan),
+        "why_so": WHY_SO,
         "gains": GAINS,
         "plant": PLANT,
         "inner_hz": INNER_HZ,
         "outer_hz": OUTER_HZ,
-        "controllers": controllers,
+        "controllers": found[PLANT],
+        "rigid": found[RIGID],
     }
+
+
+def clear(folder: Path) -> None:
+    """Take away what a run before has left in ``folder``: it is not what the new results tell of."""
+    for controller, plant in FLOWN:
+        kept = folder / folder_name(controller, plant)
+        if (kept / JSON_NAME).exists():
+            shutil.rmtree(kept, ignore_errors=True)
 
 
 def mission_along(trajectory: Trajectory) -> Plan:
@@ -115,14 +139,6 @@ def mission_along(trajectory: Trajectory) -> Plan:
     return Plan(tuple(items), DEFAULT_HOME)
 
 
-def clear(folder: Path) -> None:
-    """Take away what a run before has left in ``folder``: it is not what the new results tell of."""
-    for controller in CONTROLLERS:
-        kept = folder / f"pil-{controller}"
-        if (kept / JSON_NAME).exists():
-            shutil.rmtree(kept, ignore_errors=True)
-
-
 def _item(command: Command, place: tuple[float, float, float, float]) -> MissionItem:
     north, east, down, yaw = place
     there = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, down))
@@ -136,15 +152,22 @@ def _about(plan: Plan) -> str:
     return f"takeoff, {corners} waypoints where a move of the desired trajectory ends, landing"
 
 
-def _fly(folder: Path, controller: str, target: str, plan: Plan, instance: int | None) -> Finished:
+def folder_name(controller: str, plant: str) -> str:
+    """Return the name of the folder in which a comparison is left."""
+    return f"pil-{controller}" if plant == PLANT else f"pil-{controller}-{plant}"
+
+
+def _fly(
+    folder: Path, controller: str, target: str, plan: Plan, instance: int | None, plant: str = PLANT
+) -> Finished:
     """Fly beside the results of a run before, and replace them when all is there."""
-    kept = folder / f"pil-{controller}"
+    kept = folder / folder_name(controller, plant)
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder, prefix=".pil-") as workshop:
         path = Path(workshop) / f"{TRAJECTORY}.plan"
         save_plan(path, plan)
         options = FlyOptions(
-            path, controller, GAINS, PLANT, inner_hz=INNER_HZ, outer_hz=OUTER_HZ,
+            path, controller, GAINS, plant, inner_hz=INNER_HZ, outer_hz=OUTER_HZ,
             instance=_free_instance() if instance is None else instance,
         )  # fmt: skip
         console = Console(file=io.StringIO())

@@ -18,15 +18,16 @@ from gcs_cli.paper.report_flights import (
     beside,
     desired_figure,
     response_figures,
-    step_figure,
 )
-from gcs_cli.paper.report_labels import ANGLES, LABELS, PLANTS, anchored
+from gcs_cli.paper.report_labels import LABELS, anchored
 from gcs_cli.paper.report_linear import linear_sections
 from gcs_cli.paper.report_matrix import matrix_sections
-from gcs_cli.paper.report_metrics import metrics_table, step_table
+from gcs_cli.paper.report_metrics import metrics_table
+from gcs_cli.paper.report_moves import move_sections
 from gcs_cli.paper.report_pictures import Picture, pictures_section
 from gcs_cli.paper.report_pil import pil_sections
 from gcs_cli.paper.report_plants import plants_section
+from gcs_cli.paper.report_steps import step_sections
 from gcs_cli.paper.report_summary import summary_section, tiles
 from gcs_cli.paper.report_tables import corrections_section, tables_section
 from gcs_cli.report_plots import section
@@ -48,11 +49,13 @@ _NAVIGATION = (
     ("plants", "Plants"),
     ("fig-14", "Fig. 14"),
     ("hard", "Hard profile"),
+    ("moves-hard-paper", "Overshoot"),
     ("matrix-hard-paper", "Disturbances"),
     ("fig-15", "Fig. 15, PIL"),
     ("linear", "Poles"),
     ("bode", "Open loops"),
     ("margins", "Margins"),
+    ("margins-outer", "x, y, z"),
     ("onset", "Lowest rate"),
     ("conditions", "How it was made"),
 )
@@ -97,10 +100,11 @@ def _sections(
     yield desired_figure(recordings)
     yield from response_figures(recordings)
     yield _metrics(found, recordings)
-    yield from _steps(found, recordings)
-    yield plants_section(results["plants"], recordings, left_out.get(cases.MULTIBODY, ""))
+    yield from step_sections(results, recordings)
+    yield plants_section(results, recordings, left_out.get(cases.MULTIBODY, ""))
     yield from xy_figures(recordings)
     yield hard_over_time(recordings)
+    yield from move_sections(found)
     yield from matrix_sections(found)
     yield from pil_sections(results["pil"], left_out.get("pil", ""))
     yield from linear_sections(results["linear"], results["onset"] or (), left_out.get("linear", ""))
@@ -116,31 +120,18 @@ def _metrics(found: Mapping[str, Any], recordings: Recordings) -> str:
     if others:
         table += f"<details><summary>The same of the other gains</summary>{others}</details>"
     note = (
-        "Of figures 8 to 13. Overshoot is that of the worst move between two rests of the "
-        "axis; rise and settling time are those of the last one, from its begin: on this smooth trajectory they tell "
-        "of the reference as much as of the controller. Roll and pitch have no rests, so errors alone."
+        "Of figures 8 to 13. Overshoot is that of the worst move that began at rest; rise and settling time are those "
+        "of the last one that is watched for 4 s, from its begin: on this smooth trajectory they tell of the "
+        "reference as much as of the controller. Roll and pitch have no rests, so errors alone."
     )
     title = "Figures of the responses along the desired trajectory"
     return anchored("metrics", section(title, table, note=note))
 
 
-def _steps(found: Mapping[str, Any], recordings: Recordings) -> Iterator[str]:
-    plant = cases.SMALL_ANGLE
-    yield step_figure(recordings, "Steps of the attitude, inner loop alone", "steps", ANGLES, plant)
-    yield step_figure(recordings, "Steps of the position", "steps-position", ("x", "y", "z"), plant)
-    tables = ""
-    for name, title in PLANTS.items():
-        table = step_table(found, name)
-        if table:
-            unfolded = " open" if name == plant else ""
-            tables += f"<details{unfolded}><summary>{escape(title)}</summary>{table}</details>"
-    if tables:
-        note = "Of the axis that steps: what the paper's words of overshoot and stabilisation time have no numbers for."
-        yield anchored("step-figures", section("Figures of the steps", tables, note=note))
-
-
 def _conditions(results: Mapping[str, Any]) -> str:
-    conditions = results.get("conditions", {})
+    conditions = dict(results.get("conditions", {}))
+    if any(f"/{cases.NUDGE.name}/" in key for key in results["cases"]):
+        conditions[cases.NUDGE.name] = cases.NUDGE.label
     rows = "".join(
         f"<tr><th>{escape(name)}</th><td>{escape(label)}</td></tr>" for name, label in conditions.items()
     )

@@ -28,13 +28,18 @@ from gcs_cli.paper.report_labels import (
     row,
     wide_table,
 )
+from gcs_cli.paper.report_metrics import HOW_ENDED
 from gcs_cli.paper.types import Recording
 from gcs_cli.report_chart import Line
 from gcs_cli.report_plots import section
 
 XY_SIZE = (480, 400)
-OTHERS = (cases.POLES, cases.TUNED_PID)
-_CONDITION_TITLES = {cases.PLAIN: "with rotor limits and lag", cases.IDEAL: "without limits and lag"}
+OTHERS = (cases.POLES, cases.RATE_FED_PID, cases.TUNED_PID)
+_CONDITION_TITLES = {
+    cases.PLAIN: "with rotor limits, motors of 5 ms",
+    cases.NO_LIMITS: "no limits, motors of 5 ms",
+    cases.IDEAL: "ideal rotors",
+}
 
 
 def claims_section(claims: Sequence[Mapping[str, Any]]) -> str:
@@ -69,11 +74,14 @@ def xy_figures(recordings: Recordings) -> Iterator[str]:
     body = "".join(
         _xy(recordings, PAIR, trajectory, condition)
         for trajectory in (cases.SMOOTH, cases.HARD)
-        for condition in (cases.PLAIN, cases.IDEAL)
+        for condition in _CONDITION_TITLES
     )
     if not body:
         return
-    note = "Small-angle plant. North is up, east is right, a metre is as long in both directions."
+    note = (
+        "Small-angle plant. North is up, east is right, a metre is as long in both directions. Ideal rotors have no "
+        "limits, no lag and no spin-up torque."
+    )
     title = "Fig. 14: PID and backstepping in XY"
     yield anchored(
         "fig-14", section(title, f'<div class="pair">{body}</div>', legend_of(PAIR, "desired"), note)
@@ -82,7 +90,10 @@ def xy_figures(recordings: Recordings) -> Iterator[str]:
         _xy(recordings, OTHERS, trajectory, cases.PLAIN) for trajectory in (cases.SMOOTH, cases.HARD)
     )
     if others:
-        note = "Small-angle plant. What our gains do in the PID, and what backstepping's poles do without backstepping."
+        note = (
+            "Small-angle plant. What backstepping's poles do without backstepping, what the PID of Table II does when "
+            "it is fed the reference's rate as backstepping is, and what our gains do in it."
+        )
         title = "Beside figure 14: other gains in the same laws"
         legend = legend_of(OTHERS, "desired")
         yield anchored("fig-14-others", section(title, f'<div class="pair">{others}</div>', legend, note))
@@ -143,6 +154,8 @@ def _xy(recordings: Recordings, contenders: Sequence[str], trajectory: str, cond
 
 def _crashes(flown: Mapping[str, Recording]) -> str:
     told = [
-        f"{LABELS[name]} {one.ended_why} at {one.ended_s:.2f} s" for name, one in flown.items() if one.ended_s
+        f"{LABELS[name]} {HOW_ENDED[one.ended_how]}: {one.ended_why} at {one.ended_s:.2f} s"
+        for name, one in flown.items()
+        if one.ended_s
     ]
     return f' <span class="bad">{escape("; ".join(told))}</span>' if told else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
@@ -34,7 +34,6 @@ Cases = Mapping[str, Mapping[str, Any]]
 PAIR = (cases.PID, cases.BACKSTEPPING)
 ERROR_SIZE = (480, 150)
 STEP_SIZE = (480, 220)
-_STEP_SHOWN_S = 2.5
 _FIGURES = {"roll": 8, "pitch": 9, "yaw": 10, "x": 11, "y": 12, "z": 13}
 _COLUMN = {"x": 0, "y": 1, "z": 2, "roll": 0, "pitch": 1, "yaw": 2}
 _LEAST = {False: 0.02, True: 0.2}
@@ -51,11 +50,22 @@ def signals(recording: Recording, axis: str) -> tuple[FloatArray, FloatArray]:
     return sign * recording.reference[:, column], sign * recording.position_ned_m[:, column]
 
 
+def response_lines(flown: Mapping[str, Recording], axis: str) -> list[Line]:
+    """Return the reference of the first flight, and the response of each contender."""
+    lines: list[Line] = []
+    for name, recording in flown.items():
+        wanted, got = signals(recording, axis)
+        if not lines:
+            lines.append(Line("reference", recording.time_s, wanted, REFERENCE))
+        lines.append(Line(LABELS[name], recording.time_s, got, STYLES[name]))
+    return lines
+
+
 def label(axis: str) -> str:
     """Return the label of an axis of a chart."""
     if axis in ANGLES:
         return f"{AXIS_TITLES[axis]} [°]"
-    return "height −z [m]" if axis == "z" else f"{AXIS_TITLES[axis]} [m]"
+    return f"{AXIS_TITLES[axis]} [m]"
 
 
 def over_time(recording: Recording) -> Axis:
@@ -123,13 +133,9 @@ def beside(recordings: Recordings) -> list[str]:
 
 def _column(recordings: Recordings, axis: str, plant: str) -> str:
     pair = {name: recordings[cases.key(name, cases.DESIRED, cases.PLAIN, plant)] for name in PAIR}
-    lines: list[Line] = []
-    errors: list[Line] = []
+    lines, errors = response_lines(pair, axis), []
     for name, recording in pair.items():
         wanted, got = signals(recording, axis)
-        if not lines:
-            lines.append(Line("reference", recording.time_s, wanted, REFERENCE))
-        lines.append(Line(LABELS[name], recording.time_s, got, STYLES[name]))
         errors.append(Line(LABELS[name], recording.time_s, got - wanted, f"{STYLES[name]} thin"))
     time = over_time(max(pair.values(), key=lambda recording: len(recording.time_s)))
     least = _LEAST[axis in ANGLES]
@@ -150,44 +156,3 @@ def _column(recordings: Recordings, axis: str, plant: str) -> str:
         size=ERROR_SIZE,
     )
     return f"<div>{head}{response}{missing}</div>"
-
-
-def step_figure(recordings: Recordings, title: str, anchor: str, axes: Sequence[str], plant: str) -> str:
-    """Return the responses of all contenders to steps of these axes."""
-    charts, names = [], []
-    for axis in axes:
-        flown = {
-            name: recordings[key]
-            for name in LABELS
-            if (key := cases.key(name, f"step_{axis}", cases.PLAIN, plant)) in recordings
-        }
-        if not flown:
-            continue
-        names = list(flown)
-        charts.append(_step_chart(flown, axis))
-    if not charts:
-        return ""
-    body = f'<div class="pair">{"".join(charts)}</div>'
-    return anchored(anchor, section(title, body, legend_of(names)))
-
-
-def _step_chart(flown: Mapping[str, Recording], axis: str) -> str:
-    lines: list[Line] = []
-    for name, recording in flown.items():
-        wanted, got = signals(recording, axis)
-        if not lines:
-            lines.append(Line("reference", recording.time_s, wanted, REFERENCE))
-        lines.append(Line(LABELS[name], recording.time_s, got, STYLES[name]))
-    begin_s = float(lines[0].x[int(np.argmax(lines[0].y != lines[0].y[0]))])
-    shown_s = _STEP_SHOWN_S if axis not in ANGLES else 0.2 * _STEP_SHOWN_S
-    shown_s *= 2.0 if axis in ("x", "y", "yaw") else 1.0
-    kept = [_between(line, begin_s - 0.08 * shown_s, begin_s + shown_s) for line in lines]
-    time = Axis("time [s]", begin_s - 0.08 * shown_s, begin_s + shown_s)
-    return chart(
-        f"Step of {axis}", time, spanning(label(axis), [line.y for line in kept]), kept, size=STEP_SIZE
-    )
-
-
-def _between(line: Line, start_s: float, end_s: float) -> Line:
-    within = (line.x >= start_s) & (line.x <= end_s)
-    return line._replace(x=line.x[within], y=line.y[within])

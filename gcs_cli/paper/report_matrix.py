@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
@@ -24,8 +25,6 @@ from gcs_cli.report_plots import section
 
 ALIKE = 0.01
 """Within this share of the best, somebody is as good."""
-TELLING_POINTS, SAME_POINTS = 0.5, 0.05
-"""Overshoots of a row that differ by less tell nobody apart; the least is marked, and what is written the same."""
 IN_METRES = 0.2
 """Shorter ones are written in millimetres."""
 _OPEN = ((cases.HARD, cases.SMALL_ANGLE), (cases.SMOOTH, cases.SMALL_ANGLE))
@@ -48,10 +47,10 @@ def matrix_sections(found: Cases) -> Iterator[str]:
 
 
 _MATRIX_NOTE = (
-    "Upper figure: RMS distance from the reference in space. Below: the largest error of one axis, and the largest "
-    "overshoot of x, y and z. Bold on colour: the smallest RMS of the row, and whatever is within 1 % of it. "
-    "Underlined: the smallest overshoot, where they differ. On the hard profile the largest error is a step itself, "
-    "whoever flies it."
+    "Upper figure: RMS distance from the reference in space. Below: the largest error of one axis, and the overshoot "
+    "over the moves of x, y and z that began at rest: the median, and the worst with its axis. Bold on colour: the "
+    "smallest RMS of the row, and whatever is within 1 % of it. On the hard profile the largest error is a step "
+    "itself, whoever flies it. A flight that lost control has no figures: what comes after is not what was asked for."
 )
 
 
@@ -72,8 +71,6 @@ def matrix_table(found: Cases, trajectory: str, plant: str) -> str:
 def _cells(flown: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     survivors = [case for case in flown.values() if case["ended"] is None]
     best = min((space_rms(case) for case in survivors), default=math.inf)
-    over = [value for case in survivors if (value := worst_overshoot(case)) is not None]
-    least = min(over) if over and max(over) - min(over) >= TELLING_POINTS else -math.inf
     for name in LABELS:
         case = flown.get(name)
         if case is None:
@@ -81,16 +78,17 @@ def _cells(flown: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
         elif case["ended"] is not None:
             yield f'<td class="bad">{escape(ending(case))}</td>'
         else:
-            yield _cell(case, best, least)
+            yield _cell(case, best)
 
 
-def _cell(case: Mapping[str, Any], best: float, least: float) -> str:
-    rms, over = space_rms(case), worst_overshoot(case)
+def _cell(case: Mapping[str, Any], best: float) -> str:
+    rms, over = space_rms(case), overshoots(case)
     largest = max(case["metrics"][axis]["max_error"] for axis in "xyz")
     style = ' class="best"' if rms <= best * (1.0 + ALIKE) else ""
-    beyond = "" if over is None else f"{fixed(over, 1)} % over"
-    if over is not None and over <= least + SAME_POINTS:
-        beyond = f"<u>{beyond}</u>"
+    beyond = ""
+    if over:
+        most = max(over, key=over.__getitem__)
+        beyond = f"{fixed(statistics.median(over.values()), 1)} % over, {most[0]} {fixed(over[most], 1)} %"
     figures = (
         f"<b{style}>{_length(rms, 3, 1)}</b><span>max {_length(largest, 2, 0)}</span><span>{beyond}</span>"
     )
@@ -106,7 +104,11 @@ def space_rms(case: Mapping[str, Any]) -> float:
     return math.sqrt(sum(case["metrics"][axis]["rms_error"] ** 2 for axis in "xyz"))
 
 
-def worst_overshoot(case: Mapping[str, Any]) -> float | None:
-    """Return the largest overshoot of x, y and z [%]; None where none is defined."""
-    there = [case["metrics"][axis]["overshoot_percent"] for axis in "xyz"]
-    return max((value for value in there if value is not None), default=None)
+def overshoots(case: Mapping[str, Any]) -> dict[tuple[str, float], float]:
+    """Return the overshoot [%] of each move of x, y and z that began at rest, by axis and time."""
+    return {
+        (axis, move["at_s"]): move["overshoot_percent"]
+        for axis in "xyz"
+        for move in case["metrics"][axis]["moves"]
+        if move["overshoot_percent"] is not None
+    }

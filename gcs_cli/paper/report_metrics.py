@@ -36,19 +36,26 @@ def metrics_table(found: Cases, trajectory: str, plants: Sequence[str], names: S
     return wide_table(_COLUMNS, rows) if rows else ""
 
 
-def step_table(found: Cases, plant: str) -> str:
+def step_table(found: Cases, plant: str, condition: str = cases.PLAIN) -> str:
     """Return the figures of each axis in the flight in which it steps; empty if nothing was flown."""
-    rows = [one for axis in AXES for one in _axis_rows(found, f"step_{axis}", axis, (plant,), LABELS)]
+    rows = [
+        one for axis in AXES for one in _axis_rows(found, f"step_{axis}", axis, (plant,), LABELS, condition)
+    ]
     return wide_table(_COLUMNS, rows) if rows else ""
 
 
 def _axis_rows(
-    found: Cases, trajectory: str, axis: str, plants: Sequence[str], names: Iterable[str]
+    found: Cases,
+    trajectory: str,
+    axis: str,
+    plants: Sequence[str],
+    names: Iterable[str],
+    condition: str = cases.PLAIN,
 ) -> Iterator[str]:
     first = True
     for plant in plants:
         for name in names:
-            case = found.get(cases.key(name, trajectory, cases.PLAIN, plant))
+            case = found.get(cases.key(name, trajectory, condition, plant))
             if case is None:
                 continue
             head = f"<th>{escape(AXIS_TITLES[axis]) if first else ''}</th><td>{escape(LABELS[name])}</td>"
@@ -64,7 +71,8 @@ def metrics_cells(case: Mapping[str, Any], axis: str) -> str:
     if of is None:
         return '<td class="n" colspan="6">–</td>'
     factor, unit, places = (math.degrees(1.0), "°", 3) if axis in ANGLES else (1e3, "mm", 1)
-    errors = (of[name] for name in ("steady_state_error", "rms_error", "max_error"))
+    upwards = -1.0 if axis == "z" else 1.0  # a height is told, as it is drawn
+    errors = (upwards * of["steady_state_error"], of["rms_error"], of["max_error"])
     return "".join(
         (
             cell(with_unit(fixed(of["overshoot_percent"], 1), "%")),
@@ -80,7 +88,10 @@ def with_unit(shown: str, unit: str) -> str:
     return shown if shown == UNKNOWN else f"{shown}{'' if unit == '°' else ' '}{unit}"
 
 
+HOW_ENDED = {"crashed": "crashed", "lost": "lost control"}
+
+
 def ending(case: Mapping[str, Any]) -> str:
-    """Say when and why a flight ended before its time."""
+    """Say how, when and why a flight ended before its time."""
     ended = case["ended"]
-    return f"crashed at {fixed(ended['time_s'], 2)} s: {ended['why']}"
+    return f"{HOW_ENDED[ended['how']]} at {fixed(ended['time_s'], 2)} s: {ended['why']}"

@@ -6,8 +6,20 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
-from gcs_cli.paper.pil_section import EMULATED
-from gcs_cli.paper.report_labels import LABELS, PLANTS, STYLES, anchored, cell, fixed, number, row, wide_table
+from gcs_cli.paper.pil_section import EMULATED, folder_name
+from gcs_cli.paper.report_findings import pil_flights
+from gcs_cli.paper.report_labels import (
+    LABELS,
+    OTHER_STYLE,
+    PLANTS,
+    STYLES,
+    anchored,
+    cell,
+    fixed,
+    number,
+    row,
+    wide_table,
+)
 from gcs_cli.pil.histogram_chart import histogram_chart
 from gcs_cli.pil.profile import STAGE_TITLES, StageProfile
 from gcs_cli.pil.report_tables import checks_section, differences_section
@@ -45,17 +57,18 @@ def pil_sections(pil: Mapping[str, Any], why: str) -> Iterator[str]:
     )
     body = (
         f"<p>{escape(pil['meaning'])} Mission: {escape(pil['mission'])}; gains of the paper, {pil['inner_hz']:g} and "
-        f"{pil['outer_hz']:g} Hz, on the {escape(PLANTS[pil['plant']])}.</p>{_profile_table(profiles, unit)}"
+        f"{pil['outer_hz']:g} Hz, on the {escape(PLANTS[pil['plant']])}. {escape(pil['why_so'])}</p>"
+        f"{_profile_table(profiles, unit)}"
         f'<div class="pair histograms">{charts}</div>{_identity(pil)}'
     )
-    legend = [(LABELS.get(name, name), STYLES.get(name, "s6"), False) for name in profiles]
+    legend = [(LABELS.get(name, name), STYLES.get(name, OTHER_STYLE), False) for name in profiles]
     yield anchored("fig-15", section(title, body, legend, about))
     yield anchored("pil", _verdicts(pil))
-    for name, of in pil["controllers"].items():
-        label = LABELS.get(name, name)
+    for name, plant, of in pil_flights(pil):
         folded = checks_section(of["checks"]) + differences_section(of["differences"], of["compared"])
-        link = f'<p class="note">All of it: <a href="pil-{escape(name)}/pil.html">pil-{escape(name)}/pil.html</a></p>'
-        summary = f"Numerical equivalence in full: {escape(label)}"
+        page = escape(f"{folder_name(name, plant)}/pil.html")
+        link = f'<p class="note">All of it: <a href="{page}">{page}</a></p>'
+        summary = f"Numerical equivalence in full: {escape(LABELS.get(name, name))}, {escape(PLANTS[plant])}"
         yield f'<section class="folded"><details><summary>{summary}</summary>{folded}{link}</details></section>'
 
 
@@ -66,7 +79,7 @@ def _histogram(stage: str, profile: Mapping[str, Any], name: str) -> str:
         stage, of["count"], of["min"], of["mean"], of["p99"], of["max"], tuple(histogram["edges"]),
         tuple(histogram["counts"]),
     )  # fmt: skip
-    return histogram_chart(one, profile["unit"], STYLES.get(name, "s6"))
+    return histogram_chart(one, profile["unit"], STYLES.get(name, OTHER_STYLE))
 
 
 def _profile_table(profiles: Mapping[str, Mapping[str, Any]], unit: str) -> str:
@@ -97,12 +110,13 @@ def _identity(pil: Mapping[str, Any]) -> str:
 def _verdicts(pil: Mapping[str, Any]) -> str:
     """Return the equivalence of each pair of flights in one line: the largest difference of all signals."""
     rows = []
-    for name, of in pil["controllers"].items():
+    for name, plant, of in pil_flights(pil):
         pairs = list(dict.fromkeys(one["pair"] for one in of["differences"]))
         style = "good" if of["verdict"] == "passed" else "bad"
+        who, where, judged = (escape(text) for text in (LABELS.get(name, name), PLANTS[plant], of["verdict"]))
         for index, pair in enumerate(pairs):
-            title, verdict = ("", "") if index else (escape(LABELS.get(name, name)), escape(of["verdict"]))
-            cells = f"<th>{title}</th><td>{escape(pair)}</td>{_difference_cells(of, pair)}"
+            title, on, verdict = ("", "", "") if index else (who, where, judged)
+            cells = f"<th>{title}</th><td>{on}</td><td>{escape(pair)}</td>{_difference_cells(of, pair)}"
             rows.append(row(f'{cells}<td class="{style}">{verdict}</td>', not index))
     note = (
         "MIL: the loops in Python. SIL: the C core on this machine. PIL: the C core on the target. ulp: unit in the "
@@ -110,6 +124,7 @@ def _verdicts(pil: Mapping[str, Any]) -> str:
     )
     columns = (
         "controller",
+        "plant",
         "flights compared",
         "#position, largest difference",
         "#of all signals, largest",

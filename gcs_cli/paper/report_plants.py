@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 from html import escape
 from typing import Any
 
-import numpy as np
-
 from gcs_cli.paper import cases
+from gcs_cli.paper.plants import apart
 from gcs_cli.paper.report_axes import Axis, chart, spanning
 from gcs_cli.paper.report_flights import PAIR, STEP_SIZE, Recordings, over_time
 from gcs_cli.paper.report_labels import (
@@ -16,6 +15,7 @@ from gcs_cli.paper.report_labels import (
     LABELS,
     PLANTS,
     STYLES,
+    UNKNOWN,
     anchored,
     cell,
     fixed,
@@ -24,7 +24,6 @@ from gcs_cli.paper.report_labels import (
     row,
     wide_table,
 )
-from gcs_cli.paper.types import Recording
 from gcs_cli.report_chart import Line
 from gcs_cli.report_plots import section
 
@@ -32,8 +31,9 @@ _ROUNDING = 1e-4
 _MM, _LEAST_MM, _LEAST_DEG = 1e3, 0.01, 1e-3
 
 
-def plants_section(plants: Mapping[str, Any], recordings: Recordings, why_no_multibody: str = "") -> str:
+def plants_section(results: Mapping[str, Any], recordings: Recordings, why_no_multibody: str = "") -> str:
     """Return the table of differences and their course over time, for each pair of plants."""
+    plants = results["plants"]
     pairs = [tuple(name.split("_")) for name in plants]
     about = "".join(
         f"<div><dt>{escape(PLANTS[name])}</dt><dd>{escape(ABOUT_PLANTS[name])}</dd></div>"
@@ -44,8 +44,13 @@ def plants_section(plants: Mapping[str, Any], recordings: Recordings, why_no_mul
     if why_no_multibody:
         body += f'<p class="none">The multibody plant was left out: {escape(why_no_multibody)}</p>'
     charts = "".join(chart_ for pair in pairs for chart_ in _charts(recordings, *pair))
-    body += f'<div class="pair">{charts}</div>'
-    note = "The same controller flies the desired trajectory on both plants; the difference of the states is shown."
+    body += f'<div class="pair">{charts}</div>{_elsewhere(results.get("plants_elsewhere", {}))}'
+    note = (
+        "The same controller flies the desired trajectory on both plants; the difference of the states is shown. "
+        "Rounding alone: by how much a push of 10⁻¹² N moves the flight on the rigid body from itself. Where that is "
+        "more than a micrometre, a loop is unstable and magnifies whatever comes first, and how far two plants are "
+        "apart is chance: no bound can be judged there."
+    )
     return anchored("plants", section("The plants against each other", body, legend_of(PAIR, ""), note))
 
 
@@ -57,15 +62,34 @@ def _table(plants: Mapping[str, Any]) -> str:
         title = " – ".join(PLANTS[plant] for plant in name.split("_"))
         for index, (contender, found) in enumerate(contenders.items()):
             head = f"<th>{escape(title) if not index else ''}</th><td>{escape(LABELS[contender])}</td>"
-            apart = "".join(
-                cell(_small(_MM * found[key], " mm")) for key in ("max_position_m", "rms_position_m")
-            )
-            turned = "".join(
-                cell(_small(found[key], "°")) for key in ("max_attitude_deg", "rms_attitude_deg")
-            )
-            rows.append(row(f"{head}{apart}{turned}{_bound(found)}", not index))
-    columns = ("plants", "controller", "#position, largest", "#RMS", "#attitude, largest", "#RMS", "bound")
-    return wide_table(columns, rows)
+            rows.append(row(f"{head}{_figures(found)}{_rounding(found)}{_bound(found)}", not index))
+    return wide_table(("plants", "controller", *_FIGURES, "#rounding alone", "bound"), rows)
+
+
+_FIGURES = ("#position, largest", "#RMS", "#attitude, largest", "#RMS")
+
+
+def _figures(found: Mapping[str, Any]) -> str:
+    apart_mm = (_MM * found[key] for key in ("max_position_m", "rms_position_m"))
+    turned_deg = (found[key] for key in ("max_attitude_deg", "rms_attitude_deg"))
+    shown = [_small(value, " mm") for value in apart_mm] + [_small(value, "°") for value in turned_deg]
+    return "".join(cell(text) for text in shown)
+
+
+def _elsewhere(found: Mapping[str, Any]) -> str:
+    """Return the same of the other trajectories that the multibody assembly flew, folded."""
+    rows = []
+    for trajectory, plants in found.items():
+        contenders = plants[f"{cases.RIGID}_{cases.MULTIBODY}"]
+        for index, (contender, one) in enumerate(contenders.items()):
+            title = trajectory.replace("_", " of ") if not index else ""
+            head = f"<th>{escape(title)}</th><td>{escape(LABELS[contender])}</td>"
+            rows.append(row(f"{head}{_figures(one)}", not index))
+    if not rows:
+        return ""
+    table = wide_table(("trajectory", "controller", *_FIGURES), rows)
+    summary = f"{PLANTS[cases.RIGID]} – {PLANTS[cases.MULTIBODY]} on the other trajectories"
+    return f"<details><summary>{escape(summary)}</summary>{table}</details>"
 
 
 def _small(value: float, unit: str) -> str:
@@ -73,10 +97,17 @@ def _small(value: float, unit: str) -> str:
     return f"< {_ROUNDING:g}{unit}" if value < _ROUNDING else f"{number(value)}{unit}"
 
 
+def _rounding(found: Mapping[str, Any]) -> str:
+    rounding = found.get("rounding")
+    return cell(UNKNOWN if rounding is None else _small(_MM * rounding["max_position_m"], " mm"))
+
+
 def _bound(found: Mapping[str, Any]) -> str:
     if "within_bounds" not in found:
         return "<td>another model: differs by right</td>"
     words = f"{fixed(100.0 * found['position_bound_m'], 0)} cm, {fixed(found['attitude_bound_deg'], 1)}°"
+    if found["rounding"] is not None and not found["bound_decides"]:
+        return "<td>chance: magnified rounding</td>"
     style, kept = ("good", "kept") if found["within_bounds"] else ("bad", "not kept")
     return f'<td class="{style}">{kept}: {words}</td>'
 
@@ -89,9 +120,9 @@ def _charts(recordings: Recordings, one: str, other: str) -> Iterator[str]:
         if pair[0] is None or pair[1] is None:
             continue
         time = over_time(pair[0])
-        apart, turned = differences(pair[0], pair[1])
-        position.append(Line(LABELS[name], pair[0].time_s[: len(apart)], _MM * apart, STYLES[name]))
-        attitude.append(Line(LABELS[name], pair[0].time_s[: len(apart)], turned, STYLES[name]))
+        found = apart(pair[0], pair[1])
+        position.append(Line(LABELS[name], found.time_s, _MM * found.position_m, STYLES[name]))
+        attitude.append(Line(LABELS[name], found.time_s, found.attitude_deg.max(axis=1), STYLES[name]))
     if not position:
         return
     title = f"{PLANTS[one]} – {PLANTS[other]}"
@@ -102,11 +133,3 @@ def _charts(recordings: Recordings, one: str, other: str) -> Iterator[str]:
         axis = spanning(what, [line.y for line in lines], least=least)
         drawn = chart(f"{title}: {what}", time, axis._replace(low=0.0), lines, size=size)
         yield f'<div><h3 class="plant">{escape(title)}</h3>{drawn}</div>'
-
-
-def differences(one: Recording, other: Recording) -> tuple[Any, Any]:
-    """Return the distance [m] and the largest difference of an angle [°] at the times that both flew, (n,) each."""
-    count = min(len(one.time_s), len(other.time_s))
-    apart = np.linalg.norm(one.position_ned_m[:count] - other.position_ned_m[:count], axis=1)
-    turned = np.degrees(np.abs(one.euler_rad[:count] - other.euler_rad[:count])).max(axis=1)
-    return apart, turned

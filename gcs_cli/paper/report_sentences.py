@@ -9,10 +9,11 @@ from gcs_cli.paper import cases
 from gcs_cli.paper.pil_section import EMULATED
 from gcs_cli.paper.report_findings import (
     Results,
-    crashed,
+    ended,
     flies,
     onset_apart,
     paper_claims,
+    pil_flights,
     same_bits,
     worst_plants,
 )
@@ -20,7 +21,6 @@ from gcs_cli.paper.report_labels import LABELS, PLANTS, fixed, minus, number
 from gcs_cli.paper.report_matrix import space_rms
 from gcs_cli.paper.types import Case
 
-_MAGNIFIED = 1e3
 _SPIN_UP = "spin-up"
 """In the name of the onset's setting that has the rotors' spin-up torque."""
 _PARTS = {"linear": "linear analysis", "onset": "onset of instability", "pil": "processor in the loop"}
@@ -36,7 +36,7 @@ def sentences(results: Results) -> Iterator[str]:
     )
     yield from _of_claims(results)
     yield from _of_gains(results)
-    yield from _of_crashes(results)
+    yield from _of_endings(results)
     yield from _of_plants(results)
     yield from _of_linear(results)
     yield from _of_pil(results)
@@ -63,7 +63,7 @@ def _of_claims(results: Results) -> Iterator[str]:
 def _of_gains(results: Results) -> Iterator[str]:
     """Say what own gains reach beside the paper's, on the hard profile's overshoot and the smooth profile's error."""
     found = results["cases"]
-    names = (cases.PID, cases.BACKSTEPPING, cases.POLES, cases.TUNED_PID)
+    names = (cases.PID, cases.RATE_FED_PID, cases.BACKSTEPPING, cases.POLES, cases.TUNED_PID)
     flown = {name: found.get(cases.key(name, cases.SMOOTH)) for name in names}
     told = [
         f"{fixed(1e3 * space_rms(case), 1)} mm ({LABELS[name]})"
@@ -77,51 +77,64 @@ def _of_gains(results: Results) -> Iterator[str]:
         )
 
 
-def _of_crashes(results: Results) -> Iterator[str]:
-    lost: dict[str, list[str]] = {}
-    for key in crashed(results):
-        name, _, condition, _ = key.split("/") if key.count("/") == 3 else (key, "", key, "")
-        told = results.get("conditions", {}).get(condition, condition)
-        of = lost.setdefault(name, [])
-        if told not in of:
-            of.append(told)
+def _of_endings(results: Results) -> Iterator[str]:
+    """Say who did not come to the end, and with what."""
     if not results["cases"]:
         return
-    if not lost:
-        yield "No flight of the matrix ended in a crash."
-        return
-    parts = [f"{LABELS.get(name, name)} ({'; '.join(of)})" for name, of in lost.items()]
+    found = {how: _by_contender(results, ended(results, how)) for how in ("crashed", "lost")}
+    for how, words in (
+        ("crashed", "Flights that ended in a crash"),
+        ("lost", "Flights that lost control and flew on"),
+    ):
+        told = [f"{LABELS.get(name, name)} ({'; '.join(of)})" for name, of in found[how].items()]
+        yield escape(f"{words}, and with what: {', '.join(told)}." if told else f"{words}: none.")
+    flown = {key.split("/")[0] for key in results["cases"]}
     never = [
         title
         for name, title in LABELS.items()
-        if name not in lost and any(k.startswith(f"{name}/") for k in results["cases"])
+        if name in flown and not any(name in of for of in found.values())
     ]
-    words = f"Flights that ended in a crash, and with what: {', '.join(parts)}."
-    yield escape(f"{words} Never: {', '.join(never)}." if never else words)
+    if never and len(never) < len(flown):
+        yield escape(f"All flights came to their end with: {', '.join(never)}.")
+
+
+def _by_contender(results: Results, keys: list[str]) -> dict[str, list[str]]:
+    """Sort keys of cases by contender, each with the labels of its conditions."""
+    labels = results.get("conditions", {})
+    found: dict[str, list[str]] = {}
+    for key in keys:
+        name, _, condition, _ = key.split("/") if key.count("/") == 3 else (key, "", key, "")
+        told = found.setdefault(name, [])
+        if (label := labels.get(condition, condition)) not in told:
+            told.append(label)
+    return found
 
 
 def _of_plants(results: Results) -> Iterator[str]:
     worst, of = worst_plants(results), results["plants"].get(f"{cases.RIGID}_{cases.MULTIBODY}")
-    if worst is None or not of:
+    if not of:
         return
-    broken = [LABELS.get(name, name) for name, one in of.items() if not one.get("within_bounds")]
     one = next(iter(of.values()))
     bound = f"{fixed(100.0 * one['position_bound_m'], 0)} cm and {fixed(one['attitude_bound_deg'], 1)}°"
-    verdict = (
-        f"the bound of {bound} is kept by all" if not broken else f"not within {bound}: {', '.join(broken)}"
-    )
-    words = (
-        "Rigid body (our equations) and multibody assembly (MuJoCo's mechanics) stay within "
-        f"{number(1e3 * worst[0])} mm and {number(worst[1], 2)}° of each other over the whole desired trajectory; "
-        f"{verdict}."
-    )
-    others = [found["max_position_m"] for name, found in of.items() if name != cases.PID]
-    if others and cases.PID in of and of[cases.PID]["max_position_m"] > _MAGNIFIED * max(others):
-        words += (
-            " All of it comes with the PID of Table II, which magnifies what rounding begins; the others stay "
-            f"within {number(1e3 * max(others), 1)} mm."
+    if worst is not None:
+        broken = [
+            LABELS.get(name, name)
+            for name, found in of.items()
+            if found["bound_decides"] and not found["within_bounds"]
+        ]
+        verdict = f"not within {bound}: {', '.join(broken)}" if broken else f"the bound of {bound} is kept"
+        yield escape(
+            "Rigid body (our equations) and multibody assembly (MuJoCo's mechanics) stay within "
+            f"{number(1e3 * worst[0], 2)} mm and {number(worst[1], 2)}° of each other over the whole desired "
+            f"trajectory, with all loops that do not magnify rounding; {verdict}."
         )
-    yield escape(words)
+    for name, found in of.items():
+        if not found["bound_decides"] and found["rounding"] is not None:
+            yield escape(
+                f"With {LABELS.get(name, name)}, two plants cannot be compared: a push of 10⁻¹² N moves its flight on "
+                f"the rigid body by up to {number(1e3 * found['rounding']['max_position_m'])} mm from itself, because "
+                f"its yaw loop is unstable there; the plants are {number(1e3 * found['max_position_m'])} mm apart."
+            )
 
 
 def _of_linear(results: Results) -> Iterator[str]:
@@ -157,7 +170,7 @@ def _of_pil(results: Results) -> Iterator[str]:
     target = "an emulated Cortex-M4F (no board was measured)" if pil["target"] == EMULATED else pil["target"]
     apart = [
         row["largest"]
-        for of in pil["controllers"].values()
+        for _, _, of in pil_flights(pil)
         for row in of["differences"]
         if row["signal"] == "position" and row["pair"] == "MIL–PIL" and row["largest"] is not None
     ]
@@ -168,5 +181,5 @@ def _of_pil(results: Results) -> Iterator[str]:
         else ""
     )
     yield escape(
-        f"The C loops on {target} give {words} as on this machine, in every signal of both flights.{position}"
+        f"The C loops on {target} give {words} as on this machine, in every signal of all flights.{position}"
     )

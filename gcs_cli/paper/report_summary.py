@@ -6,7 +6,7 @@ from html import escape
 
 from gcs_cli.paper.report_findings import (
     Results,
-    crashed,
+    ended,
     onset_apart,
     paper_claims,
     same_bits,
@@ -19,7 +19,10 @@ from gcs_cli.report_plots import section
 
 def tiles(results: Results) -> str:
     """Return the figures that stand on top."""
-    found = [("flights", str(len(results["cases"]))), ("crashes among them", str(len(crashed(results))))]
+    found = [
+        ("flights", str(len(results["cases"]))),
+        ("crashed / lost control", f"{len(ended(results, 'crashed'))} / {len(ended(results, 'lost'))}"),
+    ]
     claims = paper_claims(results)
     if claims:
         held = sum(all(claim["holds"] for claim in of) for of in claims.values())
@@ -29,7 +32,10 @@ def tiles(results: Results) -> str:
     worst = worst_plants(results)
     if worst is not None:
         found.append(
-            ("rigid body to multibody, at most", f"{number(1e3 * worst[0])} mm, {number(worst[1], 2)}°")
+            (
+                "rigid body to multibody, where loops are stable, at most",
+                f"{number(1e3 * worst[0], 2)} mm, {number(worst[1], 2)}°",
+            )
         )
     same = same_bits(results)
     if same is not None:

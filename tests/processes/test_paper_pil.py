@@ -23,26 +23,28 @@ def test_the_paper_controller_gives_the_same_bits_on_the_target_and_replaces_an_
     monkeypatch.setattr(
         pil_section, "TRAJECTORY", "step_z"
     )  # a metre up and down again: the shortest mission
-    monkeypatch.setattr(pil_section, "CONTROLLERS", ("backstepping",))
+    monkeypatch.setattr(pil_section, "FLOWN", (("backstepping", "paper"), ("backstepping", "rigid")))
     older = tmp_path / "pil-backstepping"
     older.mkdir()
     (older / "pil.json").write_text("{}")
     told: list[str] = []
     found = pil_section.run(tmp_path, tell=told.append, instance=free_instance())
-    assert told == ["processor in the loop: backstepping"]
+    assert told == ["processor in the loop: backstepping", "processor in the loop: backstepping, rigid"]
     assert found["why_left_out"] is None
     assert "stands for no board" in found["meaning"]
-    of = found["controllers"]["backstepping"]
-    assert of["verdict"] == "passed", [check for check in of["checks"] if not check["passed"]]
-    rows = [row for row in of["differences"] if row["pair"] == "SIL–PIL"]
-    assert len(rows) > 10
-    assert all(row["largest"] == 0.0 for row in rows)
+    of, rigid = found["controllers"]["backstepping"], found["rigid"]["backstepping"]
+    for one in (of, rigid):
+        assert one["verdict"] == "passed", [check for check in one["checks"] if not check["passed"]]
+        rows = [row for row in one["differences"] if row["pair"] == "SIL–PIL"]
+        assert len(rows) > 10
+        assert all(row["largest"] == 0.0 for row in rows)
+    assert rigid["differences"] != of["differences"]
     whole = of["profile"]["stages"]["whole"]
     assert of["profile"]["unit"] == "instructions"
     assert whole["count"] == of["flights"]["PIL"]["ticks"] == sum(whole["histogram"]["counts"]) > 3000
     assert json.loads((older / "pil.json").read_text())["differences"] == of["differences"]
     assert (older / "pil.html").exists()
-    assert [path.name for path in tmp_path.iterdir()] == ["pil-backstepping"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["pil-backstepping", "pil-backstepping-rigid"]
     text = json.dumps(found)
     assert "wall" not in text
     assert "round_trip" not in text

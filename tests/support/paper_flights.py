@@ -131,9 +131,11 @@ def pil_part() -> dict[str, Any]:
         "why_left_out": None,
         "meaning": "It stands for no board.",
         "mission": "takeoff and landing",
+        "why_so": "It is a mission and no path.",
         "gains": "paper",
         "plant": "paper",
         "inner_hz": 1000.0,
         "outer_hz": 250.0,
         "controllers": {"pid": of, "backstepping": of},
+        "rigid": {"backstepping": of},
     }

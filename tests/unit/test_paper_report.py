@@ -10,14 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flightstack.params.vehicle import load_vehicle
 from gcs_cli.paper import cases
 from gcs_cli.paper.report import render
 from gcs_cli.paper.report_flights import signals
 from gcs_cli.paper.report_labels import LABELS, fixed, number
 from gcs_cli.paper.report_matrix import matrix_table, space_rms
 from gcs_cli.paper.report_metrics import metrics_table, step_table
+from gcs_cli.paper.report_moves import moves_table, shared_moves
 from gcs_cli.paper.report_pictures import Picture, poses_of, quaternions, take
 from gcs_cli.paper.report_sentences import sentences
+from gcs_cli.paper.report_steps import yaw_authority, yaw_note
 from gcs_cli.paper.report_tables import plain
 from tests.support.paper_flights import linear_part, onset_part, pil_part, small_flights, small_results
 from tests.unit.test_report import parsed
@@ -109,17 +112,88 @@ def test_a_crash_is_said_and_ends_the_curve() -> None:
     arrays = {
         name: value[:half] for name, value in recording._asdict().items() if isinstance(value, np.ndarray)
     }
-    crashed = recording._replace(**arrays, ended_s=11.0, ended_why="turned <over>")
-    results = small_results()
+    crashed = recording._replace(**arrays, ended_s=11.0, ended_why="turned <over>", ended_how="crashed")
+    results = all_flown()
     results["cases"] = results["cases"] | {
-        key: {**flown.entries[key], "ended": {"time_s": 11.0, "why": "turned <over>"}}
+        key: {**flown.entries[key], "ended": {"time_s": 11.0, "why": "turned <over>", "how": "crashed"}}
     }
     html = render(results, flown.recordings | {key: crashed})
     text = parsed(html).text
     assert "crashed at 11.00 s: turned <over>" in text  # in the matrix
-    assert "turned <over> at 11.00 s" in text  # beside figure 14
+    assert "crashed: turned <over> at 11.00 s" in text  # beside figure 14
     assert "ended in a crash, and with what: backstepping, Table III (Table I, motors of 5 ms, thrust" in text
+    assert "Flights that lost control and flew on: none." in text
+    assert "All flights came to their end with: PID, Table II, linear PD" in text
     assert "<over>" not in html
+
+
+def all_flown() -> dict[str, Any]:
+    """Results in which nobody crashed or lost control, as some do at these low rates."""
+    results = small_results()
+    results["cases"] = {key: {**case, "ended": None} for key, case in results["cases"].items()}
+    return results
+
+
+def test_who_lost_control_is_told_apart_from_who_crashed() -> None:
+    results = all_flown()
+    key = cases.key(cases.PID, cases.SMOOTH)
+    ending = {"time_s": 7.0, "why": "heading off by more than 60°", "how": "lost"}
+    results["cases"] = results["cases"] | {key: {**results["cases"][key], "ended": ending}}
+    text = parsed(render(results, {})).text
+    assert "lost control at 7.00 s: heading off by more than 60°" in text
+    assert "Flights that ended in a crash: none." in text
+    assert "lost control and flew on, and with what: PID, Table II (Table I, motors of 5 ms, thrust" in text
+    assert "0 / 1" in text
+    matrix = parsed(matrix_table(results["cases"], cases.SMOOTH, cases.SMALL_ANGLE)).text
+    assert matrix.count("heading off") == 1
+
+
+def test_overshoot_is_told_of_each_move_and_compared_over_those_that_all_began_at_rest() -> None:
+    def case(x: list[float | None], y: list[float | None]) -> dict[str, Any]:
+        moves = {
+            axis: {
+                "moves": [
+                    {"at_s": 1.0 + at, "by": -2.0, "overshoot_percent": one} for at, one in enumerate(over)
+                ]
+            }
+            for axis, over in (("x", x), ("y", y))
+        }
+        return {"ended": None, "metrics": moves}
+
+    found = {
+        cases.key(cases.PID, cases.HARD): case([10.0, 90.0, 30.0], [20.0]),
+        cases.key(cases.BACKSTEPPING, cases.HARD): case([12.0, None, 16.0], [14.0]),
+        cases.key(cases.POLES, cases.HARD): {"ended": {"how": "lost"}, "metrics": {}},
+    }
+    whole = {key: one for key, one in found.items() if one["ended"] is None}
+    pid, back = whole
+    assert shared_moves(whole) == [{pid: 10.0, back: 12.0}, {pid: 30.0, back: 16.0}, {pid: 20.0, back: 14.0}]
+    table = moves_table(found, cases.PLAIN, cases.SMALL_ANGLE)
+    rows = [re.findall(r"<t[hd][^>]*>([^<]*)", one) for one in table.split("<tr")[2:]]
+    assert rows[1] == ["x, 2.0 s, by −2.0 m", "90.0 %", "–", "lost control"]
+    median, worst = rows[-2:]
+    assert median == ["median of the 3 that all began at rest", "20.0 %", "14.0 %", "lost control"]
+    assert worst == ["worst of these", "30.0 %", "16.0 %", "lost control"]  # without the one of 90 %
+
+
+def test_the_reference_that_asks_more_of_yaw_than_there_is_is_named_beside_the_steps() -> None:
+    """U4 of Table I with one pair at twice its thrust and the other off: 4 d Ω² over Iz."""
+    results = small_results() | {"linear": linear_part()}
+    flown = cases.key(cases.TUNED_PID, "step_yaw")
+    results["cases"] = results["cases"] | {flown: results["cases"][cases.key(cases.PID, "step_yaw")]}
+    vehicle = load_vehicle("paper_quad")
+    rotor = vehicle.rotors[0]
+    torque = rotor.torque_coefficient_n_m_s2 / rotor.thrust_coefficient_n_s2 * vehicle.weight_n
+    assert yaw_authority() == pytest.approx(torque / vehicle.inertia_kg_m2[2])
+    note = yaw_note(results)
+    over = results["cases"][flown]["metrics"]["yaw"]["overshoot_percent"]
+    for words in (
+        "by 60 rad/s² (own gains: 150)",
+        f"{yaw_authority():.1f} rad/s²",
+        f"overshoots by {over:.1f} %",
+    ):
+        assert words in note, words
+    assert yaw_note(small_results()) == ""  # nobody to tell of
 
 
 def test_texts_are_escaped() -> None:
@@ -163,10 +237,11 @@ def test_the_summary_counts_claims_by_their_verdicts() -> None:
     assert "0 of 1" in parsed(render(results, {})).text
 
 
-def plants_part(within: bool) -> dict[str, Any]:
+def plants_part(within: bool, decides: bool = True) -> dict[str, Any]:
     found = {
         "max_position_m": 0.0021, "rms_position_m": 0.001, "max_attitude_deg": 0.123, "rms_attitude_deg": 0.05,
         "position_bound_m": 0.01, "attitude_bound_deg": 0.5, "within_bounds": within,
+        "bound_decides": decides, "rounding": {"max_position_m": 1e-9 if decides else 0.0028},
     }  # fmt: skip
     return {"rigid_multibody": {cases.PID: found}}
 
@@ -179,6 +254,19 @@ def test_the_difference_of_the_plants_stands_beside_its_bound(within: bool) -> N
     assert "2.10 mm" in text
     assert "0.123°" in text
     assert ("not kept: 1 cm, 0.5°" in text) is not within
+    assert ("not within 1 cm and 0.5°" in text) is not within
+
+
+def test_plants_are_not_judged_where_a_loop_magnifies_rounding() -> None:
+    results = small_results()
+    results["plants"] = plants_part(True, decides=False)
+    results["plants_elsewhere"] = {"step_roll": plants_part(True)}
+    text = parsed(render(results, {})).text
+    assert "kept: 1 cm" not in text
+    assert "chance: magnified rounding" in text
+    assert "moves its flight on the rigid body by up to 2.80 mm from itself" in text
+    assert "step of roll" in text
+    assert "rigid body to multibody, where loops" not in text  # no tile: nothing can be told
 
 
 def test_signals_are_in_metres_and_degrees_with_the_height_upwards() -> None:
@@ -247,7 +335,8 @@ def test_the_target_s_costs_and_differences_are_those_of_the_comparison(page: st
         "without a clock",
     ):
         assert words in text, words
-    assert page.count('href="pil-') == 2
+    assert re.findall('href="(pil-[^/]*)', page) == ["pil-pid", "pil-backstepping", "pil-backstepping-rigid"]
+    assert "It is a mission and no path." in text
 
 
 def test_a_loop_of_other_gains_is_named_by_them() -> None:
