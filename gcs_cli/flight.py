@@ -14,16 +14,16 @@ from gcs_cli import calls
 from gcs_cli.calls import Answer, Call
 from gcs_cli.errors import FAILED, NO_ANSWER
 from gcs_cli.flight_outcome import Outcome, ends_in_air, judged
+from gcs_cli.flight_watch import STALL_S, Watch, no_state, no_vehicle
 from gcs_cli.plan_parts import Uploads
 from gcs_cli.session import Session
-from gcs_cli.view_types import LOST_AFTER_S, VehicleView
+from gcs_cli.view_types import VehicleView
 
 READY_PAUSE_S = 0.1
 """Between two questions whether the vehicle is ready."""
 SHUT_DOWN_PATIENCE_S = 3.0
-STALL_S = 10.0
-"""How long simulated time may stand still in flight, at real time or faster."""
 _FACTOR_NEEDS_S = 0.05
+_LONG_WAIT_S = 3.0
 _IN_AIR = 2  # MAV_LANDED_STATE
 
 
@@ -70,9 +70,9 @@ class Flight:
         self._ask_again_s: float | None = None
         self._questions: list[calls.Command] = []
         self._start_time_s: float | None = None
-        self._stall_s = stall_s
-        self._moved: tuple[float | None, float] = (None, now_s)
+        self._watch = Watch(stall_s, connect_s)
         self._phase_due_s = 0.0
+        self._now_s = self._phase_since_s = now_s
 
     @property
     def view(self) -> VehicleView:
@@ -83,6 +83,12 @@ class Flight:
     def over(self) -> bool:
         """Whether there is nothing left to do."""
         return self.phase is Phase.OVER
+
+    @property
+    def may_compile(self) -> bool:
+        """Whether what keeps us waiting, for a while now, may be that simulator or flight stack compile kernels."""
+        waits = self.phase in (Phase.CONNECT, Phase.READY) or self._watch.is_first_step
+        return waits and self._now_s - self._phase_since_s > _LONG_WAIT_S
 
     @property
     def flown_s(self) -> float | None:
@@ -111,19 +117,22 @@ class Flight:
 
     def step(self, now_s: float) -> None:
         """Go on as far as possible."""
-        before = None
+        self._now_s, before = now_s, None
         while before is not self.phase and not self.over:
             before = self.phase
             if self.outcome is None and self.phase is not Phase.CONNECT:
                 self._watch_vehicle(now_s)
             _STEPS[self.phase](self, now_s)
+            if self.phase is not before:
+                self._phase_since_s = now_s
 
     def _watch_vehicle(self, now_s: float) -> None:
         at = "" if self.view.time_s is None else f" at t = {self.view.time_s:.1f} s"
         if self.view.powered_off:
             self._end(Outcome(f"the flight stack shut down{at} while {self.phase.value}", FAILED), now_s)
-        elif self.view.lost(now_s):
-            lost = f"the vehicle was lost{at}: no heartbeat for {LOST_AFTER_S:g} s while {self.phase.value}"
+            return
+        lost = self._watch.lost(self.view.silent_s(now_s), self.view.time_s, self.phase.value)
+        if lost is not None:
             self._end(Outcome(lost, FAILED), now_s)
 
     # -- phases
@@ -132,7 +141,7 @@ class Flight:
         if self.view.identity is not None:
             self.phase = Phase.UPLOAD
         elif now_s >= self._connect_due_s:
-            self._end(Outcome(f"no vehicle answered within {self._connect_s:g} s", NO_ANSWER), now_s)
+            self._end(Outcome(no_vehicle(self._connect_s), NO_ANSWER), now_s)
 
     def _upload(self, now_s: float) -> None:
         if self._accepted(
@@ -147,8 +156,7 @@ class Flight:
             self._order(calls.ARM, now_s)
             self.phase = Phase.ARM
         elif now_s >= self._connect_due_s:
-            late = f"the vehicle has no position and attitude after {self._connect_s:g} s"
-            self._end(Outcome(late, NO_ANSWER), now_s)
+            self._end(Outcome(no_state(self._connect_s), NO_ANSWER), now_s)
         elif self._ask_again_s is not None:
             if now_s >= self._ask_again_s:
                 self._ask_again_s = None
@@ -165,11 +173,12 @@ class Flight:
     def _start(self, now_s: float) -> None:
         if self._answered("the vehicle refused to start the mission: ", now_s):
             self.began_s = now_s
-            self._moved = (self.view.time_s, now_s)
+            self._watch.begin(self._start_time_s, now_s)
             self.phase = Phase.FLY
 
     def _fly(self, now_s: float) -> None:
         view = self.view
+        held_up = self._watch.held_up(view.time_s, now_s)
         heard_since_start = self.began_s is not None and (view.last_heartbeat_s or 0.0) > self.began_s
         if heard_since_start and not view.armed:
             self.ended_s = now_s
@@ -179,20 +188,13 @@ class Flight:
         elif (self.flown_s or 0.0) > self._limit_s:
             late = f"the flight took longer than --limit {self._limit_s:g} s of simulated time"
             self._end(Outcome(late, NO_ANSWER), now_s)
-        elif self._stands_still(now_s):
-            still = f"simulated time stood still for {self._stall_s:g} s at t = {self._moved[0] or 0.0:.1f} s"
-            self._end(Outcome(f"{still}: the simulator does not answer", FAILED), now_s)
+        elif held_up is not None:
+            self._end(Outcome(held_up, FAILED), now_s)
         elif self._ends_in_air and view.mission.complete and view.mode == "HOLD" and not self.returned_by_us:
             self.returned_by_us = True
             self._order(calls.RETURN, now_s)
         elif self.returned_by_us and view.landed_state == _IN_AIR:
             self._answered("the mission is flown, but the vehicle refused to return: ", now_s)
-
-    def _stands_still(self, now_s: float) -> bool:
-        """Tell whether time has stood still for too long; the vehicle's heartbeats go on meanwhile."""
-        if self.view.time_s != self._moved[0]:
-            self._moved = (self.view.time_s, now_s)
-        return now_s - self._moved[1] > self._stall_s
 
     def _confirm(self, now_s: float) -> None:
         """Ask for what the last telemetry may not have said; the answers are in the view."""

@@ -148,8 +148,9 @@ def _share(flight: Flight) -> tuple[float, float]:
 
 
 def phase_words(flight: Flight) -> str:
-    """Say what is going on: the mode in flight, else the phase."""
-    return flight.view.mode or "flying" if flight.phase is Phase.FLY else flight.phase.value
+    """Say what is going on: the mode in flight, else the phase; and what a long wait may be for."""
+    words = flight.view.mode or "flying" if flight.phase is Phase.FLY else flight.phase.value
+    return f"{words} (it may be compiling, once)" if flight.may_compile else words
 
 
 def item_words(flight: Flight) -> str:

@@ -14,8 +14,9 @@ from flightstack.plan import Plan
 from gcs_cli.connection import Connection
 from gcs_cli.endpoint import Endpoint
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
-from gcs_cli.flight import STALL_S, Flight
+from gcs_cli.flight import Flight
 from gcs_cli.flight_outcome import Outcome
+from gcs_cli.flight_watch import STALL_S
 from gcs_cli.fly_display import Display
 from gcs_cli.fly_options import (
     DEFAULT_HOME,

@@ -8,7 +8,9 @@ import pytest
 
 from flightstack.plan import RALLY_POINT, Command, FenceCommand, Frame, MissionItem, MissionType, Plan
 from gcs_cli.errors import DONE, FAILED, NO_ANSWER
-from gcs_cli.flight import STALL_S, Flight, Phase
+from gcs_cli.flight import Flight, Phase
+from gcs_cli.flight_watch import STALL_S
+from gcs_cli.fly_display import phase_words
 from gcs_cli.session import Session
 from tests.support.fake_vehicle import ARM, RETURN, SHUT_DOWN, START, FakeVehicle
 
@@ -110,7 +112,11 @@ def test_a_refused_part_of_the_plan_is_named(kind: MissionType, name: str) -> No
 
 def test_no_vehicle() -> None:
     story = Story(FakeVehicle(mute={"HEARTBEAT"}), connect_s=3.0).run()
-    assert (story.reason, story.code) == ("no vehicle answered within 3 s", NO_ANSWER)
+    assert story.reason.startswith(
+        "no vehicle answered within 3 s: flightstack has not begun; compiling its loops"
+    )
+    assert "see flightstack.log" in story.reason
+    assert story.code == NO_ANSWER
     assert not story.orders
 
 
@@ -158,7 +164,11 @@ def test_arming_waits_for_the_first_state() -> None:
 
 def test_a_vehicle_that_never_gets_ready() -> None:
     story = Story(FakeVehicle(healthy_after_s=1e9), connect_s=8.0).run()
-    assert (story.reason, story.code) == ("the vehicle has no position and attitude after 8 s", NO_ANSWER)
+    assert story.reason.startswith(
+        "the vehicle has no position and attitude after 8 s: sim-bridge has sent no state"
+    )
+    assert "see sim-bridge.log" in story.reason
+    assert story.code == NO_ANSWER
     assert ARM not in story.orders
 
 
@@ -203,9 +213,43 @@ def test_a_vehicle_that_shuts_down_in_flight() -> None:
 
 def test_simulated_time_that_stands_still_ends_the_flight() -> None:
     vehicle = FakeVehicle(stop_at_item=1, at_stop="hover", simulated_s_per_item=1e-9)
-    story = Story(vehicle).run(most_s=STALL_S + 5.0)
+    story = Story(vehicle, connect_s=1.0).run(until=Phase.FLY)
+    vehicle.time_s = 2.0  # a step that is answered, and then no other one
+    began_s = story.now_s
+    story.run(most_s=STALL_S + 5.0)
     assert story.code == FAILED
-    assert story.reason.startswith("simulated time stood still for 10 s at t = 0.0 s: the simulator")
+    assert story.reason == (
+        "simulated time stood still for 10 s at t = 2.0 s: sim-bridge does not answer: see sim-bridge.log"
+    )
+    assert story.now_s - began_s == pytest.approx(STALL_S, abs=1.5)
+
+
+def test_the_first_step_may_take_as_long_as_the_vehicle_may_to_begin() -> None:
+    """In it the simulator compiles what only some flights need."""
+    vehicle = FakeVehicle(stop_at_item=1, at_stop="hover", simulated_s_per_item=1e-9)
+    story = Story(vehicle, connect_s=40.0).run(until=Phase.FLY)
+    began_s = story.now_s
+    assert phase_words(story.flight) == "MISSION"
+    while story.now_s < began_s + 30.0:
+        story.now_s += STEP_S
+        story.flight.step(story.now_s)  # nothing is heard: the flight stack may be the one that compiles
+    assert story.flight.phase is Phase.FLY
+    assert phase_words(story.flight) == "MISSION (it may be compiling, once)"
+    story.run(most_s=15.0)
+    assert story.now_s - began_s == pytest.approx(40.0, abs=1.5)
+    assert story.reason.startswith(
+        "simulated time stood still for 40 s at t = 0.0 s: sim-bridge has not answered the first step; compiling its"
+    )
+
+
+def test_a_vehicle_that_is_silent_in_the_first_step_for_too_long_is_lost() -> None:
+    vehicle = FakeVehicle(stop_at_item=1, at_stop="hover", simulated_s_per_item=1e-9)
+    story = Story(vehicle, connect_s=40.0).run(until=Phase.FLY)
+    vehicle.silent = True
+    story.run(most_s=45.0)
+    assert story.reason == (
+        "the vehicle was lost at t = 0.0 s: no heartbeat for 40 s while flying: see flightstack.log"
+    )
 
 
 def test_the_limit_counts_simulated_time() -> None:
