@@ -133,6 +133,14 @@ class Flight:
 
     def _touchdown_s(self, landed_s: float) -> float:
         """Return since when the vehicle, found to be landed at ``landed_s``, had been standing still."""
+    def standing(self, time_s: FloatArray) -> FlagArray:
+        """Tell for each time whether the vehicle stood after a landing: from its touchdown until it took off again.
+
+        Its setpoint is in the ground then, so that it stays there, and is nowhere that it shall fly to.
+        """
+        again = ((self._touchdown_s(at_s) if landed else at_s, landed) for at_s, landed in self.landed[1:])
+        return _step(again, time_s)
+
         before = int(np.searchsorted(self.velocity.time_s, landed_s, side="right"))
         moving = np.flatnonzero(np.linalg.norm(self.velocity.values[:before], axis=1) > _STILL_M_S)
         if not len(moving) or moving[-1] + 1 == before:

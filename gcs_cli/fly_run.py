@@ -181,6 +181,8 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
         battery_capacity=options.battery_capacity,
         battery_drain=options.battery_drain,
         faults=options.faults,
+        ideal_rotors=options.ideal_rotors,
+        params=None if options.params is None else str(options.params),
         inner_hz=options.inner_hz,
         outer_hz=options.outer_rate_hz,
         overruns=flown.overruns,

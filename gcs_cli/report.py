@@ -10,6 +10,7 @@ from typing import Any
 from flightstack.atomic_file import write_text_atomically
 from flightstack.plan import Plan, command_name
 from gcs_cli.flight_data import Flight, LoopTiming
+from gcs_cli.report_conditions import conditions, flown
 from gcs_cli.report_plots import plots, section
 from gcs_cli.report_timing import read_loop_timing
 
@@ -53,14 +54,13 @@ def render_report(flight: Flight, plan: Plan, summary: dict[str, Any], timings: 
 
 def _header(title: str, summary: dict[str, Any]) -> str:
     good = "good" if summary["outcome"] == _COMPLETED else "bad"
-    about = " · ".join(
-        f"{name} {_show(summary[key])}"
-        for name, key in (("vehicle", "vehicle"), ("controller", "controller"), ("plant", "plant"))
+    about = "".join(
+        f'<div class="about">{escape(" · ".join(line))}</div>'
+        for line in (flown(summary), conditions(summary))
     )
     return (
         f"<header><h1>{escape(title)}</h1>"
-        f'<span class="outcome {good}">{escape(summary["outcome"])}</span>'
-        f'<div class="about">{about}</div></header>'
+        f'<span class="outcome {good}">{escape(summary["outcome"])}</span>{about}</header>'
     )
 
 

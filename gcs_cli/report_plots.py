@@ -76,8 +76,9 @@ def _within(series: Series, span: tuple[float, float]) -> Series:
 
 def _altitude(flight: Flight, span: tuple[float, float], bands: list[Band]) -> str:
     setpoint, position = _within(flight.position_setpoint, span), _within(flight.position, span)
+    wanted = np.where(flight.standing(setpoint.time_s), np.nan, -setpoint.values[:, 2])
     lines = [
-        Line("setpoint", setpoint.time_s, -setpoint.values[:, 2], _TARGET),
+        Line("setpoint", setpoint.time_s, wanted, _TARGET),
         Line("altitude", position.time_s, -position.values[:, 2], _ACTUAL),
     ]
     return section(

@@ -44,6 +44,8 @@ class RunInfo:
     battery_capacity: float | None = None
     battery_drain: float | None = None
     faults: tuple[str, ...] = ()
+    ideal_rotors: bool | None = None
+    params: str | None = None
     inner_hz: float | None = None
     outer_hz: float | None = None
     overruns: int | None = None
@@ -89,6 +91,8 @@ def _conditions(run: RunInfo) -> dict[str, Any]:
         "battery_capacity_mah": run.battery_capacity,
         "battery_drain": run.battery_drain,
         "faults": list(run.faults),
+        "ideal_rotors": run.ideal_rotors,
+        "params": run.params,
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -117,6 +118,39 @@ def test_real_time_shows_lateness_too(flight: Flight) -> None:
     text = parsed(report(flight, timings=[timing_row(1.0, True), timing_row(2.0, True)])).text
     assert "lateness of a tick" in text
     assert "lockstep" not in text
+
+
+def test_the_head_says_under_what_it_flew(flight: Flight) -> None:
+    run = RunInfo(
+        "completed", "missions/square.plan", controller="backstepping", gains="paper", plant="multibody", seed=7,
+        inner_hz=1000.0, outer_hz=250.0, wind="5,-3", gust=1.0, torque_gust=0.1, battery_start=60.0,
+        battery_drain=20.0, faults=("rotor:2:off@8", "state:freeze@9"), ideal_rotors=True, params="my.params",
+    )  # fmt: skip
+    head = render_report(flight, square_plan(), summarise(flight, square_plan(), run), [])
+    head = head.partition("<header>")[2].partition("</header>")[0]
+    assert "vehicle paper_quad · controller backstepping, gains paper · loops in python" in head
+    assert "1000 and 250 Hz · plant multibody" in head
+    assert (
+        "wind 5 m/s north, -3 m/s east · gusts 1 m/s · gusty torque 0.1 N m · battery from 60 % · battery drained "
+        "20 times as fast · fault rotor:2:off@8 · fault state:freeze@9 · rotors without lag and limits · parameters of "
+        "my.params · seed 7" in head
+    )
+    assert "no wind, no faults · seed 1" in report(flight)
+
+
+def test_the_setpoint_is_not_drawn_while_the_vehicle_stands_landed(flight: Flight) -> None:
+    """It sinks into the ground then, to hold the vehicle there."""
+    time_s, touchdown = flight.position_setpoint.time_s, 34.0
+    ends = replace(flight, landed=(*flight.landed[:-1], (touchdown, True)))
+
+    def with_setpoint(down_m: float, from_s: float) -> str:
+        values = flight.position_setpoint.values.copy()
+        values[time_s >= from_s, 2] = down_m
+        return report(replace(ends, position_setpoint=series(time_s.copy(), values)))
+
+    assert ends.standing(np.array([0.0, 5.0, touchdown - 1.0, 40.0])).tolist() == [False, False, False, True]
+    assert with_setpoint(7.5, touchdown) == with_setpoint(-7.5, touchdown)
+    assert with_setpoint(7.5, touchdown - 5.0) != with_setpoint(-7.5, touchdown - 5.0)
 
 
 def test_a_run_without_a_log_has_a_report() -> None:

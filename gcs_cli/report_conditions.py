@@ -1,0 +1,59 @@
+"""What flew and under what, in words, from the content of ``summary.json``; what is not known is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+def flown(summary: Mapping[str, Any]) -> list[str]:
+    """Return vehicle, controller with its gains, loops, rates and plant."""
+    controller, gains = summary.get("controller"), summary.get("gains")
+    inner_hz, outer_hz = summary.get("inner_hz"), summary.get("outer_hz")
+    parts = [
+        _named("vehicle", summary.get("vehicle")),
+        _named("controller", controller if gains is None else f"{controller or '–'}, gains {gains}"),
+        _named("loops in", summary.get("loops")),
+        ""
+        if inner_hz is None
+        else f"{inner_hz:g} Hz"
+        if outer_hz is None
+        else f"{inner_hz:g} and {outer_hz:g} Hz",
+        _named("plant", summary.get("plant")),
+    ]
+    return [part for part in parts if part]
+
+
+def conditions(summary: Mapping[str, Any]) -> list[str]:
+    """Return what the simulator did to the vehicle: wind, gusts, battery, faults, and the seed of it all."""
+    parts = [
+        _wind(summary.get("wind_m_s")),
+        _amount("gusts", summary.get("gust_m_s"), " m/s"),
+        _amount("gusty torque", summary.get("torque_gust_n_m"), " N m"),
+        _amount("battery from", summary.get("battery_start_percent"), " %"),
+        _amount("battery of", summary.get("battery_capacity_mah"), " mAh"),
+        _amount("battery drained", summary.get("battery_drain"), " times as fast"),
+        *(f"fault {fault}" for fault in summary.get("faults") or ()),
+    ]
+    if summary.get("ideal_rotors"):
+        parts.append("rotors without lag and limits")
+    parts.append(_named("parameters of", summary.get("params")))
+    told = [part for part in parts if part] or ["no wind, no faults"]
+    return [*told, *([f"seed {summary['seed']}"] if summary.get("seed") is not None else [])]
+
+
+def _named(name: str, value: object) -> str:
+    return "" if value is None else f"{name} {value}"
+
+
+def _amount(name: str, value: float | None, unit: str) -> str:
+    return "" if value is None else f"{name} {value:g}{unit}"
+
+
+def _wind(wind_m_s: Sequence[float] | None) -> str:
+    if wind_m_s is None:
+        return ""
+    parts = (
+        f"{value:g} m/s {axis}" for value, axis in zip(wind_m_s, ("north", "east", "down"), strict=False)
+    )
+    return f"wind {', '.join(parts)}"
