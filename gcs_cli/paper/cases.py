@@ -119,19 +119,19 @@ def matrix(
 def all_cases(multibody: bool) -> list[Case]:
     """Return every experiment of ``gcs paper``.
 
-    Paths in all conditions; steps plain, with ideal rotors and through the reference model, which smooth paths do not
-    need; on the multibody plant the desired trajectory, and with the paper's gains everything else that is plain.
+    The two paths of the comparison in all conditions; the desired trajectory and steps plain and with ideal rotors;
+    all steps of position through the reference model, which smooth paths do not need; on the multibody plant the
+    desired trajectory, and with the paper's gains everything else that is plain.
     """
-    paths = [condition for condition in CONDITIONS if condition.name != SHAPED]
-    steps = [condition for condition in CONDITIONS if condition.name in (PLAIN, IDEAL, SHAPED)]
-    plain, shaped = CONDITIONS[:1], CONDITIONS[-1:]
-    both = (SMALL_ANGLE, RIGID)
-    cases = matrix(PATHS, both, conditions=paths) + matrix((HARD,), both, conditions=shaped)
-    cases += matrix(ATTITUDE_STEPS, both, conditions=steps[:-1]) + matrix(
-        POSITION_STEPS, both, conditions=steps
-    )
+    plants = (SMALL_ANGLE, RIGID)
+    simple = [condition for condition in CONDITIONS if condition.name in (PLAIN, IDEAL)]
+    shaped = [condition for condition in CONDITIONS if condition.name == SHAPED]
+    others = [condition for condition in CONDITIONS if condition.name != SHAPED]
+    cases = matrix((SMOOTH, HARD), plants, conditions=others)
+    cases += matrix((DESIRED, *STEPS), plants, conditions=simple)
+    cases += matrix((HARD, *POSITION_STEPS), plants, conditions=shaped)
     cases += matrix((DESIRED,), (RIGID,), conditions=(NUDGE,))
     if multibody:
-        cases += matrix((DESIRED,), (MULTIBODY,), conditions=plain)
-        cases += matrix((SMOOTH, HARD, *STEPS), (MULTIBODY,), _PAIR, plain)
+        cases += matrix((DESIRED,), (MULTIBODY,), conditions=simple[:1])
+        cases += matrix((SMOOTH, HARD, *STEPS), (MULTIBODY,), _PAIR, simple[:1])
     return cases

@@ -87,7 +87,7 @@ def _beyond(actual: FloatArray, reference: FloatArray, window: int) -> FloatArra
 
     NaN where there is no reference.
     """
-    behind = (window - 1) // 2  # moves the filter's window from around a tick to before it
+    behind = window // 2  # moves the filter's window from around a tick to before it
     size = 2 * behind + 1
     low = minimum_filter1d(reference, size, axis=0, mode="nearest", origin=behind)
     high = maximum_filter1d(reference, size, axis=0, mode="nearest", origin=behind)

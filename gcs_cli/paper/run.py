@@ -18,6 +18,8 @@ from gcs_cli.errors import FAILED, CliError
 from gcs_cli.paper import linear, pil_section, report_pictures
 from gcs_cli.paper.cases import MULTIBODY, all_cases
 from gcs_cli.paper.checks import check
+from gcs_cli.paper.claims import claims
+from gcs_cli.paper.endings import CRASHED
 from gcs_cli.paper.experiments import Flown, default_jobs, run_cases
 from gcs_cli.paper.report import render
 from gcs_cli.paper.report_pictures import Picture
@@ -65,8 +67,10 @@ def _run(
     _write(options.out, results, flown)
     pil_section.clear(options.out)  # of a run before
     for part, (words, work) in parts.items():
-        with console.status(words):
-            results[part] = found = work()
+        with console.status(words) as status:
+            results[part] = found = work(status.update)
+            if part == "linear":  # one of the claims is judged by it
+                results["comparisons"]["claims"] = claims(flown.entries, found)
         del results["left_out"][part]
         why = found.get("why_left_out") if isinstance(found, dict) else None
         if why is not None:
@@ -81,20 +85,21 @@ def _run(
     return results
 
 
-def _parts(options: PaperOptions) -> dict[str, tuple[str, Callable[[], Any]]]:
-    """What follows the flights: a part's name in the results, what is said of it, and its work."""
+def _parts(options: PaperOptions) -> dict[str, tuple[str, Callable[[Callable[[str], None]], Any]]]:
+    """What follows the flights: a part's name in the results, what is said of it, and its work, which may tell more."""
     return {
-        "linear": ("linear analysis", linear.results),
-        "onset": ("onset of instability", linear.onset),
-        "pil": ("processor in the loop", lambda: pil_section.run(options.out, options.target)),
+        "linear": ("linear analysis", lambda tell: linear.results()),
+        "onset": ("onset of instability", lambda tell: linear.onset()),
+        "pil": ("processor in the loop", lambda tell: pil_section.run(options.out, options.target, tell)),
     }
 
 
 def _fly(cases: Sequence[Case], jobs: int, console: Console) -> Flown:
     with step_bar("experiments", console) as bar:
         flown = run_cases(cases, jobs, bar.show)
-    crashed = sum(entry["ended"] is not None for entry in flown.entries.values())
-    told = f"experiments: {len(flown.entries)} flown, {crashed} of them ended in a crash"
+    ended = [entry["ended"]["how"] for entry in flown.entries.values() if entry["ended"] is not None]
+    crashed = ended.count(CRASHED)
+    told = f"experiments: {len(flown.entries)} flown, {crashed} crashed, {len(ended) - crashed} lost control"
     console.print(told, markup=False, highlight=False)
     return flown
 

@@ -57,7 +57,7 @@ def test_keys_are_distinct_and_every_combination_is_there() -> None:
     by_key = {case.key: case for case in cases}
     for contender in CONTENDERS:
         for condition in CONDITIONS:
-            along = ("hard", "step_z") if condition.name == SHAPED else ("desired", "smooth", "hard")
+            along = ("hard", "step_z") if condition.name == SHAPED else ("smooth", "hard")
             for trajectory in along:
                 for plant in (SMALL_ANGLE, RIGID):
                     case = by_key[key(contender.name, trajectory, condition.name, plant)]
@@ -405,7 +405,7 @@ def test_a_target_that_is_not_there_is_told_before_anything_flies(tmp_path: Path
             "gcs: --port names a target for what --no-pil leaves",
         ),
         (["paper", "--port", "serial:/dev/nobody"], "/dev/nobody"),
-        (["paper", "--port", "board"], "gcs: --target board: "),
+        (["paper", "--port", "board"], "gcs: --port board: "),
     ],
 )
 def test_usage_is_told_in_one_sentence(
