@@ -24,7 +24,7 @@ from gcs_cli.paper.linear.gains import (
     ReferenceFilter,
     backstepping_gains,
 )
-from gcs_cli.paper.linear.instability import IDEAL, LAGGING, SPIN_UP, find_onset
+from gcs_cli.paper.linear.instability import IDEAL, LAGGING, SPIN_UP, Onset, find_onset
 from gcs_cli.paper.linear.margins import closed, lowest_stable_hz, margins, response, spectral_radius
 from gcs_cli.paper.linear.outer_onset import (
     find_outer_onset,
@@ -382,3 +382,18 @@ def test_matrix_exponential_is_scipys(seed: int, scale: float) -> None:
     matrix = scale * np.random.default_rng(seed).uniform(-1.0, 1.0, (5, 5))
     expected = expm(matrix)
     assert np.allclose(exponential(matrix), expected, rtol=0.0, atol=1e-11 * np.abs(expected).max())
+
+
+def test_onset_asks_an_inner_loop_once_and_every_outer_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rate that is fed ahead is no matter to a kick, but moves the poles of x and y."""
+
+    def asked(controller: str, gains: str, *where: Any) -> Onset:
+        name = where[0].name if len(where) == 2 else "outer"
+        return Onset(controller, gains, name, where[-1], 1.0, 1.0)
+
+    monkeypatch.setattr(tables, "find_onset", asked)
+    monkeypatch.setattr(tables, "find_outer_onset", asked)
+    found = [(one["controller"], one["gains"], one["setting"]) for one in tables.onset()]
+    assert len(set(found)) == 4 * 4 + 1
+    assert ("pid", "paper_rate_fed", "outer") in found
+    assert ("pid", "paper_rate_fed", IDEAL.name) not in found

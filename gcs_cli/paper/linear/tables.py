@@ -27,7 +27,13 @@ from gcs_cli.paper.linear.sampled import Actuators, AttitudeTick, Rates
 from gcs_cli.paper.linear.small_signal import flown_gains, spin_up_lead_s
 from gcs_cli.paper.linear.steps import exact_figures
 
-LOOPS = (("pid", "paper"), ("backstepping", "paper"), ("pid", "tuned"), ("backstepping", "tuned"))
+LOOPS = (
+    ("pid", "paper"),
+    ("backstepping", "paper"),
+    ("pid", "tuned"),
+    ("backstepping", "tuned"),
+    ("pid", "paper_rate_fed"),
+)
 """Controllers with their gains files; the linear PD with backstepping's poles is backstepping here."""
 INNER_RATES_HZ = (250.0, 500.0, 1000.0)
 CASCADE_RATES = (Rates(250.0, 50.0), Rates(500.0, 100.0), Rates(1000.0, 250.0))
@@ -55,10 +61,18 @@ def results() -> dict[str, Any]:
 
 
 def onset() -> list[dict[str, Any]]:
-    """Return the lowest stable rates that simulation finds beside the predicted ones: inner, then outer loops."""
-    found = []
+    """Return the lowest stable rates that simulation finds beside the predicted ones: inner, then outer loops.
+
+    Inner loops with the feedback of one before are left out.
+    """
+    found: list[dict[str, Any]] = []
+    known: set[tuple[float, ...]] = set()
     for controller, gains in LOOPS:
-        ones = [find_onset(controller, gains, setting, axis) for setting in SETTINGS for axis in setting.axes]
+        attitude = flown_gains(controller, gains).attitude.values()
+        feedback = tuple(value for law in attitude for value in (law.kp, law.ki, law.kd))
+        settings = () if feedback in known else SETTINGS
+        known.add(feedback)
+        ones = [find_onset(controller, gains, setting, axis) for setting in settings for axis in setting.axes]
         ones += [find_outer_onset(controller, gains, axis) for axis in POSITION_AXES]
         found += [_plain(one._asdict() | {"difference_percent": one.difference_percent}) for one in ones]
     return found
