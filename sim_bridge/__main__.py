@@ -132,7 +132,10 @@ def open_loop(
     seed: options.Seed = 1,
     as_json: options.Json = False,
 ) -> None:
-    """Print the state after some time at constant rotor speeds (taken as given, without limits)."""
+    """Print the state after a time at given rotor speeds.
+
+    They are constant, and taken as they are given, without limits.
+    """
     arguments.plant(plant)
     arguments.in_range("--seconds", seconds, 0.0, 1e5)
     arguments.in_range("--dt", dt, 1e-6, 1.0)

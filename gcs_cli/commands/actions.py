@@ -125,7 +125,10 @@ def goto(
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
 ) -> None:
-    """Fly to a place and hold there; put -- before negative degrees."""
+    """Fly to a place and hold there.
+
+    Put -- before negative degrees.
+    """
     from gcs_cli import calls  # noqa: PLC0415
 
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
@@ -160,7 +163,10 @@ def sethome(
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
 ) -> None:
-    """Move home, where a return goes and from where altitudes count; put -- before negative degrees."""
+    """Move home, where a return goes.
+
+    Altitudes count from there. Put -- before negative degrees.
+    """
     from gcs_cli import calls  # noqa: PLC0415
 
     if place and len(place) != 3:

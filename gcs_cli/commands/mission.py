@@ -35,9 +35,9 @@ def upload(
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
 ) -> None:
-    """Replace the vehicle's mission, geofence and rally points by those of a file.
+    """Replace the vehicle's plans by those of a file.
 
-    What the file does not hold stays as it is on the vehicle.
+    Mission, geofence and rally points; what the file does not hold stays as it is on the vehicle.
     """
     from flightstack.plan import load_plan  # noqa: PLC0415
     from gcs_cli import calls  # noqa: PLC0415
@@ -59,7 +59,10 @@ def upload(
 
 @app.command()
 def check(file: FileArgument) -> None:
-    """Check a file as the vehicle does, without one: mission, geofence and rally points."""
+    """Check a file as the vehicle does, without one.
+
+    Mission, geofence and rally points.
+    """
     from flightstack.geodesy import GeoPoint  # noqa: PLC0415
     from flightstack.plan import load_plan  # noqa: PLC0415
     from gcs_cli.errors import FAILED, CliError  # noqa: PLC0415

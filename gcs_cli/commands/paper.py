@@ -36,7 +36,10 @@ def paper(
     open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Fly every experiment of the paper; write report.html and results.json."""
+    """Fly every experiment of the paper, and report on it.
+
+    A few minutes: report.html holds figures, tables and verdicts, results.json the numbers, the same in each run.
+    """
     from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
     from gcs_cli.paper.printed import print_results  # noqa: PLC0415
     from gcs_cli.paper.run import HTML_NAME, PaperOptions, run  # noqa: PLC0415

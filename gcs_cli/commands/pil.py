@@ -29,7 +29,7 @@ class _MissionGroup(TyperGroup):
 
 app = typer.Typer(
     cls=_MissionGroup,
-    help="Check the loops on a target: `gcs pil MISSION` flies it as MIL, SIL and PIL.",
+    help="Check the loops in C and on a target.\n\n`gcs pil MISSION` flies it as MIL, SIL and PIL.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -74,7 +74,10 @@ def fly(
     timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 60]")] = None,
     limit: Annotated[float, typer.Option(help="Longest flight, s of simulated time.")] = 3600.0,
 ) -> None:
-    """Fly a mission with the loops in Python, in C and on a target, and compare the flights."""
+    """Fly a mission with each of the loops, and compare.
+
+    The loops fly in Python (MIL), in C (SIL) and on a target (PIL).
+    """
     from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
     from gcs_cli.fly_options import FlyOptions, checked_plan  # noqa: PLC0415
     from gcs_cli.pil.run import run  # noqa: PLC0415
@@ -112,7 +115,10 @@ def replay(
     open_report: OpenOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Feed the inputs recorded in a flight log to a target, and compare its outputs with the log's."""
+    """Feed a target with the inputs of a flight log.
+
+    Its outputs are compared with those that the log holds.
+    """
     from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
     from gcs_cli.pil import replay_run  # noqa: PLC0415
     from gcs_cli.pil.run import make_pil_directory, write_outcome  # noqa: PLC0415

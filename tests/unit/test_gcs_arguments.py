@@ -18,8 +18,9 @@ from rich.text import Text
 
 from flightstack.geodesy import GeoPoint
 from flightstack.params.errors import ConfigError
+from gcs_cli.__main__ import main
 from gcs_cli.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
-from gcs_cli.errors import USAGE, CliError
+from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.flight import Phase
 from gcs_cli.fly_display import LineDisplay, make_display, progress
 from gcs_cli.fly_options import (
@@ -270,6 +271,16 @@ def test_a_busy_port_is_named(kind: socket.SocketKind, base: int) -> None:
         with pytest.raises(CliError, match=f"port {base + instance} .* is in use: .*--instance") as error:
             check_ports(FlyOptions(HOP, instance=instance))
     assert error.value.exit_code == USAGE
+
+
+@pytest.mark.parametrize("words", [[], ["mission"], ["param"], ["log"], ["pil"]], ids=" ".join)
+def test_no_line_of_the_help_is_cut(words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main([*words, "--help"]) == DONE
+    usage, *lines = capsys.readouterr().out.splitlines()
+    assert usage.startswith("Usage: gcs ")
+    assert len(lines) > 5
+    assert [line for line in lines if line.endswith("...")] == []
 
 
 def test_run_directories_never_meet(tmp_path: Path) -> None:
