@@ -18,6 +18,7 @@ from flightstack.contract import MAX_ROTORS, FloatArray
 from flightstack.params.errors import ConfigError
 
 NO_POINTS: FloatArray = np.zeros((0, 3))
+NO_NUMBERS: FloatArray = np.zeros(0)
 _BAD_FILE = (
     ValueError,
     KeyError,
@@ -36,6 +37,8 @@ class Poses(NamedTuple):
     first, body FRD to world NED; ``rotor_speed_rad_s`` is (n, rotors). ``target_ned_m`` (n, 3), the setpoint, may
     be NaN where there is none. ``waypoints_ned_m`` (m, 3) are the places that were planned. ``vehicle`` is the
     name of a built-in vehicle or the path of its file; ``title`` is written into the picture.
+    ``waypoint_numbers`` (m,) are the whole numbers that the places are called by; where there are none they count
+    from 1.
     """
 
     time_s: FloatArray
@@ -46,6 +49,7 @@ class Poses(NamedTuple):
     waypoints_ned_m: FloatArray = NO_POINTS
     vehicle: str = "paper_quad"
     title: str = ""
+    waypoint_numbers: FloatArray = NO_NUMBERS
 
 
 def write_poses(path: Path, poses: Poses) -> None:
@@ -99,7 +103,15 @@ def _checked(path: Path, content: dict[str, np.ndarray[Any, Any]]) -> Poses:
         numbers("waypoints_ned_m", 3, default=NO_POINTS),
         str(content.get("vehicle", "paper_quad")),
         str(content.get("title", "")),
+        numbers("waypoint_numbers", default=NO_NUMBERS),
     )
+    labels = poses.waypoint_numbers
+    if (
+        not np.isfinite(labels).all()
+        or len(labels) not in (0, len(poses.waypoints_ned_m))
+        or not (np.trunc(labels) == labels).all()
+    ):
+        raise ConfigError(path, "waypoint_numbers", "is not a whole number for each of waypoints_ned_m")
     for name in ("position_ned_m", "attitude", "rotor_speed_rad_s", "target_ned_m"):
         if len(getattr(poses, name)) != count:
             raise ConfigError(path, name, f"has {len(getattr(poses, name))} rows, time_s has {count}")

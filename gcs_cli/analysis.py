@@ -6,6 +6,7 @@ import contextlib
 import io
 import math
 import struct
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -28,6 +29,7 @@ from gcs_cli.flight_data import (
     loop_timing,
     series,
 )
+from gcs_cli.log_damage import is_whole
 
 __all__ = ["Flight", "read_flight"]
 
@@ -52,8 +54,10 @@ def read_flight(path: Path) -> Flight:
     """Read a ULog file, complete or cut off; raise ConfigError when it is none."""
     try:
         # pyulog reports damage on stdout, which belongs to the command's own output
-        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):
-            return _Reader(ULog(file, _TOPICS)).flight()
+        content = path.read_bytes()
+        with contextlib.redirect_stdout(io.StringIO()):
+            log = ULog(io.BytesIO(content), _TOPICS)
+        return replace(_Reader(log).flight(), damaged=log.file_corruption or not is_whole(content))
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
     except _DAMAGE as error:

@@ -106,6 +106,8 @@ class Flight:
     texts: tuple[Text, ...] = ()
     overruns: int | None = None
     loop_timing: tuple[LoopTiming, ...] = ()
+    damaged: bool = False
+    """The log ends within a message, or holds what is none."""
 
     @property
     def origin(self) -> GeoPoint | None:
@@ -131,8 +133,6 @@ class Flight:
         on_ground = [(self._touchdown_s(at_s) if landed else at_s, landed) for at_s, landed in self.landed]
         return armed & ~_step(on_ground, time_s)
 
-    def _touchdown_s(self, landed_s: float) -> float:
-        """Return since when the vehicle, found to be landed at ``landed_s``, had been standing still."""
     def standing(self, time_s: FloatArray) -> FlagArray:
         """Tell for each time whether the vehicle stood after a landing: from its touchdown until it took off again.
 
@@ -141,6 +141,8 @@ class Flight:
         again = ((self._touchdown_s(at_s) if landed else at_s, landed) for at_s, landed in self.landed[1:])
         return _step(again, time_s)
 
+    def _touchdown_s(self, landed_s: float) -> float:
+        """Return since when the vehicle, found to be landed at ``landed_s``, had been standing still."""
         before = int(np.searchsorted(self.velocity.time_s, landed_s, side="right"))
         moving = np.flatnonzero(np.linalg.norm(self.velocity.values[:before], axis=1) > _STILL_M_S)
         if not len(moving) or moving[-1] + 1 == before:

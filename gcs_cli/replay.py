@@ -13,7 +13,7 @@ from flightstack.geometry_bulk import quaternions_from_euler
 from flightstack.params.errors import ConfigError
 from flightstack.params.vehicle import load_vehicle
 from flightstack.plan import NAV_COMMANDS, load_plan
-from flightstack.poses_file import NO_POINTS, Poses
+from flightstack.poses_file import Poses
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.flight_data import Flight, Series
 from gcs_cli.run_directory import LOG_NAME
@@ -65,6 +65,8 @@ def _summary(log: Path) -> dict[str, Any]:
 
 def poses_of(flight: Flight, run: Run, vehicle: str | None) -> Poses:
     """Return the poses of a flight; ``vehicle`` overrides the one that the log names. Raise CliError (usage)."""
+    if flight.damaged and not len(flight.position.time_s):
+        raise CliError(f"{run.log}: no readable flight in it", USAGE)
     name = vehicle or _vehicle_name(flight, run)
     _check_vehicle(name, flight, run, given=vehicle is not None)
     time_s, position = flight.position
@@ -76,6 +78,7 @@ def poses_of(flight: Flight, run: Run, vehicle: str | None) -> Poses:
     if not good.any():
         raise CliError(f"{run.log} holds no positions and attitudes to show", USAGE)
     plan = run.summary.get("plan")
+    numbers, places = _waypoints(flight, plan)
     title = [
         name if vehicle is None else Path(name).stem,
         *([Path(plan).name] if isinstance(plan, str) else []),
@@ -85,10 +88,11 @@ def poses_of(flight: Flight, run: Run, vehicle: str | None) -> Poses:
         position[good],
         quaternions_from_euler(euler[good]),
         _latest(flight.rotor_speed, time_s)[good],
-        _latest(flight.position_setpoint, time_s)[good],
-        _waypoints(flight, plan),
+        _targets(flight, time_s)[good],
+        places,
         name,
         " · ".join(Path(part).stem if part.endswith(".toml") else part for part in title),
+        numbers,
     )
 
 
@@ -98,6 +102,14 @@ def _latest(series: Series, time_s: FloatArray) -> FloatArray:
         return np.full((len(time_s), series.values.shape[1]), np.nan)
     index = np.searchsorted(series.time_s, time_s, side="right") - 1
     return series.values[np.maximum(index, 0)]
+
+
+def _targets(flight: Flight, time_s: FloatArray) -> FloatArray:
+    """Setpoints at given times; none on the ground, where they sink into it and mean nothing."""
+    targets = _latest(flight.position_setpoint, time_s)
+    if flight.statuses:
+        targets[~flight.flying(time_s)] = np.nan
+    return targets
 
 
 def _vehicle_name(flight: Flight, run: Run) -> str:
@@ -120,14 +132,18 @@ def _check_vehicle(name: str, flight: Flight, run: Run, given: bool) -> None:
         raise CliError(f"{name} has {rotors} rotors, the vehicle of {run.log} {flown}: see --vehicle", USAGE)
 
 
-def _waypoints(flight: Flight, plan: object) -> FloatArray:
-    """Return the places of the flown plan NED [m], shape (m, 3); none when its file is gone."""
-    if not isinstance(plan, str):
-        return NO_POINTS
+def _waypoints(flight: Flight, plan: object) -> tuple[FloatArray, FloatArray]:
+    """Return the items of the flown plan that have a place: their numbers (m,) and their places NED [m] (m, 3)."""
     try:
-        items = load_plan(plan).items
-    except (ConfigError, OSError):
-        return NO_POINTS
-    places = [item_ned_m(item, flight) for item in items if item.command in NAV_COMMANDS]
-    found = [place for place in places if place is not None and np.isfinite(place).all()]
-    return np.array(found) if found else NO_POINTS
+        items = load_plan(plan).items if isinstance(plan, str) else ()
+    except (ConfigError, OSError):  # the plan's file is gone
+        items = ()
+    found = [
+        (seq, *place)
+        for seq, item in enumerate(items)
+        if item.command in NAV_COMMANDS
+        and (place := item_ned_m(item, flight)) is not None
+        and np.isfinite(place).all()
+    ]
+    table = np.array(found).reshape(-1, 4)
+    return table[:, 0], table[:, 1:]

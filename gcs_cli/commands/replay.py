@@ -10,58 +10,52 @@ from typing import Annotated
 
 import typer
 
+from flightstack import picture_options as asked
 from gcs_cli.errors import FAILED, CliError
 
+_NAME = "gcs replay"
 _PATIENCE_S = 10.0
 
 
 def replay(
     run: Annotated[Path, typer.Argument(help="Directory of a flight, or its log.", show_default=False)],
-    png: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a picture.")] = None,
-    sheet: Annotated[Path | None, typer.Option(metavar="FILE", help="Write several in one picture.")] = None,
-    video: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Write a film, .mp4 or .gif.  [default: replay.mp4 beside the log]"
-        ),
-    ] = None,
-    view: Annotated[bool, typer.Option("--view", help="Play it in a window.")] = False,
-    at: Annotated[
-        str | None,
-        typer.Option(metavar="T1[,T2,…]", help="Moments of the pictures, s; several give numbered files."),
-    ] = None,
-    camera: Annotated[str, typer.Option(help="chase, fixed, top or side.")] = "chase",
-    size: Annotated[
-        str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 1280x720; 480x270 for a gif]")
-    ] = None,
-    fps: Annotated[
-        float | None, typer.Option(help="Frames per second.  [default: 30; 12.5 for a gif]")
-    ] = None,
-    begin: Annotated[float | None, typer.Option("--from", help="Begin of the film, s.")] = None,
-    end: Annotated[float | None, typer.Option("--to", help="End of the film, s.")] = None,
-    speed: Annotated[float, typer.Option(help="Show it so many times as fast as it was flown.")] = 1.0,
+    png: asked.Png = None,
+    sheet: asked.Sheet = None,
+    video: asked.Video = None,
+    view: asked.View = False,
+    at: asked.At = None,
+    camera: asked.Camera = "chase",
+    size: asked.Size = None,
+    fps: asked.Fps = None,
+    begin: asked.Begin = None,
+    end: asked.End = None,
+    speed: asked.Speed = None,
     vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the log's]")] = None,
-    no_words: Annotated[bool, typer.Option("--no-words", help="Leave out the figures.")] = False,
+    no_words: asked.NoWords = False,
 ) -> None:
-    """Show a flight: pictures, a film, or a window that plays it."""
+    """Draw a flight: pictures, a film, or a window.
+
+    Without --png, --sheet, --video or --view it makes a film, replay.mp4 beside the log. That takes minutes without
+    a graphics card; --from, --to and --size make it shorter.
+    """
     from flightstack.poses_file import write_poses  # noqa: PLC0415
     from gcs_cli.analysis import read_flight  # noqa: PLC0415
     from gcs_cli.replay import find_run, poses_of  # noqa: PLC0415
 
     found = find_run(run)
-    poses = poses_of(read_flight(found.log), found, vehicle)
+    flight = read_flight(found.log)
+    poses = poses_of(flight, found, vehicle)
+    if flight.damaged:
+        print(f"gcs: warning: the log is damaged; drawn up to {poses.time_s[-1]:.1f} s", file=sys.stderr)
     if not (png or sheet or video or view):
         video = found.film
-    given = {
-        "--png": png, "--sheet": sheet, "--video": video, "--at": at, "--camera": camera, "--size": size,
-        "--fps": fps, "--from": begin, "--to": end, "--speed": speed,
-    }  # fmt: skip
-    options = [f"{flag}={value}" for flag, value in given.items() if value is not None]
-    flags = [*(["--view"] if view else []), *(["--no-words"] if no_words else [])]
+    options = asked.PictureOptions(
+        png, sheet, video, view, at, camera, size, fps, begin, end, speed, no_words
+    )
     with tempfile.TemporaryDirectory(prefix="gcs-replay-") as folder:
         file = Path(folder) / "poses.npz"
         write_poses(file, poses)
-        code = _render([str(file), *options, *flags])
+        code = _render([str(file), *options.arguments(), f"--caller={_NAME}"])
     if code:
         raise typer.Exit(code)
 
@@ -81,7 +75,7 @@ def _render(arguments: list[str]) -> int:
                 raise
             return FAILED
     if code < 0:
-        raise CliError(f"sim-bridge render was killed by signal {-code}")
+        raise CliError(f"the renderer was killed by signal {-code}")
     return code
 
 

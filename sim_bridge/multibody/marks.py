@@ -15,7 +15,8 @@ from sim_bridge.multibody import looks
 from sim_bridge.multibody.frames import flip_vector
 from sim_bridge.multibody.poses import Moment
 
-MOST_TRAIL = 500
+MOST_TRAIL = 1500
+_LEAST_LINE_PX, _LEAST_BALL_PX = 1.3, 4.5
 _TRAIL_NEW, _TRAIL_OLD = np.array([1.0, 0.78, 0.10, 0.95]), np.array([0.98, 0.90, 0.55, 0.28])
 _TARGET = np.array([0.95, 0.10, 0.62, 0.75])
 _PLAN = np.array([0.10, 0.42, 0.95, 0.45])
@@ -35,19 +36,28 @@ class Marks:
         waypoints_ned_m: FloatArray,
         span_m: float,
         ground_m: float,
+        names: Sequence[str] = (),
     ) -> None:
+        """``names`` label the planned places; without them they have no labels."""
         self._trail = trail
         self._span_m, self._ground_m = span_m, ground_m
         self._width_m = 0.022 * span_m
         self._waypoints = [flip_vector(row) for row in waypoints_ned_m.tolist()]
+        self._names = names or [""] * len(self._waypoints)
 
-    def draw(self, scene: Any, moment: Moment) -> None:
-        """Add all marks of a moment to a scene that holds the model already."""
-        self._draw_plan(scene)
-        points = [flip_vector(row) for row in self._trail(moment.time_s, MOST_TRAIL).tolist()]
-        for index, (begin, end) in enumerate(pairwise(points), start=1):
-            age = 1.0 - index / len(points)
-            _line(scene, begin, end, self._width_m, _TRAIL_NEW + (_TRAIL_OLD - _TRAIL_NEW) * age**0.5)
+    def draw(self, scene: Any, moment: Moment, pixel_m: float = 0.0) -> None:
+        """Add all marks of a moment to a scene that holds the model already.
+
+        ``pixel_m`` is what a pixel measures where the camera looks at: nothing gets too thin to be seen.
+        """
+        self._draw_plan(scene, pixel_m)
+        points = self._trail(moment.time_s, MOST_TRAIL)
+        along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+        age = 1.0 - along[1:] / max(float(along[-1]), 1e-9)
+        width_m = max(self._width_m, _LEAST_LINE_PX * pixel_m)
+        places = [flip_vector(row) for row in points.tolist()]
+        for (begin, end), share in zip(pairwise(places), age**0.5, strict=True):
+            _line(scene, begin, end, width_m, _TRAIL_NEW + (_TRAIL_OLD - _TRAIL_NEW) * share)
         if moment.target_ned_m is not None:
             self._draw_target(scene, flip_vector(moment.target_ned_m))
 
@@ -60,17 +70,17 @@ class Marks:
                 ends[:, axis] += (1.15 * side, 1.45 * side)
                 _line(scene, ends[0].tolist(), ends[1].tolist(), 0.5 * self._width_m, _TARGET)
 
-    def _draw_plan(self, scene: Any) -> None:
+    def _draw_plan(self, scene: Any, pixel_m: float) -> None:
         """Balls on poles, joined by thin lines."""
-        for number, at in enumerate(self._waypoints, start=1):
-            _solid(
-                scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.13 * self._span_m,) * 3, at, _PLAN, label=str(number)
-            )
+        radius_m = max(0.13 * self._span_m, _LEAST_BALL_PX * pixel_m)
+        width_m = max(0.35 * self._width_m, 0.6 * _LEAST_LINE_PX * pixel_m)
+        for name, at in zip(self._names, self._waypoints, strict=True):
+            _solid(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (radius_m,) * 3, at, _PLAN, label=name)
             foot = (at[0], at[1], self._ground_m)
             if at[2] > self._ground_m:
-                _line(scene, foot, at, 0.35 * self._width_m, _PLAN * (1, 1, 1, 0.7))
+                _line(scene, foot, at, width_m, _PLAN * (1, 1, 1, 0.7))
         for begin, end in pairwise(self._waypoints):
-            _line(scene, begin, end, 0.35 * self._width_m, _PLAN * (1, 1, 1, 0.8))
+            _line(scene, begin, end, width_m, _PLAN * (1, 1, 1, 0.8))
 
 
 class RotorLooks:
@@ -104,6 +114,27 @@ class RotorLooks:
             for blade in self._blades[index]:
                 if blade >= 0:
                     rgba[blade, 3] = 1.0 - 0.72 * blur
+
+    def lift_discs(self, scene: Any, data: Any) -> None:
+        """Draw the discs as marks of a scene in place of the model's, which cast the shadow of something solid."""
+        for disc in sorted(self.discs):
+            rgba = self._model.geom_rgba[disc].copy()
+            if rgba[3] <= 0.0:
+                continue
+            geom = _free(scene)
+            if geom is None:
+                return
+            mujoco.mjv_initGeom(
+                geom, mujoco.mjtGeom.mjGEOM_CYLINDER, self._discs_size(disc), data.geom_xpos[disc],
+                data.geom_xmat[disc], rgba,
+            )  # fmt: skip
+            geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+            self._model.geom_rgba[disc, 3] = 0.0
+
+    def _discs_size(self, disc: int) -> Any:
+        """Size as a scene wants it: a cylinder's radius twice, and half its height."""
+        radius, half_height, _ = self._model.geom_size[disc]
+        return np.array([radius, radius, half_height])
 
 
 def _geom(model: Any, name: str) -> int:

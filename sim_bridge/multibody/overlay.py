@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 from PIL import Image, ImageDraw, ImageFont
 
+from sim_bridge.multibody.cameras import View
+from sim_bridge.multibody.labels import Place, draw_numbers, draw_scale
 from sim_bridge.multibody.poses import Moment
 from sim_bridge.multibody.renderer import Picture
 
@@ -15,15 +17,23 @@ _TEXT, _FAINT = (244, 246, 248, 255), (176, 188, 200, 255)
 _EMPTY = (58, 68, 80, 255)
 _SLOW, _FAST = (120, 176, 226), (255, 116, 40)
 _LEAST_UNIT = 0.5  # of the sizes for 1280x720: smaller letters cannot be read
-_LEAST_WIDTH_PX, _LEAST_HEIGHT_PX = 300, 170
-"""A picture narrower or lower than this has no room for words."""
+_LEAST_WIDTH_PX, _LEAST_HEIGHT_PX = 480, 260
+"""A picture narrower or lower than this has no room for figures."""
 _LONGEST_TITLE = 40
 
 
 class Overlay:
     """Writes on the pictures of one flight; ``largest_rad_s`` are the speeds of full bars."""
 
-    def __init__(self, title: str, largest_rad_s: Sequence[float], width: int, height: int) -> None:
+    def __init__(
+        self,
+        title: str,
+        largest_rad_s: Sequence[float],
+        width: int,
+        height: int,
+        places: Sequence[Place] = (),
+    ) -> None:
+        self._places = tuple(places)
         self._title = title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 1]}…"
         self._largest = tuple(largest_rad_s)
         self._unit = max(_LEAST_UNIT, min(width / 1280.0, height / 720.0))
@@ -34,11 +44,20 @@ class Overlay:
     def _sized(self, size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
         return ImageFont.load_default(size=max(9.0, size * self._unit))
 
-    def write(self, picture: Picture, moment: Moment) -> Image.Image:
-        """Return the picture with the figures of its moment."""
+    def write(
+        self, picture: Picture, moment: Moment, view: View | None = None, scale: bool = False
+    ) -> Image.Image:
+        """Return the picture with the figures of its moment.
+
+        With the view that it was taken from it gets the numbers of the places, and if wanted a scale.
+        """
         image = Image.fromarray(picture)
+        if view is not None:
+            draw_numbers(ImageDraw.Draw(image), view, self._places, image.size)
         if not self._fits:
             return image
+        if view is not None and scale:
+            draw_scale(ImageDraw.Draw(image), view, image.size, self._unit)
         layer = Image.new("RGBA", image.size, (0, 0, 0, 0))
         draw = ImageDraw.Draw(layer)
         self._figures(draw, moment)

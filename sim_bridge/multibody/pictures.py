@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,13 +12,17 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.multibody.cameras import SCALED
 from sim_bridge.multibody.film import drawn_for, sheet, write_film, write_png
+from sim_bridge.multibody.frames import flip_vector
+from sim_bridge.multibody.labels import Place
 from sim_bridge.multibody.overlay import Overlay
 from sim_bridge.multibody.poses import FlightPath
 from sim_bridge.multibody.renderer import Renderer
 
 _FASTEST_RAD_S = 1e4
 SHEET_PICTURES = 9
+_LONG_MIN = 0.75
 
 
 class Look(NamedTuple):
@@ -65,7 +70,12 @@ class Pictures:
         self._path, self._look = path, look
         self._renderer = Renderer(vehicle, path, look.width, look.height)
         fastest = [min(rotor.max_speed_rad_s, _FASTEST_RAD_S) for rotor in vehicle.rotors]
-        self._overlay = Overlay(path.poses.title or vehicle.name, fastest, look.width, look.height)
+        places = [
+            Place(name, flip_vector(at))
+            for name, at in zip(path.place_names(), path.poses.waypoints_ned_m.tolist(), strict=True)
+        ]
+        title = path.poses.title or vehicle.name
+        self._overlay = Overlay(title, fastest, look.width, look.height, places)
         console = Console(stderr=True)
         self._progress = Progress(
             TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
@@ -76,10 +86,12 @@ class Pictures:
     def at(self, time_s: float) -> Image.Image:
         """Return the picture of a moment."""
         moment = self._path.at(time_s)
-        picture = self._renderer.draw(moment, self._look.camera)
-        image = self._overlay.write(picture, moment) if self._look.words else Image.fromarray(picture)
+        camera = self._look.camera
+        picture = self._renderer.draw(moment, camera)
         self._progress.advance(self._task)
-        return image
+        if not self._look.words:
+            return Image.fromarray(picture)
+        return self._overlay.write(picture, moment, self._renderer.view(moment, camera), camera in SCALED)
 
     def write_pngs(self, path: Path, times_s: list[float]) -> list[Path]:
         """Write a picture of each moment; return the files. Raises OSError."""
@@ -96,10 +108,27 @@ class Pictures:
 
     def write_film(self, film: Film) -> None:
         """Write a film. Raises OSError."""
-        self._begin(film.path.name, drawn_for(film.path, film.frames))
+        drawn = drawn_for(film.path, film.frames)
+        self._begin(film.path.name, drawn)
+        self._announce(film, drawn)
         write_film(
             film.path, lambda index: self.at(film.begin_s + index * film.step_s), film.frames, film.fps
         )
+
+    def _announce(self, film: Film, drawn: int) -> None:
+        """Say how long a film will take when that is long: who wants less can still say so."""
+        self.at(film.begin_s)  # the first picture of all also makes what the others find made
+        begun = time.perf_counter()
+        self.at(film.begin_s)
+        minutes = drawn * (time.perf_counter() - begun) / 60.0
+        self._progress.update(self._task, completed=0)
+        if minutes >= _LONG_MIN:
+            self._progress.console.print(
+                f"{film.path.name}: {film.frames} frames, about {minutes:.0f} min; "
+                "--from, --to, --size and --fps make it shorter",
+                highlight=False,
+                soft_wrap=True,
+            )
 
     def _begin(self, name: str, total: int) -> None:
         self._progress.reset(self._task, total=total, description=name)

@@ -13,7 +13,11 @@ from flightstack.poses_file import Poses
 
 _SMOOTH_S = 0.9
 """Half the width of the window over which a chasing camera follows the heading."""
-_TRAIL_STEP_M = 0.08
+_TRAIL_STEP_M = 0.02
+_TRAIL_MISS_M = 0.003
+_TRAIL_LONGEST_M = 0.5
+"""A piece of the drawn way misses the flown one by at most so much and is at most so long."""
+_TRAIL_SAMPLES = 20_000  # looked at, so that a long flight begins at once
 
 
 class Moment(NamedTuple):
@@ -42,6 +46,8 @@ class FlightPath:
         self._chase = _smoothed(poses.time_s, self._heading)
         self._angle = _integral(poses.time_s, np.nan_to_num(np.abs(poses.rotor_speed_rad_s)))
         self._trail = _thinned(poses.position_ned_m)
+        points = np.vstack((poses.position_ned_m, poses.waypoints_ned_m))
+        self.low_ned_m, self.high_ned_m = points.min(axis=0), points.max(axis=0)
 
     def at(self, time_s: float) -> Moment:
         """Return the moment, between two samples by linear interpolation."""
@@ -61,6 +67,13 @@ class FlightPath:
             self._row(self._angle, time_s),
             (target[0], target[1], target[2]) if all(map(math.isfinite, target)) else None,
         )
+
+    def place_names(self) -> list[str]:
+        """Return what the planned places are called."""
+        given = self.poses.waypoint_numbers
+        return [f"{number:.0f}" for number in given] or [
+            str(number) for number in range(1, 1 + len(self.poses.waypoints_ned_m))
+        ]
 
     def trail(self, time_s: float, most: int) -> FloatArray:
         """Return the way flown until ``time_s``, NED [m], shape (n, 3), in at most ``most`` + 1 points."""
@@ -112,6 +125,18 @@ def _integral(time_s: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _thinned(position: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Numbers of the samples that lie a little apart."""
+    """Numbers of the samples that the way is drawn through: few where it is straight, many where it bends."""
     along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))))
-    return np.unique(np.floor(along / _TRAIL_STEP_M), return_index=True)[1]
+    step = max(_TRAIL_STEP_M, float(along[-1]) / _TRAIL_SAMPLES)
+    near = np.unique(np.floor(along / step), return_index=True)[1]
+    kept, last = [0], len(near) - 1
+    for candidate in range(2, last + 1):
+        begin, between = position[near[kept[-1]]], position[near[kept[-1] + 1 : candidate]]
+        chord = position[near[candidate]] - begin
+        offset = between - begin
+        share = np.clip(offset @ chord / max(float(chord @ chord), 1e-12), 0.0, 1.0)
+        miss = np.linalg.norm(offset - share[:, None] * chord, axis=1).max()
+        if miss > _TRAIL_MISS_M or along[near[candidate]] - along[near[kept[-1]]] > _TRAIL_LONGEST_M:
+            kept.append(candidate - 1)
+    drawn: np.ndarray[tuple[int], np.dtype[np.intp]] = near[np.unique([*kept, last])]
+    return drawn

@@ -10,7 +10,7 @@ import numpy as np
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.multibody import looks
-from sim_bridge.multibody.cameras import view
+from sim_bridge.multibody.cameras import Site, View, view
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.marks import MOST_TRAIL, Marks, RotorLooks
 from sim_bridge.multibody.mjcf import model_xml
@@ -68,7 +68,13 @@ class Renderer:
         self.width, self.height = width, height
         self._gl = make_context(width, height)
         self._stage = Stage(vehicle)
-        self._marks = Marks(path.trail, path.poses.waypoints_ned_m, self._stage.span_m, self._stage.ground_m)
+        span_m, ground_m = self._stage.span_m, self._stage.ground_m
+        corners = np.array([flip_vector(path.low_ned_m), flip_vector(path.high_ned_m)])
+        low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        self._site = Site(
+            span_m, ground_m, (low[0], low[1], low[2]), (high[0], high[1], high[2]), width / height
+        )
+        self._marks = Marks(path.trail, path.poses.waypoints_ned_m, span_m, ground_m)
         model = self._stage.model
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
@@ -81,7 +87,8 @@ class Renderer:
         """Return the picture of a moment, seen by a camera of ``cameras.CAMERAS``."""
         stage, scene = self._stage, self._scene
         stage.put(moment)
-        self._aim(camera, moment)
+        seen = self.view(moment, camera)
+        self._aim(seen)
         mujoco.mjv_updateScene(
             stage.model,
             stage.data,
@@ -96,11 +103,14 @@ class Renderer:
         ]:  # only the vehicle casts a shadow, the ground's have bad edges
             if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid in stage.shadeless:
                 geom.category = mujoco.mjtCatBit.mjCAT_DECOR
-        self._marks.draw(scene, moment)
+        self._marks.draw(scene, moment, seen.pixel_m(self.height))
         return self._read()
 
-    def _aim(self, camera: str, moment: Moment) -> None:
-        seen = view(camera, moment, self._stage.span_m, self._stage.ground_m)
+    def view(self, moment: Moment, camera: str) -> View:
+        """Return where the picture of a moment is taken from."""
+        return view(camera, moment, self._site)
+
+    def _aim(self, seen: View) -> None:
         self._camera.lookat[:] = seen.look_at_m
         self._camera.distance = seen.distance_m
         self._camera.azimuth, self._camera.elevation = seen.azimuth_deg, seen.elevation_deg

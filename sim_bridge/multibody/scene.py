@@ -116,4 +116,5 @@ def _cameras(world: Element, body: Element, vehicle: Vehicle, ground_m: float) -
     )
     add(world, "camera", name="fixed", mode="targetbody", target="vehicle", pos=(-11, 6, ground_m + 1.75))
     add(body, "camera", name="top", mode="trackcom", pos=(0, 0, 3.0 * far), xyaxes=(0, -1, 0, 1, 0, 0))
+    add(world, "camera", name="whole", pos=(0, 0, ground_m + 18.0), xyaxes=(0, -1, 0, 1, 0, 0))
     add(body, "camera", name="side", mode="trackcom", pos=(0, far, 0.1 * far), xyaxes=(-1, 0, 0, 0, -0.1, 1))

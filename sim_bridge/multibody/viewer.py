@@ -80,18 +80,18 @@ def require_display() -> None:
         )
 
 
-def play(vehicle: Vehicle, path: FlightPath, begin_s: float, end_s: float, speed: float) -> None:
-    """Play a flight until the window is closed."""
+def play(vehicle: Vehicle, path: FlightPath, begin_s: float, end_s: float, speed: float, caller: str) -> None:
+    """Play a flight until the window is closed; ``caller`` is the command that was given."""
     require_display()
     playback = Playback(begin_s, end_s, speed)
-    print(f"sim-bridge: {HELP}", file=sys.stderr, flush=True)
+    print(f"{caller.split(maxsplit=1)[0]}: {HELP}", file=sys.stderr, flush=True)
 
     def moments() -> Iterable[Moment]:
         while True:
             yield path.at(playback.at(time.monotonic()))
 
     stage = Stage(vehicle)
-    marks = Marks(path.trail, path.poses.waypoints_ned_m, stage.span_m, stage.ground_m)
+    marks = Marks(path.trail, path.poses.waypoints_ned_m, stage.span_m, stage.ground_m, path.place_names())
     show(stage, moments(), marks, playback.press)
 
 
@@ -114,6 +114,7 @@ def show(
                 with window.lock():
                     stage.put(moment)
                     window.user_scn.ngeom = 0
+                    stage.rotors.lift_discs(window.user_scn, stage.data)
                     marks.draw(window.user_scn, moment)
                 window.sync()
             time.sleep(_FRAME_S)

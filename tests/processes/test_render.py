@@ -102,7 +102,27 @@ def test_a_log_is_replayed_from_end_to_end(poses: Path, tmp_path: Path) -> None:
     assert frames_of(tmp_path / "replay.mp4") == (5, (96, 54))
     done = subprocess.run([*program, "--camera", "nose"], capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr == "sim-bridge: --camera: 'nose' is not one of chase, fixed, top, side\n"
+    assert done.stderr == "gcs: --camera: 'nose' is not one of chase, fixed, top, side, whole\n"
+
+
+def test_a_damaged_log_is_drawn_as_far_as_it_goes_and_said_to_be_damaged(poses: Path, tmp_path: Path) -> None:
+    log = synthetic_flight_bytes(inner_ms=20, outer_ms=20, seconds=4.0)
+    (tmp_path / "flight.ulg").write_bytes(log[: len(log) * 3 // 4])
+    program = [
+        sys.executable,
+        "-m",
+        "gcs_cli",
+        "replay",
+        str(tmp_path),
+        "--png",
+        str(tmp_path / "p.png"),
+        *SMALL,
+    ]
+    done = subprocess.run(program, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    said = re.fullmatch(r"gcs: warning: the log is damaged; drawn up to ([0-9.]+) s\n", done.stderr)
+    assert said is not None, done.stderr
+    assert 0.5 < float(said[1]) < 4.0
 
 
 @pytest.mark.parametrize(
@@ -112,13 +132,20 @@ def test_a_log_is_replayed_from_end_to_end(poses: Path, tmp_path: Path) -> None:
         (["--png", "p.jpg"], "--png p.jpg: the name must end in .png"),
         (["--video", "f.avi"], "--video f.avi: the name must end in .mp4 or .gif"),
         (["--png", "no/where/p.png"], "--png no/where/p.png: there is no directory no/where"),
-        (["--png", "p.png", "--camera", "nose"], "--camera: 'nose' is not one of chase, fixed, top, side"),
+        (["--png", "p.png", "--camera", "nose"], "--camera: 'nose' is not one of chase, fixed, top, side, whole"),
         (["--png", "p.png", "--size", "big"], "--size: 'big' is not WIDTHxHEIGHT in pixels, such as 1280x720"),
         (["--png", "p.png", "--size", "8x9"], "--size: 8 is outside the allowed range 16 to 4096"),
         (["--video", "f.mp4", "--size", "97x54"], "--size: an mp4 needs even numbers, not 97x54"),
         (["--video", "f.mp4", "--fps", "0"], "--fps: 0 is outside the allowed range 0.1 to 240"),
         (["--video", "f.mp4", "--speed", "nan"], "--speed: nan is outside the allowed range 0.001 to 1000"),
-        (["--png", "p.png", "--at", "1,x"], "--at: '1,x' is not"),
+        (["--png", ""], "--png: the name of a file is missing; it must end in .png"),
+        (["--png", "p.png", "--at", "1,x"], "--at: '1,x' is not one or more times in seconds, separated by commas\n"),
+        (["--png", "p.png", "--at", "1," * 1000 + "1"], "--at: 1001 times are too many, at most 1000 are allowed"),
+        (["--video", "f.mp4", "--at", "1"], "--at is for --png and --sheet: a part of a film is --from and --to"),
+        (["--png", "p.png", "--from", "1"], "--from is for --video, --sheet and --view: the moment of"),
+        (["--sheet", "s.png", "--at", "1", "--to", "1"], "--to is for --video, --sheet and --view"),
+        (["--png", "p.png", "--fps", "5"], "--fps is for --video"),
+        (["--png", "p.png", "--speed", "5"], "--speed is for --video and --view"),
         (["--png", "p.png", "--at", "99"], "--at: 99 s is outside the flight, 0 to 2 s"),
         (["--video", "f.mp4", "--from", "-1"], "--from: -1 s is outside the flight, 0 to 2 s"),
         (["--video", "f.mp4", "--from", "1.5", "--to", "1"], "--from 1.5, --to 1: the film would end before it begins"),

@@ -52,6 +52,14 @@ def test_targets_waypoints_and_speeds_may_be_left_out(tmp_path: Path) -> None:
         ({"attitude": np.array(["a"] * 3)}, "attitude: is not an array of numbers"),
         ({"position_ned_m": np.zeros((2, 3))}, "position_ned_m: has 2 rows, time_s has 3"),
         ({"rotor_speed_rad_s": np.zeros((3, 9))}, "rotor_speed_rad_s: has 9 rotors, at most 8 are allowed"),
+        (
+            {"waypoint_numbers": np.ones(2)},
+            "waypoint_numbers: is not a whole number for each of waypoints_ned_m",
+        ),
+        (
+            {"waypoints_ned_m": np.zeros((1, 3)), "waypoint_numbers": np.array([np.inf])},
+            "waypoint_numbers: is not a whole number",
+        ),
         ({"waypoints_ned_m": np.zeros(())}, "waypoints_ned_m: is not an array of numbers of shape (n, 3)"),
     ],
 )

@@ -13,6 +13,7 @@ from flightstack.plan import save_plan
 from gcs_cli.analysis import read_flight
 from gcs_cli.errors import CliError
 from gcs_cli.flight_data import Flight, series
+from gcs_cli.log_damage import is_whole
 from gcs_cli.replay import Run, find_run, poses_of
 from tests.support.gcs import gcs
 from tests.support.square_plan import square_plan
@@ -41,7 +42,17 @@ def test_poses_are_those_of_the_log(run: Path) -> None:
     assert 190.0 < np.nanmedian(poses.rotor_speed_rad_s) < 240.0
     assert np.isfinite(poses.target_ned_m).any()
     assert poses.waypoints_ned_m.shape[1] == 3
-    assert len(poses.waypoints_ned_m) >= 5
+    places = [seq for seq, item in enumerate(square_plan().items) if item.position_deg is not None]
+    assert poses.waypoint_numbers.tolist() == places
+
+
+def test_there_is_no_target_on_the_ground(run: Path) -> None:
+    flight = read_flight(run / "flight.ulg")
+    poses = poses_of(flight, find_run(run), None)
+    flying = flight.flying(poses.time_s)
+    assert 0 < flying.sum() < len(flying)
+    assert np.isnan(poses.target_ned_m[~flying]).all()
+    assert np.isfinite(poses.target_ned_m[flying]).any()
 
 
 def test_a_log_alone_names_its_vehicle_and_has_no_plan(run: Path, tmp_path: Path) -> None:
@@ -102,6 +113,22 @@ def test_directories_without_one_log_are_named(tmp_path: Path) -> None:
         find_run(tmp_path)
     with pytest.raises(CliError, match="there is no such directory or log"):
         find_run(tmp_path / "c.ulg")
+
+
+def test_a_log_is_whole_when_messages_fill_it(run: Path) -> None:
+    log = (run / "flight.ulg").read_bytes()
+    assert is_whole(log)
+    assert not is_whole(log[:-1])
+    assert not is_whole(log[: len(log) // 2] + b"\xff" * 40 + log[len(log) // 2 :])
+    assert not is_whole(log[:10])
+    assert not is_whole(b"")
+
+
+def test_a_log_cut_to_its_head_holds_no_flight(run: Path, tmp_path: Path) -> None:
+    (tmp_path / "flight.ulg").write_bytes((run / "flight.ulg").read_bytes()[:30])
+    ended = gcs("replay", tmp_path)
+    assert ended.returncode == 2
+    assert ended.stderr.strip() == f"gcs: {tmp_path}/flight.ulg: no readable flight in it"
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
