@@ -23,6 +23,7 @@ from gcs_cli.paper.report_labels import (
     STYLES,
     TRAJECTORIES,
     anchored,
+    label_of,
     legend_of,
     minus,
     row,
@@ -52,7 +53,7 @@ def claims_section(claims: Sequence[Mapping[str, Any]]) -> str:
         new = claim["claim"] != before
         before = claim["claim"]
         title = f"{escape(claim['claim'])}<span>{escape(claim['source'])}</span>" if new else ""
-        holds = '<td class="good">yes</td>' if claim["holds"] else '<td class="bad">no</td>'
+        style, holds = ("good", "yes") if claim["holds"] else ("bad", "no")
         plant, words, threshold = (
             escape(text)
             for text in (
@@ -62,10 +63,11 @@ def claims_section(claims: Sequence[Mapping[str, Any]]) -> str:
             )
         )
         cells = (
-            f'<td class="two claim">{title}</td><td>{plant}</td>{holds}<td>{words}</td><td>{threshold}</td>'
+            f'<td class="two claim">{title}</td><td>{plant}</td><td class="{style}">{holds}</td><td>{words}</td>'
+            f"<td{label_of('holds if')}>{threshold}</td>"
         )
         rows.append(row(cells, new))
-    table = wide_table(("claim", "plant", "holds", "what came out", "holds if"), rows)
+    table = wide_table(("claim", "plant", "holds", "what came out", "holds if"), rows, style="stacked")
     return anchored("claims", section("Does it hold?", table))
 
 

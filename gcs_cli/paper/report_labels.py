@@ -94,6 +94,11 @@ def wide_table(columns: Sequence[str], rows: Iterable[str], style: str = "", cap
     return f'<div class="wide"><table{named}>{above}<tr>{heads}</tr>{"".join(rows)}</table></div>'
 
 
+def label_of(column: str) -> str:
+    """Return the attribute by which a cell of a ``stacked`` table tells its column where a phone stacks the cells."""
+    return f' data-label="{escape(column)}"'
+
+
 def row(cells: str, begins: bool = False) -> str:
     """Return a row of a table; ``begins``: it is the first one of a group."""
     return f"<tr{' class=stage' if begins else ''}>{cells}</tr>"

@@ -104,7 +104,7 @@ def _rounding(found: Mapping[str, Any]) -> str:
 
 def _bound(found: Mapping[str, Any]) -> str:
     if "within_bounds" not in found:
-        return "<td>another model: differs by right</td>"
+        return "<td>none: not the same model</td>"
     words = f"{fixed(100.0 * found['position_bound_m'], 0)} cm, {fixed(found['attitude_bound_deg'], 1)}°"
     if found["rounding"] is not None and not found["bound_decides"]:
         return "<td>chance: magnified rounding</td>"

@@ -12,9 +12,10 @@ import numpy as np
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import DEFAULT_VEHICLE, load_vehicle
 from gcs_cli.paper import cases
+from gcs_cli.paper.report_alike import hidden_note
 from gcs_cli.paper.report_axes import Axis, chart, spanning
 from gcs_cli.paper.report_flights import STEP_SIZE, Recordings, label, response_lines
-from gcs_cli.paper.report_labels import ANGLES, LABELS, PLANTS, anchored, fixed, legend_of
+from gcs_cli.paper.report_labels import ANGLES, AXIS_TITLES, LABELS, PLANTS, anchored, fixed, legend_of
 from gcs_cli.paper.report_metrics import step_table
 from gcs_cli.paper.types import Recording
 from gcs_cli.report_chart import Line
@@ -107,7 +108,9 @@ def step_figure(
     note: str = "",
 ) -> str:
     """Return the responses of all contenders to steps of these axes, on the small-angle plant."""
-    charts, names = [], []
+    charts: list[str] = []
+    curves: dict[str, list[Line]] = {}
+    names: list[str] = []
     for axis in axes:
         flown = {
             name: recordings[key]
@@ -117,23 +120,29 @@ def step_figure(
         if not flown:
             continue
         names = list(flown)
-        charts.append(_step_chart(flown, axis))
+        lines = _step_lines(flown, axis)
+        charts.append(_step_chart(lines, axis))
+        curves[AXIS_TITLES[axis]] = lines[1:]
     if not charts:
         return ""
     body = f'<div class="pair">{"".join(charts)}</div>'
+    note = " ".join(words for words in (hidden_note(curves), note) if words)
     return anchored(anchor, section(title, body, legend_of(names), note))
 
 
-def _step_chart(flown: Mapping[str, Recording], axis: str) -> str:
+def _step_lines(flown: Mapping[str, Recording], axis: str) -> list[Line]:
+    """Return reference and responses from just before the step."""
     lines = response_lines(flown, axis)
     begin_s = float(lines[0].x[int(np.argmax(lines[0].y != lines[0].y[0]))])
     shown_s = _STEP_SHOWN_S if axis not in ANGLES else 0.2 * _STEP_SHOWN_S
     shown_s *= 2.0 if axis in ("x", "y", "yaw") else 1.0
-    kept = [_between(line, begin_s - 0.08 * shown_s, begin_s + shown_s) for line in lines]
-    time = Axis("time [s]", begin_s - 0.08 * shown_s, begin_s + shown_s)
-    return chart(
-        f"Step of {axis}", time, spanning(label(axis), [line.y for line in kept]), kept, size=STEP_SIZE
-    )
+    return [_between(line, begin_s - 0.08 * shown_s, begin_s + shown_s) for line in lines]
+
+
+def _step_chart(lines: Sequence[Line], axis: str) -> str:
+    time = Axis("time [s]", float(lines[0].x[0]), float(lines[0].x[-1]))
+    reach = spanning(label(axis), [line.y for line in lines])
+    return chart(f"Step of {axis}", time, reach, lines, size=STEP_SIZE)
 
 
 def _between(line: Line, start_s: float, end_s: float) -> Line:

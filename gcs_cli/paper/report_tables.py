@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from gcs_cli.paper.report_labels import UNKNOWN, anchored, row, wide_table
+from gcs_cli.paper.report_labels import UNKNOWN, anchored, label_of, row, wide_table
 from gcs_cli.report_plots import section
 
 _TITLES = {
@@ -66,10 +66,15 @@ def corrections_section(corrections: Sequence[Mapping[str, Any]]) -> str:
     rows = (
         row(
             f"<th>{escape(one['where'])}</th>"
-            + "".join(f"<td>{escape(one[name])}</td>" for name in ("printed", "used", "why"))
-            + f"<td><code>{escape(one['place'])}</code></td>"
+            + "".join(f"<td{label_of(name)}>{escape(one[name])}</td>" for name in ("printed", "used", "why"))
+            + f"<td{label_of('lives in')}><code>{_breakable(one['place'])}</code></td>"
         )
         for one in corrections
     )
-    table = wide_table(("where", "printed", "used", "why", "lives in"), rows, style="text")
+    table = wide_table(("where", "printed", "used", "why", "lives in"), rows, style="text stacked")
     return anchored("corrections", section("Corrections of the paper", table))
+
+
+def _breakable(place: str) -> str:
+    """Let the name of a file break where it has a joint, and nowhere else."""
+    return escape(place).replace("/", "/<wbr>").replace("_", "_<wbr>")

@@ -28,7 +28,7 @@ from gcs_cli.tlog_file import TlogFile
 from tests.support.square_plan import square_plan
 from tests.support.synthetic_flight import synthetic_flight_bytes
 
-VOID = {"meta", "br", "hr", "img", "link", "input"}
+VOID = {"meta", "wbr", "br", "hr", "img", "link", "input"}
 
 
 class Checker(HTMLParser):
