@@ -26,10 +26,17 @@ from gcs_cli.fly_options import (
     stack_arguments,
 )
 from gcs_cli.processes import Child, Children
-from gcs_cli.run_directory import LOG_NAME, make_run_directory
+from gcs_cli.run_directory import (
+    LOG_NAME,
+    REPORT_NAME,
+    SIMULATOR,
+    STACK,
+    SUMMARY_NAME,
+    TLOG_NAME,
+    make_run_directory,
+)
 from gcs_cli.tlog_file import TlogFile
 
-TLOG_NAME, SUMMARY_NAME, REPORT_NAME = "gcs.tlog", "summary.json", "report.html"
 _STEP_S = 0.1
 _END_PATIENCE_S = 10.0
 
@@ -84,8 +91,8 @@ def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> 
         )
         with _recording(connection, folder), Children(folder) as children:
             home = plan.home or DEFAULT_HOME
-            children.start("sim-bridge", "sim_bridge", simulator_arguments(options, home))
-            children.start("flightstack", "flightstack", stack_arguments(options, home, folder))
+            children.start(SIMULATOR, "sim_bridge", simulator_arguments(options, home))
+            children.start(STACK, "flightstack", stack_arguments(options, home, folder))
             _run(flight, connection, children, interruption, display)
             if flight.shut_down_accepted:
                 children.wait(_END_PATIENCE_S)
@@ -131,7 +138,7 @@ def _run(
         casualty = _casualty(flight, children)
         if casualty is not None:
             code = casualty.exit_code if casualty.exit_code in (USAGE, NO_ANSWER) else FAILED
-            gone = any(child.name == "flightstack" for child in children.ended())
+            gone = any(child.name == STACK for child in children.ended())
             flight.abort(casualty.obituary, code, now_s, vehicle_is_gone=gone)
         flight.step(now_s)
         display.update(flight)

@@ -8,14 +8,25 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from flightstack.firmware.pil_record import LINK_FILE, STEPS_FILE
 from gcs_cli.errors import USAGE, CliError
 
 RUNS = Path("runs")
-LOG_NAME = "flight.ulg"
+LOG_NAME, TLOG_NAME, SUMMARY_NAME, REPORT_NAME = "flight.ulg", "gcs.tlog", "summary.json", "report.html"
+FILM_NAME = "replay.mp4"
+SIMULATOR, STACK = "sim-bridge", "flightstack"
+"""The children of a flight; the output of each goes to ``<name>.log``."""
+_LEFT_OVER = (
+    LOG_NAME, TLOG_NAME, SUMMARY_NAME, REPORT_NAME, FILM_NAME, LINK_FILE, STEPS_FILE,
+    f"{SIMULATOR}.log", f"{STACK}.log",
+)  # fmt: skip
 
 
 def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS) -> Path:
-    """Make and return the directory; raise CliError (usage) when it cannot be, or holds a flight."""
+    """Make and return the directory; raise CliError (usage) when it cannot be, or holds a flight.
+
+    What a flight that never began has left there goes, for it tells nothing of the one that begins now.
+    """
     try:
         if out is None:
             return _fresh(base, plan.stem)
@@ -25,6 +36,8 @@ def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS) -> Path:
         out.mkdir(parents=True, exist_ok=True)
         if not os.access(out, os.W_OK | os.X_OK):
             raise CliError(f"--out {out}: nothing can be written there: permission denied", USAGE)
+        for name in _LEFT_OVER:
+            (out / name).unlink(missing_ok=True)
     except OSError as error:
         raise CliError(f"{out or base}: the directory cannot be made: {error.strerror}", USAGE) from None
     return out

@@ -19,7 +19,9 @@ def fly(
     context: typer.Context,
     plan: Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)],
     controller: Annotated[str, typer.Option(help="pid, backstepping, or the name of one of yours.")] = "pid",
-    gains: Annotated[str, typer.Option(help="tuned, paper, backstepping_poles, or a TOML file.")] = "tuned",
+    gains: Annotated[
+        str, typer.Option(help="tuned, paper, paper_rate_fed, backstepping_poles, or a TOML file.")
+    ] = "tuned",
     plant: Annotated[str, typer.Option(help="rigid, multibody or paper.")] = "rigid",
     speed: Annotated[str, typer.Option(metavar="max|N", help="N times real time.")] = "max",
     inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop.")] = 500.0,
@@ -68,8 +70,9 @@ def fly(
     """Fly a mission in simulation and write log, summary and report."""
     from gcs_cli.fly_display import FlyConsole, make_display  # noqa: PLC0415
     from gcs_cli.fly_options import FlyOptions, checked_plan  # noqa: PLC0415
-    from gcs_cli.fly_run import REPORT_NAME, write_results  # noqa: PLC0415
     from gcs_cli.fly_run import fly as fly_plan  # noqa: PLC0415
+    from gcs_cli.fly_run import write_results  # noqa: PLC0415
+    from gcs_cli.run_directory import REPORT_NAME  # noqa: PLC0415
 
     settings = settings_of(context).merged(None, timeout)
     if settings.connect is not None:

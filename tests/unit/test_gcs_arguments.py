@@ -30,7 +30,8 @@ from gcs_cli.fly_options import (
     simulator_arguments,
     stack_arguments,
 )
-from gcs_cli.run_directory import make_run_directory
+from gcs_cli.replay import Run
+from gcs_cli.run_directory import LOG_NAME, make_run_directory
 from tests.support.fake_vehicle import SHUT_DOWN, FakeVehicle
 from tests.support.free_instance import free_instance
 from tests.unit.test_gcs_flight import Story
@@ -297,6 +298,15 @@ def test_a_directory_with_a_flight_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CliError, match="of another flight is there") as error:
         make_run_directory(HOP, out)
     assert error.value.exit_code == USAGE
+
+
+def test_what_a_flight_that_never_began_has_left_does_not_stay_beside_the_next_one(tmp_path: Path) -> None:
+    film = Run(tmp_path / LOG_NAME, {}).film.name
+    names = (LOG_NAME, "report.html", "summary.json", "gcs.tlog", "sim-bridge.log", "pil-link.json", film)
+    for name in (*names, "notes.txt", "old.ulg"):
+        (tmp_path / name).write_text("")
+    make_run_directory(HOP, tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.txt", "old.ulg"]
 
 
 def test_a_directory_without_permission_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
