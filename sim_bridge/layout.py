@@ -21,7 +21,7 @@ CONTACT = 1  # result bits of ``advance``
 DIVERGED = 2
 
 # columns of "rotor"
-THRUST, ROLL, PITCH, DRAG, MOMENTUM, LAG_RATE, LOWEST, HIGHEST, HALF_STEP_DECAY = range(9)
+THRUST, ROLL, PITCH, DRAG, MOMENTUM, LAG_RATE, LOWEST, HIGHEST, HALF_STEP_DECAY, MOST_TORQUE = range(10)
 
 MEMORY = np.dtype(
     [
@@ -47,7 +47,7 @@ MEMORY = np.dtype(
         # what is fixed
         ("step_s", "f8"),
         ("rotor_count", "i8"),
-        ("rotor", "f8", (MAX_ROTORS, 9)),
+        ("rotor", "f8", (MAX_ROTORS, 10)),
         ("mass", "f8"),  # kg
         ("weight", "f8"),  # N
         ("inertia", "f8", 3),  # kg m²

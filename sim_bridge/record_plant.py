@@ -10,7 +10,7 @@ import numpy as np
 from flightstack.contract import FloatArray
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.battery import BatteryState, battery_state, set_battery
-from sim_bridge.layout import DRAG, HIGHEST, LOWEST, MEMORY, OUTPUT, THRUST, RecordArray
+from sim_bridge.layout import DRAG, HALF_STEP_DECAY, HIGHEST, LOWEST, MEMORY, OUTPUT, THRUST, RecordArray
 from sim_bridge.plant import PlantOptions
 from sim_bridge.turbulence import Turbulence
 
@@ -53,6 +53,8 @@ class RecordPlant(ABC):
                 rotor.min_speed_rad_s if limits else -math.inf,
                 rotor.max_speed_rad_s if limits else math.inf,
                 0.0,  # set with the step
+                # speeds that are imposed need no torque
+                rotor.max_drive_torque_n_m if rotor.lag_s > 0.0 and rotor.inertia_kg_m2 > 0.0 else math.inf,
             )
         self._healthy: FloatArray = m["rotor"].copy()
 
@@ -85,7 +87,9 @@ class RecordPlant(ABC):
         m = self._memory[0]
         m["step_s"] = step_s
         for index, rotor in enumerate(self._vehicle.rotors):
-            m["rotor"][index, -1] = math.exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
+            m["rotor"][index, HALF_STEP_DECAY] = (
+                math.exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
+            )
         self._turbulence.set_step(step_s)
 
     def rotor_speeds_rad_s(self) -> list[float]:

@@ -12,7 +12,8 @@ torque that this takes follows from the equations of motion (b: the frame's six 
     τ = (M_hh − M_hb M_bb⁻¹ M_bh) Ω̇ + M_hb M_bb⁻¹ (f_b − c_b) + c_h − f_h
 
 Both matrices are constant in body axes, because rotors are round. With it the hinge accelerates as the lag wants, to
-rounding, and its speed is taken from the lag's exact solution, which stays stable for any lag.
+rounding, and its speed is taken from the lag's exact solution, which stays stable for any lag. A drive of limited
+torque (``rotors.py``) wants less of the same.
 
 State and memory are those of the rigid plant: NED and FRD. MuJoCo's x-y-z is north-west-up and forward-left-up.
 """
@@ -27,9 +28,20 @@ from flightstack.compiled import compiled
 from flightstack.contract import MAX_ROTORS, FloatArray
 from sim_bridge.battery import discharge
 from sim_bridge.integrator import LARGEST_TURN_RAD, next_gust
-from sim_bridge.layout import CONTACT, DIVERGED, DRAG, LAG_RATE, PITCH, ROLL, THRUST, Record, RecordArray
+from sim_bridge.layout import (
+    CONTACT,
+    DIVERGED,
+    DRAG,
+    LAG_RATE,
+    MOST_TORQUE,
+    PITCH,
+    ROLL,
+    THRUST,
+    Record,
+    RecordArray,
+)
 from sim_bridge.rigid import after_step, rotation
-from sim_bridge.rotors import half_step, take_commands
+from sim_bridge.rotors import driven, half_step, take_commands
 
 _LARGEST = 1e9  # of any number of the state: beyond it MuJoCo gives up
 _NEAR_M = 0.05
@@ -65,7 +77,10 @@ def _note_speeds(m: Record, d: Record, when: int) -> None:
     for i in range(m["rotor_count"]):
         d["speed"][when, i] = speed[i]
         rate = rotor[i, LAG_RATE]
-        d["wanted"][when, i] = (held[i] - speed[i]) * rate if rate < math.inf else 0.0
+        if rotor[i, MOST_TORQUE] < math.inf:
+            d["wanted"][when, i] = driven(m, i, speed[i])
+        else:
+            d["wanted"][when, i] = (held[i] - speed[i]) * rate if rate < math.inf else 0.0
 
 
 @compiled

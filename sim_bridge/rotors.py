@@ -1,4 +1,9 @@
-"""The rotor set in compiled code: commands with their limits, first-order lag, thrust and torques."""
+"""The rotor set in compiled code: commands with their limits, first-order lag, thrust and torques.
+
+A rotor without lag jumps to its speed: that is a convention, with no reaction on the frame (no spin-up torque).
+A drive of limited torque (``max_drive_torque_n_m`` of a vehicle file) slows the lag down: the sum of J_r·Ω̇ and of the
+drag torque d·Ω|Ω| stays within it.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +20,7 @@ from sim_bridge.layout import (
     LAG_RATE,
     LOWEST,
     MOMENTUM,
+    MOST_TORQUE,
     PITCH,
     ROLL,
     THRUST,
@@ -58,11 +64,35 @@ def take_commands(m: Record, command: FloatArray, flags: int) -> None:
 
 
 @compiled
+def driven(m: Record, i: int, speed: float) -> float:
+    """Acceleration [rad/s²] of rotor ``i`` at a speed: the lag's, as far as the torque of its drive allows."""
+    rotor = m["rotor"]
+    wanted = (m["command"][i] - speed) * rotor[i, LAG_RATE]
+    drag = abs(rotor[i, DRAG]) * speed * abs(speed)
+    most, inertia = rotor[i, MOST_TORQUE], abs(rotor[i, MOMENTUM])
+    limited: float = min(max(wanted, (-most - drag) / inertia), (most - drag) / inertia)
+    return limited
+
+
+@compiled
+def _driven_half_step(m: Record, i: int) -> float:
+    """Speed of a rotor with a limited drive after half a step, by the midpoint rule; not beyond its command."""
+    begin, target, h = m["rotor_speed"][i], m["command"][i], 0.5 * m["step_s"]
+    end = begin + h * driven(m, i, begin + 0.5 * h * driven(m, i, begin))
+    passed = (target - begin) * (target - end) < 0.0
+    speed: float = target if passed else end
+    return speed
+
+
+@compiled
 def half_step(m: Record) -> None:
-    """Advance the rotor speeds by half a step: the exact solution of Ω̇ = (command − Ω)/lag."""
+    """Advance the rotor speeds by half a step: the exact solution of Ω̇ = (command − Ω)/lag, where nothing limits it."""
     rotor, held, speed = m["rotor"], m["command"], m["rotor_speed"]
     for i in range(m["rotor_count"]):
-        speed[i] = held[i] + (speed[i] - held[i]) * rotor[i, HALF_STEP_DECAY]
+        if rotor[i, MOST_TORQUE] < math.inf:
+            speed[i] = _driven_half_step(m, i)
+        else:
+            speed[i] = held[i] + (speed[i] - held[i]) * rotor[i, HALF_STEP_DECAY]
 
 
 @compiled
@@ -79,6 +109,8 @@ def rotor_forces(m: Record) -> RotorForces:
         drag += rotor[i, DRAG] * w2
         momentum += rotor[i, MOMENTUM] * w
         power += abs(rotor[i, DRAG] * w2 * w)
-        if held[i] != w:  # never where there is no lag
+        if rotor[i, MOST_TORQUE] < math.inf:
+            spin_up -= rotor[i, MOMENTUM] * driven(m, i, w)
+        elif held[i] != w:  # never where there is no lag
             spin_up -= rotor[i, MOMENTUM] * (held[i] - w) * rotor[i, LAG_RATE]
     return RotorForces(thrust, roll, pitch, drag, spin_up, momentum, power)

@@ -31,6 +31,8 @@ class Rotor:
     lag_s: float
     min_speed_rad_s: float
     max_speed_rad_s: float
+    max_drive_torque_n_m: float = math.inf
+    """Of the motor, for what speeds the rotor up and for the drag of the air; it acts on rotors with a lag."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +74,14 @@ class Vehicle:
         return matrix
 
     def with_ideal_rotors(self) -> Vehicle:
-        """Return the vehicle with rotors that follow at once and have no limits, as the paper assumes."""
+        """Return the vehicle with rotors that follow at once and have no limits, as the paper assumes.
+
+        Their speeds are imposed: plants leave out the spin-up torque as well.
+        """
+        lowest, most = -math.inf, math.inf
         rotors = tuple(
-            replace(r, lag_s=0.0, min_speed_rad_s=-math.inf, max_speed_rad_s=math.inf) for r in self.rotors
+            replace(r, lag_s=0.0, min_speed_rad_s=lowest, max_speed_rad_s=most, max_drive_torque_n_m=most)
+            for r in self.rotors
         )
         return replace(self, rotors=rotors, ideal_rotors=True)
 
@@ -140,6 +147,7 @@ def _rotors(top: Table, rotor_type: Table, mass_kg: float) -> tuple[Rotor, ...]:
     torque_coefficient = rotor_type.number("torque_coefficient_n_m_s2", 1e-15, 1.0)
     inertia = rotor_type.number("inertia_kg_m2", 0.0, 1.0, 0.0)
     lag_s = rotor_type.number("lag_s", 0.0, 1.0, 0.0)
+    drive_torque = _drive_torque(rotor_type, lag_s, inertia)
     rotors = []
     for entry in entries:
         x, y, z = entry.numbers("position_frd_m", 3, -10.0, 10.0)
@@ -147,10 +155,27 @@ def _rotors(top: Table, rotor_type: Table, mass_kg: float) -> tuple[Rotor, ...]:
         entry.finish()
         rotors.append(
             Rotor(
-                (x, y, z), spin, thrust_coefficient, torque_coefficient, inertia, lag_s, min_speed, max_speed
+                (x, y, z),
+                spin,
+                thrust_coefficient,
+                torque_coefficient,
+                inertia,
+                lag_s,
+                min_speed,
+                max_speed,
+                drive_torque,
             )
         )
     return tuple(rotors)
+
+
+def _drive_torque(rotor_type: Table, lag_s: float, inertia_kg_m2: float) -> float:
+    """Read the largest torque of a drive; infinite where the file has none."""
+    if not rotor_type.has("max_drive_torque_n_m"):
+        return math.inf
+    if lag_s == 0.0 or inertia_kg_m2 == 0.0:
+        raise rotor_type.error("max_drive_torque_n_m", "needs a lag_s and an inertia_kg_m2 above 0")
+    return rotor_type.number("max_drive_torque_n_m", 1e-9, 1e3)
 
 
 def _check_geometry(top: Table, vehicle: Vehicle) -> None:
@@ -167,3 +192,7 @@ def _check_geometry(top: Table, vehicle: Vehicle) -> None:
         if squared <= 0.0 or not low < needed < high:
             needs = f"number {number} would need {needed:.0f} rad/s, its range is {low:.0f} to {high:.0f}"
             raise top.error("rotor", f"the rotors cannot hold the vehicle in hover: {needs}")
+        drag_torque = rotor.torque_coefficient_n_m_s2 * squared
+        if drag_torque >= rotor.max_drive_torque_n_m:
+            torque = f"number {number} needs {drag_torque:.3g} N m against the drag alone"
+            raise top.error("rotor_type.max_drive_torque_n_m", f"cannot hold the vehicle in hover: {torque}")

@@ -46,6 +46,28 @@ def test_built_in_vehicles_load() -> None:
         assert vehicle.description
 
 
+def test_a_limit_of_the_drives_is_optional(tmp_path: Path) -> None:
+    assert {rotor.max_drive_torque_n_m for rotor in load_vehicle("paper_quad").rotors} == {math.inf}
+    limited = changed(r"^lag_s = .*$", "lag_s = 0.005\nmax_drive_torque_n_m = 0.2")
+    vehicle = load_text(tmp_path, limited)
+    assert [rotor.max_drive_torque_n_m for rotor in vehicle.rotors] == [0.2] * 4
+    assert {rotor.max_drive_torque_n_m for rotor in vehicle.with_ideal_rotors().rotors} == {math.inf}
+
+
+@pytest.mark.parametrize(
+    ("lines", "problem"),
+    [
+        ("lag_s = 0.005\nmax_drive_torque_n_m = 0.03", "number 1 needs 0.0331 N m against the drag alone"),
+        ("lag_s = 0.0\nmax_drive_torque_n_m = 0.2", "needs a lag_s and an inertia_kg_m2 above 0"),
+        ("lag_s = 0.005\nmax_drive_torque_n_m = -1", "outside the allowed range"),
+    ],
+)
+def test_says_what_is_wrong_with_a_limit_of_the_drives(tmp_path: Path, lines: str, problem: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(problem)) as caught:
+        load_text(tmp_path, changed(r"^lag_s = .*$", lines))
+    assert "max_drive_torque_n_m" in str(caught.value)
+
+
 def test_the_papers_vehicle_is_table_i() -> None:
     v = load_vehicle("paper_quad")
     assert (v.mass_kg, v.inertia_kg_m2) == (0.55, (7.2e-3, 7.2e-3, 1.1e-2))
