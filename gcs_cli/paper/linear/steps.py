@@ -21,8 +21,8 @@ from scipy.optimize import brentq
 from flightstack.contract import FloatArray
 from gcs_cli.paper.linear.continuous import TransferFunction
 from gcs_cli.paper.linear.exponential import exponential
+from gcs_cli.paper.metrics import HIGH, LOW, SETTLED, rise_time_s, settling_time_s
 
-LOW, HIGH, BAND = 0.1, 0.9, 0.02
 _EQUAL = 1e-7  # relative distance of two real poles below which they count as one
 
 
@@ -126,12 +126,12 @@ def _crossing(value: Callable[[float], float], begin: float, end: float, level: 
 
 
 def _settling(value: Callable[[float], float], knots: list[float], values: list[float]) -> float | None:
-    if abs(values[-1] - 1.0) > BAND:
+    if abs(values[-1] - 1.0) > SETTLED:
         return None
     for index in range(len(knots) - 2, -1, -1):
-        if abs(values[index] - 1.0) > BAND:
+        if abs(values[index] - 1.0) > SETTLED:
             return _crossing(
-                value, knots[index], knots[index + 1], 1.0 + math.copysign(BAND, values[index] - 1.0)
+                value, knots[index], knots[index + 1], 1.0 + math.copysign(SETTLED, values[index] - 1.0)
             )
     return 0.0
 
@@ -199,30 +199,9 @@ def read_figures(time_s: FloatArray, response: FloatArray) -> StepFigures:
     """
     peak = int(response.argmax())
     overshoot = max(0.0, 100.0 * float(response[peak] - 1.0))
-    low, high = _crossed(time_s, response, LOW), _crossed(time_s, response, HIGH)
-    outside = np.flatnonzero(np.abs(response - 1.0) > BAND)
-    settling: float | None = 0.0
-    if outside.size and outside[-1] == len(response) - 1:
-        settling = None
-    elif outside.size:
-        last = int(outside[-1])
-        level = 1.0 + math.copysign(BAND, float(response[last]) - 1.0)
-        settling = _between(time_s, response, last, level)
     return StepFigures(
         overshoot,
         float(time_s[peak]) if overshoot > 0.0 else None,
-        None if low is None or high is None else high - low,
-        settling,
+        rise_time_s(time_s, response),
+        settling_time_s(time_s, response),
     )
-
-
-def _crossed(time_s: FloatArray, response: FloatArray, level: float) -> float | None:
-    reached = np.flatnonzero(response >= level)
-    if not reached.size:
-        return None
-    return float(time_s[0]) if reached[0] == 0 else _between(time_s, response, int(reached[0]) - 1, level)
-
-
-def _between(time_s: FloatArray, response: FloatArray, index: int, level: float) -> float:
-    share = (level - response[index]) / (response[index + 1] - response[index])
-    return float(time_s[index] + share * (time_s[index + 1] - time_s[index]))
