@@ -15,7 +15,9 @@ PATHS = (DESIRED, SMOOTH, HARD)
 ATTITUDE_STEPS = ("step_roll", "step_pitch", "step_yaw")
 POSITION_STEPS = ("step_x", "step_y", "step_z")
 STEPS = (*ATTITUDE_STEPS, *POSITION_STEPS)
-PLAIN, IDEAL, NO_LIMITS, NO_LAG, SHAPED = "plain", "ideal", "no_limits", "lag_0", "shaped"
+PLAIN, IDEAL, NO_LIMITS, NO_LAG, SHAPED, DRIVE = (
+    "plain", "ideal", "no_limits", "lag_0", "shaped", "drive",
+)  # fmt: skip
 
 
 class Contender(NamedTuple):
@@ -72,6 +74,7 @@ CONDITIONS = (
     Condition("delay", "one more inner period of delay, 1 ms", {"delay_steps": 1}),
     Condition("slow", "inner loop at 500 Hz", {"inner_hz": 500}),
     Condition("twice", "the trajectory at twice its size", {"scale": 2.0}),
+    Condition(DRIVE, "motors of at most 0.2 N m, six times what hover takes", {"drive_torque_n_m": 0.2}),
     Condition(SHAPED, "setpoints through a reference model: 3 rad/s, damping 1, 4.5 m/s²", {"shaped": True}),
 )
 NUDGE = Condition("nudge", "a push of 10⁻¹² N", {"force_ned_n": Vector3(1e-12, 0.0, 0.0)})
@@ -121,13 +124,16 @@ def all_cases(multibody: bool) -> list[Case]:
 
     The two paths of the comparison in all conditions; the desired trajectory and steps plain and with ideal rotors;
     all steps of position through the reference model, which smooth paths do not need; on the multibody plant the
-    desired trajectory, and with the paper's gains everything else that is plain.
+    desired trajectory, and with the paper's gains everything else that is plain. The torque of the motors is a matter
+    of the rigid body: on small angles rotors turn for nothing.
     """
     plants = (SMALL_ANGLE, RIGID)
     simple = [condition for condition in CONDITIONS if condition.name in (PLAIN, IDEAL)]
     shaped = [condition for condition in CONDITIONS if condition.name == SHAPED]
-    others = [condition for condition in CONDITIONS if condition.name != SHAPED]
+    drive = [condition for condition in CONDITIONS if condition.name == DRIVE]
+    others = [condition for condition in CONDITIONS if condition.name not in (SHAPED, DRIVE)]
     cases = matrix((SMOOTH, HARD), plants, conditions=others)
+    cases += matrix((SMOOTH, HARD), (RIGID,), conditions=drive)
     cases += matrix((DESIRED, *STEPS), plants, conditions=simple)
     cases += matrix((HARD, *POSITION_STEPS), plants, conditions=shaped)
     cases += matrix((DESIRED,), (RIGID,), conditions=(NUDGE,))

@@ -62,12 +62,14 @@ def controlled_vehicle(case: Case) -> Vehicle:
 
 
 def flown_vehicle(case: Case) -> Vehicle:
-    """Return the vehicle that the plant is: with the case's mass, inertia and motor lag."""
+    """Return the vehicle that the plant is: with the case's mass, inertia, motor lag and torque."""
     vehicle = load_vehicle(case.vehicle)
     ix, iy, iz = (case.inertia_factor * value for value in vehicle.inertia_kg_m2)
     rotors = vehicle.rotors
     if case.lag_s is not None:
         rotors = tuple(replace(rotor, lag_s=case.lag_s) for rotor in rotors)
+    if case.drive_torque_n_m is not None:
+        rotors = tuple(replace(rotor, max_drive_torque_n_m=case.drive_torque_n_m) for rotor in rotors)
     return replace(
         vehicle, mass_kg=case.mass_factor * vehicle.mass_kg, inertia_kg_m2=(ix, iy, iz), rotors=rotors
     )

@@ -41,6 +41,8 @@ class Case(NamedTuple):
     """Further inner steps between a state and the actuators that answer it."""
     scale: float = 1.0
     """Of all displacements of the trajectory."""
+    drive_torque_n_m: float | None = None
+    """The most that a motor can turn its rotor with, on the rigid and the multibody plant; None: the vehicle file's."""
     shaped: bool = False
     """Setpoints pass a reference model that feeds velocity and acceleration ahead, as guidance does in flight."""
     vehicle: str = "paper_quad"

@@ -292,3 +292,10 @@ def test_a_push_of_nothing_stays_nothing_where_the_loops_are_stable() -> None:
         moved_m[name] = difference(plain, nudged)["max_position_m"]
     assert moved_m[BACKSTEPPING] < 1e-9
     assert moved_m[PID] > ROUNDING_M
+
+
+def test_the_papers_gains_ask_for_more_than_a_motor_of_that_size_gives() -> None:
+    """0.2 N m is six times what hover takes; rotors of Table I's inertia then follow in tens of milliseconds."""
+    for name in (PID, BACKSTEPPING):
+        assert flown(name, "hard", "drive", "rigid").ended_how == "crashed"
+    assert flown("tuned_pid", "hard", "drive", "rigid").ended_s is None

@@ -21,6 +21,7 @@ from gcs_cli.paper.cases import (
     BACKSTEPPING,
     CONDITIONS,
     CONTENDERS,
+    DRIVE,
     MULTIBODY,
     NUDGE,
     PID,
@@ -59,7 +60,7 @@ def test_keys_are_distinct_and_every_combination_is_there() -> None:
         for condition in CONDITIONS:
             along = ("hard", "step_z") if condition.name == SHAPED else ("smooth", "hard")
             for trajectory in along:
-                for plant in (SMALL_ANGLE, RIGID):
+                for plant in (SMALL_ANGLE, RIGID) if condition.name != DRIVE else (RIGID,):
                     case = by_key[key(contender.name, trajectory, condition.name, plant)]
                     assert (case.controller, case.gains) == (contender.controller, contender.gains)
                     assert all(getattr(case, name) == value for name, value in condition.changes.items())

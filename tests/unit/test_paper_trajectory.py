@@ -11,12 +11,15 @@ import pytest
 from flightstack.params.errors import ConfigError
 from gcs_cli.paper.trajectory import (
     ATTITUDE,
+    MODEL_M_S2,
+    MODEL_RAD_S,
     POSITION,
     Move,
     Trajectory,
     load_trajectory,
     sample,
     setpoints,
+    shaped_setpoints,
     trajectory_names,
 )
 
@@ -103,7 +106,30 @@ def test_the_desired_trajectory_moves_all_four_commands_and_comes_back() -> None
     at = sample(trajectory, np.linspace(0.0, trajectory.duration_s, 3401))
     assert (np.ptp(at.value, axis=0) > 1.0).all()
     assert at.value[-1] == pytest.approx([0.0, 0.0, -0.5, 0.0], abs=1e-9)
-    assert np.abs(at.acceleration[:, :3]).max() < 2.6
+    assert np.linalg.norm(at.acceleration[:, :2], axis=1).max() == pytest.approx(1.92, abs=0.005)
+    assert np.abs(at.acceleration[:, 2]).max() == pytest.approx(0.72, abs=0.005)
+
+
+def test_the_reference_model_makes_of_a_step_a_path_that_can_be_flown() -> None:
+    time_s = np.arange(0.0, 9.0, 0.004)
+    rows = shaped_setpoints(load_trajectory("step_x"), time_s)
+    t = np.maximum(time_s - 1.0, 0.0)
+    free = 1.0 - (1.0 + MODEL_RAD_S * t) * np.exp(-MODEL_RAD_S * t)  # where it asks for less than it may
+    small = shaped_setpoints(load_trajectory("step_x"), time_s, scale=0.1)
+    assert small[:, 0] == pytest.approx(0.1 * free, abs=0.0015)
+    assert np.abs(rows[:, 6]).max() == MODEL_M_S2
+    assert rows[:, 0].max() <= 1.0 + 1e-9
+    assert rows[-1, 0] == pytest.approx(1.0, abs=1e-6)
+    assert np.diff(rows[:, 0]) == pytest.approx(0.004 * rows[1:, 3], abs=1e-12)
+    assert np.diff(rows[:, 3]) == pytest.approx(0.004 * rows[:-1, 6], abs=1e-12)
+
+
+def test_the_reference_model_bounds_a_diagonal_and_leaves_the_heading() -> None:
+    time_s = np.arange(0.0, 22.0, 0.004)
+    bare, shaped = (shape(load_trajectory("hard"), time_s, 2.0) for shape in (setpoints, shaped_setpoints))
+    assert np.linalg.norm(shaped[:, 6:8], axis=1).max() == pytest.approx(MODEL_M_S2)
+    assert np.abs(shaped[:, 8]).max() <= MODEL_M_S2
+    assert (shaped[:, 9:] == bare[:, 9:]).all()
 
 
 BAD = {
