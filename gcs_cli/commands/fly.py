@@ -54,7 +54,9 @@ def fly(
     ] = None,
     vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
     instance: Annotated[int, typer.Option(help="Shifts all ports, to fly beside another one.")] = 0,
-    ideal_rotors: Annotated[bool, typer.Option("--ideal-rotors", help="No rotor lag, no limits.")] = False,
+    ideal_rotors: Annotated[
+        bool, typer.Option("--ideal-rotors", help="Rotors without limits, lag and spin-up torque.")
+    ] = False,
     params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None,
     loops: Annotated[
         str,
