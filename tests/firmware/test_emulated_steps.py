@@ -8,8 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flightstack.firmware.build import EXACT
 from flightstack.firmware.numbers import default_numbers
-from tests.firmware.step_machines import Costs, first_difference, gcc_image, on_cortex_m4, on_host, zig_image
+from tests.firmware.step_machines import (
+    INCLUDES,
+    LOOPS,
+    STEPS,
+    C,
+    Costs,
+    first_difference,
+    gcc_image,
+    hashes,
+    on_cortex_m4,
+    on_host,
+    run,
+    tool,
+    zig_image,
+)
 from tests.firmware.step_streams import flown_steps, parameter_frame, random_steps
 
 RANDOM_STEPS = 100_000
@@ -45,6 +60,16 @@ def test_a_whole_mission_gives_the_same_bits(tmp_path: Path) -> None:
 def test_another_compiler_for_the_target_changes_no_bit(tmp_path: Path) -> None:
     image, stream = gcc_image(tmp_path), b"".join(random_steps(5_000, seed=5))
     assert first_difference(on_host(stream, tmp_path), on_cortex_m4(stream, image)[0]) == ""
+
+
+def test_no_step_is_decided_by_memory_that_was_never_written(tmp_path: Path) -> None:
+    """MemorySanitizer, which clang alone has: codec and loops on this machine, both laws, every limit."""
+    (tmp_path / "steps").write_bytes(b"".join(random_steps(5_000, seed=5)))
+    sources = [*LOOPS, *STEPS, C / "steps_host.c"]
+    flags = [*EXACT, *INCLUDES, "-fsanitize=memory", "-fno-sanitize-recover=all", "-g", "-O1"]
+    run([tool("clang", "clang"), *flags, *sources, "-lm", "-o", tmp_path / "program"])
+    run([tmp_path / "program", tmp_path / "steps", tmp_path / "hashes"])
+    assert len(hashes((tmp_path / "hashes").read_bytes())) == 5_001
 
 
 def test_a_gain_off_by_one_bit_is_seen(tmp_path: Path) -> None:
