@@ -233,3 +233,10 @@ def test_a_yaw_without_a_sine_keeps_the_target_also_without_nan(without_nan: Cor
     assert all(np.array_equal(row, made[1, :5]) for row in made[2:, :5])
     flown, _ = run_python(python, ticks)
     assert not np.array_equal(flown[4, :5], flown[3, :5])
+
+
+@pytest.mark.parametrize(("divisor", "period"), [(5, 5), (1, 1), (0, 1), (65_535, 65_535)])
+def test_rate_groups_begin_with_the_outer_loop_and_come_back_to_it(divisor: int, period: int) -> None:
+    due = np.zeros(140_000, np.uint16)
+    Core("float").call("drive_rate_groups", divisor, due.size, due)
+    assert np.array_equal(due, np.where(np.arange(due.size) % period == 0, OUTER_DUE, 0))
