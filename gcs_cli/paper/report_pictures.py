@@ -22,13 +22,14 @@ from gcs_cli.paper.types import Recording
 from gcs_cli.report_plots import section
 
 SIZE = "960x540"
+"""Twice as wide as the page shows them: figures in them would be too small to read, captions say what is seen."""
 PATIENCE_S = 180.0
 """A renderer that takes longer is given up: software rendering of a picture takes a tenth of a second."""
 _SHOTS = (
     ("chase", 7.0, "on its way north, nose down"),
     ("side", 12.6, "on the second side of the square, from the side"),
     ("fixed", 17.6, "third side, climbing and turning, from the ground"),
-    ("top", 25.0, "the square flown, from above"),
+    ("whole", 25.0, "the way flown, from above, north up, lines on the ground every metre"),
 )
 _POSES_HZ = 50.0
 _JPEG_QUALITY = 86
@@ -114,7 +115,7 @@ def _drawn(recording: Recording) -> list[Picture]:
 
 
 def _render(poses: Path, file: Path, camera: str, at_s: float) -> None:
-    arguments = [f"--png={file}", f"--at={at_s:g}", f"--camera={camera}", f"--size={SIZE}"]
+    arguments = [f"--png={file}", f"--at={at_s:g}", f"--camera={camera}", f"--size={SIZE}", "--no-words"]
     subprocess.run(
         [sys.executable, "-m", "sim_bridge", "render", str(poses), *arguments],
         check=True,

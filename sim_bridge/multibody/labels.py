@@ -14,7 +14,8 @@ from PIL import ImageDraw, ImageFont
 from sim_bridge.multibody.cameras import View, project
 
 Font: TypeAlias = ImageFont.FreeTypeFont | ImageFont.ImageFont
-Colour = tuple[int, int, int, int]
+Box: TypeAlias = tuple[float, float, float, float]
+Colour: TypeAlias = tuple[int, int, int, int]
 
 _INK, _EDGE, _NORTH = (255, 255, 255, 255), (16, 34, 66, 235), (255, 128, 52, 255)
 _SHARE = 0.030  # of the picture's height: letters of the numbers
@@ -33,14 +34,21 @@ class Place(NamedTuple):
 
 
 def draw_numbers(
-    draw: ImageDraw.ImageDraw, view: View, places: Sequence[Place], size: tuple[int, int]
+    draw: ImageDraw.ImageDraw,
+    view: View,
+    places: Sequence[Place],
+    size: tuple[int, int],
+    covered: Sequence[Box] = (),
 ) -> None:
-    """Write the name of each place above it; those that fall on one spot share it."""
+    """Write the name of each place above it; those that fall on one spot share it.
+
+    ``covered`` are boxes (left, top, right, bottom) that something else will be drawn on.
+    """
     letters = max(_LEAST_PX, _SHARE * size[1])
     spots: list[tuple[list[str], float, float]] = []
     for place in places:
         seen = project(view, place.at_m, size)
-        if seen is None or not (0.0 <= seen[0] < size[0] and 0.0 <= seen[1] < size[1]):
+        if seen is None or not _inside(seen, (0.0, 0.0, *size)):
             continue
         for names, x, y in spots:
             if math.hypot(seen[0] - x, seen[1] - y) < letters:
@@ -50,7 +58,13 @@ def draw_numbers(
             spots.append(([place.name], *seen))
     font = ImageFont.load_default(size=letters)
     for names, x, y in spots:
-        write(draw, (x, max(0.6 * letters, y - _ABOVE * letters)), ", ".join(dict.fromkeys(names)), font)
+        at = (x, max(0.6 * letters, y - _ABOVE * letters))
+        if not any(_inside(at, box) for box in covered):
+            write(draw, at, ", ".join(dict.fromkeys(names)), font)
+
+
+def _inside(at: tuple[float, float], box: Box) -> bool:
+    return box[0] <= at[0] < box[2] and box[1] <= at[1] < box[3]
 
 
 def write(

@@ -73,7 +73,7 @@ class Marks:
     def _draw_plan(self, scene: Any, pixel_m: float) -> None:
         """Balls on poles, joined by thin lines."""
         radius_m = max(0.13 * self._span_m, _LEAST_BALL_PX * pixel_m)
-        width_m = max(0.35 * self._width_m, 0.6 * _LEAST_LINE_PX * pixel_m)
+        width_m = 0.35 * max(self._width_m, _LEAST_LINE_PX * pixel_m)
         for name, at in zip(self._names, self._waypoints, strict=True):
             _solid(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (radius_m,) * 3, at, _PLAN, label=name)
             foot = (at[0], at[1], self._ground_m)

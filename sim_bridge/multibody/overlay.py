@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from PIL import Image, ImageDraw, ImageFont
 
 from sim_bridge.multibody.cameras import View
-from sim_bridge.multibody.labels import Place, draw_numbers, draw_scale
+from sim_bridge.multibody.labels import Box, Place, draw_numbers, draw_scale
 from sim_bridge.multibody.poses import Moment
 from sim_bridge.multibody.renderer import Picture
 
@@ -52,19 +52,20 @@ class Overlay:
         With the view that it was taken from it gets the numbers of the places, and if wanted a scale.
         """
         image = Image.fromarray(picture)
-        if view is not None:
-            draw_numbers(ImageDraw.Draw(image), view, self._places, image.size)
-        if not self._fits:
-            return image
-        if view is not None and scale:
-            draw_scale(ImageDraw.Draw(image), view, image.size, self._unit)
         layer = Image.new("RGBA", image.size, (0, 0, 0, 0))
-        draw = ImageDraw.Draw(layer)
-        self._figures(draw, moment)
-        self._rotors(draw, image.size, moment)
+        covered = self._panels(ImageDraw.Draw(layer), image.size, moment) if self._fits else []
+        if view is not None:
+            draw = ImageDraw.Draw(image)
+            draw_numbers(draw, view, self._places, image.size, covered)
+            if scale and self._fits:
+                draw_scale(draw, view, image.size, self._unit)
         return Image.alpha_composite(image.convert("RGBA"), layer).convert("RGB")
 
-    def _figures(self, draw: ImageDraw.ImageDraw, moment: Moment) -> None:
+    def _panels(self, draw: ImageDraw.ImageDraw, size: tuple[int, int], moment: Moment) -> list[Box]:
+        """Draw all panels; return where they are."""
+        return [self._figures(draw, moment), *self._rotors(draw, size, moment)]
+
+    def _figures(self, draw: ImageDraw.ImageDraw, moment: Moment) -> Box:
         u = self._unit
         heading = round(math.degrees(moment.heading_rad)) % 360
         rows = [
@@ -88,12 +89,13 @@ class Overlay:
             draw.text((left + 16.0 * u, y + 3.0 * u), name, font=self._small, fill=_FAINT)
             draw.text((left + width - 16.0 * u, y), value, font=self._font, fill=_TEXT, anchor="ra")
             y += line
+        return left, top, left + width, bottom
 
-    def _rotors(self, draw: ImageDraw.ImageDraw, size: tuple[int, int], moment: Moment) -> None:
+    def _rotors(self, draw: ImageDraw.ImageDraw, size: tuple[int, int], moment: Moment) -> list[Box]:
         """A bar for each rotor, full at the largest speed."""
         u, count = self._unit, min(len(self._largest), len(moment.rotor_speed_rad_s))
         if not count:
-            return
+            return []
         width, line = 250.0 * u, 24.0 * u
         right, bottom = size[0] - 18.0 * u, size[1] - 18.0 * u
         left, top = right - width, bottom - line * count - 40.0 * u
@@ -113,3 +115,4 @@ class Overlay:
                 )
             shown = f"{speed:.0f}" if math.isfinite(speed) else "—"
             draw.text((right - 16.0 * u, y), shown, font=self._small, fill=_TEXT, anchor="ra")
+        return [(left, top, right, bottom)]
