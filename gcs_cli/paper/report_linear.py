@@ -22,6 +22,7 @@ from gcs_cli.report_plots import section
 
 BODE_HZ = 1000.0
 _POINTS = 360
+_CRITICAL_DEG = np.array([-180.0])
 _LOWEST_RAD_S = 1.0
 
 
@@ -73,8 +74,9 @@ def _bode(loops: Loops, axis: str, actuators: Actuators, title: str) -> str:
         f"Gain of the open loop, {title}", along, spanning("gain [dB]", [line.y for line in gain]), gain,
         guides=[Guide("0 dB", 0.0)], size=STEP_SIZE,
     )  # fmt: skip
+    turns = spanning("phase [°]", [_CRITICAL_DEG, *(line.y for line in phase)])
     below = chart(
-        f"Phase of the open loop, {title}", along, Axis("phase [°]", -400.0, -60.0), phase,
+        f"Phase of the open loop, {title}", along, turns, phase,
         guides=[Guide("−180°", -180.0)], size=STEP_SIZE,
     )  # fmt: skip
     return f"<div>{heading}{above}</div><div>{heading}{below}</div>"

@@ -17,6 +17,7 @@ from gcs_cli.paper.report_labels import (
     row,
     wide_table,
 )
+from gcs_cli.paper.report_lag import beyond_note
 from gcs_cli.paper.report_onset import loop_title
 from gcs_cli.report_plots import section
 
@@ -49,6 +50,7 @@ def margin_sections(linear: Mapping[str, Any]) -> Iterator[str]:
         "report flies so, but the simulated onset below. ωn and ζ are what the proportional and the derivative gain "
         "alone would place; ζ above 1: two real poles. Motor lag borne: what ends stability at 1000 Hz without delay."
     )
+    note = f"{note} {beyond_note(loops)}".rstrip()
     title = "Margins with ideal rotors and one step of delay"
     yield anchored("margins-delayed", section(title, delayed_table(loops), note=note))
     note = (

@@ -15,7 +15,7 @@ from gcs_cli.paper import cases
 from gcs_cli.paper.report_alike import hidden_note
 from gcs_cli.paper.report_axes import Axis, chart, spanning
 from gcs_cli.paper.report_flights import STEP_SIZE, Recordings, label, response_lines
-from gcs_cli.paper.report_labels import ANGLES, AXIS_TITLES, LABELS, PLANTS, anchored, fixed, legend_of
+from gcs_cli.paper.report_labels import ANGLES, LABELS, PLANTS, anchored, fixed, legend_of
 from gcs_cli.paper.report_metrics import step_table
 from gcs_cli.paper.types import Recording
 from gcs_cli.report_chart import Line
@@ -122,7 +122,7 @@ def step_figure(
         names = list(flown)
         lines = _step_lines(flown, axis)
         charts.append(_step_chart(lines, axis))
-        curves[AXIS_TITLES[axis]] = lines[1:]
+        curves["height" if axis == "z" else axis] = lines[1:]
     if not charts:
         return ""
     body = f'<div class="pair">{"".join(charts)}</div>'
