@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 from flightstack.compiled import compiled
-from flightstack.contract import MAX_ROTORS, FloatArray
+from flightstack.contract import MAX_ROTORS, FloatArray, Vector3
 from sim_bridge.battery import discharge
 from sim_bridge.integrator import LARGEST_TURN_RAD, next_gust
 from sim_bridge.layout import (
@@ -134,6 +134,22 @@ def begin_step(memory: RecordArray, drive: RecordArray, qpos: FloatArray, qvel: 
 
 
 @compiled
+def _drive(
+    m: Record, d: Record, when: int, force: Vector3, torque: Vector3, bias: FloatArray, applied: FloatArray
+) -> None:
+    """Write the torques of the drives to ``applied``; ``force`` and ``torque``, FRD, are f_b − c_b of the frame."""
+    gain, row, wanted, speed, rotors = d["gain"], d["row"], d["wanted"], d["speed"], m["rotor_count"]
+    for i in range(rotors):
+        w2 = speed[when, i] * abs(speed[when, i])
+        drive_torque = bias[6 + i] - d["spin"][i] * m["rotor"][i, DRAG] * w2
+        drive_torque += row[i, 0] * force.x + row[i, 1] * force.y + row[i, 2] * force.z
+        drive_torque += row[i, 3] * torque.x + row[i, 4] * torque.y + row[i, 5] * torque.z
+        for j in range(rotors):
+            drive_torque += gain[i, j] * wanted[when, j]
+        applied[6 + i] = drive_torque
+
+
+@compiled
 def apply_forces(
     memory: RecordArray, drive: RecordArray, stage: int, bias: FloatArray, contact: FloatArray,
     applied: FloatArray, on_body: FloatArray,
@@ -174,15 +190,7 @@ def apply_forces(
     fx = n.x * north + e.x * east + z.x * down
     fy = n.y * north + e.y * east + z.y * down
     fz = n.z * north + e.z * east + z.z * down
-    gain, row, wanted = d["gain"], d["row"], d["wanted"]
-    for i in range(rotors):
-        w2 = speed[when, i] * abs(speed[when, i])
-        drive_torque = bias[6 + i] - d["spin"][i] * rotor[i, DRAG] * w2
-        drive_torque += row[i, 0] * fx + row[i, 1] * fy + row[i, 2] * fz
-        drive_torque += row[i, 3] * tx + row[i, 4] * ty + row[i, 5] * tz
-        for j in range(rotors):
-            drive_torque += gain[i, j] * wanted[when, j]
-        applied[6 + i] = drive_torque
+    _drive(m, d, when, Vector3(fx, fy, fz), Vector3(tx, ty, tz), bias, applied)
 
 
 @compiled
