@@ -131,7 +131,7 @@ def test_the_head_says_under_what_it_flew(flight: Flight) -> None:
     assert "vehicle paper_quad · controller backstepping, gains paper · loops in python" in head
     assert "1000 and 250 Hz · plant multibody" in head
     assert (
-        "wind 5 m/s north, -3 m/s east · gusts 1 m/s · gusty torque 0.1 N m · battery from 60 % · battery drained "
+        "wind 5 m/s north, −3 m/s east · gusts 1 m/s · gusty torque 0.1 N m · battery from 60 % · battery drained "
         "20 times as fast · fault rotor:2:off@8 · fault state:freeze@9 · rotors without lag and limits · parameters of "
         "my.params · seed 7" in head
     )
