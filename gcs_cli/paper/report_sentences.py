@@ -18,6 +18,7 @@ from gcs_cli.paper.report_findings import (
     worst_plants,
 )
 from gcs_cli.paper.report_labels import LABELS, PLANTS, fixed, minus, number
+from gcs_cli.paper.report_margins import FLOWN, sampled
 from gcs_cli.paper.report_matrix import space_rms
 from gcs_cli.paper.types import Case
 
@@ -145,16 +146,19 @@ def _of_linear(results: Results) -> Iterator[str]:
     words = (
         f"The rate at which instability sets in is predicted within {fixed(apart, 2)} % of the simulated one"
     )
-    rates = {one["controller"]: one["predicted_hz"] for one in reversed(onset) if one["axis"] == "roll"}
-    if len(rates) == 2:
+    yield escape(f"{words}, for inner and outer loops.")
+    rates = {
+        loop["controller"]: of["lowest_stable_hz"]
+        for loop in results["linear"].get("loops", ())
+        if loop["gains"] == "paper" and (of := sampled(loop["axes"]["roll"], FLOWN)) is not None
+    }
+    if len(rates) == 2 and None not in rates.values():
         pid, backstepping = rates[cases.PID], rates[cases.BACKSTEPPING]
         nearer = "backstepping" if backstepping > pid else "the PID"
-        words += (
-            f"; with {onset[0]['setting']} the roll loop needs at least {fixed(pid, 0)} Hz with the paper's PID and "
-            f"{fixed(backstepping, 0)} Hz with its backstepping: by this measure {nearer} is the one nearer to "
-            "instability, whatever survives the flights"
+        yield escape(
+            f"As it flies, the roll loop would be stable down to {fixed(pid, 0)} Hz with the paper's PID and to "
+            f"{fixed(backstepping, 0)} Hz with its backstepping: by this measure {nearer} is nearer to instability."
         )
-    yield escape(f"{words}.")
     for one in onset:
         if one["controller"] == cases.PID and _SPIN_UP in one["setting"]:
             yield escape(

@@ -90,13 +90,16 @@ def _linear_overshoot(results: Mapping[str, Any]) -> float | None:
 
 
 def yaw_authority() -> float:
-    """Return the largest yaw acceleration [rad/s²] of the paper's vehicle at hover: one pair of rotors, other off."""
+    """Return the largest yaw acceleration [rad/s²] of the paper's vehicle at hover: one pair slowest, one fastest."""
     vehicle = load_vehicle(DEFAULT_VEHICLE)
     matrix = vehicle.effectiveness()  # of the squared speeds: thrust, then torques
     squared = vehicle.weight_n / matrix[0].sum()
-    highest = np.array([rotor.max_speed_rad_s**2 for rotor in vehicle.rotors])
-    pair = np.where(matrix[3] > 0.0, np.minimum(2.0 * squared, highest), 0.0)
-    return float(matrix[3] @ pair) / vehicle.inertia_kg_m2[2]
+    lowest, highest = (
+        np.array([value**2 for value in speeds])
+        for speeds in zip(*((r.min_speed_rad_s, r.max_speed_rad_s) for r in vehicle.rotors), strict=True)
+    )
+    turning = np.where(matrix[3] > 0.0, np.minimum(2.0 * squared - lowest, highest), lowest)
+    return float(matrix[3] @ turning) / vehicle.inertia_kg_m2[2]
 
 
 def step_figure(
