@@ -16,7 +16,6 @@ from gcs_cli.paper.report_labels import anchored, fixed, number
 from gcs_cli.paper.report_sentences import sentences
 from gcs_cli.report_plots import section
 
-
 _TELLING = 0.001
 
 
