@@ -125,16 +125,11 @@ class RotorLooks:
             if geom is None:
                 return
             mujoco.mjv_initGeom(
-                geom, mujoco.mjtGeom.mjGEOM_CYLINDER, self._discs_size(disc), data.geom_xpos[disc],
+                geom, mujoco.mjtGeom.mjGEOM_CYLINDER, self._model.geom_size[disc], data.geom_xpos[disc],
                 data.geom_xmat[disc], rgba,
             )  # fmt: skip
             geom.category = mujoco.mjtCatBit.mjCAT_DECOR
             self._model.geom_rgba[disc, 3] = 0.0
-
-    def _discs_size(self, disc: int) -> Any:
-        """Size as a scene wants it: a cylinder's radius twice, and half its height."""
-        radius, half_height, _ = self._model.geom_size[disc]
-        return np.array([radius, radius, half_height])
 
 
 def _geom(model: Any, name: str) -> int:

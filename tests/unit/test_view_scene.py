@@ -265,7 +265,8 @@ def test_discs_of_the_window_are_marks_that_cast_no_shadow() -> None:
     for geom, disc in zip(drawn, sorted(place.rotors.discs), strict=True):
         assert geom.category == mujoco.mjtCatBit.mjCAT_DECOR
         np.testing.assert_allclose(geom.pos, place.data.geom_xpos[disc], atol=1e-6)
-        assert geom.size[0] == pytest.approx(place.model.geom_size[disc][0])
+        radius, half_height, _ = place.model.geom_size[disc]
+        assert geom.size == pytest.approx((radius, radius, half_height))
         assert geom.rgba[3] > 0.0 == place.model.geom_rgba[disc][3]
     place.put(standing(speed=0.0).at(0.0))
     scene.ngeom = 0
