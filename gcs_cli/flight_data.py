@@ -15,6 +15,7 @@ from flightstack.geodesy import GeoPoint, LocalFrame
 FlagArray: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
 
 _STILL_M_S = 0.1  # slower than any descent: a vehicle that is about to be found landed stands already
+_SAME_HEIGHT_M = 0.05
 _REAL_TIME = 1  # clock of a loop timing
 
 
@@ -136,21 +137,26 @@ class Flight:
     def standing(self, time_s: FloatArray) -> FlagArray:
         """Tell for each time whether the vehicle stood after a landing: from its touchdown until it took off again.
 
-        Its setpoint is in the ground then, so that it stays there, and is nowhere that it shall fly to.
+        Its setpoint is in the ground then, so that it stays there, and is nowhere that it shall fly to. Wind may push
+        it about meanwhile: it counts from when it was as low as at the end.
         """
-        again = ((self._touchdown_s(at_s) if landed else at_s, landed) for at_s, landed in self.landed[1:])
+        again = ((self._settled_s(at_s) if landed else at_s, landed) for at_s, landed in self.landed[1:])
         return _step(again, time_s)
 
     def _touchdown_s(self, landed_s: float) -> float:
         """Return since when the vehicle, found to be landed at ``landed_s``, had been standing still."""
-        before = int(np.searchsorted(self.velocity.time_s, landed_s, side="right"))
-        moving = np.flatnonzero(np.linalg.norm(self.velocity.values[:before], axis=1) > _STILL_M_S)
-        if not len(moving) or moving[-1] + 1 == before:
-            return landed_s
-        return float(self.velocity.time_s[moving[-1] + 1])
+        time_s, velocity = self.velocity
+        return _since(time_s, np.linalg.norm(velocity, axis=1) <= _STILL_M_S, landed_s)
+
+    def _settled_s(self, landed_s: float) -> float:
+        """Return since when the vehicle, found to be landed at ``landed_s``, had stood still or been as low as then."""
+        time_s, down = self.position.time_s, self.position.values[:, 2]
+        before = int(np.searchsorted(time_s, landed_s, side="right"))
+        low = np.abs(down - down[before - 1]) <= _SAME_HEIGHT_M if before else np.zeros(0, dtype=bool)
+        return min(self._touchdown_s(landed_s), _since(time_s, low, landed_s))
 
     def tracking_error(self) -> Series:
-        """Distance [m] between position and setpoint while flying, shape (n, 1)."""
+        """Distance [m] between position and setpoint while flying, shape (n, 1); a vehicle that stands does not fly."""
         time_s, position = self.position
         if not len(time_s) or not len(self.position_setpoint.time_s):
             return empty_series(1)
@@ -158,7 +164,8 @@ class Flight:
         if not np.array_equal(time_s, self.position_setpoint.time_s):
             setpoint = _interpolated(self.position_setpoint, time_s)
         error = np.linalg.norm(position - setpoint, axis=1)
-        kept = self.flying(time_s) & np.isfinite(error)  # a setpoint may leave an axis free: NaN
+        flies = self.flying(time_s) & ~self.standing(time_s)
+        kept = flies & np.isfinite(error)  # a setpoint may leave an axis free: NaN
         return series(time_s[kept], error[kept][:, None])
 
 
@@ -168,6 +175,15 @@ def _step(changes: Iterable[tuple[float, bool]], time_s: FloatArray) -> FlagArra
     times = np.array([time for time, _ in listed])
     values = np.array([False, *(value for _, value in listed)])
     return values[np.searchsorted(times, time_s, side="right")]
+
+
+def _since(time_s: FloatArray, flags: FlagArray, end_s: float) -> float:
+    """Return since when a flag given by samples had been True without a break at ``end_s``; ``end_s`` if it was not."""
+    before = int(np.searchsorted(time_s, end_s, side="right"))
+    others = np.flatnonzero(~flags[:before])
+    if not len(others) or others[-1] + 1 == before:
+        return end_s
+    return float(time_s[others[-1] + 1])
 
 
 def _interpolated(series: Series, time_s: FloatArray) -> FloatArray:

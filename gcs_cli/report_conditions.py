@@ -54,6 +54,7 @@ def _wind(wind_m_s: Sequence[float] | None) -> str:
     if wind_m_s is None:
         return ""
     parts = (
-        f"{value:g} m/s {axis}" for value, axis in zip(wind_m_s, ("north", "east", "down"), strict=False)
+        f"{value:g} m/s {axis}".replace("-", "−")
+        for value, axis in zip(wind_m_s, ("north", "east", "down"), strict=False)
     )
     return f"wind {', '.join(parts)}"

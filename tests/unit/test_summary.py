@@ -136,6 +136,23 @@ def test_a_landing_counts_from_the_touchdown() -> None:
     assert flight.tracking_error().values[:, 0].tolist() == [0.0, 0.0]
 
 
+def test_a_vehicle_that_wind_pushes_about_on_the_ground_has_landed() -> None:
+    time_s = [0, 1, 2, 3, 4, 5]
+    flight = Flight(
+        position=samples(
+            time_s, [[0, 0, -2], [0, 0, -1], [0.5, 0, 0.01], [1, 0, -0.03], [1.5, 0, 0], [1.5, 0, 0]]
+        ),
+        velocity=samples(time_s, [[0, 0, 1], [0, 0, 1], [0.5, 0, 0], [0.5, 0, 0], [0.5, 0, 0], [0, 0, 0]]),
+        position_setpoint=samples(
+            time_s, [[x, 0, z] for x, z in zip([0, 0, 0.5, 1, 1.5, 1.5], range(-2, 4), strict=True)]
+        ),
+        statuses=armed_from(0.0),
+        landed=((0.0, True), (0.5, False), (5.0, True)),
+    )
+    assert flight.tracking_error().time_s.tolist() == [1.0]
+    assert flight.standing(flight.position.time_s).tolist() == [False, False, True, True, True, True]
+
+
 def test_a_landing_without_a_stand_before_it_counts_from_its_detection() -> None:
     flight = Flight(
         velocity=samples([0, 1, 2], [[0, 0, 1], [0, 0, 1], [0, 0, 0]]),
