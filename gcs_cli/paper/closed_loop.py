@@ -123,26 +123,50 @@ def fly(case: Case) -> Recording:
     return _recording(case, trajectory, fly_rows(case, trajectory))
 
 
+class Exchange:
+    """Plant and loops of a case, which exchange states and rotor commands tick by tick, as the lockstep does."""
+
+    def __init__(self, case: Case, outer_hz: float | None = None) -> None:
+        """Bring both to hover; raise ConfigError. ``outer_hz`` is what ``make_loops`` takes."""
+        self.loops, (self._plant, self._steps) = make_loops(case, outer_hz), make_plant(case)
+        self.state: FloatArray = self._plant.output[0]["state"]
+        """Array form of ``VehicleState``, shape (13,); a view that every tick changes."""
+        self._speeds: FloatArray = self._plant.output[0]["rotor_speed"]
+        self._waiting = [_padded(hover_speeds(case)) for _ in range(case.delay_steps)]
+        self.loops.reset(self.state)
+
+    def tick(
+        self,
+        aim: FloatArray,
+        outer_due: bool,
+        attitude_only: bool,
+        row: FloatArray,
+        instead: FloatArray | None = None,
+    ) -> bool:
+        """Pass an inner tick; fill ``row``, shape (48,), and tell whether the plant's numbers ran away.
+
+        ``aim`` is a setpoint (11,), or an attitude target (5,) for the inner loop alone, which hears of it when
+        ``outer_due``. ``instead`` are rotor commands in place of those that are due.
+        """
+        if attitude_only and outer_due:
+            self.loops.set_attitude_target(aim)
+        self.loops.step(self.state, aim, self._speeds, outer_due and not attitude_only, row)
+        self._waiting.append(row[LoopRow.ROTOR_COMMAND].copy())
+        due = self._waiting.pop(0)
+        return bool(self._plant.advance(due if instead is None else instead, _ARMED, self._steps) & DIVERGED)
+
+
 def fly_rows(case: Case, trajectory: Trajectory) -> Rows:
     """Fly the case to the trajectory's end, or until the plant's numbers run away; raise ConfigError."""
-    loops, (plant, steps) = make_loops(case), make_plant(case)
-    divisor = _divisor(case)
+    exchange, divisor = Exchange(case), _divisor(case)
     count = round(trajectory.duration_s * case.inner_hz)
     wanted = _wanted(case, trajectory, np.arange(0, count, divisor) / case.inner_hz)
     attitude_only = trajectory.kind == ATTITUDE
     rows, targets = np.zeros((count, LoopRow.SIZE)), np.zeros((count, ATTITUDE_TARGET_SIZE))
-    state, speeds = plant.output[0]["state"], plant.output[0]["rotor_speed"]
-    loops.reset(state)
-    waiting = [_padded(hover_speeds(case)) for _ in range(case.delay_steps)]
     for tick in range(count):
-        row, aim = rows[tick], wanted[tick // divisor]
-        outer_due = tick % divisor == 0
-        if attitude_only and outer_due:
-            loops.set_attitude_target(aim)
-        loops.step(state, aim, speeds, outer_due and not attitude_only, row)
-        targets[tick] = loops.attitude_target
-        waiting.append(row[LoopRow.ROTOR_COMMAND])
-        if plant.advance(waiting.pop(0), _ARMED, steps) & DIVERGED:
+        diverged = exchange.tick(wanted[tick // divisor], tick % divisor == 0, attitude_only, rows[tick])
+        targets[tick] = exchange.loops.attitude_target
+        if diverged:
             return Rows(rows[: tick + 1], targets[: tick + 1], True)
     return Rows(rows, targets, False)
 

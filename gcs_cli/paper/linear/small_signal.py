@@ -17,7 +17,7 @@ from flightstack.contract import (
 )
 from flightstack.geometry import quaternion_from_euler
 from flightstack.params.vehicle import Vehicle, load_vehicle
-from gcs_cli.paper.closed_loop import hover_speeds, make_loops, make_plant
+from gcs_cli.paper.closed_loop import Exchange, make_loops
 from gcs_cli.paper.linear.gains import (
     ATTITUDE_AXES,
     BACKSTEPPING,
@@ -31,8 +31,6 @@ from gcs_cli.paper.types import Case
 
 VELOCITY_AT, RATES_AT = 3, 10
 """Columns of the state: velocity NED, body rates FRD."""
-ARMED = 2
-"""FS_ACTUATORS: the rotors turn."""
 STEP_RAD, STEP_M = 1e-4, 1e-4
 """Steps small enough that what is not linear stays below a millionth of them."""
 TRAJECTORY = "step_roll"
@@ -165,26 +163,16 @@ def _fly(case: Case, ticks: int, wanted: FloatArray, parameters: dict[str, float
          divisor: int | None = None, first_command: FloatArray | None = None) -> Flight:  # fmt: skip
     """Fly a constant attitude target (5,) or setpoint (11,); ``first_command`` replaces that of the first tick."""
     every = divisor or round(case.inner_hz / case.outer_hz)
-    loops, (plant, steps) = make_loops(case, case.inner_hz / every), make_plant(case)
+    exchange = Exchange(case, case.inner_hz / every)
     is_target = len(wanted) == ATTITUDE_TARGET_SIZE
     for name, value in parameters.items():
-        loops.set_parameter(name, value)
-    state, speeds = plant.output[0]["state"], plant.output[0]["rotor_speed"]
-    loops.reset(state)
-    hover = np.zeros(MAX_ROTORS)
-    hover[: len(hover_speeds(case))] = hover_speeds(case)
-    waiting = [hover] * case.delay_steps
+        exchange.loops.set_parameter(name, value)
+    exchange.loops.reset(exchange.state)
     row, states = np.zeros(LoopRow.SIZE), np.empty((ticks, STATE_SIZE))
     for tick in range(ticks):
-        outer_due = tick % every == 0
-        states[tick] = state
-        if is_target and outer_due:
-            loops.set_attitude_target(wanted)
-        loops.step(state, wanted, speeds, outer_due and not is_target, row)
-        waiting.append(row[LoopRow.ROTOR_COMMAND].copy())
-        command = waiting.pop(0)
-        plant.advance(command if tick or first_command is None else first_command, ARMED, steps)
-        if not abs(state[ends.column]) < ends.above:
+        states[tick] = exchange.state
+        exchange.tick(wanted, tick % every == 0, is_target, row, None if tick else first_command)
+        if not abs(exchange.state[ends.column]) < ends.above:
             states = states[: tick + 1]
             break
     return Flight(np.arange(len(states)) / case.inner_hz, states)
