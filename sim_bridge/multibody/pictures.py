@@ -22,7 +22,7 @@ from sim_bridge.multibody.renderer import Renderer
 
 _FASTEST_RAD_S = 1e4
 SHEET_PICTURES = 9
-_LONG_MIN = 0.75
+_MANY, _LONG_S = 60, 45.0
 
 
 class Look(NamedTuple):
@@ -61,6 +61,16 @@ def numbered(path: Path, count: int) -> list[Path]:
 def spread(begin_s: float, end_s: float, count: int) -> list[float]:
     """Return ``count`` moments at even distances, with the first and the last one."""
     return [begin_s + (end_s - begin_s) * index / max(1, count - 1) for index in range(count)]
+
+
+def announcement(film: Film, seconds: float) -> str:
+    """Return what is said before a film that takes so long to make; nothing before one that does not take long."""
+    if seconds < _LONG_S:
+        return ""
+    return (
+        f"{film.path.name}: {film.frames} frames, about {max(1, round(seconds / 60.0))} min; "
+        "--from, --to, --size and --fps make it shorter"
+    )
 
 
 class Pictures:
@@ -117,18 +127,15 @@ class Pictures:
 
     def _announce(self, film: Film, drawn: int) -> None:
         """Say how long a film will take when that is long: who wants less can still say so."""
+        if drawn < _MANY:
+            return
         self.at(film.begin_s)  # the first picture of all also makes what the others find made
         begun = time.perf_counter()
         self.at(film.begin_s)
-        minutes = drawn * (time.perf_counter() - begun) / 60.0
+        sentence = announcement(film, drawn * (time.perf_counter() - begun))
         self._progress.update(self._task, completed=0)
-        if minutes >= _LONG_MIN:
-            self._progress.console.print(
-                f"{film.path.name}: {film.frames} frames, about {minutes:.0f} min; "
-                "--from, --to, --size and --fps make it shorter",
-                highlight=False,
-                soft_wrap=True,
-            )
+        if sentence:
+            self._progress.console.print(sentence, highlight=False, soft_wrap=True)
 
     def _begin(self, name: str, total: int) -> None:
         self._progress.reset(self._task, total=total, description=name)

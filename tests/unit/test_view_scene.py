@@ -20,6 +20,7 @@ from sim_bridge.multibody.cameras import CAMERAS, Site, View, project, view
 from sim_bridge.multibody.frames import flip_vector
 from sim_bridge.multibody.labels import Place, bar
 from sim_bridge.multibody.overlay import Overlay
+from sim_bridge.multibody.pictures import announcement, film_of
 from sim_bridge.multibody.poses import FlightPath, Moment
 from sim_bridge.multibody.renderer import Picture, Renderer, Stage
 from tests.support.sample_poses import sample_poses
@@ -283,6 +284,14 @@ def test_the_drawn_way_keeps_to_the_flown_one_with_few_points() -> None:
     for point in flown[::7]:
         share = np.clip(((point - begin) * chord).sum(axis=1) / square, 0.0, 1.0)
         assert np.linalg.norm(begin + share[:, None] * chord - point, axis=1).min() < 0.015
+
+
+def test_a_film_is_announced_when_it_takes_long() -> None:
+    film = film_of(Path("a/f.mp4"), 0.0, 25.0, 30.0, 1.0)
+    assert announcement(film, 44.0) == ""
+    assert announcement(film, 170.0) == (
+        "f.mp4: 750 frames, about 3 min; --from, --to, --size and --fps make it shorter"
+    )
 
 
 # ------------------------------------------------------------------ no renderer
