@@ -25,7 +25,7 @@ Cases: TypeAlias = Mapping[str, Mapping[str, Any]]
 """``cases`` of results.json."""
 
 _COLUMNS = (
-    *("axis", "controller", "plant", "#overshoot", "#rise 10–90 %", "#settling 2 %"),
+    *("#overshoot", "#rise 10–90 %", "#settling 2 %"),
     *("#steady-state error", "#RMS error", "#largest error"),
 )
 
@@ -33,15 +33,20 @@ _COLUMNS = (
 def metrics_table(found: Cases, trajectory: str, plants: Sequence[str], names: Sequence[str]) -> str:
     """Return overshoot, rise, settling and errors of each axis, contender and plant; empty if nothing was flown."""
     rows = [one for axis in AXES for one in _axis_rows(found, trajectory, axis, plants, names)]
-    return wide_table(_COLUMNS, rows) if rows else ""
+    return wide_table(("axis", "controller", "plant", *_COLUMNS), rows) if rows else ""
 
 
 def step_table(found: Cases, plant: str, condition: str = cases.PLAIN) -> str:
-    """Return the figures of each axis in the flight in which it steps; empty if nothing was flown."""
+    """Return the figures of each axis in the flight in which it steps; empty if nothing was flown.
+
+    The plant is not told: all rows are of one.
+    """
     rows = [
-        one for axis in AXES for one in _axis_rows(found, f"step_{axis}", axis, (plant,), LABELS, condition)
+        one
+        for axis in AXES
+        for one in _axis_rows(found, f"step_{axis}", axis, (plant,), LABELS, condition, plant_told=False)
     ]
-    return wide_table(_COLUMNS, rows) if rows else ""
+    return wide_table(("axis", "controller", *_COLUMNS), rows) if rows else ""
 
 
 def _axis_rows(
@@ -51,6 +56,8 @@ def _axis_rows(
     plants: Sequence[str],
     names: Iterable[str],
     condition: str = cases.PLAIN,
+    *,
+    plant_told: bool = True,
 ) -> Iterator[str]:
     first = True
     for plant in plants:
@@ -59,7 +66,8 @@ def _axis_rows(
             if case is None:
                 continue
             head = f"<th>{escape(AXIS_TITLES[axis]) if first else ''}</th><td>{escape(LABELS[name])}</td>"
-            yield row(f"{head}<td>{escape(PLANTS[plant])}</td>{metrics_cells(case, axis)}", first)
+            where = f"<td>{escape(PLANTS[plant])}</td>" if plant_told else ""
+            yield row(f"{head}{where}{metrics_cells(case, axis)}", first)
             first = False
 
 

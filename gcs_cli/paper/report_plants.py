@@ -60,13 +60,15 @@ def _table(plants: Mapping[str, Any]) -> str:
     rows = []
     for name, contenders in plants.items():
         title = " – ".join(PLANTS[plant] for plant in name.split("_"))
-        for index, (contender, found) in enumerate(contenders.items()):
-            head = f"<th>{escape(title) if not index else ''}</th><td>{escape(LABELS[contender])}</td>"
-            rows.append(row(f"{head}{_figures(found)}{_rounding(found)}{_bound(found)}", not index))
-    return wide_table(("plants", "controller", *_FIGURES, "#rounding alone", "bound"), rows)
+        rows.append(row(f'<th colspan="{len(_COLUMNS)}">{escape(title)}</th>', begins=True))
+        for contender, found in contenders.items():
+            head = f"<td>{escape(LABELS[contender])}</td>"
+            rows.append(row(f"{head}{_figures(found)}{_rounding(found)}{_bound(found)}"))
+    return wide_table(_COLUMNS, rows, style="grouped")
 
 
 _FIGURES = ("#position, largest", "#RMS", "#attitude, largest", "#RMS")
+_COLUMNS = ("controller", *_FIGURES, "#rounding alone", "bound")
 
 
 def _figures(found: Mapping[str, Any]) -> str:

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from gcs_cli.paper.linear.gains import AttitudeGains
@@ -32,8 +32,9 @@ def line(label: str, y: np.ndarray) -> Line:
 
 @given(st.floats(0.0, 0.03))
 def test_curves_closer_than_a_hundredth_of_the_chart_are_one(apart: float) -> None:
-    found = alike([line("a", TIME), line("b", TIME + apart), line("c", 2.0 * TIME)])
     reach = 0.01 * 2.0  # c goes from 0 to 2, which is the chart's height
+    assume(abs(apart - reach) > 1e-9)
+    found = alike([line("a", TIME), line("b", TIME + apart), line("c", 2.0 * TIME)])
     assert found == ([("a", "b")] if apart <= reach else [])
 
 
