@@ -53,7 +53,9 @@ def fly(
     plan: Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)],
     target: TargetOption = "emulated",
     controller: Annotated[str, typer.Option(help="pid or backstepping.")] = "pid",
-    gains: Annotated[str, typer.Option(help="tuned, paper, backstepping_poles, or a TOML file.")] = "tuned",
+    gains: Annotated[
+        str, typer.Option(help="tuned, paper, paper_rate_fed, backstepping_poles, or a TOML file.")
+    ] = "tuned",
     vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
     plant: Annotated[str, typer.Option(help="rigid, multibody or paper.")] = "rigid",
     inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop.")] = 500.0,
@@ -64,7 +66,9 @@ def fly(
     seed: Annotated[int, typer.Option(help="Seed of the gusts.")] = 1,
     wind: Annotated[str | None, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")] = None,
     gust: Annotated[float | None, typer.Option(help="Standard deviation of the gusts, m/s.")] = None,
-    ideal_rotors: Annotated[bool, typer.Option("--ideal-rotors", help="No rotor lag, no limits.")] = False,
+    ideal_rotors: Annotated[
+        bool, typer.Option("--ideal-rotors", help="Rotors without limits, lag and spin-up torque.")
+    ] = False,
     params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None,
     instance: Annotated[int, typer.Option(help="Shifts all ports, to fly beside another one.")] = 0,
     out: OutOption = None,

@@ -9,10 +9,21 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from gcs_cli.paper.cases import BACKSTEPPING, CONDITIONS, DESIRED, HARD, PID, PLAIN, RIGID, SMALL_ANGLE, key
+from gcs_cli.paper.cases import (
+    BACKSTEPPING,
+    CONDITIONS,
+    DESIRED,
+    HARD,
+    PID,
+    PLAIN,
+    RATE_FED_PID,
+    RIGID,
+    SMALL_ANGLE,
+    key,
+)
 from gcs_cli.paper.comparisons import Cases
 from gcs_cli.paper.types import Case
-from gcs_cli.paper.verdicts import Question, how_ended, sentence, where_of
+from gcs_cli.paper.verdicts import Question, how_ended, where_of
 
 RARELY_PERCENT = 1.0
 """Rotors that are at their limits in less of the time are not driven there."""
@@ -103,10 +114,10 @@ def survives(cases: Cases, plant: str) -> dict[str, Any]:
         "survives",
         "backstepping survives whatever the PID survives",
         "our question",
-        "it comes to its end in every condition of the hard profile in which the PID does",
+        "it comes to its end in every condition of the hard profile in which the PID as flown does",
     )
-    ended: dict[str, list[str]] = {PID: [], BACKSTEPPING: []}
-    told: dict[str, list[str]] = {PID: [], BACKSTEPPING: []}
+    ended: dict[str, list[str]] = {PID: [], BACKSTEPPING: [], RATE_FED_PID: []}
+    told: dict[str, list[str]] = {who: [] for who in ended}
     flown = 0
     for condition in CONDITIONS:
         for who, where in ended.items():
@@ -121,10 +132,11 @@ def survives(cases: Cases, plant: str) -> dict[str, Any]:
         raise KeyError(plant)
     words = (
         f"On the hard profile {where_of(plant)} the PID does not come to its end with: {_listed(told[PID])}. "
-        f"Backstepping does not with: {_listed(told[BACKSTEPPING])}."
+        f"Backstepping does not with: {_listed(told[BACKSTEPPING])}. The PID with its rate fed ahead does not with: "
+        f"{_listed(told[RATE_FED_PID])}."
     )
     holds = set(ended[BACKSTEPPING]) <= set(ended[PID])
-    return question.answer(holds, sentence(words), pid=ended[PID], backstepping=ended[BACKSTEPPING])
+    return question.answer(holds, words, **ended)
 
 
 def _listed(labels: list[str]) -> str:

@@ -209,6 +209,7 @@ def test_a_crash_is_told_and_decides_nothing_in_its_favour(how: str, words: str)
     )
     assert "the PID does not come to its end with: nothing" in found["survives"]["words"]
     assert f"({words})" in found["survives"]["words"]
+    assert found["survives"]["words"].endswith("The PID with its rate fed ahead does not with: nothing.")
 
 
 def test_an_advantage_that_ends_with_the_limits_alone_is_theirs() -> None:
