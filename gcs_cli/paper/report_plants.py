@@ -91,7 +91,10 @@ def _elsewhere(found: Mapping[str, Any]) -> str:
         return ""
     table = wide_table(("trajectory", "controller", *_FIGURES), rows)
     summary = f"{PLANTS[cases.RIGID]} – {PLANTS[cases.MULTIBODY]} on the other trajectories"
-    return f"<details><summary>{escape(summary)}</summary>{table}</details>"
+    note = (
+        "Steps of the attitude fly without the outer loop: nothing holds their place, and small tilts add up."
+    )
+    return f'<details><summary>{escape(summary)}</summary>{table}<p class="note">{note}</p></details>'
 
 
 def _small(value: float, unit: str) -> str:
