@@ -14,11 +14,12 @@ ALIKE = 0.01
 
 def hidden_note(charts: Mapping[str, Sequence[Line]]) -> str:
     """Return a sentence that names the curves of each chart that cannot be told apart; empty if all can."""
-    where: dict[tuple[str, ...], list[str]] = {}
+    where: dict[str, list[str]] = {}
     for title, lines in charts.items():
         for group in alike(lines):
-            where.setdefault(group, []).append(title)
-    told = [f"{' = '.join(group)} ({', '.join(titles)})" for group, titles in where.items()]
+            names = "all" if 2 < len(group) == len(lines) else " = ".join(group)
+            where.setdefault(names, []).append(title)
+    told = [f"{names} ({', '.join(titles)})" for names, titles in where.items()]
     return f"On top of each other: {'; '.join(told)}." if told else ""
 
 

@@ -47,6 +47,7 @@ def test_hidden_curves_are_named_with_their_charts() -> None:
     same, other = [line("a", TIME), line("b", TIME)], [line("a", TIME), line("b", -TIME)]
     assert hidden_note({"x": same, "y": same, "z": other}) == "On top of each other: a = b (x, y)."
     assert hidden_note({"z": other}) == ""
+    assert hidden_note({"x": [*same, line("c", TIME)]}) == "On top of each other: all (x)."
 
 
 def test_slow_poles_of_x_are_drawn_once_more_by_themselves() -> None:
