@@ -59,7 +59,7 @@ def render(
 def _render(poses: Path, options: asked.PictureOptions, vehicle: str | None, caller: str) -> None:
     wish = wish_of(options)
     is_mp4 = wish.video is not None and wish.video.suffix.lower() == ".mp4"
-    require(caller, "PIL", *(["imageio_ffmpeg"] if is_mp4 else []))
+    require(caller.rsplit(maxsplit=1)[-1], "PIL", *(["imageio_ffmpeg"] if is_mp4 else []))
     from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
     from flightstack.poses_file import read_poses  # noqa: PLC0415
     from sim_bridge.multibody.poses import FlightPath  # noqa: PLC0415

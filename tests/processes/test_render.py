@@ -18,6 +18,7 @@ from PIL import Image
 from flightstack.mavlink.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.params.vehicle import load_vehicle
 from flightstack.poses_file import write_poses
+from sim_bridge import render_command
 from sim_bridge.__main__ import main
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.live_view import READY, SNAPSHOT, LiveView
@@ -169,6 +170,29 @@ def test_bad_arguments_get_a_sentence(
         signal.signal(signal.SIGTERM, before)
     assert f"sim-bridge: {said}" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [([], "sim-bridge: render needs MuJoCo"), (["--caller", "gcs replay"], "gcs: replay needs MuJoCo")],
+)
+def test_complaints_name_the_command_that_was_given(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    said: str,
+) -> None:
+    write_poses(tmp_path / "poses.npz", sample_poses(1.0))
+    monkeypatch.setattr(render_command, "find_spec", lambda _name: None)
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        assert (
+            main(["render", str(tmp_path / "poses.npz"), "--png", str(tmp_path / "p.png"), *arguments]) == 2
+        )
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert capsys.readouterr().err == f"{said}: pip install 'flightstack[multibody]'\n"
 
 
 def test_without_a_renderer_nothing_is_written(poses: Path, tmp_path: Path) -> None:
