@@ -142,9 +142,10 @@ def _conditions(results: Mapping[str, Any]) -> str:
     words = (
         "<p>Made by <code>gcs paper</code>. Loops and plants are those of the flight stack and its simulator, joined "
         "tick by tick in one process: inner loop at 1 kHz, outer loop at 250 Hz, unless a condition says otherwise. "
-        "Flights begin in hover, and there is no ground. The same command gives the same "
-        '<a href="results.json">results.json</a>, which holds every number of this page. Model, derivation and '
-        "corrections: docs/paper.md.</p>"
+        "Flights begin in hover, and there is no ground. Motors without lag take the commanded speed at once; a jump "
+        "of speed would need an impulse of torque, so their spin-up torque is left out on every plant. The same "
+        'command gives the same <a href="results.json">results.json</a>, which holds every number of this page. '
+        "Model, derivation and corrections: docs/paper.md.</p>"
     )
     body = (
         f"{words}<h3>Conditions</h3><table>{rows}</table><h3>Trajectories</h3><table>{trajectories}</table>"

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import base64
+import io
 import math
 import re
 from html import unescape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.paper import cases
+from gcs_cli.paper.printed import print_results
 from gcs_cli.paper.report import render
 from gcs_cli.paper.report_flights import signals
 from gcs_cli.paper.report_labels import LABELS, fixed, number
@@ -350,3 +354,15 @@ def test_a_loop_of_other_gains_is_named_by_them() -> None:
     results = small_results() | {"linear": linear_part(), "onset": onset_part()}
     results["linear"]["loops"][0]["gains"] = "mine"
     assert "pid, mine" in parsed(render(results, {})).text
+
+
+@pytest.mark.parametrize("decides", [True, False])
+def test_the_terminal_is_told_where_a_difference_of_plants_is_chance(decides: bool) -> None:
+    results = small_results()
+    results["plants"] = plants_part(True, decides)
+    terminal = Console(file=io.StringIO(), width=200)
+    print_results(terminal, results, Path("here"))
+    told = terminal.file.getvalue()
+    assert "rigid body against multibody, PID, Table II: at most 2.1 mm and 0.123° apart" in told
+    assert ("by chance: a push of 10⁻¹² N moves it by 2.8 mm on one plant alone" in told) is not decides
+    assert "results in here" in told
