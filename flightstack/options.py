@@ -9,7 +9,9 @@ import typer
 
 Vehicle = Annotated[str, typer.Option(help="Built-in vehicle or TOML file.")]
 Controller = Annotated[str, typer.Option(help="Attitude controller: pid, backstepping or yours.")]
-Gains = Annotated[str, typer.Option(help="Gains: tuned, paper, paper_rate_fed, backstepping_poles or a TOML file.")]
+Gains = Annotated[
+    str, typer.Option(help="Gains: tuned, paper, paper_rate_fed, backstepping_poles or a TOML file.")
+]
 InnerHz = Annotated[float, typer.Option(help="Rate of the inner loop [Hz].")]
 OuterHz = Annotated[
     float | None,

@@ -147,7 +147,7 @@ def test_a_busy_port_is_named(start: Start) -> None:
     [
         (["--vehicle", "no_such"], "is neither a file nor a built-in vehicle (paper_quad, x_quad)"),
         (["--controller", "no_such"], "installed are backstepping, pid"),
-        (["--gains", "no_such"], "is neither a file nor built-in gains (backstepping_poles, paper, paper_rate_fed, tuned)"),
+        (["--gains", "no_such"], "nor built-in gains (backstepping_poles, paper, paper_rate_fed, tuned)"),
         (["--inner-hz", "0"], "is outside 10 to 20000"),
         (["--inner-hz", "300"], "does not make a whole number of microseconds"),
         (["--outer-hz", "333"], "does not divide the inner rate"),
