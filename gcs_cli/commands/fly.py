@@ -66,7 +66,7 @@ def fly(
     ] = "python",
     open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
     as_json: JsonOption = False,
-    timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 60]")] = None,
+    timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 180]")] = None,
     limit: Annotated[float, typer.Option(help="Longest flight, s of simulated time.")] = 3600.0,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""
@@ -81,7 +81,7 @@ def fly(
         raise CliError("fly starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
     options = FlyOptions(
         plan, controller, gains, plant, speed, inner_hz, outer_hz, seed, wind, gust, torque_gust, vehicle,
-        instance, ideal_rotors, 60.0 if settings.timeout_s is None else settings.timeout_s, limit,
+        instance, ideal_rotors, 180.0 if settings.timeout_s is None else settings.timeout_s, limit,
         battery_start, battery_capacity, battery_drain, tuple(fault or ()), params, loops,
     )  # fmt: skip
     items = checked_plan(options)

@@ -75,7 +75,7 @@ def fly(
     fail_over: FailOverOption = False,
     open_report: OpenOption = False,
     as_json: JsonOption = False,
-    timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 60]")] = None,
+    timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 180]")] = None,
     limit: Annotated[float, typer.Option(help="Longest flight, s of simulated time.")] = 3600.0,
 ) -> None:
     """Fly a mission with each of the loops, and compare.
@@ -93,7 +93,7 @@ def fly(
     options = FlyOptions(
         plan, controller, gains, plant, inner_hz=inner_hz, outer_hz=outer_hz, seed=seed, wind=wind, gust=gust,
         vehicle=vehicle, instance=instance, ideal_rotors=ideal_rotors, params=params, limit_s=limit,
-        timeout_s=60.0 if settings.timeout_s is None else settings.timeout_s,
+        timeout_s=180.0 if settings.timeout_s is None else settings.timeout_s,
     )  # fmt: skip
     checked_target(target)
     items = checked_plan(options)
