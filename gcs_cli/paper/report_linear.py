@@ -49,9 +49,11 @@ def linear_sections(linear: Mapping[str, Any], onset: Sequence[Mapping[str, Any]
         f"Open attitude loops as they fly: cut at the law's demand, sampled at {BODE_HZ:g} Hz, held, motors of "
         f"{1e3 * flown.lag_s:g} ms. Gain margin: where the phase crosses −180°. Phase margin: where the gain crosses "
         "0 dB. The last pair has the torque by which rotors react to being spun up, as the rigid body and the "
-        "multibody assembly have it: where its phase crosses −180° above 0 dB, yaw is unstable."
+        "multibody assembly have it: where its phase crosses −180° above 0 dB, yaw is unstable. A rate "
+        "that is fed ahead is no part of a loop, so that the PID with it has the curves of the one without."
     )
     title = "Linear analysis: open loops"
+    legend = [(loop_title(loop), loop_style(loop), False) for loop in own_feedback(loops, "roll")]
     yield anchored("bode", section(title, f'<div class="pair">{bode}</div>', legend, note))
     yield from margin_sections(linear)
     yield onset_section(onset)
