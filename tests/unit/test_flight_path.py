@@ -10,7 +10,7 @@ import pytest
 
 from flightstack.poses_file import Poses
 from sim_bridge.live_view import SNAPSHOT
-from sim_bridge.multibody.cameras import CAMERAS, FIELD_DEG, View, view
+from sim_bridge.multibody.cameras import CAMERAS, FIELD_DEG, Site, View, project, view
 from sim_bridge.multibody.film import gif_durations_ms
 from sim_bridge.multibody.live_window import LiveFlight, newest
 from sim_bridge.multibody.pictures import film_of, numbered, spread
@@ -18,6 +18,7 @@ from sim_bridge.multibody.poses import FlightPath
 from tests.support.sample_poses import sample_poses
 
 SPAN_M, GROUND_M = 0.33, -0.1
+SITE = Site(SPAN_M, GROUND_M)
 
 
 def _poses(time_s: list[float], **values: list[list[float]]) -> Poses:
@@ -97,22 +98,25 @@ def _eye(seen: View) -> np.ndarray:
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_each_camera_has_the_vehicle_in_its_picture(camera: str) -> None:
-    path = FlightPath(sample_poses(8.0))
+    poses = sample_poses(8.0)
+    path = FlightPath(poses)
+    flown = poses.position_ned_m * (1.0, -1.0, -1.0)
+    site = SITE._replace(low_m=tuple(flown.min(axis=0)), high_m=tuple(flown.max(axis=0)))
     for time_s in np.linspace(0.0, 8.0, 33).tolist():
         moment = path.at(time_s)
         north, east, down = moment.position_ned_m
-        seen = view(camera, moment, SPAN_M, GROUND_M)
-        to_vehicle = np.array([north, -east, -down]) - _eye(seen)
-        ahead = np.array(seen.look_at_m) - _eye(seen)
-        cosine = to_vehicle @ ahead / np.linalg.norm(to_vehicle) / np.linalg.norm(ahead)
-        assert math.degrees(math.acos(min(1.0, cosine))) < 0.5 * seen.field_deg
+        seen = view(camera, moment, site)
+        place = project(seen, (north, -east, -down), (1280, 720))
+        assert place is not None
+        assert 0.0 < place[0] < 1280.0
+        assert 0.0 < place[1] < 720.0
         assert _eye(seen)[2] > GROUND_M
         assert seen.field_deg <= FIELD_DEG
 
 
 def test_the_chasing_camera_is_behind_the_vehicle() -> None:
     path = FlightPath(_poses([0.0], attitude=[[math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]]))  # nose east
-    eye = _eye(view("chase", path.at(0.0), SPAN_M, GROUND_M))
+    eye = _eye(view("chase", path.at(0.0), SITE))
     assert eye[1] > 1.0  # west of it
     assert eye[2] > 0.0
 
