@@ -110,12 +110,21 @@ async def test_kill_stops_the_rotors_in_the_air(drone: Drone) -> None:
     await drone.take_off()
     await drone.action.kill()
     await drone.until_disarmed()
-    await drone.until("at rest on the ground", drone.telemetry.subscribe_position_velocity_ned(), rests)
+    await drone.until("at rest on the ground", drone.telemetry.subscribe_position_velocity_ned(), AtRest())
 
 
-def rests(now: PositionVelocityNed) -> bool:
-    """Tell whether a vehicle that fell has stopped jumping; the first jump ends its rise at 0.1 m."""
-    return abs(now.position.down_m) < 0.02 and abs(now.velocity.down_m_s) < 0.02
+class AtRest:
+    """Tells when a vehicle that fell has stopped jumping: still on the ground in several reports in a row.
+
+    At the lowest point of each jump, too, it is on the ground and has no speed.
+    """
+
+    reports = 0
+
+    def __call__(self, now: PositionVelocityNed) -> bool:
+        still = abs(now.position.down_m) < 0.02 and abs(now.velocity.down_m_s) < 0.02
+        self.reports = self.reports + 1 if still else 0
+        return self.reports == 5
 
 
 @story()
