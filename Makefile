@@ -3,8 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-# test processes side by side; more would wait for each other, as a flight has processes of its own
-WORKERS ?= 2
+# test processes side by side: one more than cores, because flights in real time wait most of theirs
+WORKERS ?= 3
 .DEFAULT_GOAL := help
 
 .PHONY: help setup fly test check lint types imports generated generate bench fuzz fuzz-firmware firmware-check mutation clean

@@ -135,6 +135,7 @@ class ModeKeeper(PlanKeeper):
         self._ground.armed(self.now.time_us)
         self._takeoff_altitude_m += self._bring_home()
         self.now.landed = True
+        self._navigator.rest_at(self._state)  # guidance may remember a flight that ended in the air
 
     # ------------------------------------------------------------------ who flies
 

@@ -85,3 +85,19 @@ def test_a_reboot_does_not_find_a_lost_ground_station_again() -> None:
     assert world.arm() == DENIED
     world.run(0.1)
     assert any("ground station" in text for text in world.texts), world.texts
+
+
+def test_a_vehicle_that_was_stopped_in_the_air_arms_as_one_that_stands() -> None:
+    world = World()
+    assert world.arm() == 0
+    assert world.takeoff(2.5) == 0
+    world.until(lambda: world.mode is Mode.HOLD)
+    assert world.disarm(force=True) == 0
+    world.run(5.0)  # it falls, jumps, and lies still
+    world.texts.clear()
+    assert world.arm() == 0
+    world.run(2.0)
+    assert world.armed
+    assert world.texts == ["Armed"]
+    assert world.takeoff(2.5) == 0
+    world.until(lambda: world.altitude > 2.4)
