@@ -9,12 +9,8 @@ NamedTuples. Inside, functions pass NamedTuples, so that a control law reads as 
 
 from __future__ import annotations
 
-import hashlib
 import os
-import shutil
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar
 
@@ -23,55 +19,19 @@ import numpy as np
 from numba.extending import overload
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
+from flightstack.kernel_cache import directory, is_own
+
 F = TypeVar("F", bound=Callable[..., Any])
 
-_KEPT_CACHES = 4
-_OWN_PACKAGES = ("flightstack", "sim_bridge")
-_WITHOUT_KERNELS = (
-    "services", "logging", "transport", "plan", "firmware", "ground", "commands", "multibody",
-)  # fmt: skip
-"""Packages that neither hold compiled code nor are used by it."""
-
-
-def _sources_digest() -> str:
-    """Digest of every Python source that compiled code may be made from.
-
-    Numba's cache notices a change in the file of a function, not in a file it calls into. One directory for
-    each state of the sources closes that hole: a stale kernel cannot fly.
-    """
-    top = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256(numba.__version__.encode())
-    for package in _OWN_PACKAGES:
-        for source in sorted((top / package).rglob("*.py")):
-            if source.parent.name in _WITHOUT_KERNELS:
-                continue
-            digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _use_cache_directory() -> None:
-    if "NUMBA_CACHE_DIR" in os.environ:
-        return
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flightstack" / "kernels"
-    try:
-        directory = base / _sources_digest()
-        directory.mkdir(parents=True, exist_ok=True)
-        os.utime(directory)
-        caches = sorted(base.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
-        for old in caches[_KEPT_CACHES:]:
-            shutil.rmtree(old, ignore_errors=True)
-    except OSError:  # a read-only home: compile anew in each process
-        directory = Path(tempfile.mkdtemp(prefix="flightstack-kernels-"))
-    numba.config.CACHE_DIR = str(directory)
-
-
-_use_cache_directory()
 _specialised: dict[tuple[Callable[..., Any], str], Callable[..., Any]] = {}
 
 
-def is_own(module_name: str) -> bool:
-    """Tell whether a module is this project's: the cache directory is one for each state of its sources."""
-    return module_name.partition(".")[0] in _OWN_PACKAGES
+def _compile(function: F, modules: frozenset[str]) -> F:
+    """Compile ``function``, cached among the kernels that are made from ``modules``."""
+    cache = is_own(function.__module__)
+    if cache and "NUMBA_CACHE_DIR" not in os.environ:  # Numba reads the setting here, for each function
+        numba.config.CACHE_DIR = str(directory(modules, numba.__version__))
+    return numba.njit(cache=cache, error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
 def compiled(function: F) -> F:
@@ -79,8 +39,7 @@ def compiled(function: F) -> F:
 
     A function of another package is not cached by itself, only within a kernel whose key names its sources.
     """
-    cache = is_own(function.__module__)
-    return numba.njit(cache=cache, error_model="numpy")(function)  # type: ignore[no-any-return]
+    return _compile(function, frozenset({function.__module__}))
 
 
 def direct(kernel: Callable[..., Any], *examples: Any) -> Callable[..., Any]:
@@ -110,7 +69,8 @@ def specialise(template: Callable[..., Any], key: str, **names: Any) -> Callable
     copy = FunctionType(template.__code__, {**template.__globals__, **names}, f"{template.__name__}__{key}")
     copy.__qualname__ = copy.__name__
     copy.__module__ = template.__module__
-    _specialised[template, key] = compiled(copy)
+    modules = {getattr(value, "__module__", None) or template.__module__ for value in names.values()}
+    _specialised[template, key] = _compile(copy, frozenset(filter(is_own, {copy.__module__, *modules})))
     return _specialised[template, key]
 
 

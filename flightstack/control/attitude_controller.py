@@ -14,8 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from flightstack.compiled import is_own
 from flightstack.contract import AttitudeReference, Quaternion, Vector3
+from flightstack.kernel_cache import is_own
 from flightstack.params.toml_reader import Table
 from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import Vehicle
@@ -73,6 +73,6 @@ def _sources(module_name: str) -> list[Path]:
     if module.__file__ is None:
         return []
     path = Path(module.__file__)
-    if not module.__package__ or is_own(module_name):  # ours: the whole cache is one of their state
+    if not module.__package__ or is_own(module_name):  # ours: the cache directory covers what it imports
         return [path]
     return sorted(path.parent.rglob("*.py"))

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
 from flightstack import compiled as module
-from flightstack.compiled import as_tuple, compiled, direct, is_own, specialise, store
+from flightstack import kernel_cache
+from flightstack.compiled import as_tuple, compiled, direct, specialise, store
 from flightstack.control.mixer import mix
+from flightstack.kernel_cache import is_own
+from sim_bridge.integrator import advance_kernel
 
 inner = None  # bound by ``specialise``
 FACTOR = 0.0
@@ -93,25 +98,56 @@ def test_only_our_own_functions_are_cached_by_themselves() -> None:
     assert double._cache.cache_path is None
 
 
-def test_the_cache_is_one_for_each_state_of_the_sources(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in (
-        "flightstack/compiled.py",
-        "flightstack/control/law.py",
-        "flightstack/logging/m.py",
-        "sim_bridge/p.py",
-    ):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text("x = 1\n")
-    monkeypatch.setattr(module, "__file__", str(tmp_path / "flightstack/compiled.py"))
-    digests = [module._sources_digest()]
-    for name in ("flightstack/control/law.py", "sim_bridge/p.py"):
-        (tmp_path / name).write_text("x = 2\n")
-        digests.append(module._sources_digest())
-    assert len(set(digests)) == 3
-    (tmp_path / "flightstack/logging/m.py").write_text("x = 2\n")  # nothing compiled there
-    assert module._sources_digest() == digests[-1]
+def write_sources(top: Path, texts: dict[str, str]) -> None:
+    for name, text in texts.items():
+        path = top / "flightstack" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+
+def digest_of(top: Path, *modules: str) -> str:
+    kernel_cache._read.cache_clear()
+    return kernel_cache.digest(top, modules, "1")
+
+
+def test_the_digest_covers_direct_and_indirect_imports(tmp_path: Path) -> None:
+    used = {
+        "control/law.py": "from flightstack.control import helper\n"
+        "from flightstack.geometry import (  # frames\n    wrap,\n)\n",
+        "control/helper.py": "import flightstack.deep as d\n",
+        "control/__init__.py": "",
+        "geometry.py": "x = 1\n",
+        "deep.py": "x = 1\n",
+    }
+    write_sources(tmp_path, {**used, "elsewhere.py": "", "control/law_2.py": ""})
+    before = digest_of(tmp_path, "flightstack.control.law")
+    for name, text in used.items():
+        write_sources(tmp_path, {name: text + "y = 2\n"})
+        assert digest_of(tmp_path, "flightstack.control.law") != before, name
+        write_sources(tmp_path, {name: text})
+    write_sources(tmp_path, {"elsewhere.py": "x = 2\n", "control/law_2.py": "x = 2\n"})
+    assert digest_of(tmp_path, "flightstack.control.law") == before
+
+
+def test_no_module_that_compiled_code_names_escapes_the_digest() -> None:
+    """Compare the imports found in the text with what the running modules really hold."""
+    top = Path(module.__file__).parent.parent
+    for name in ("flightstack.control.loops", "flightstack.guidance.kernels", "sim_bridge.integrator"):
+        covered = set(kernel_cache.sources(top, [name]))
+        for value in vars(importlib.import_module(name)).values():
+            home = getattr(getattr(value, "py_func", value), "__module__", None) or ""
+            if is_own(str(home)):
+                assert Path(sys.modules[home].__file__ or "") in covered, (name, home)
+
+
+def test_a_specialised_kernel_is_cached_by_the_sources_of_all_its_parts() -> None:
+    top = Path(module.__file__).parent.parent
+    made_of = ("sim_bridge.integrator", "sim_bridge.paper")
+    joined = ("flightstack.control.loops", "flightstack.control.attitude_backstepping")
+    assert digest_of(top, *joined) != digest_of(top, *joined[:1])
+    expected = kernel_cache.digest(top, made_of, numba.__version__)
+    if "NUMBA_DISABLE_JIT" not in os.environ:
+        assert Path(advance_kernel("paper")._cache.cache_path).parent.name == expected
 
 
 def cache_directory(**variables: str) -> Path:
@@ -119,7 +155,7 @@ def cache_directory(**variables: str) -> Path:
     environment = {
         key: text for key, text in os.environ.items() if key not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
     }
-    code = "import flightstack.compiled, numba; print(numba.config.CACHE_DIR)"
+    code = "from flightstack.control.mixer import mix; print(mix._cache.cache_path)"
     done = subprocess.run(
         [sys.executable, "-c", code],
         env={**environment, **variables},
@@ -127,22 +163,24 @@ def cache_directory(**variables: str) -> Path:
         text=True,
         check=True,
     )
-    return Path(done.stdout.strip())
+    return Path(done.stdout.strip()).parent
 
 
-def test_kernels_lie_in_the_users_cache_and_old_ones_are_removed(tmp_path: Path) -> None:
+def test_kernels_are_in_the_users_cache_and_unused_ones_are_removed(tmp_path: Path) -> None:
     kernels = tmp_path / "flightstack" / "kernels"
-    for age in range(6):
-        (kernels / f"old{age}").mkdir(parents=True)
-        os.utime(kernels / f"old{age}", (1000.0 - age, 1000.0 - age))
+    for name in ("recent", "old"):
+        (kernels / name).mkdir(parents=True)
+    os.utime(kernels / "old", (1000.0, 1000.0))
     used = cache_directory(XDG_CACHE_HOME=str(tmp_path))
     assert used.parent == kernels
-    assert sorted(path.name for path in kernels.iterdir()) == sorted([used.name, "old0", "old1", "old2"])
+    names = {path.name for path in kernels.iterdir()}
+    assert {used.name, "recent"} <= names
+    assert "old" not in names
 
 
 def test_a_home_that_cannot_be_written_does_not_stop_it(tmp_path: Path) -> None:
     used = cache_directory(XDG_CACHE_HOME=os.devnull, TMPDIR=str(tmp_path))
-    assert used.parent == tmp_path
+    assert used.parent.parent == tmp_path
 
 
 def test_numbas_own_variable_wins(tmp_path: Path) -> None:
