@@ -83,8 +83,6 @@ def _snapshots(file: int) -> Iterator[bytes | None]:
 
 def main(vehicle: str) -> int:
     """Show a vehicle; return the exit code."""
-    with contextlib.suppress(OSError):
-        os.nice(_NICENESS)
     try:
         from sim_bridge.multibody.marks import MOST_TRAIL, Marks  # noqa: PLC0415  # with MuJoCo
         from sim_bridge.multibody.renderer import Stage  # noqa: PLC0415
@@ -98,6 +96,8 @@ def main(vehicle: str) -> int:
         return 2
     flight = LiveFlight(len(loaded.rotors), MOST_TRAIL)
     marks = Marks(flight.trail, NO_POINTS, stage.span_m, stage.ground_m)
+    with contextlib.suppress(OSError):  # for the threads that begin from here on; the start is waited for
+        os.nice(_NICENESS)
     sys.stdout.buffer.write(READY)
     sys.stdout.flush()
     moments = (None if snapshot is None else flight.take(snapshot) for snapshot in _snapshots(0))

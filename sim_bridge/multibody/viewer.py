@@ -19,7 +19,6 @@ from sim_bridge.multibody.renderer import Stage
 _FRAME_S = 1.0 / 60.0
 _SPACE, _RIGHT, _LEFT, _HOME = 32, 262, 263, 268  # GLFW's numbers of keys
 _SEEK_S = 2.0
-_PATIENCE_S = 3.0
 _DISTANCE_SPANS, _ELEVATION_DEG, _AZIMUTH_DEG = 6.0, -20.0, -24.0
 
 HELP = "space stops and goes on, the arrows go back and forth, Home begins anew; close the window to end"
@@ -118,8 +117,10 @@ def show(
                     marks.draw(window.user_scn, moment)
                 window.sync()
             time.sleep(_FRAME_S)
-    for thread in set(threading.enumerate()) - others:  # it still draws: Python must not end before it does
-        thread.join(_PATIENCE_S)
+    # The drawing thread is a daemon. If Python ends while it still draws, GLFW is terminated under it and the process
+    # crashes. On a loaded machine without a graphics card its last picture takes many seconds: no limit here.
+    for thread in set(threading.enumerate()) - others:
+        thread.join()
 
 
 def _aim(camera: Any, stage: Stage) -> None:

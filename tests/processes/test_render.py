@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import imageio_ffmpeg
 import pytest
@@ -23,6 +24,7 @@ from sim_bridge.__main__ import main
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.live_view import READY, SNAPSHOT, LiveView
 from sim_bridge.multibody.offscreen import choose
+from sim_bridge.multibody.viewer import show
 from sim_bridge.simulator import Simulator
 from tests.support.process import Process
 from tests.support.sample_poses import sample_poses
@@ -285,6 +287,26 @@ def test_live_view_without_a_display_ends_before_anything_starts() -> None:
     done = subprocess.run(program, capture_output=True, text=True, check=False, env=environment)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("sim-bridge: --view: no display")
+
+
+def test_the_window_waits_for_its_drawing_thread_however_slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A drawing thread that outlives Python crashes in the driver: no time limit may end the wait."""
+    drawn, waits = threading.Event(), list[float | None]()
+
+    def launch(*_arguments: object, **_options: object) -> MagicMock:
+        thread = threading.Thread(target=drawn.wait, daemon=True)
+
+        def join(timeout: float | None = None) -> None:
+            waits.append(timeout)
+            drawn.set()
+
+        monkeypatch.setattr(thread, "join", join)
+        thread.start()
+        return MagicMock()
+
+    monkeypatch.setattr("mujoco.viewer.launch_passive", launch)
+    show(MagicMock(span_m=1.0), [], MagicMock())
+    assert waits == [None]
 
 
 def test_a_window_shows_a_flight_on_a_virtual_display(poses: Path) -> None:
