@@ -45,7 +45,8 @@ class GroundEnd:
         for channel, peer in ports.closed():
             hub.drop_peer(PeerAddress(channel, *peer))
         if self._sending is None:
-            self._sending = hub.poll(now_s)
+            congested = {PeerAddress(channel, *peer) for channel, peer in ports.congested()}
+            self._sending = hub.poll(now_s, congested)
         self.send()
         return heard
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
+
 from flightstack.commands import VehicleContext
 from flightstack.ground.service import Service
 from flightstack.mavlink.services.addressing import Address
@@ -12,12 +14,15 @@ from flightstack.mavlink.services.param_pack import pack_file
 
 
 def file_services(
-    own: Address, vehicle: VehicleContext, metadata: ComponentMetadata
+    own: Address,
+    vehicle: VehicleContext,
+    metadata: ComponentMetadata,
+    has_room: Callable[[Hashable], bool],
 ) -> tuple[Service, Service]:
     """Return the services of MAVLink FTP and of the log protocol."""
     autopilot = vehicle.autopilot
     files = vehicle_files(metadata, lambda arguments: pack_file(vehicle.params, arguments), vehicle.logs)
     return (
-        FtpServer(own, files),
-        LogServer(own, vehicle.logs, lambda: autopilot.now.status.armed, autopilot.say),
+        FtpServer(own, files, has_room),
+        LogServer(own, vehicle.logs, lambda: autopilot.now.status.armed, autopilot.say, has_room),
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator, Set
 
 from flightstack.commands import VehicleContext
 from flightstack.ground.facts import AutopilotFacts
@@ -46,7 +46,9 @@ class GroundHub:
         self._own = Address(system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._peers: dict[PeerAddress, Peer] = {}
         self._setup = signing_setup(self._own, vehicle.autopilot)
-        self._services = [*make_services(self._own, vehicle, facts, self._peer_at), self._setup]
+        self._congested: Set[PeerAddress] = frozenset()
+        services = make_services(self._own, vehicle, facts, self._peer_at, self._has_room)
+        self._services = [*services, self._setup]
         self._by_type: dict[str, list[Service]] = {}
         for service in self._services:
             for kind in service.handles:
@@ -104,6 +106,9 @@ class GroundHub:
         assert isinstance(address, PeerAddress)
         return self._peers[address]
 
+    def _has_room(self, address: Hashable) -> bool:
+        return address not in self._congested
+
     def _forget_silent(self, now_s: float) -> None:
         if now_s < self._forget_due_s:
             return
@@ -148,12 +153,15 @@ class GroundHub:
 
     # ------------------------------------------------------------------ sending
 
-    def poll(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
-        """Yield (address, bytes) of all that is to be sent now.
+    def poll(
+        self, now_s: float, congested: Set[PeerAddress] = frozenset()
+    ) -> Iterator[tuple[PeerAddress, bytes]]:
+        """Yield (address, bytes) of all that is to be sent now; file data waits for peers that are ``congested``.
 
         Who has little time may take a part of it, and the rest later, before the next call; ``receive`` may be
         called in between.
         """
+        self._congested = congested
         changed = self._note_changes()
         for service in self._services:
             self._collect(service.poll(now_s))

@@ -29,13 +29,20 @@ VENDOR = "flightstack"
 
 
 def make_services(
-    own: Address, vehicle: VehicleContext, facts: AutopilotFacts, peer_at: Callable[[Hashable], Peer]
+    own: Address,
+    vehicle: VehicleContext,
+    facts: AutopilotFacts,
+    peer_at: Callable[[Hashable], Peer],
+    has_room: Callable[[Hashable], bool],
 ) -> list[Service]:
-    """Return every service, in the order in which their messages are sent; ``peer_at`` finds a known peer."""
+    """Return every service, in the order in which their messages are sent.
+
+    ``peer_at`` finds a known peer; ``has_room`` is False for a peer that reads more slowly than it is sent to.
+    """
     metadata = ComponentMetadata(
         parameters_json(vehicle.params.specs.values()), VENDOR, facts.model, __version__
     )
-    log_stream = LogStream(own, lambda: vehicle.open_log_tail())  # noqa: PLW0108  # the process sets it later
+    log_stream = LogStream(own, lambda: vehicle.open_log_tail(), has_room)  # noqa: PLW0108  # the process sets it later
     link_commands = LinkCommands(own, facts, peer_at, log_stream, metadata)
     failures = FailureCommands(vehicle.simulator, lambda: vehicle.autopilot.behaviour.failures_allowed != 0)
     return [
@@ -47,6 +54,6 @@ def make_services(
         LinkLossService(vehicle.autopilot),
         TimeService(lambda: facts.time_us),
         ParamServer(own, vehicle.params, lambda text: vehicle.autopilot.say(WARNING, text)),
-        *file_services(own, vehicle, metadata),
+        *file_services(own, vehicle, metadata, has_room),
         log_stream,
     ]

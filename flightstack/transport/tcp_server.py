@@ -20,6 +20,8 @@ from flightstack.transport.udp import Address, PortBusyError
 MAX_CLIENTS = 64
 MAX_UNSENT = 65536
 STALLED_S = 10.0
+CONGESTED = 16384
+"""Unsent bytes above which a client gets no more of what can wait, such as file data."""
 _KERNEL_BUFFER = 65536
 _PIECE = 1024
 _BACKLOG = 16
@@ -157,6 +159,10 @@ class TcpServer:
             return False
         client.unsent += frame
         return True
+
+    def congested(self) -> list[Address]:
+        """Return the clients that read more slowly than they are sent to."""
+        return [address for address, client in self._clients.items() if len(client.unsent) > CONGESTED]
 
     def flush(self) -> None:
         """Send what the clients take now, and close those who have taken nothing for long."""

@@ -109,6 +109,10 @@ class VehiclePorts:
         elif self._tcp is not None:
             self._tcp.send(peer, data)
 
+    def congested(self) -> list[Place]:
+        """Return the peers whose connection takes less than they are sent; over UDP that is not known."""
+        return [(TCP, peer) for peer in self._tcp.congested()] if self._tcp else []
+
     def flush(self) -> None:
         """Send what waits for TCP clients."""
         if self._tcp is not None:

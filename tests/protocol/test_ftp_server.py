@@ -30,7 +30,8 @@ class Dialogue:
 
     def __init__(self) -> None:
         self.tree = FileTree({"big": fixed(BIG), "small": fixed(b"hello")}, {})
-        self.server = FtpServer(VEHICLE, self.tree)
+        self.congested: set[Address] = set()
+        self.server = FtpServer(VEHICLE, self.tree, lambda peer: peer not in self.congested)
         self.now_s = 0.0
 
     def tell(self, packet: Packet, source: Address = GCS, target: Address = VEHICLE) -> None:
@@ -170,6 +171,17 @@ def test_a_new_burst_takes_the_place_of_the_one_under_way() -> None:
     assert packets[0].offset == 190_000
     assert packets[0].sequence == 21
     assert packets[-1].burst_complete
+
+
+def test_a_burst_waits_for_a_congested_peer_and_answers_do_not() -> None:
+    dialogue = Dialogue()
+    dialogue.ask(Opcode.OPEN_FILE_RO, b"big")
+    dialogue.congested.add(GCS)
+    dialogue.tell(Packet(20, 0, Opcode.BURST_READ_FILE, 239))
+    assert not dialogue.answers(10)
+    assert dialogue.ask(Opcode.NONE, sequence=30).opcode == Opcode.ACK
+    dialogue.congested.clear()
+    assert dialogue.answers()[0].offset == 0
 
 
 def test_terminate_and_reset_stop_a_burst() -> None:

@@ -163,6 +163,15 @@ def test_a_stream_waits_for_the_log_to_begin(log: bytes) -> None:
     assert len(stream.poll(0.1)) == 1
 
 
+def test_a_stream_waits_for_a_congested_peer(log: bytes) -> None:
+    congested = {PEER}
+    stream = LogStream(VEHICLE, lambda: Growing(log), lambda peer: peer not in congested)
+    assert stream.start(PEER, CLIENT) is None
+    assert stream.poll(0.0) == []
+    congested.clear()
+    assert [peer for peer, _ in stream.poll(0.1)] == [PEER]
+
+
 def test_a_tail_reads_a_file_as_it_grows(tmp_path) -> None:
     path, is_open = tmp_path / "flight.ulg", [True]
     with open(path, "wb", buffering=0) as file:

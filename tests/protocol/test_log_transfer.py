@@ -185,6 +185,20 @@ def test_a_silent_client_is_forgotten() -> None:
     assert vehicle.server.next_deadline() is None
 
 
+def test_log_data_waits_for_a_congested_peer_and_not_for_others() -> None:
+    vehicle, congested, other = Vehicle(), {GCS}, Address(254, 190)
+    server = LogServer(
+        VEHICLE, vehicle.store, lambda: False, lambda *_: None, lambda peer: peer not in congested
+    )
+    for source in (GCS, other):
+        request = mavlink.MAVLink_log_request_data_message(1, 1, 0, 0, 180)
+        request._header.srcSystem, request._header.srcComponent = source
+        server.receive(request, source, 0.0)
+    assert [peer for peer, _ in server.poll(0.0)] == [other, other]
+    congested.clear()
+    assert [(peer, message.ofs) for peer, message in server.poll(0.01)] == [(GCS, 0), (GCS, 90)]
+
+
 def test_the_client_takes_numbers_from_one_as_ardupilot_gives_them() -> None:
     client = LogClient(VEHICLE)
     client.start_list()

@@ -115,6 +115,19 @@ def test_a_client_that_takes_nothing_for_long_is_closed(server: Server) -> None:
     assert reading.recv(999) == FRAME
 
 
+def test_a_client_that_reads_too_slowly_is_congested_until_it_catches_up(server: Server) -> None:
+    client, address = server.joined()
+    client.settimeout(10.0)
+    while not server.tcp.congested():
+        server.tcp.send(address, FRAME)
+        server.tcp.flush()
+    assert server.tcp.congested() == [address]
+    assert server.tcp.dropped == 0
+    while server.tcp.congested():
+        client.recv(65536)
+        server.tcp.flush()
+
+
 def test_an_idle_client_is_not_taken_for_a_stalled_one(server: Server) -> None:
     client, address = server.joined()
     server.tcp.flush()

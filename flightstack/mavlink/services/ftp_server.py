@@ -30,7 +30,7 @@ from flightstack.mavlink.services.ftp_sessions import (
     checksum_answer,
     refused,
 )
-from flightstack.mavlink.services.pace import Pace, in_turn
+from flightstack.mavlink.services.pace import Pace, always_has_room, in_turn
 from flightstack.mavlink.services.virtual_files import Entry, VirtualFile, VirtualFiles
 
 SESSION_TIMEOUT_S = 10.0
@@ -68,9 +68,17 @@ class FtpServer:
 
     handles = frozenset({"FILE_TRANSFER_PROTOCOL"})
 
-    def __init__(self, own: Address, files: VirtualFiles, pace: Pace | None = None) -> None:
+    def __init__(
+        self,
+        own: Address,
+        files: VirtualFiles,
+        has_room: Callable[[Hashable], bool] = always_has_room,
+        pace: Pace | None = None,
+    ) -> None:
+        """Bursts go to peers that ``has_room`` is true for, the others' wait; answers always go."""
         self.own = own
         self._files = files
+        self._has_room = has_room
         self._pace = pace or Pace()
         self._clients: dict[tuple[Hashable, Address], FtpSessions] = {}
         self._outbox: list[tuple[Hashable, Message]] = []
@@ -224,7 +232,8 @@ class FtpServer:
         """Return the next packets of all bursts, fairly shared."""
         sent: list[tuple[Hashable | None, Message]] = []
         allowance = self._pace.allowance(now_s)
-        streaming = in_turn(list(self._clients.items()), self._turn)
+        ready = [(key, client) for key, client in self._clients.items() if self._has_room(key[0])]
+        streaming = in_turn(ready, self._turn)
         while streaming and len(sent) < allowance:
             for key, client in list(streaming):
                 packet = client.next_burst_packet() if len(sent) < allowance else None

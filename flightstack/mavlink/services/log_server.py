@@ -16,7 +16,7 @@ from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address, is_for, sender
 from flightstack.mavlink.services.log_messages import BLOCK, log_data_message
 from flightstack.mavlink.services.log_store import LogInfo, LogStore
-from flightstack.mavlink.services.pace import Pace, in_turn
+from flightstack.mavlink.services.pace import Pace, always_has_room, in_turn
 from flightstack.mavlink.services.virtual_files import VirtualFile
 
 CLIENT_TIMEOUT_S = 30.0
@@ -77,12 +77,15 @@ class LogServer:
         store: LogStore,
         is_armed: Callable[[], bool],
         say: Callable[[int, str], object],
+        has_room: Callable[[Hashable], bool] = always_has_room,
         pace: Pace | None = None,
     ) -> None:
+        """What a peer asked for waits while ``has_room`` is false for it, as in PX4."""
         self.own = own
         self._store = store
         self._is_armed = is_armed
         self._say = say
+        self._has_room = has_room
         self._pace = pace or Pace()
         self._clients: dict[tuple[Hashable, Address], _Client] = {}
         self._turn = 0
@@ -109,7 +112,8 @@ class LogServer:
         self._forget_silent(now_s)
         sent: list[tuple[Hashable | None, Message]] = []
         allowance = self._pace.allowance(now_s)
-        busy = [(key, client) for key, client in self._clients.items() if client.is_busy]
+        clients = self._clients.items()
+        busy = [(key, client) for key, client in clients if client.is_busy and self._has_room(key[0])]
         busy = in_turn(busy, self._turn)
         while busy and len(sent) < allowance:
             for key, client in busy[: allowance - len(sent)]:

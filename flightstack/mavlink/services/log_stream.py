@@ -13,7 +13,7 @@ from typing import Protocol
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.services.addressing import Address, is_for, sender
-from flightstack.mavlink.services.pace import Pace
+from flightstack.mavlink.services.pace import Pace, always_has_room
 
 CHUNK = 249
 NO_MESSAGE_BEGINS = 255
@@ -90,10 +90,19 @@ class LogStream:
 
     handles = frozenset({"LOGGING_ACK"})
 
-    def __init__(self, own: Address, open_tail: Callable[[], LogTail | None]) -> None:
-        """``open_tail`` returns the log that is being written, or None while there is none."""
+    def __init__(
+        self,
+        own: Address,
+        open_tail: Callable[[], LogTail | None],
+        has_room: Callable[[Hashable], bool] = always_has_room,
+    ) -> None:
+        """``open_tail`` returns the log that is being written, or None while there is none.
+
+        The stream waits while ``has_room`` is false for its peer.
+        """
         self._own = own
         self._open_tail = open_tail
+        self._has_room = has_room
         self._stream: _Stream | None = None
         self._pace = Pace()
 
@@ -136,6 +145,8 @@ class LogStream:
         if stream.waiting is not None:
             return self._resend(stream, now_s)
         pieces: list[tuple[Hashable | None, Message]] = []
+        if not self._has_room(stream.peer):
+            return pieces
         for _ in range(self._pace.allowance(now_s)):
             message = self._next(stream, now_s)
             if message is None:
