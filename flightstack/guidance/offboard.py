@@ -97,6 +97,8 @@ def _turned(target: Quaternion, rates: Vector3, present: Quaternion, dt_s: float
     angle = math.sqrt(lead.x * lead.x + lead.y * lead.y + lead.z * lead.z)
     if angle <= RATE_LEAD_RAD:
         return turned
+    if not math.isfinite(angle):  # the target was not: begin anew
+        return present
     scale = RATE_LEAD_RAD / angle
     bounded = Vector3(lead.x * scale, lead.y * scale, lead.z * scale)
     return normalised(quaternion_product(present, rotation_over(bounded, 1.0)))
