@@ -9,6 +9,7 @@ from flightstack.control.backend import ControlBackend
 from flightstack.geodesy import GeoPoint
 from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.modes import STREAM_MODES, Mode
+from flightstack.plan.jumps import takes_off
 from flightstack.plan_keeper import PlanKeeper
 from flightstack.snapshot import CRITICAL, NOTICE, WARNING, Text
 
@@ -40,7 +41,7 @@ class ModeKeeper(PlanKeeper):
             upright=known.upright,
             landed=self.now.landed,
             has_mission=bool(self.items),
-            mission_takes_off=self._mission_takes_off(),
+            mission_takes_off=takes_off(self.items),
             manual_fresh=known.manual_fresh,
             offboard_fresh=known.offboard_fresh,
         )
@@ -135,6 +136,7 @@ class ModeKeeper(PlanKeeper):
         self._ground.armed(self.now.time_us)
         self._takeoff_altitude_m += self._bring_home()
         self.now.landed = True
+        self._stood_down_m = float(self._state[2])
         self._navigator.rest_at(self._state)  # guidance may remember a flight that ended in the air
 
     # ------------------------------------------------------------------ who flies
@@ -161,5 +163,5 @@ class ModeKeeper(PlanKeeper):
         """Tell whether the mode makes a standing vehicle leave the ground."""
         mode = self.now.status.mode
         if mode in STREAM_MODES:
-            return self._navigator.wants_to_rise(mode, float(self._state[2]))
+            return self._navigator.wants_to_rise(mode, self._stood_down_m)
         return mode is Mode.TAKEOFF or (mode is Mode.MISSION and self._navigator.mission_flies)

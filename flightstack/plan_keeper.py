@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from flightstack.commander.supervisor import Supervisor
 from flightstack.contract import FloatArray, Vector3
 from flightstack.geodesy import GeoPoint
-from flightstack.guidance.mission import LAND, NAV_DELAY, RETURN_TO_LAUNCH
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.plan_table import plan_table
 from flightstack.guidance.rally import ReturnPlace
@@ -37,6 +36,7 @@ class PlanKeeper:
         self.items: tuple[MissionItem, ...] = ()
         self.places = SafePlaces(home)
         self._ground_m = 0.0  # above the origin
+        self._stood_down_m = 0.0  # where the vehicle armed or landed last
 
     def _mission_is_gone(self) -> None:
         """Act when the mission that may be flown was cleared."""
@@ -204,10 +204,3 @@ class PlanKeeper:
         now.mission_count = len(self.items)
         now.mission_complete = False
         self._recorder.mission(now.time_us, now.progress, len(self.items))
-
-    def _mission_takes_off(self) -> bool:
-        """Tell whether the mission leaves the ground: by a takeoff, or on the way to its first position."""
-        for item in self.items:
-            if item.command < NAV_DELAY:  # the first item that moves the vehicle
-                return item.command not in (LAND, RETURN_TO_LAUNCH)
-        return False
