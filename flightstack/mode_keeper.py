@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flightstack.commander.arming_checks import arming_refusals
 from flightstack.commander.ground_watch import GroundWatch
-from flightstack.commander.transitions import Event, Facts, Outcome, Status, transition
+from flightstack.commander.transitions import Event, Facts, Need, Outcome, Status, transition
 from flightstack.control.backend import ControlBackend
 from flightstack.geodesy import GeoPoint
 from flightstack.guidance.speeds import SpeedOverrides
@@ -48,8 +48,20 @@ class ModeKeeper(PlanKeeper):
 
     def arming_refusals(self, mode: Mode | None = None) -> tuple[str, ...]:
         """Return every reason for which the vehicle would not arm now, or in ``mode``; empty when it would."""
-        known = self.supervisor.arming_facts(self.now.status.mode if mode is None else mode, self.has_state)
-        return arming_refusals(known._replace(throttle=self._throttle), self._behaviour)
+        mode = self.now.status.mode if mode is None else mode
+        known = self.supervisor.arming_facts(mode, self.has_state)
+        known = known._replace(throttle=self._throttle, mode_fault=self._fault_on_ground(mode) or "")
+        return arming_refusals(known, self._behaviour)
+
+    def _fault_on_ground(self, mode: Mode) -> str | None:
+        """Return why ``mode`` does not take a standing vehicle into the air, now or later, or None."""
+        if mode in (Mode.RETURN, Mode.LAND):
+            return f"{mode.name.lower()} mode cannot take off: select another mode first"
+        if mode is not Mode.MISSION:
+            return None
+        if not self.items:
+            return Need.MISSION.value
+        return self._mission_refusal() if takes_off(self.items) else Need.TAKES_OFF.value
 
     def say(self, severity: int, text: str) -> None:
         """Tell the operator and the log."""
@@ -68,7 +80,7 @@ class ModeKeeper(PlanKeeper):
             refusal = self._set_takeoff_altitude(takeoff_altitude_m)
             if refusal is not None:
                 return refusal
-        if event is Event.SELECT_MISSION:
+        if event is Event.SELECT_MISSION and before.armed:
             refusal = self._mission_refusal()
             if refusal is not None:
                 return refusal

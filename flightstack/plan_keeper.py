@@ -35,6 +35,7 @@ class PlanKeeper:
     def __init__(self, home: GeoPoint) -> None:
         self.items: tuple[MissionItem, ...] = ()
         self.places = SafePlaces(home)
+        self._mission_judged: tuple[object, str | None] = (None, None)
         self._ground_m = 0.0  # above the origin
         self._stood_down_m = 0.0  # where the vehicle armed or landed last
 
@@ -148,8 +149,13 @@ class PlanKeeper:
 
     def _mission_refusal(self) -> str | None:
         """Tell why the mission would be refused by now: home, limits or geofence may have changed since it came."""
-        rejection = self.check_mission(self.items) if self.items else None
-        return None if rejection is None else rejection.reason
+        basis = (self.items, self.home, self.limits, self.places.fence)
+        if (
+            basis != self._mission_judged[0]
+        ):  # a check of 2000 items takes its time, and SYS_STATUS asks again and again
+            rejection = self.check_mission(self.items) if self.items else None
+            self._mission_judged = basis, None if rejection is None else rejection.reason
+        return self._mission_judged[1]
 
     def check_mission(self, items: Sequence[MissionItem]) -> Rejection | None:
         """Tell why the vehicle would refuse a mission, or None."""

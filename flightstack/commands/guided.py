@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from flightstack.commander.transitions import Event
+from flightstack.commander.transitions import Event, Need
 from flightstack.commands.context import (
     ACCEPTED,
     DENIED,
@@ -53,9 +53,14 @@ def take_off(vehicle: VehicleContext, command: Command) -> Answer:
     return answer_to(vehicle.autopilot.happen(Event.SELECT_TAKEOFF, wanted))
 
 
-def selects(event: Event) -> Handler:
-    """Return the handler of a command that only selects a mode."""
-    return lambda vehicle, command: answer_to(vehicle.autopilot.happen(event))
+def brings_down(event: Event) -> Handler:
+    """Return the handler of a command that ends a flight: unlike the choice of its mode, it needs one."""
+
+    def handle(vehicle: VehicleContext, command: Command) -> Answer:
+        autopilot = vehicle.autopilot
+        return answer_to(autopilot.happen(event) if autopilot.now.status.armed else Need.ARMED.value)
+
+    return handle
 
 
 def reposition(vehicle: VehicleContext, command: Command) -> Answer:
@@ -145,8 +150,8 @@ def pause_or_continue(vehicle: VehicleContext, command: Command) -> Answer:
 
 HANDLERS: dict[int, Handler] = {
     mavlink.MAV_CMD_NAV_TAKEOFF: take_off,
-    mavlink.MAV_CMD_NAV_LAND: selects(Event.SELECT_LAND),
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: selects(Event.SELECT_RETURN),
+    mavlink.MAV_CMD_NAV_LAND: brings_down(Event.SELECT_LAND),
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: brings_down(Event.SELECT_RETURN),
     mavlink.MAV_CMD_DO_REPOSITION: reposition,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: change_speed,
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: pause_or_continue,

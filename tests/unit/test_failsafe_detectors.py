@@ -338,6 +338,7 @@ def test_a_vehicle_that_is_ready_arms() -> None:
         ({"mode": Mode.POSITION}, [], Need.MANUAL_STREAM.value),
         ({"mode": Mode.ALTITUDE}, [], Need.MANUAL_STREAM.value),
         ({"mode": Mode.OFFBOARD}, [], Need.OFFBOARD_STREAM.value),
+        ({"mode_fault": Need.MISSION.value}, [], Need.MISSION.value),
         ({"mode": Mode.TERMINATION}, [], TERMINATED),
     ],
 )
