@@ -178,7 +178,7 @@ class Autopilot(FlightRequests):
             self._ground.changed(time_us)
             if landed:
                 self.now.landing_us = time_us
-                self._stood_down_m = float(self._state[2])
+                self._stands_here()
             else:
                 self.now.takeoff_us = self.now.takeoff_us or time_us
             self._recorder.landed(time_us, landed)

@@ -92,14 +92,24 @@ class ModeKeeper(PlanKeeper):
         return None
 
     def _set_takeoff_altitude(self, above_home_m: float | None) -> str | None:
-        """Take the altitude of a takeoff, the parameter's for None; return why not, or None."""
-        altitude = self._behaviour.takeoff_altitude_m if above_home_m is None else above_home_m
+        """Take the altitude of a takeoff, for None the parameter's above home and vehicle; return why not, or None."""
+        stands_m = self._stands_above_home_m()
+        default_m = max(stands_m, 0.0) + self._behaviour.takeoff_altitude_m
+        altitude = default_m if above_home_m is None else above_home_m
+        if altitude - stands_m < self._behaviour.altitude_acceptance_m < altitude:
+            return f"takeoff altitude {altitude:g} m is not above the vehicle, which is at {stands_m:.4g} m above home"
         if not altitude > self._behaviour.altitude_acceptance_m:
             return f"takeoff altitude {altitude:g} m is too low"
         if altitude > self.limits.max_altitude_m:
             return f"takeoff altitude {altitude:g} m is above {self.limits.max_altitude_m:g} m"
         self._takeoff_altitude_m = altitude + self.places.home.altitude_m
         return None
+
+    def _stands_above_home_m(self) -> float:
+        """Return the height of a standing vehicle above home as it will be when it takes off: home may come along."""
+        comes_along = not self.now.status.armed and self._home_follows
+        known = self.facts.state_is_valid and not comes_along
+        return -float(self._state[2]) - self.places.home.altitude_m if known else 0.0
 
     def _begins_return(self, before: Status, after: Status) -> bool:
         return after.mode is Mode.RETURN and before.mode is not Mode.RETURN and not self.now.landed
@@ -148,7 +158,7 @@ class ModeKeeper(PlanKeeper):
         self._ground.armed(self.now.time_us)
         self._takeoff_altitude_m += self._bring_home()
         self.now.landed = True
-        self._stood_down_m = float(self._state[2])
+        self._stands_here()
         self._navigator.rest_at(self._state)  # guidance may remember a flight that ended in the air
 
     # ------------------------------------------------------------------ who flies
@@ -175,5 +185,5 @@ class ModeKeeper(PlanKeeper):
         """Tell whether the mode makes a standing vehicle leave the ground."""
         mode = self.now.status.mode
         if mode in STREAM_MODES:
-            return self._navigator.wants_to_rise(mode, self._stood_down_m)
+            return self._navigator.wants_to_rise(mode, -self._stood.altitude_m)
         return mode is Mode.TAKEOFF or (mode is Mode.MISSION and self._navigator.mission_flies)

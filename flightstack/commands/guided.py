@@ -23,6 +23,8 @@ from flightstack.modes import Mode
 
 CHANGE_MODE, RELATIVE_YAW = 1, 2
 """Bits of DO_REPOSITION's second parameter."""
+GROUND_TOLERANCE_M = 0.05
+"""An altitude above sea level comes as a 32-bit float; and the ground gives way by less than this."""
 NO_CHANGE, DEFAULT = -1.0, -2.0
 """Speeds of DO_CHANGE_SPEED that are none."""
 _SPEED_TYPES = {0.0: "cruise_m_s", 1.0: "cruise_m_s", 2.0: "climb_m_s", 3.0: "descent_m_s"}
@@ -84,7 +86,7 @@ def reposition(vehicle: VehicleContext, command: Command) -> Answer:
     home = autopilot.home
     place = autopilot.places.frame.to_ned(GeoPoint(latitude, longitude, home.altitude_m + altitude_m))
     is_pause = math.isnan(latitude) and math.isnan(altitude_m)
-    refusal = None if is_pause else _too_far(vehicle, place.x, place.y, altitude_m)
+    refusal = None if is_pause else _out_of_reach(vehicle, place.x, place.y, altitude_m)
     if refusal is not None:
         return Answer(DENIED, refusal)
     if bits & RELATIVE_YAW:
@@ -103,22 +105,29 @@ def _not_a_place(latitude: float, longitude: float, altitude_m: float, yaw_rad: 
     return None
 
 
-def _too_far(vehicle: VehicleContext, north_m: float, east_m: float, altitude_m: float) -> str | None:
-    """Tell why the vehicle does not go to a place: the limits of a mission and the geofence hold for it too."""
+def _out_of_reach(vehicle: VehicleContext, north_m: float, east_m: float, altitude_m: float) -> str | None:
+    """Tell why the vehicle does not go to a place: the limits of a mission, the ground and the geofence."""
     autopilot = vehicle.autopilot
     limits, (x, y, z) = autopilot.limits, autopilot.now.state[:3].tolist()
+    home_m = autopilot.places.home.altitude_m
     if 0.0 < limits.max_altitude_m < altitude_m:
         return f"altitude {altitude_m:.6g} m is above {limits.max_altitude_m:g} m"
     away_m = math.hypot(north_m - x, east_m - y)
     if 0.0 < limits.max_distance_m < away_m:
         return f"the place is {away_m / 1e3:.1f} km away, farther than MIS_DIST_WPS allows"
-    if autopilot.behaviour.fence_action == 0:
-        return None
+    here = (x, y, -z - home_m)
     if math.isnan(north_m):
         north_m, east_m = x, y
     if math.isnan(altitude_m):
-        altitude_m = -z - autopilot.places.home.altitude_m
-    here = (x, y, -z - autopilot.places.home.altitude_m)
+        altitude_m = here[2]
+    ground_m = autopilot.ground_m(north_m, east_m) - home_m
+    valley_m = max(
+        0.0, autopilot.ground_m(x, y) - home_m - here[2]
+    )  # the vehicle is below what counts as ground
+    if altitude_m < ground_m - valley_m - GROUND_TOLERANCE_M:
+        return f"altitude {altitude_m:.6g} m above home is below the ground, which is at {ground_m:.4g} m"
+    if autopilot.behaviour.fence_action == 0:
+        return None
     refusal = autopilot.supervisor.fence.way_refusal(here, (north_m, east_m, altitude_m))
     return None if refusal is None else f"the place {refusal}"
 
