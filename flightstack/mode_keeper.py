@@ -105,11 +105,21 @@ class ModeKeeper(PlanKeeper):
         self._takeoff_altitude_m = altitude + self.places.home.altitude_m
         return None
 
+    @property
+    def home_at_takeoff_m(self) -> float:
+        """Altitude above the sea of home as it will be when the vehicle takes off: it may come along on arming."""
+        comes_along = not self.now.status.armed and self._home_follows and self.facts.state_is_valid
+        return (
+            self.places.frame.origin.altitude_m - float(self._state[2])
+            if comes_along
+            else self.home.altitude_m
+        )
+
     def _stands_above_home_m(self) -> float:
-        """Return the height of a standing vehicle above home as it will be when it takes off: home may come along."""
-        comes_along = not self.now.status.armed and self._home_follows
-        known = self.facts.state_is_valid and not comes_along
-        return -float(self._state[2]) - self.places.home.altitude_m if known else 0.0
+        """Return the height of a standing vehicle above home as it will be when it takes off; 0 if it is not known."""
+        if not self.facts.state_is_valid:
+            return 0.0
+        return self.places.frame.origin.altitude_m - float(self._state[2]) - self.home_at_takeoff_m
 
     def _begins_return(self, before: Status, after: Status) -> bool:
         return after.mode is Mode.RETURN and before.mode is not Mode.RETURN and not self.now.landed

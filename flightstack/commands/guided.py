@@ -47,8 +47,10 @@ def take_off(vehicle: VehicleContext, command: Command) -> Answer:
     unsupported = frame_answer(command)
     if unsupported is not None:
         return unsupported
+    altitude_m = command.params[6]
     is_plain = vehicle.is_generic and command.frame is None
-    altitude_m = command.params[6] if is_plain else above_home_m(vehicle, command)
+    if not is_plain and command.frame not in RELATIVE_FRAMES:
+        altitude_m -= vehicle.autopilot.home_at_takeoff_m
     if math.isinf(altitude_m):
         return Answer(DENIED, "the takeoff altitude is not a number")
     wanted = None if math.isnan(altitude_m) else altitude_m
