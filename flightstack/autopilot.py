@@ -6,6 +6,7 @@ import numpy as np
 
 from flightstack.commander.conditions import LinkFacts, StateSource
 from flightstack.commander.failsafe import Action, Failsafe, phase_of
+from flightstack.commander.ground_watch import Standing
 from flightstack.commander.supervisor import EVENTS_OF_ACTION, Supervisor
 from flightstack.commander.transitions import Event
 from flightstack.contract import FloatArray, LoopFlags, LoopRow, LoopStatus
@@ -17,6 +18,7 @@ from flightstack.guidance.params import guidance_params
 from flightstack.modes import STREAM_MODES, Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
+from flightstack.plan.jumps import takes_off
 from flightstack.snapshot import INFO, WARNING, Recorder, Snapshot
 
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
@@ -112,10 +114,9 @@ class Autopilot(FlightRequests):
     def _guide(self) -> None:
         """Let guidance say where to fly; it rests while the state is not to be flown by."""
         now, flying = self.now, self._flying
-        mode = now.status.mode
-        if self.supervisor.states.holds_rotors or not (
-            flying or mode is _MISSION
-        ):  # it also waits on the ground
+        armed, mode = now.status
+        waits = armed and mode is _MISSION  # on the ground
+        if self.supervisor.states.holds_rotors or not (flying or waits):
             return
         navigator, target = self._navigator, None
         navigator.step(mode, self._state, now.attitude_target)
@@ -177,6 +178,7 @@ class Autopilot(FlightRequests):
             self._ground.changed(time_us)
             if landed:
                 self.now.landing_us = time_us
+                self._stands_here()
             else:
                 self.now.takeoff_us = self.now.takeoff_us or time_us
             self._recorder.landed(time_us, landed)
@@ -184,10 +186,16 @@ class Autopilot(FlightRequests):
             self._choose_loops()
         if not landed:
             return
-        mode = self.now.status.mode  # after a landing, only who goes on flying stays armed
-        is_taking_off = mode in AIRBORNE_MODES or (mode in STREAM_MODES and self._flying)
-        event = self._ground.event(time_us, is_taking_off, self._behaviour)
+        mode = self.now.status.mode
+        goes_on = mode in AIRBORNE_MODES or (mode in STREAM_MODES and self._flying)
+        lift = float(self.now.attitude_target[4]) / self._vehicle.weight_n
+        standing = Standing(goes_on, self._flying, float(self._state[2]), lift)
+        event = self._ground.event(time_us, standing, self._behaviour)
         if event is Event.NO_TAKEOFF:
+            waits = mode is _MISSION and not self._flying
+            if waits and takes_off(self.items, self._navigator.progress.current):
+                self._ground.waits(time_us)
+                return
             self.say(WARNING, "Disarmed: no takeoff")
         if event is not None:
             self._apply(event)

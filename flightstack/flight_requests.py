@@ -16,9 +16,7 @@ from flightstack.params.vehicle import Vehicle
 from flightstack.snapshot import EMERGENCY
 
 USERS_CHOICES: dict[Event, Phase] = {
-    rule.event: PHASE_OF_MODE[rule.mode]
-    for rule in RULES
-    if rule.mode is not None and rule.event.name.startswith("SELECT_")
+    rule.event: PHASE_OF_MODE[rule.mode] for rule in RULES if rule.mode is not None and rule.selects
 }
 """What a user selects, and the phase of flight that it begins."""
 
@@ -50,10 +48,14 @@ class FlightRequests(ModeKeeper):
 
     def _select(self, event: Event, phase: Phase, takeoff_altitude_m: float | None = None) -> str | None:
         """Let a user begin ``phase`` by ``event``; return why not, or None."""
-        refusal = self.supervisor.refusal(phase) or self._apply(event, takeoff_altitude_m)
+        refusal = self._failsafe_refusal(phase) or self._apply(event, takeoff_altitude_m)
         if refusal is None:
             self.supervisor.override(phase)
         return refusal
+
+    def _failsafe_refusal(self, phase: Phase) -> str | None:
+        """Return why a failsafe denies flying in ``phase``, or None; failsafes deny a disarmed vehicle nothing."""
+        return self.supervisor.refusal(phase) if self.now.status.armed else None
 
     def start_mission(self, first: int | None) -> str | None:
         """Select the mission, from item ``first`` if it is given, and arm where need be; return why not, or None.
@@ -62,11 +64,11 @@ class FlightRequests(ModeKeeper):
         """
         phase = USERS_CHOICES[Event.SELECT_MISSION]
         arms = not self.now.status.armed
-        refusal = transition(self.now.status, self.facts, Event.SELECT_MISSION).refusal
-        refusal = refusal or self._mission_refusal()
-        if refusal is None and arms:
+        if arms:
             refusal = "; ".join(self.arming_refusals(Mode.MISSION)) or None
-        refusal = refusal or self.supervisor.refusal(phase)
+        else:
+            refusal = transition(self.now.status, self.facts, Event.SELECT_MISSION).refusal
+            refusal = refusal or self._mission_refusal() or self._failsafe_refusal(phase)
         if refusal is not None:
             return refusal
         if first is not None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from flightstack.commander.arming_checks import arming_refusals
 from flightstack.commander.ground_watch import GroundWatch
-from flightstack.commander.transitions import Event, Facts, Outcome, Status, transition
+from flightstack.commander.transitions import Event, Facts, Need, Outcome, Status, transition
 from flightstack.control.backend import ControlBackend
 from flightstack.geodesy import GeoPoint
 from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.modes import STREAM_MODES, Mode
+from flightstack.plan.jumps import takes_off
 from flightstack.plan_keeper import PlanKeeper
 from flightstack.snapshot import CRITICAL, NOTICE, WARNING, Text
 
@@ -40,15 +41,27 @@ class ModeKeeper(PlanKeeper):
             upright=known.upright,
             landed=self.now.landed,
             has_mission=bool(self.items),
-            mission_takes_off=self._mission_takes_off(),
+            mission_takes_off=takes_off(self.items),
             manual_fresh=known.manual_fresh,
             offboard_fresh=known.offboard_fresh,
         )
 
     def arming_refusals(self, mode: Mode | None = None) -> tuple[str, ...]:
         """Return every reason for which the vehicle would not arm now, or in ``mode``; empty when it would."""
-        known = self.supervisor.arming_facts(self.now.status.mode if mode is None else mode, self.has_state)
-        return arming_refusals(known._replace(throttle=self._throttle), self._behaviour)
+        mode = self.now.status.mode if mode is None else mode
+        known = self.supervisor.arming_facts(mode, self.has_state)
+        known = known._replace(throttle=self._throttle, mode_fault=self._fault_on_ground(mode) or "")
+        return arming_refusals(known, self._behaviour)
+
+    def _fault_on_ground(self, mode: Mode) -> str | None:
+        """Return why ``mode`` does not take a standing vehicle into the air, now or later, or None."""
+        if mode in (Mode.RETURN, Mode.LAND):
+            return f"{mode.name.lower()} mode cannot take off: select another mode first"
+        if mode is not Mode.MISSION:
+            return None
+        if not self.items:
+            return Need.MISSION.value
+        return self._mission_refusal() if takes_off(self.items) else Need.TAKES_OFF.value
 
     def say(self, severity: int, text: str) -> None:
         """Tell the operator and the log."""
@@ -67,7 +80,7 @@ class ModeKeeper(PlanKeeper):
             refusal = self._set_takeoff_altitude(takeoff_altitude_m)
             if refusal is not None:
                 return refusal
-        if event is Event.SELECT_MISSION:
+        if event is Event.SELECT_MISSION and before.armed:
             refusal = self._mission_refusal()
             if refusal is not None:
                 return refusal
@@ -79,14 +92,34 @@ class ModeKeeper(PlanKeeper):
         return None
 
     def _set_takeoff_altitude(self, above_home_m: float | None) -> str | None:
-        """Take the altitude of a takeoff, the parameter's for None; return why not, or None."""
-        altitude = self._behaviour.takeoff_altitude_m if above_home_m is None else above_home_m
+        """Take the altitude of a takeoff, for None the parameter's above home and vehicle; return why not, or None."""
+        stands_m = self._stands_above_home_m()
+        default_m = max(stands_m, 0.0) + self._behaviour.takeoff_altitude_m
+        altitude = default_m if above_home_m is None else above_home_m
+        if altitude - stands_m < self._behaviour.altitude_acceptance_m < altitude:
+            return f"takeoff altitude {altitude:g} m is not above the vehicle, which is at {stands_m:.4g} m above home"
         if not altitude > self._behaviour.altitude_acceptance_m:
             return f"takeoff altitude {altitude:g} m is too low"
         if altitude > self.limits.max_altitude_m:
             return f"takeoff altitude {altitude:g} m is above {self.limits.max_altitude_m:g} m"
         self._takeoff_altitude_m = altitude + self.places.home.altitude_m
         return None
+
+    @property
+    def home_at_takeoff_m(self) -> float:
+        """Altitude above the sea of home as it will be when the vehicle takes off: it may come along on arming."""
+        comes_along = not self.now.status.armed and self._home_follows and self.facts.state_is_valid
+        return (
+            self.places.frame.origin.altitude_m - float(self._state[2])
+            if comes_along
+            else self.home.altitude_m
+        )
+
+    def _stands_above_home_m(self) -> float:
+        """Return the height of a standing vehicle above home as it will be when it takes off; 0 if it is not known."""
+        if not self.facts.state_is_valid:
+            return 0.0
+        return self.places.frame.origin.altitude_m - float(self._state[2]) - self.home_at_takeoff_m
 
     def _begins_return(self, before: Status, after: Status) -> bool:
         return after.mode is Mode.RETURN and before.mode is not Mode.RETURN and not self.now.landed
@@ -135,6 +168,7 @@ class ModeKeeper(PlanKeeper):
         self._ground.armed(self.now.time_us)
         self._takeoff_altitude_m += self._bring_home()
         self.now.landed = True
+        self._stands_here()
         self._navigator.rest_at(self._state)  # guidance may remember a flight that ended in the air
 
     # ------------------------------------------------------------------ who flies
@@ -161,5 +195,5 @@ class ModeKeeper(PlanKeeper):
         """Tell whether the mode makes a standing vehicle leave the ground."""
         mode = self.now.status.mode
         if mode in STREAM_MODES:
-            return self._navigator.wants_to_rise(mode, float(self._state[2]))
+            return self._navigator.wants_to_rise(mode, -self._stood.altitude_m)
         return mode is Mode.TAKEOFF or (mode is Mode.MISSION and self._navigator.mission_flies)

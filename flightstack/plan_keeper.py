@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from flightstack.commander.supervisor import Supervisor
 from flightstack.contract import FloatArray, Vector3
 from flightstack.geodesy import GeoPoint
-from flightstack.guidance.mission import LAND, NAV_DELAY, RETURN_TO_LAUNCH
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.plan_table import plan_table
-from flightstack.guidance.rally import ReturnPlace
+from flightstack.guidance.rally import HOME, ReturnPlace
 from flightstack.guidance.safe_places import HOME_SPREAD_M, SafePlaces, plan_limits
 from flightstack.modes import Mode
 from flightstack.params.behaviour import Behaviour
@@ -36,7 +35,9 @@ class PlanKeeper:
     def __init__(self, home: GeoPoint) -> None:
         self.items: tuple[MissionItem, ...] = ()
         self.places = SafePlaces(home)
-        self._ground_m = 0.0  # above the origin
+        self._mission_judged: tuple[object, str | None] = (None, None)
+        self._ground_m = -math.inf  # above the origin
+        self._stood = HOME  # where the vehicle armed or landed last
 
     def _mission_is_gone(self) -> None:
         """Act when the mission that may be flown was cleared."""
@@ -101,36 +102,49 @@ class PlanKeeper:
             self._recorder.home(self.now.time_us, point, home_ned_m)
         return refusal
 
+    @property
+    def _home_follows(self) -> bool:
+        """Whether home moves to where the vehicle arms."""
+        return bool(self._behaviour.home_follows) and not self.places.home_is_chosen
+
     def _bring_home(self) -> float:
         """Move home to where the vehicle stands, as it arms; return by how much that is higher [m]."""
         places, here = self.places, Vector3(*self._state[:3].tolist())
         before_m = places.home.altitude_m
-        follows = self._behaviour.home_follows and not places.home_is_chosen
-        if follows and places.has_left_home(here):
+        if self._home_follows and places.has_left_home(here):
             self._move_home(places.frame.to_geo(here), chosen=False)
         return places.home.altitude_m - before_m
 
-    def _find_ground(self, return_place: ReturnPlace | None) -> None:
-        """Say where the ground is taken to be as a mode begins.
+    def _stands_here(self) -> None:
+        """Remember where the vehicle stands: there is ground."""
+        north_m, east_m, down_m = self._state[:3].tolist()
+        self._stood = ReturnPlace(north_m, east_m, -down_m)
+        self._set_bounds()
 
-        It is that of home; of the place of a return; in a landing, that of the nearest place known.
-        """
-        places, mode = self.places, self.now.status.mode
-        self._ground_m = places.home.altitude_m
+    def ground_m(self, north_m: float, east_m: float) -> float:
+        """Return how high the ground is taken to be at a place, above the origin."""
+        return self.places.ground_m(north_m, east_m, self._stood)
+
+    def _find_ground(self, return_place: ReturnPlace | None) -> None:
+        """Say where the ground is taken to be as a return or a landing begins: there, or at the nearest place known."""
+        self._ground_m = -math.inf
         if return_place is not None:
             self._ground_m = return_place.altitude_m
-        elif mode is Mode.LAND:
-            self._ground_m = places.ground_m(float(self._state[0]), float(self._state[1]))
+        elif self.now.status.mode is Mode.LAND:
+            self._ground_m = self.ground_m(float(self._state[0]), float(self._state[1]))
         self._set_bounds()
 
     def _set_bounds(self) -> None:
-        """Tell guidance where the ground is, and how high it may climb where no plan says so."""
+        """Tell guidance where the ground begins, and how high it may climb where no plan says so.
+
+        A descent is slow from the highest ground on: a home or a rally point may have been placed too low.
+        """
         home_m, limit_m = self.places.home.altitude_m, self._behaviour.fence_max_altitude_m
         if self.now.status.mode not in (Mode.RETURN, Mode.LAND):  # they end where they were going to
-            self._ground_m = home_m
+            self._ground_m = -math.inf
         below_m = max(limit_m - CEILING_MARGIN_M, 0.5 * limit_m)
         ceiling_m = home_m + below_m if limit_m > 0.0 else math.inf
-        self._navigator.set_bounds(-self._ground_m, -ceiling_m)
+        self._navigator.set_bounds(-max(self._ground_m, home_m, self._stood.altitude_m), -ceiling_m)
 
     def _return_place(self) -> ReturnPlace | None:
         """Return where a return from here goes, or None if all places are outside the geofence."""
@@ -148,8 +162,13 @@ class PlanKeeper:
 
     def _mission_refusal(self) -> str | None:
         """Tell why the mission would be refused by now: home, limits or geofence may have changed since it came."""
-        rejection = self.check_mission(self.items) if self.items else None
-        return None if rejection is None else rejection.reason
+        basis = (self.items, self.home, self.limits, self.places.fence)
+        if (
+            basis != self._mission_judged[0]
+        ):  # a check of 2000 items takes its time, and SYS_STATUS asks again and again
+            rejection = self.check_mission(self.items) if self.items else None
+            self._mission_judged = basis, None if rejection is None else rejection.reason
+        return self._mission_judged[1]
 
     def check_mission(self, items: Sequence[MissionItem]) -> Rejection | None:
         """Tell why the vehicle would refuse a mission, or None."""
@@ -204,10 +223,3 @@ class PlanKeeper:
         now.mission_count = len(self.items)
         now.mission_complete = False
         self._recorder.mission(now.time_us, now.progress, len(self.items))
-
-    def _mission_takes_off(self) -> bool:
-        """Tell whether the mission leaves the ground: by a takeoff, or on the way to its first position."""
-        for item in self.items:
-            if item.command < NAV_DELAY:  # the first item that moves the vehicle
-                return item.command not in (LAND, RETURN_TO_LAUNCH)
-        return False

@@ -174,6 +174,8 @@ def _rotors(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
         return view
     rpm = list(view.rotor_rpm) + [0.0] * (first + 4 - len(view.rotor_rpm))
     rpm[first : first + 4] = [float(value) for value in message.rpm]
+    if view.identity is not None and view.identity.rotors is not None:  # a message holds four, used or not
+        rpm = rpm[: view.identity.rotors]
     peak = max(view.rotor_peak_rpm, *(abs(value) for value in rpm))
     return view._replace(rotor_rpm=tuple(rpm), rotor_peak_rpm=peak)
 

@@ -9,6 +9,14 @@ LOST_AFTER_S = 5.0
 """Silence after which a vehicle counts as lost: five missed heartbeats."""
 
 _POWEROFF = 7  # MAV_STATE_POWEROFF
+_KINDS = {
+    2: ("quadrotor", 4),
+    13: ("hexarotor", 6),
+    14: ("octorotor", 8),
+    15: ("tricopter", 3),
+    43: ("multirotor", 0),
+}
+"""Name and number of rotors by MAV_TYPE."""
 MISSION_COMPLETE = 5  # MISSION_STATE_COMPLETE
 
 
@@ -27,6 +35,16 @@ class Identity(NamedTuple):
     component_id: int
     vehicle_type: int
     autopilot: int
+
+    @property
+    def kind(self) -> str:
+        """Name of the type of vehicle."""
+        return _KINDS.get(self.vehicle_type, ("vehicle", 0))[0]
+
+    @property
+    def rotors(self) -> int | None:
+        """Number of rotors that the type of vehicle has; None where it does not tell."""
+        return _KINDS.get(self.vehicle_type, ("", 0))[1] or None
 
 
 class Euler(NamedTuple):

@@ -132,7 +132,7 @@ def _footer(view: VehicleView, width: int) -> Text:
     text = Text(no_wrap=True)
     text.append(" q", style="bold cyan")
     text.append(" quit   ", style="bright_black")
-    text.append(f"vehicle {view.identity.system_id}", style="bright_black")
+    text.append(f"{view.identity.kind} {view.identity.system_id}", style="bright_black")
     if view.home is not None and width >= _WIDE:
         home = view.home
         text.append(

@@ -25,6 +25,8 @@ BATTERY_HYSTERESIS = 0.02
 TILT_MARGIN_DEG = 15
 ROTOR_MEAN_S = 0.03
 """Rotors are compared by means over about this time: loops that shake them are no fault of theirs."""
+FASTEST_RAD_S = 1e6
+"""A rotor speed beyond this is no measurement; ideal rotors without limits stay below it."""
 
 ROLL, PITCH, TILT_ERROR, POSITION, ROTORS = range(5)
 TIMERS = 5
@@ -74,32 +76,45 @@ def follow_rotors(row: FloatArray, memory: FloatArray, params: FloatArray) -> No
     """Compare each rotor's measured speed with what its commands lead to; once per inner tick.
 
     ``row`` (48,) holds speeds from before its commands. ``memory`` (25,) keeps, for each rotor, the speed that the
-    commands lead to (first-order lag, exact for commands that are held), its mean, and the mean of the error.
+    commands lead to (first-order lag, exact for commands that are held), its mean, and the mean of the error. A speed
+    or command that is not finite, or beyond ``FASTEST_RAD_S``, is left out.
     """
     last = len(params) - 1
     for i in range(last):
         expected = memory[R_EXPECTED + i]
         memory[R_MEAN + i] += (expected - memory[R_MEAN + i]) * params[last]
-        memory[R_ERROR + i] += (row[_SPEED_AT + i] - expected - memory[R_ERROR + i]) * params[last]
-        memory[R_EXPECTED + i] = expected + (row[_COMMAND_AT + i] - expected) * params[i]
+        speed, command = row[_SPEED_AT + i], row[_COMMAND_AT + i]
+        if abs(speed) <= FASTEST_RAD_S:  # NaN is not
+            memory[R_ERROR + i] += (speed - expected - memory[R_ERROR + i]) * params[last]
+        if abs(command) <= FASTEST_RAD_S:
+            memory[R_EXPECTED + i] = expected + (command - expected) * params[i]
 
 
 @compiled
-def _watch(memory: FloatArray, index: int, beyond: bool, time_s: float, dt_s: float) -> bool:
-    """Advance one timer; tell whether the detector is triggered.
+def _watch(memory: FloatArray, index: int, beyond: bool, time_s: float, dt_s: float) -> None:
+    """Advance one timer.
 
     The timer counts how long the value has been on the other side than the detector's answer.
     """
     triggered = memory[M_TRIGGERED + index] > 0.0
     if beyond == triggered:
         memory[index] = 0.0
-        return bool(triggered)
+        return
     memory[index] += dt_s
     if memory[index] >= (RELEASE_S if triggered else time_s) - 1e-9:
         memory[index] = 0.0
-        triggered = not triggered
-        memory[M_TRIGGERED + index] = 1.0 if triggered else 0.0
-    return bool(triggered)
+        memory[M_TRIGGERED + index] = 0.0 if triggered else 1.0
+
+
+@compiled
+def _found(memory: FloatArray) -> int:
+    """Return the bits of the detectors that are triggered."""
+    bits = (BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT)
+    result = 0
+    for index in range(TIMERS):
+        if memory[M_TRIGGERED + index] > 0.0:
+            result |= bits[index]
+    return result
 
 
 @compiled
@@ -111,7 +126,7 @@ def _rotor_error(row: FloatArray, rotors: FloatArray, params: FloatArray) -> flo
     """
     worst = 0.0
     for i in range(int(params[P_ROTORS])):
-        if row[_SPEED_AT + i] != 0.0:
+        if 0.0 < abs(row[_SPEED_AT + i]) <= FASTEST_RAD_S:
             rotors[R_MEASURED] = 1.0
         worst = max(worst, abs(rotors[R_ERROR + i]) / max(abs(rotors[R_MEAN + i]), params[P_SLOW]))
     return worst if rotors[R_MEASURED] > 0.0 else 0.0
@@ -131,12 +146,12 @@ def detect(
 
     ``state`` (13,), ``setpoint`` (11,) and ``row`` (48,), the newest row of the inner loop, as in ``contract``;
     ``rotors`` (25,) is the memory of ``follow_rotors``; ``memory`` (10,) is updated; ``params`` come from
-    ``detector_params``. A state that is not finite leaves the other detectors as they are.
+    ``detector_params``. A state that is not finite leaves the other detectors, and what they found, as they are.
     """
     status = int(row[_STATUS_AT])
     for value in state:
         if not math.isfinite(value):
-            return NOT_FINITE
+            return NOT_FINITE | _found(memory)
     result = NOT_FINITE if status & _BAD_OUTPUT != 0 else 0
     now = vehicle_state(state)
     v, w = now.velocity_ned_m_s, now.rates_frd_rad_s
@@ -161,23 +176,21 @@ def detect(
     p = now.position_ned_m
     distance = math.sqrt((p.x - setpoint[0]) ** 2 + (p.y - setpoint[1]) ** 2 + (p.z - setpoint[2]) ** 2)
     errors = (abs(roll), abs(pitch), tilt_error, distance, _rotor_error(row, rotors, params))
-    bits = (BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT)
     for index in range(TIMERS):
         limit = params[P_LIMIT + index]
         beyond = limit > 0.0 and not errors[index] <= limit
-        if _watch(memory, index, beyond, params[P_TIME + index], dt_s):
-            result |= bits[index]
-    return result
+        _watch(memory, index, beyond, params[P_TIME + index], dt_s)
+    return result | _found(memory)
 
 
 def battery_level(before: int, remaining: float, thresholds: tuple[float, float, float]) -> int:
-    """Return how low the battery is: 0 enough or unknown (NaN), 1 low, 2 critical, 3 emergency.
+    """Return how low the battery is: 0 enough or never known, 1 low, 2 critical, 3 emergency.
 
     ``thresholds`` are the shares of charge for low, critical and emergency. A level once reached is left
-    only when the charge lies ``BATTERY_HYSTERESIS`` above its threshold.
+    only when the charge lies ``BATTERY_HYSTERESIS`` above its threshold; an unknown charge (NaN) keeps it.
     """
     if math.isnan(remaining):
-        return 0
+        return before
     reached = sum(remaining <= threshold for threshold in thresholds)
     kept = sum(remaining <= threshold + BATTERY_HYSTERESIS for threshold in thresholds)
     return max(reached, min(before, kept))

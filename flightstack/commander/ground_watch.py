@@ -2,33 +2,80 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from flightstack.commander.transitions import Event
 from flightstack.params.behaviour import Behaviour
 
+OFF_GROUND_M = 0.05
+"""Rise since the rotors began to lift from which on the vehicle is off the ground; the land detector says so later."""
+HIGHER_M, MORE_LIFT = 0.005, 0.01
+"""A takeoff makes progress when it is higher than ever by so much, or asks for so much more thrust than ever, as share
+of the weight: integrators are slow. Noise sets few such records, and a vehicle that cannot rise none."""
+
+
+class Standing(NamedTuple):
+    """What a vehicle does that the land detector has on the ground."""
+
+    goes_on: bool
+    """Whether its mode flies on after a landing, now or later."""
+    lifts: bool
+    """Whether the loops fly it."""
+    down_m: float
+    lift: float
+    """Thrust that the loops ask for, as share of the weight."""
+
+
+class _Takeoff(NamedTuple):
+    """A takeoff under way: where it began, and its records."""
+
+    stood_down_m: float
+    least_down_m: float
+    most_lift: float
+
 
 class GroundWatch:
-    """Counts the time since arming and since the last landing."""
+    """Counts the time since arming, since the last landing, and since a takeoff last made progress."""
 
     def __init__(self) -> None:
-        self._armed_us = 0
-        self._landed_us: int | None = None
+        self._since_us = 0
+        self._has_flown = False
+        self._takeoff: _Takeoff | None = None
 
     def armed(self, time_us: int) -> None:
         """Note the arming: a flight begins."""
-        self._armed_us, self._landed_us = time_us, None
+        self._since_us, self._has_flown, self._takeoff = time_us, False, None
 
     def changed(self, time_us: int) -> None:
         """Note a takeoff or a landing."""
-        self._landed_us = time_us
+        self._has_flown, self._since_us = True, time_us
 
-    def event(self, time_us: int, is_taking_off: bool, behaviour: Behaviour) -> Event | None:
+    def waits(self, time_us: int) -> None:
+        """Count anew: the plan makes the vehicle wait on the ground."""
+        self._since_us = time_us
+
+    def event(self, time_us: int, standing: Standing, behaviour: Behaviour) -> Event | None:
         """Return the event that is due while the vehicle stands: disarming after a landing, or without a takeoff."""
-        if self._landed_us is None:
-            late = _waited(time_us, self._armed_us, behaviour.disarm_without_takeoff_s)
-            return Event.NO_TAKEOFF if late else None
-        late = _waited(time_us, self._landed_us, behaviour.disarm_after_landing_s)
-        return Event.LANDED_LONG_ENOUGH if late and not is_taking_off else None
+        if self._makes_progress(standing):
+            self._since_us = time_us
+        after_landing = self._has_flown and not standing.goes_on
+        event = Event.LANDED_LONG_ENOUGH if after_landing else Event.NO_TAKEOFF
+        wait_s = behaviour.disarm_after_landing_s if after_landing else behaviour.disarm_without_takeoff_s
+        return event if 0.0 < wait_s <= (time_us - self._since_us) * 1e-6 else None
 
-
-def _waited(time_us: int, since_us: int, wait_s: float) -> bool:
-    return wait_s >= 0.0 and (time_us - since_us) * 1e-6 >= wait_s
+    def _makes_progress(self, now: Standing) -> bool:
+        """Tell whether a takeoff begins, is off the ground, or sets a record of height or thrust."""
+        before, self._takeoff = self._takeoff, None
+        if not now.lifts:
+            return False
+        if before is None:
+            self._takeoff = _Takeoff(now.down_m, now.down_m, now.lift)
+            return True
+        higher = now.down_m < before.least_down_m - HIGHER_M
+        stronger = now.lift > before.most_lift + MORE_LIFT
+        self._takeoff = _Takeoff(
+            before.stood_down_m,
+            now.down_m if higher else before.least_down_m,
+            now.lift if stronger else before.most_lift,
+        )
+        return higher or stronger or before.stood_down_m - now.down_m > OFF_GROUND_M

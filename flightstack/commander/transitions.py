@@ -1,7 +1,7 @@
 """Arming and modes as a table: each event, what it needs, and where it leads. Pure.
 
 Read ``RULES`` from top to bottom: that is the whole behaviour. A need that is not met refuses the event with the
-sentence that stands beside it, and nothing changes.
+sentence that stands beside it, and nothing changes. As with PX4, a disarmed vehicle takes any mode.
 """
 
 from __future__ import annotations
@@ -91,6 +91,11 @@ class Rule(NamedTuple):
     armed: bool | None
     mode: Mode | None
 
+    @property
+    def selects(self) -> bool:
+        """Whether a user selects a mode by it, which needs nothing while disarmed: arming then says what is missing."""
+        return self.event.name.startswith("SELECT_")
+
 
 FLYABLE = tuple(mode for mode in Mode if mode is not Mode.TERMINATION)
 TERMINATED = "the flight was terminated: reboot the vehicle first"
@@ -104,8 +109,8 @@ RULES = (
     Rule(Event.SELECT_TAKEOFF, FLYABLE, (Need.STATE, Need.ON_GROUND), None, Mode.TAKEOFF),
     Rule(Event.SELECT_MISSION, FLYABLE, (Need.STATE, Need.MISSION, Need.TAKES_OFF), None, Mode.MISSION),
     Rule(Event.SELECT_HOLD, FLYABLE, (Need.STATE,), None, Mode.HOLD),
-    Rule(Event.SELECT_RETURN, FLYABLE, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.RETURN),
-    Rule(Event.SELECT_LAND, FLYABLE, (Need.STATE, Need.ARMED, Need.IN_AIR), None, Mode.LAND),
+    Rule(Event.SELECT_RETURN, FLYABLE, (Need.STATE, Need.IN_AIR), None, Mode.RETURN),
+    Rule(Event.SELECT_LAND, FLYABLE, (Need.STATE, Need.IN_AIR), None, Mode.LAND),
     Rule(Event.SELECT_POSITION, FLYABLE, (Need.STATE, Need.MANUAL_STREAM), None, Mode.POSITION),
     Rule(Event.SELECT_ALTITUDE, FLYABLE, (Need.STATE, Need.MANUAL_STREAM), None, Mode.ALTITUDE),
     Rule(Event.SELECT_OFFBOARD, FLYABLE, (Need.STATE, Need.OFFBOARD_STREAM), None, Mode.OFFBOARD),
@@ -129,7 +134,7 @@ def transition(status: Status, facts: Facts, event: Event) -> Outcome:
     for rule in RULES:
         if rule.event is not event or status.mode not in rule.modes:
             continue
-        for need in rule.needs:
+        for need in rule.needs if status.armed or not rule.selects else ():
             if not is_met(need, status, facts):
                 return Outcome(status, need.value)
         return Outcome(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from flightstack.commander.transitions import Event
+from flightstack.commander.transitions import Event, Need
 from flightstack.commands.context import (
     ACCEPTED,
     DENIED,
@@ -23,6 +23,8 @@ from flightstack.modes import Mode
 
 CHANGE_MODE, RELATIVE_YAW = 1, 2
 """Bits of DO_REPOSITION's second parameter."""
+GROUND_TOLERANCE_M = 0.05
+"""An altitude above sea level comes as a 32-bit float; and the ground gives way by less than this."""
 NO_CHANGE, DEFAULT = -1.0, -2.0
 """Speeds of DO_CHANGE_SPEED that are none."""
 _SPEED_TYPES = {0.0: "cruise_m_s", 1.0: "cruise_m_s", 2.0: "climb_m_s", 3.0: "descent_m_s"}
@@ -45,17 +47,24 @@ def take_off(vehicle: VehicleContext, command: Command) -> Answer:
     unsupported = frame_answer(command)
     if unsupported is not None:
         return unsupported
+    altitude_m = command.params[6]
     is_plain = vehicle.is_generic and command.frame is None
-    altitude_m = command.params[6] if is_plain else above_home_m(vehicle, command)
+    if not is_plain and command.frame not in RELATIVE_FRAMES:
+        altitude_m -= vehicle.autopilot.home_at_takeoff_m
     if math.isinf(altitude_m):
         return Answer(DENIED, "the takeoff altitude is not a number")
     wanted = None if math.isnan(altitude_m) else altitude_m
     return answer_to(vehicle.autopilot.happen(Event.SELECT_TAKEOFF, wanted))
 
 
-def selects(event: Event) -> Handler:
-    """Return the handler of a command that only selects a mode."""
-    return lambda vehicle, command: answer_to(vehicle.autopilot.happen(event))
+def brings_down(event: Event) -> Handler:
+    """Return the handler of a command that ends a flight: unlike the choice of its mode, it needs one."""
+
+    def handle(vehicle: VehicleContext, command: Command) -> Answer:
+        autopilot = vehicle.autopilot
+        return answer_to(autopilot.happen(event) if autopilot.now.status.armed else Need.ARMED.value)
+
+    return handle
 
 
 def reposition(vehicle: VehicleContext, command: Command) -> Answer:
@@ -79,7 +88,7 @@ def reposition(vehicle: VehicleContext, command: Command) -> Answer:
     home = autopilot.home
     place = autopilot.places.frame.to_ned(GeoPoint(latitude, longitude, home.altitude_m + altitude_m))
     is_pause = math.isnan(latitude) and math.isnan(altitude_m)
-    refusal = None if is_pause else _too_far(vehicle, place.x, place.y, altitude_m)
+    refusal = None if is_pause else _out_of_reach(vehicle, place.x, place.y, altitude_m)
     if refusal is not None:
         return Answer(DENIED, refusal)
     if bits & RELATIVE_YAW:
@@ -98,22 +107,29 @@ def _not_a_place(latitude: float, longitude: float, altitude_m: float, yaw_rad: 
     return None
 
 
-def _too_far(vehicle: VehicleContext, north_m: float, east_m: float, altitude_m: float) -> str | None:
-    """Tell why the vehicle does not go to a place: the limits of a mission and the geofence hold for it too."""
+def _out_of_reach(vehicle: VehicleContext, north_m: float, east_m: float, altitude_m: float) -> str | None:
+    """Tell why the vehicle does not go to a place: the limits of a mission, the ground and the geofence."""
     autopilot = vehicle.autopilot
     limits, (x, y, z) = autopilot.limits, autopilot.now.state[:3].tolist()
+    home_m = autopilot.places.home.altitude_m
     if 0.0 < limits.max_altitude_m < altitude_m:
         return f"altitude {altitude_m:.6g} m is above {limits.max_altitude_m:g} m"
     away_m = math.hypot(north_m - x, east_m - y)
     if 0.0 < limits.max_distance_m < away_m:
         return f"the place is {away_m / 1e3:.1f} km away, farther than MIS_DIST_WPS allows"
-    if autopilot.behaviour.fence_action == 0:
-        return None
+    here = (x, y, -z - home_m)
     if math.isnan(north_m):
         north_m, east_m = x, y
     if math.isnan(altitude_m):
-        altitude_m = -z - autopilot.places.home.altitude_m
-    here = (x, y, -z - autopilot.places.home.altitude_m)
+        altitude_m = here[2]
+    ground_m = autopilot.ground_m(north_m, east_m) - home_m
+    valley_m = max(
+        0.0, autopilot.ground_m(x, y) - home_m - here[2]
+    )  # the vehicle is below what counts as ground
+    if altitude_m < ground_m - valley_m - GROUND_TOLERANCE_M:
+        return f"altitude {altitude_m:.6g} m above home is below the ground, which is at {ground_m:.4g} m"
+    if autopilot.behaviour.fence_action == 0:
+        return None
     refusal = autopilot.supervisor.fence.way_refusal(here, (north_m, east_m, altitude_m))
     return None if refusal is None else f"the place {refusal}"
 
@@ -145,8 +161,8 @@ def pause_or_continue(vehicle: VehicleContext, command: Command) -> Answer:
 
 HANDLERS: dict[int, Handler] = {
     mavlink.MAV_CMD_NAV_TAKEOFF: take_off,
-    mavlink.MAV_CMD_NAV_LAND: selects(Event.SELECT_LAND),
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: selects(Event.SELECT_RETURN),
+    mavlink.MAV_CMD_NAV_LAND: brings_down(Event.SELECT_LAND),
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: brings_down(Event.SELECT_RETURN),
     mavlink.MAV_CMD_DO_REPOSITION: reposition,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: change_speed,
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: pause_or_continue,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from flightstack.compiled import compiled
 from flightstack.contract import FloatArray, VehicleState
-from flightstack.guidance.mission import landing_speed
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.trajectory import Goal
 from flightstack.modes import Mode
@@ -32,7 +31,7 @@ def advance_return(aim: FloatArray, state: VehicleState, params: GuidanceParams)
 
 
 @compiled
-def aim_goal(mode: int, aim: FloatArray, state: VehicleState, params: GuidanceParams) -> Goal:
+def aim_goal(mode: int, aim: FloatArray, params: GuidanceParams) -> Goal:
     """Return where ``mode`` sends the reference."""
     z, climb, descent = aim[A_Z], params.climb_speed_m_s, params.descent_speed_m_s
     speed = aim[A_SPEED] if aim[A_SPEED] > 0.0 else params.cruise_speed_m_s
@@ -40,5 +39,4 @@ def aim_goal(mode: int, aim: FloatArray, state: VehicleState, params: GuidancePa
         climb = params.takeoff_speed_m_s
     elif mode == LAND or (mode == RETURN and aim[A_PHASE] == DESCENDING):
         z = params.far_below_m
-        descent = landing_speed(state.position_ned_m.z, params)
     return Goal(aim[A_X], aim[A_Y], z, aim[A_YAW], speed, climb, descent, params.yaw_rate_rad_s, 0.0)

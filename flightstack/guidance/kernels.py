@@ -10,7 +10,7 @@ from flightstack.contract import FloatArray, VehicleState
 from flightstack.guidance.aim import A_START_X, A_START_Y, RETURN, advance_return, aim_goal
 from flightstack.guidance.land_detector import LandMemory, land_detector_step
 from flightstack.guidance.manual import manual_step
-from flightstack.guidance.mission import mission_goal, mission_step
+from flightstack.guidance.mission import into_ground, mission_goal, mission_step
 from flightstack.guidance.offboard import attitude_step, point_step
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import ATTITUDE, S_KIND
@@ -76,11 +76,12 @@ def goal_kernel(
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     if mode == MISSION:
         mission_step(mission, plan, jumps_left, state, trajectory[T_YAW], land[0] > 0.0, params, dt_s)
-        goal = mission_goal(mission, plan, aim[A_START_X], aim[A_START_Y], state.position_ned_m.z, params)
+        goal = mission_goal(mission, plan, aim[A_START_X], aim[A_START_Y], params)
     else:
         if mode == RETURN:
             advance_return(aim, state, params)
-        goal = aim_goal(mode, aim, state, params)
+        goal = aim_goal(mode, aim, params)
+    goal = into_ground(goal, state.position_ned_m.z, params)
     last = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE))
     reference = trajectory_step(last, goal, _limits(params), dt_s)
     thrust_n = attitude_target[THRUST_AT]

@@ -285,11 +285,10 @@ def mission_step(
 
 @compiled
 def mission_goal(
-    m: FloatArray, plan: FloatArray, start_x: float, start_y: float, down_m: float, params: GuidanceParams
+    m: FloatArray, plan: FloatArray, start_x: float, start_y: float, params: GuidanceParams
 ) -> Goal:
-    """Return where the present item sends the vehicle, now at ``down_m``; it began above ``start``."""
-    x, y, z = m[M_X], m[M_Y], m[M_Z]
-    climb, descent = params.climb_speed_m_s, params.descent_speed_m_s
+    """Return where the present item sends the vehicle; it began above ``start``."""
+    x, y, z, climb = m[M_X], m[M_Y], m[M_Z], params.climb_speed_m_s
     index = int(m[M_CURRENT])
     if m[M_FINISHED] == 0.0 and index < plan.shape[0]:
         command = plan[index, COMMAND]
@@ -302,8 +301,21 @@ def mission_goal(
             climb = params.takeoff_speed_m_s
         elif command == LAND and m[M_PHASE] == STAY:
             z = params.far_below_m
-            descent = landing_speed(down_m, params)
-    return Goal(x, y, z, m[M_YAW], m[M_SPEED], climb, descent, m[M_YAW_RATE], m[M_YAW_IS_COUNTED])
+    descent, counted = params.descent_speed_m_s, m[M_YAW_IS_COUNTED]
+    return Goal(x, y, z, m[M_YAW], m[M_SPEED], climb, descent, m[M_YAW_RATE], counted)
+
+
+@compiled
+def into_ground(goal: Goal, down_m: float, params: GuidanceParams) -> Goal:
+    """Return the goal with the descent of a landing if it is below the ground: the vehicle is now at ``down_m``.
+
+    A landing's goal always is; so is a place whose ground is not where home or a plan says.
+    """
+    g = goal
+    descent = landing_speed(down_m, params) if g.z > params.ground_down_m else g.descent_m_s
+    return Goal(
+        g.x, g.y, g.z, g.yaw_rad, g.speed_m_s, g.climb_m_s, descent, g.yaw_rate_rad_s, g.yaw_is_counted
+    )
 
 
 @compiled

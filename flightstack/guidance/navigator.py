@@ -232,7 +232,9 @@ class Navigator:
         self._aim[A_START_X], self._aim[A_START_Y] = t[0], t[1]
 
     def rest_at(self, state: FloatArray) -> None:
-        """Put the reference at the vehicle's position, at rest: before it leaves the ground."""
+        """Put the reference at the vehicle's position, at rest, before it leaves the ground; not at a state of NaNs."""
+        if not np.isfinite(state).all():
+            return
         self._trajectory[:] = 0.0
         self._trajectory[:3] = state[:3]
         self._trajectory[T_YAW] = euler_from_quaternion(vehicle_state(state).attitude).z
@@ -241,6 +243,8 @@ class Navigator:
 
     def take_up(self, state: FloatArray) -> None:
         """Put the reference where the vehicle is, moving as it does: it could not follow the old one."""
+        if not np.isfinite(state).all():
+            return
         self._trajectory[:6] = state[:6]
         self._trajectory[6:9] = 0.0
 

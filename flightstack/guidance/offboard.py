@@ -32,11 +32,13 @@ from flightstack.guidance.setpoints import (
     S_YAW,
     S_YAW_RATE,
 )
-from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, clipped
+from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, approach_speed, clipped
 from flightstack.params.vehicle import GRAVITY_M_S2
 
 EXTRAPOLATION_S = 0.25
 """How long a moving point goes on along its velocity until the next one: a stream of 4 Hz stays smooth."""
+SPEED_LAG_S = 0.5
+"""How late the reference and the vehicle follow a descent that slows down: their acceleration and jerk are limited."""
 RATE_LEAD_RAD = 0.5
 """How far an attitude turned by body rates may lead the vehicle: farther, the vehicle cannot follow it."""
 
@@ -54,6 +56,13 @@ def _vector(stream: FloatArray, at: int) -> Vector3:
 @compiled
 def _moved(position: float, velocity: float, acceleration: float, age_s: float) -> float:
     return position + age_s * (_given(velocity) + 0.5 * age_s * _given(acceleration))
+
+
+@compiled
+def descent_above(height_m: float, params: GuidanceParams, limits: TrajectoryLimits) -> float:
+    """Largest descent at a height above the ground: that of a landing, and what may still be braked to it."""
+    spare = approach_speed(max(height_m, 0.0), params.descent_speed_m_s, limits.vertical_acceleration_m_s2)
+    return min(params.descent_speed_m_s, params.land_speed_m_s + spare)
 
 
 @compiled
@@ -77,9 +86,9 @@ def point_step(
     p = Vector3(_moved(p.x, v.x, a.x, age_s), _moved(p.y, v.y, a.y, age_s), _moved(p.z, v.z, a.z, age_s))
     here = state.position_ned_m
     x, y, vx, vy, ax, ay = follow_horizontally(t, p, v, a, params.max_speed_m_s, limits, dt_s)
-    z, vz, az = follow_vertically(
-        t, p.z, v.z, a.z, params.climb_speed_m_s, params.descent_speed_m_s, limits, dt_s
-    )
+    height = params.ground_down_m - (here.z + SPEED_LAG_S * t.vz)
+    descent = descent_above(height, params, limits)
+    z, vz, az = follow_vertically(t, p.z, v.z, a.z, params.climb_speed_m_s, descent, limits, dt_s)
     if not (math.isfinite(p.x) and math.isfinite(p.y)):
         x, y = leashed(x, here.x), leashed(y, here.y)
     if not math.isfinite(p.z):
@@ -97,6 +106,8 @@ def _turned(target: Quaternion, rates: Vector3, present: Quaternion, dt_s: float
     angle = math.sqrt(lead.x * lead.x + lead.y * lead.y + lead.z * lead.z)
     if angle <= RATE_LEAD_RAD:
         return turned
+    if not math.isfinite(angle):  # the target was not: begin anew
+        return present
     scale = RATE_LEAD_RAD / angle
     bounded = Vector3(lead.x * scale, lead.y * scale, lead.z * scale)
     return normalised(quaternion_product(present, rotation_over(bounded, 1.0)))

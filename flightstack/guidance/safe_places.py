@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from flightstack.contract import Vector3
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.fence import NO_FENCE, Fence
-from flightstack.guidance.rally import HOME, RALLY_FIRST, ReturnPlace, choose, rally_points
+from flightstack.guidance.rally import HOME, NEAREST, RALLY_FIRST, ReturnPlace, choose, rally_points
 from flightstack.params.behaviour import Behaviour
 from flightstack.plan import (
     DEFAULT_LIMITS,
@@ -114,6 +114,9 @@ class SafePlaces:
             return choose((north_m, east_m), self.home, points, return_type)
         return choose((north_m, east_m), self.home, points, RALLY_FIRST) if points else None
 
-    def ground_m(self, north_m: float, east_m: float) -> float:
-        """Return how high the ground is taken to be here, above the origin: as at the nearest place known."""
-        return choose((north_m, east_m), self.home, self.points, 0.0).altitude_m
+    def ground_m(self, north_m: float, east_m: float, stood: ReturnPlace) -> float:
+        """Return how high the ground is taken to be, above the origin: as at the nearest place known.
+
+        Where the vehicle ``stood`` counts before a home at the same place, which may have been set to any altitude.
+        """
+        return choose((north_m, east_m), stood, (self.home, *self.points), NEAREST).altitude_m

@@ -6,12 +6,12 @@ from math import nan
 
 from flightstack.logging.topics import Field, Topic
 from flightstack.modes import NAVIGATION_STATE, Mode
+from flightstack.params.vehicle import system_type
 
 ARMING_STATE_DISARMED = 1
 ARMING_STATE_ARMED = 2
 
 _ROTARY_WING = 1
-_MAV_TYPE_QUADROTOR = 2
 
 EVENT_TOPICS = (
     Topic(
@@ -21,7 +21,7 @@ EVENT_TOPICS = (
             Field("uint8_t", "arming_state", default=ARMING_STATE_DISARMED),
             Field("uint8_t", "nav_state", default=NAVIGATION_STATE[Mode.HOLD]),
             Field("uint8_t", "vehicle_type", default=_ROTARY_WING),
-            Field("uint8_t", "system_type", default=_MAV_TYPE_QUADROTOR),
+            Field("uint8_t", "system_type", default=system_type(4)),
             Field("uint8_t", "system_id", default=1),
             Field("uint8_t", "component_id", default=1),
             Field("bool", "failsafe"),

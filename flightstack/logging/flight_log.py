@@ -19,7 +19,7 @@ from flightstack.logging import ulog
 from flightstack.logging.event_topics import EVENT_TOPICS
 from flightstack.logging.row_block import RowBlock, TimeArray, content_size
 from flightstack.logging.topics import OUTER, OUTER_TOPICS, Topic, inner_topics
-from flightstack.params.vehicle import Vehicle
+from flightstack.params.vehicle import Vehicle, system_type
 
 DEFAULT_CAPACITY = 256
 
@@ -64,7 +64,8 @@ class Trace:
 class _EventTopic:
     """Packs one message of an event topic."""
 
-    def __init__(self, topic: Topic, message_id: int) -> None:
+    def __init__(self, topic: Topic, message_id: int, known: Mapping[str, float]) -> None:
+        """``known`` fields have these values in every message that does not give another."""
         self._header = ulog.DATA_HEADER.pack(content_size(topic), ulog.DATA_TYPE, message_id)
         codes = "".join(ulog.STRUCT_CODES[field.type] for field in topic.fields)
         self._pack = struct.Struct("<Q" + codes).pack
@@ -72,6 +73,7 @@ class _EventTopic:
             field.name: field.default if field.type in ("float", "double") else int(field.default)
             for field in topic.fields
         }
+        self._defaults |= known
 
     def encode(self, time_us: int, fields: Mapping[str, float]) -> bytes:
         values = {**self._defaults, **fields}
@@ -99,8 +101,9 @@ class FlightLog:
         self._inner_block = RowBlock(self._inner_topics, 0, capacity)
         self._first_outer_id = first_outer_id
         self._outer_block: RowBlock | None = None
+        known = {"vehicle_status": {"system_type": system_type(rotors)}}
         self._events = {
-            topic.name: _EventTopic(topic, message_id)
+            topic.name: _EventTopic(topic, message_id, known.get(topic.name, {}))
             for message_id, topic in enumerate(EVENT_TOPICS, first_event_id)
         }
 

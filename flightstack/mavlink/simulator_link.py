@@ -23,7 +23,7 @@ from flightstack.mavlink.hot_frames import (
     PlantStateFrame,
 )
 from flightstack.mavlink.link import Link, Message
-from flightstack.params.vehicle import Vehicle
+from flightstack.params.vehicle import Vehicle, system_type
 
 HIL_ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED | mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 HIL_DISARMED = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -77,6 +77,7 @@ class SimulatorLink:
         self._plant = PlantStateFrame()
         self._actuators = ActuatorsFrame(system_id)
         self._actuators.set_rotor_count(len(vehicle.rotors))
+        self._system_type = system_type(len(vehicle.rotors))
         self._frame = LocalFrame(home)
         self._top_speed = np.array([min(r.max_speed_rad_s, 1e6) for r in vehicle.rotors])
         self._lockstep = LOCKSTEP_FLAG if lockstep else 0
@@ -125,7 +126,7 @@ class SimulatorLink:
         """Return a heartbeat; ``leaving`` announces an orderly end."""
         return self._link.encode(
             mavlink.MAVLink_heartbeat_message(
-                mavlink.MAV_TYPE_QUADROTOR,
+                self._system_type,
                 mavlink.MAV_AUTOPILOT_PX4,
                 HIL_ARMED if armed else HIL_DISARMED,
                 0,

@@ -118,10 +118,10 @@ class Behaviour:
         choices=((0, "Off"), (1, "On")),
     )  # fmt: skip
     disarm_after_landing_s: float = _param(
-        "COM_DISARM_LAND", 1.0, -1, 20, "s", "Disarm after landing; -1 never"
+        "COM_DISARM_LAND", 1.0, -1, 20, "s", "Disarm after landing; 0 or less never"
     )
     disarm_without_takeoff_s: float = _param(
-        "COM_DISARM_PRFLT", 30, -1, 300, "s", "Disarm without takeoff; -1 never"
+        "COM_DISARM_PRFLT", 30, -1, 300, "s", "Disarm without takeoff or delay by a mission; 0 or less never"
     )
     # failsafes: commander/failsafe.py is the table that uses them
     failsafe_delay_s: float = _param(

@@ -17,6 +17,15 @@ from flightstack.params.toml_reader import Table, read_toml
 BUILT_IN = Path(__file__).parent / "vehicles"
 DEFAULT_VEHICLE = "paper_quad"
 GRAVITY_M_S2 = 9.81  # the paper's Table I
+SYSTEM_TYPES = {3: 15, 4: 2, 6: 13, 8: 14}
+"""MAV_TYPE by number of rotors: tricopter, quadrotor, hexarotor, octorotor."""
+GENERIC_MULTIROTOR = 43
+"""MAV_TYPE of any other number of rotors."""
+
+
+def system_type(rotors: int) -> int:
+    """Return the MAV_TYPE that a vehicle with so many rotors announces."""
+    return SYSTEM_TYPES.get(rotors, GENERIC_MULTIROTOR)
 
 
 @dataclass(frozen=True)

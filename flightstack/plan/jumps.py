@@ -1,4 +1,4 @@
-"""Loops of DO_JUMP that no item to fly interrupts: the vehicle would go round them without moving."""
+"""Where the DO_JUMPs of a mission lead: into loops without an item to fly, or into the air."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import NAV_COMMANDS, Command
 
+LEAVES_GROUND = frozenset({Command.NAV_TAKEOFF, Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME})
+STAYS_ON_GROUND = frozenset({Command.NAV_LAND, Command.NAV_RETURN_TO_LAUNCH})
 _UNSEEN, _ON_PATH, _DONE = 0, 1, 2
 
 
@@ -37,15 +39,39 @@ def find_idle_loop(items: Sequence[MissionItem]) -> int | None:
 
 def _next_at_once(items: Sequence[MissionItem], seq: int) -> Iterator[int]:
     """Yield the items that may follow ``seq`` with no time passing; none when ``seq`` takes time."""
+    if items[seq].command not in NAV_COMMANDS:
+        yield from _next(items, seq)
+
+
+def _next(items: Sequence[MissionItem], seq: int) -> Iterator[int]:
+    """Yield the items that may follow ``seq``."""
     item = items[seq]
-    if item.command in NAV_COMMANDS:
-        return
     if item.command == Command.DO_JUMP and item.param2 != 0.0:
         yield int(item.param1)
         if item.param2 < 0.0:  # for ever: what follows is never reached from here
             return
     if seq + 1 < len(items):
         yield seq + 1
+
+
+def takes_off(items: Sequence[MissionItem], start: int = 0) -> bool:
+    """Tell whether a standing vehicle that goes on with item ``start`` leaves the ground.
+
+    It does so by a takeoff or on the way to a position; a landing or a return before that keeps it there, as does an
+    endless loop of delays.
+    """
+    ahead, seen = [start], set()
+    while ahead:
+        seq = ahead.pop()
+        if seq in seen or seq >= len(items):
+            continue
+        seen.add(seq)
+        command = items[seq].command
+        if command in LEAVES_GROUND:
+            return True
+        if command not in STAYS_ON_GROUND:
+            ahead.extend(_next(items, seq))
+    return False
 
 
 def _jump_on_path(items: Sequence[MissionItem], path: list[int], loop_start: int) -> int:

@@ -47,6 +47,7 @@ def status_facts(view: VehicleView) -> dict[str, Any]:
     battery, geo, timing = view.battery, view.geo, view.timing
     return {
         "system": None if view.identity is None else view.identity.system_id,
+        "type": None if view.identity is None else view.identity.kind,
         "mode": view.mode,
         "armed": view.armed,
         "landed": {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}.get(view.landed_state),

@@ -267,12 +267,11 @@ def test_a_goto_across_an_exclusion_area_is_refused() -> None:
 # ---------------------------------------------------------------------- sticks
 
 
-def test_sticks_need_a_stream() -> None:
-    world = World()
+def test_sticks_need_a_stream_in_flight(hovering: World) -> None:
     for mode in (POSITION, ALTITUDE):
-        assert select(world, mode) == REJECTED
-    world.run(0.02)
-    assert any("no manual control" in text for text in world.texts), world.texts
+        assert select(hovering, mode) == REJECTED
+    hovering.run(0.02)
+    assert any("no manual control" in text for text in hovering.texts), hovering.texts
 
 
 def test_a_whole_flight_by_sticks() -> None:

@@ -101,14 +101,22 @@ def test_a_home_that_was_chosen_stays_and_the_present_place_does_not() -> None:
 
 
 def test_a_takeoff_selected_before_home_rose_ends_above_the_new_one() -> None:
+    assert altitude_of_takeoff(math.nan) == pytest.approx(2.5, abs=0.02)
+
+
+def test_a_takeoff_to_an_altitude_above_the_sea_ends_there_though_home_rose() -> None:
+    assert altitude_of_takeoff(5.0) == pytest.approx(5.0, abs=0.02)
+
+
+def altitude_of_takeoff(altitude_m: float) -> float:
+    """Select a takeoff while home is a metre below the vehicle, arm, and return where it ends."""
     world = World()
-    autopilot = world.stack.autopilot
-    autopilot.set_home(FRAME.to_geo(Vector3(0.0, 0.0, 1.0)), chosen=False)  # a metre below where it stands
-    world.takeoff()
+    world.stack.autopilot.set_home(FRAME.to_geo(Vector3(0.0, 0.0, 1.0)), chosen=False)
+    world.takeoff(altitude_m)
     world.arm()
     world.until(lambda: world.mode is Mode.HOLD)
     world.run(3.0)
-    assert world.altitude == pytest.approx(2.5, abs=0.02)
+    return world.altitude
 
 
 def test_a_geofence_is_judged_where_it_lies_after_home_has_moved() -> None:

@@ -29,17 +29,19 @@ def in_offboard(**world_options: object) -> World:
     return world
 
 
-def test_offboard_needs_a_stream() -> None:
+def test_offboard_needs_a_stream_in_flight() -> None:
     world = World()
+    world.arm()
+    world.takeoff(2.0)
+    world.until(lambda: world.mode is Mode.HOLD)
     assert select(world, OFFBOARD) == REJECTED
     world.run(0.02)
     assert any("no offboard setpoints" in text for text in world.texts), world.texts
     stream(world, local_point((0.0, 0.0, -2.0)), 0.2)
     assert select(world, OFFBOARD) == ACCEPTED
     assert world.mode is Mode.OFFBOARD
-    world = World()
-    stream(world, local_point((0.0, 0.0, -2.0)), 0.2)
-    world.run(2.0)  # it was there, and is no more
+    assert world.hold() == ACCEPTED
+    world.run(2.0)  # the stream was there, and is no more
     assert select(world, OFFBOARD) == REJECTED
 
 

@@ -201,6 +201,57 @@ def test_an_output_that_is_none_is_found() -> None:
     assert bench.run(DT_S) & NOT_FINITE
 
 
+BAD_NUMBERS = [math.nan, math.inf, -math.inf, 3e38]
+"""What one sample may be: not a number, infinite, or the largest that the wire carries."""
+
+
+@pytest.mark.parametrize("bad", BAD_NUMBERS)
+@pytest.mark.parametrize("column", [LoopRow.ROTOR_SPEED.start + 2, LoopRow.ROTOR_COMMAND.start + 2])
+def test_one_bad_rotor_sample_leaves_its_detector_as_it_was(column: int, bad: float) -> None:
+    disturbed, quiet = Bench(), Bench()
+    for bench in (disturbed, quiet):
+        bench.run(1.0)
+    good = disturbed.row[column]
+    disturbed.row[column] = bad
+    follow_rotors(disturbed.row, disturbed.rotors, disturbed.rotor_params)
+    disturbed.row[column] = good
+    assert not disturbed.run(0.5) & ROTOR_FAULT
+    quiet.run(0.5)
+    for bench in (disturbed, quiet):
+        bench.row[LoopRow.ROTOR_SPEED.start + 2] = 0.0
+    for _ in range(30):
+        assert disturbed.run(DT_S) == quiet.run(DT_S)
+    assert disturbed.run(DT_S) & ROTOR_FAULT
+
+
+@pytest.mark.parametrize("bad", BAD_NUMBERS)
+def test_one_bad_rotor_sample_is_no_measurement(bad: float) -> None:
+    bench = Bench()
+    bench.row[LoopRow.ROTOR_SPEED] = 0.0
+    bench.run(1.0)
+    bench.row[LoopRow.ROTOR_SPEED.start + 1] = bad
+    bench.run(DT_S)
+    bench.row[LoopRow.ROTOR_SPEED.start + 1] = 0.0
+    assert not bench.run(2.0) & ROTOR_FAULT
+
+
+@pytest.mark.parametrize("bad", BAD_NUMBERS[:3])
+def test_one_bad_state_ends_no_fault_that_was_found(bad: float) -> None:
+    bench = Bench()
+    bench.state[0] = 20.0
+    assert bench.run(1.1) & BEYOND_POSITION
+    bench.state[4] = bad
+    assert bench.run(DT_S) == NOT_FINITE | BEYOND_POSITION
+    bench.state[4] = 0.0
+    assert bench.run(DT_S) == BEYOND_POSITION
+
+
+def test_an_unknown_charge_keeps_the_level_that_was_reached() -> None:
+    level = battery_level(0, 0.07, THRESHOLDS)
+    level = battery_level(level, 0.08, THRESHOLDS)
+    assert battery_level(battery_level(level, math.nan, THRESHOLDS), 0.08, THRESHOLDS) == level == 2
+
+
 def test_moving_is_any_speed_or_rate() -> None:
     for index in (3, 4, 5, 10, 11, 12):
         bench = Bench()
@@ -287,6 +338,7 @@ def test_a_vehicle_that_is_ready_arms() -> None:
         ({"mode": Mode.POSITION}, [], Need.MANUAL_STREAM.value),
         ({"mode": Mode.ALTITUDE}, [], Need.MANUAL_STREAM.value),
         ({"mode": Mode.OFFBOARD}, [], Need.OFFBOARD_STREAM.value),
+        ({"mode_fault": Need.MISSION.value}, [], Need.MISSION.value),
         ({"mode": Mode.TERMINATION}, [], TERMINATED),
     ],
 )

@@ -141,7 +141,32 @@ def test_mission_progress_and_its_end() -> None:
     assert (m.seq, m.total, m.mission_state, m.mission_mode) == (2, 5, 3, 1)
     assert on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mission_current=5).seq == 4
     nothing = on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mission_current=0, mission_count=0)
-    assert (nothing.seq, nothing.total) == (0, 0)
+    assert (nothing.seq, nothing.total) == (0, 65535)
+
+
+@pytest.mark.parametrize(
+    ("rotors", "system_type"),
+    [
+        (3, mavlink.MAV_TYPE_TRICOPTER),
+        (4, mavlink.MAV_TYPE_QUADROTOR),
+        (5, mavlink.MAV_TYPE_GENERIC_MULTIROTOR),
+        (6, mavlink.MAV_TYPE_HEXAROTOR),
+        (8, mavlink.MAV_TYPE_OCTOROTOR),
+    ],
+)
+def test_the_heartbeat_announces_the_type_by_the_rotors(rotors: int, system_type: int) -> None:
+    assert heartbeat(facts(rotors=rotors)).type == system_type
+
+
+@pytest.mark.parametrize("rotors", [4, 6, 8])
+def test_every_message_about_rotors_has_all_of_them(rotors: int) -> None:
+    top = {"rotors": rotors, "top_speed_rad_s": [600.0] * rotors}
+    outputs = on_the_wire(mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS, **top)
+    pulses = on_the_wire(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, **top)
+    assert outputs.active == (1 << rotors) - 1
+    assert [getattr(pulses, f"servo{number}_raw") > 0 for number in range(1, 9)] == [
+        number <= rotors for number in range(1, 9)
+    ]
 
 
 def test_status_says_whether_it_can_arm_and_that_there_is_no_battery() -> None:

@@ -115,9 +115,16 @@ def test_modes_change_only_to_where_the_event_leads() -> None:
             assert after.mode is leads_to.get(event, status.mode)
 
 
+def test_a_disarmed_vehicle_takes_any_mode() -> None:
+    for status, facts, event in EVERYTHING:
+        if not status.armed and event.name.startswith("SELECT"):
+            expected = TERMINATED if status.mode is Mode.TERMINATION else None
+            assert transition(status, facts, event).refusal == expected
+
+
 def test_without_a_valid_state_nothing_flies() -> None:
     for status, facts, event in EVERYTHING:
-        if not facts.state_is_valid and event.name.startswith("SELECT"):
+        if status.armed and not facts.state_is_valid and event.name.startswith("SELECT"):
             assert transition(status, facts, event).refusal in (Need.STATE.value, TERMINATED)
 
 
@@ -131,11 +138,9 @@ REFUSALS = [
     (Need.ON_GROUND, FLYING, IN_AIR, Event.NO_TAKEOFF),
     (Need.IN_AIR, FLYING, READY, Event.SELECT_LAND),
     (Need.IN_AIR, FLYING, READY, Event.SELECT_RETURN),
-    (Need.ARMED, STANDING, READY, Event.SELECT_LAND),
-    (Need.ARMED, STANDING, READY, Event.SELECT_RETURN),
     (Need.ARMED, Status(False, Mode.TAKEOFF), READY, Event.TAKEOFF_REACHED),
     (Need.ARMED, Status(False, Mode.MISSION), READY, Event.MISSION_ASKS_RETURN),
-    (Need.MISSION, STANDING, READY._replace(has_mission=False), Event.SELECT_MISSION),
+    (Need.MISSION, FLYING, READY._replace(has_mission=False), Event.SELECT_MISSION),
     (Need.TAKES_OFF, FLYING, READY._replace(mission_takes_off=False), Event.SELECT_MISSION),
     (Need.MANUAL_STREAM, FLYING, IN_AIR._replace(manual_fresh=False), Event.SELECT_POSITION),
     (Need.MANUAL_STREAM, FLYING, IN_AIR._replace(manual_fresh=False), Event.SELECT_ALTITUDE),

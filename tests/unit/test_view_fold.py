@@ -34,8 +34,10 @@ class Vehicle:
         return self.view
 
 
-def heartbeat(base: int = 1, mode: int = MISSION_MODE, state: int = 4, autopilot: int = 12) -> Any:
-    return mavlink.MAVLink_heartbeat_message(2, autopilot, base, mode, state, 3)
+def heartbeat(
+    base: int = 1, mode: int = MISSION_MODE, state: int = 4, autopilot: int = 12, kind: int = 2
+) -> Any:
+    return mavlink.MAVLink_heartbeat_message(kind, autopilot, base, mode, state, 3)
 
 
 @pytest.fixture
@@ -138,12 +140,38 @@ def test_mission_progress(vehicle: Vehicle) -> None:
     assert shorter == (0, 1, None, 2)  # the item reached was another mission's
 
 
-def test_rotor_speeds_come_in_groups_of_four(vehicle: Vehicle) -> None:
+def test_rotor_speeds_come_in_groups_of_four() -> None:
+    vehicle = Vehicle()
+    vehicle.send(heartbeat(kind=mavlink.MAV_TYPE_OCTOROTOR))
     vehicle.send(EscStatus(4, 0, [5, 6, 7, -8], [0.0] * 4, [0.0] * 4))
     view = vehicle.send(EscStatus(0, 0, [1, 2, 3, 4], [0.0] * 4, [0.0] * 4))
     assert view.rotor_rpm == (1, 2, 3, 4, 5, 6, 7, -8)
     assert view.rotor_peak_rpm == 8
     assert vehicle.send(EscStatus(250, 0, [1, 1, 1, 1], [0.0] * 4, [0.0] * 4)).rotor_rpm == view.rotor_rpm
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "rotors"),
+    [
+        (mavlink.MAV_TYPE_QUADROTOR, "quadrotor", 4),
+        (mavlink.MAV_TYPE_HEXAROTOR, "hexarotor", 6),
+        (mavlink.MAV_TYPE_OCTOROTOR, "octorotor", 8),
+        (mavlink.MAV_TYPE_GENERIC_MULTIROTOR, "multirotor", 8),
+    ],
+)
+def test_the_type_of_vehicle_names_it_and_counts_its_rotors(kind: int, name: str, rotors: int) -> None:
+    vehicle = Vehicle()
+    identity = vehicle.send(heartbeat(kind=kind)).identity
+    assert identity is not None
+    assert identity.kind == name
+    for first in (0, 4):
+        view = vehicle.send(EscStatus(first, 0, [1, 2, 3, 4], [0.0] * 4, [0.0] * 4))
+    assert len(view.rotor_rpm) == rotors
+
+
+def test_a_vehicle_without_a_mission_has_no_number_of_items(vehicle: Vehicle) -> None:
+    view = vehicle.send(mavlink.MAVLink_mission_current_message(0, 65535, 1, 2))
+    assert view.mission.total is None
 
 
 def test_loop_timing_turns_nan_into_unknown(vehicle: Vehicle) -> None:

@@ -11,8 +11,11 @@ from flightstack.mavlink.link import Message
 from flightstack.mavlink.telemetry.facts import VehicleFacts
 from flightstack.mavlink.telemetry.fields import NAN, boot_ms, int16, int32, whole
 from flightstack.modes import CUSTOM_MODE, Mode
+from flightstack.params.vehicle import system_type
 
 MAVLINK_2 = 200
+NO_MISSION = 0xFFFF
+"""MISSION_CURRENT.total of a vehicle without a mission."""
 NAME_IN_VERSION = list(b"flightst")
 """In place of a Git hash, eight octets: who reads it sees that this is not PX4."""
 
@@ -34,7 +37,7 @@ def heartbeat(f: VehicleFacts, leaving: bool = False) -> Message:
     system = mavlink.MAV_STATE_POWEROFF if leaving else f.system_status
     autopilot = mavlink.MAV_AUTOPILOT_GENERIC if f.is_generic else mavlink.MAV_AUTOPILOT_PX4
     return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_QUADROTOR, autopilot, base, CUSTOM_MODE[f.mode], system, 3
+        system_type(f.rotors), autopilot, base, CUSTOM_MODE[f.mode], system, 3
     )
 
 
@@ -51,13 +54,12 @@ def extended_state(f: VehicleFacts) -> Message:
 
 
 def mission_current(f: VehicleFacts) -> Message:
-    """MISSION_CURRENT."""
+    """MISSION_CURRENT; the field ``total`` has a number of its own for no mission, and 0 would be "not supported"."""
+    total = f.mission_count or NO_MISSION
     # a finished mission's current item would be one past its last
     current = min(f.mission_current, max(0, f.mission_count - 1))
     mission_mode = 1 if f.mode is Mode.MISSION else 2
-    return mavlink.MAVLink_mission_current_message(
-        current, f.mission_count, f.mission_state, mission_mode, *f.plan_ids
-    )
+    return mavlink.MAVLink_mission_current_message(current, total, f.mission_state, mission_mode, *f.plan_ids)
 
 
 SENSORS = (
