@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.link import SILENT_AFTER_S, Link, Message
 from flightstack.mavlink.streams import Streams
 
 GROUND, API = "ground", "api"
@@ -34,5 +34,9 @@ class Peer:
 
     @property
     def heard(self) -> bool:
-        """Whether it has ever sent a valid message: only then telemetry is streamed to it."""
+        """Whether it has sent a valid message and is not forgotten since: only then it gets heartbeats unasked."""
         return self.heard_s > -math.inf
+
+    def is_silent(self, now_s: float) -> bool:
+        """Return True if nothing valid came for SILENT_AFTER_S: then heartbeats are all it gets."""
+        return now_s - self.heard_s > SILENT_AFTER_S

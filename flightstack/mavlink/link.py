@@ -15,6 +15,9 @@ from flightstack.mavlink.signing import LinkSigning
 Message: TypeAlias = Any
 """A pymavlink message object."""
 
+SILENT_AFTER_S = 5.0
+"""A peer that sent nothing valid for so long counts as gone: five heartbeats are missing."""
+
 _HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, two flags, sequence, system, component, id (24 bits)
 _crc16 = crc16.mcrf4xx
 
@@ -74,6 +77,10 @@ class Link:
         codec.seq = (seq + 1) % 256
         self.sent += 1
         return self._outgoing(frame + crc.to_bytes(2, "little"), message)
+
+    def is_authentic(self, message: Message) -> bool:
+        """Return True if a decoded message carried the signature that this link requires, if any."""
+        return self._signing is None or self._signing.is_authentic(bytes(message.get_msgbuf()))
 
     @property
     def has_partial(self) -> bool:

@@ -136,28 +136,37 @@ class Signing:
         """
         if not self.is_on:
             return True
-        if frame[0] == MAGIC_V2 and frame[2] & _SIGNED:
-            outcome = self._check(frame)
+        if is_signed(frame):
+            outcome = self._judge(frame)
+            if outcome == "good":
+                timestamp = _timestamp_in(frame)
+                self._streams[_stream_of(frame)] = timestamp
+                self._timestamp = max(self._timestamp, timestamp)
         else:
             taken = trusted or self.allow_unsigned or _message_id(frame) in _ALWAYS_TAKEN
             outcome = "unsigned_taken" if taken else "unsigned_refused"
         self.counts = self.counts._replace(**{outcome: getattr(self.counts, outcome) + 1})
         return outcome in ("good", "unsigned_taken")
 
-    def _check(self, frame: bytes) -> str:
+    def authenticates(self, frame: bytes, trusted: bool = False) -> bool:
+        """Return True if ``frame`` proves that its sender may use the link; nothing is counted or remembered.
+
+        An unsigned RADIO_STATUS is accepted, but proves nothing.
+        """
+        if self.is_on and is_signed(frame):
+            return self._judge(frame) == "good"
+        return trusted or self.allow_unsigned or not self.is_on
+
+    def _judge(self, frame: bytes) -> str:
         """Return what to count a signed frame as."""
         if not hmac.compare_digest(self._signature(frame[:-6]), frame[-6:]):
             return "bad_signature"
-        timestamp = int.from_bytes(frame[-12:-6], "little")
-        stream = frame[5:7] + frame[-SIGNATURE_SIZE : -SIGNATURE_SIZE + 1]  # system, component, link
-        last = self._streams.get(stream)
+        timestamp, last = _timestamp_in(frame), self._streams.get(_stream_of(frame))
         if last is not None and timestamp <= last:
             return "replayed"
         now = max(self._timestamp, timestamp_of(self._clock()))
         if last is None and (timestamp + NEW_STREAM_TICKS < now or len(self._streams) >= MAX_STREAMS):
             return "too_old"
-        self._streams[stream] = timestamp
-        self._timestamp = max(self._timestamp, timestamp)
         return "good"
 
     def _signature(self, octets: bytes) -> bytes:
@@ -180,14 +189,36 @@ class LinkSigning(NamedTuple):
         """Tell whether a received frame may be used, and count it."""
         return self.signing.accepts(frame, self.trusted)
 
+    def authenticates(self, frame: bytes) -> bool:
+        """Return True if a received frame, not accepted yet, proves that its sender may use the link."""
+        return self.signing.authenticates(frame, self.trusted)
+
+    def is_authentic(self, frame: bytes) -> bool:
+        """Return True if a frame that was accepted had the signature that this link requires, if any."""
+        return is_signed(frame) or self.trusted or self.signing.allow_unsigned or not self.signing.is_on
+
 
 def without_signature(frame: bytes, crc_extra: int) -> bytes:
     """Return a frame without its signature, as it belongs into a log; an unsigned one stays as it is."""
-    if frame[0] != MAGIC_V2 or not frame[2] & _SIGNED:
+    if not is_signed(frame):
         return frame
     body = bytes((*frame[:2], frame[2] & ~_SIGNED)) + frame[3 : HEADER_V2 + frame[1]]
     checksum: int = _crc16(body[1:] + bytes((crc_extra,)))
     return body + checksum.to_bytes(2, "little")
+
+
+def is_signed(frame: bytes) -> bool:
+    """Return True if ``frame`` has a signature, right or wrong."""
+    return frame[0] == MAGIC_V2 and bool(frame[2] & _SIGNED)
+
+
+def _timestamp_in(frame: bytes) -> int:
+    return int.from_bytes(frame[-12:-6], "little")
+
+
+def _stream_of(frame: bytes) -> bytes:
+    """Return system, component and link id of a signed frame."""
+    return frame[5:7] + frame[-SIGNATURE_SIZE : -SIGNATURE_SIZE + 1]
 
 
 def _message_id(frame: bytes) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import math
 import select
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -69,26 +70,33 @@ class VehiclePorts:
         """Those whom the vehicle addresses unasked."""
 
     def receive(
-        self, is_known: Callable[[Place], bool] = lambda _: False, octets: int = OCTETS_A_POLL
+        self, heard_s: Callable[[Place], float] = lambda _: -math.inf, octets: int = OCTETS_A_POLL
     ) -> Iterator[tuple[str, Address, bytes]]:
         """Yield pieces (channel, peer, data) of what is here, ``octets`` in all, peer by peer in turns.
 
-        ``is_known`` tells from whom a valid message has come: strangers have to share what is left to them.
+        ``heard_s`` tells when the last valid message came from a place (−inf: none did). Places that were never
+        heard share a limited number of turns, and a TCP client that is silent gives way to a new one.
         """
         filenos = [fileno for fileno, _ in self._poller.poll(0)]
         if filenos:
-            self._collect(filenos, is_known)
+            self._collect(filenos, heard_s)
         for (channel, peer), data in self._queue.take(octets):
             yield channel, peer, data
 
-    def _collect(self, filenos: list[int], is_known: Callable[[Place], bool]) -> None:
+    def _collect(self, filenos: list[int], heard_s: Callable[[Place], float]) -> None:
         """Move what is here into the queue: a UDP socket is shared by peers, and so by those who flood it."""
+
+        def is_known(place: Place) -> bool:
+            return heard_s(place) > -math.inf
+
         for channel, udp in self._sockets.items():
             if udp.fileno() in filenos:
                 for data, peer in udp.receive():
                     self._queue.push((channel, peer), data, is_known)
         if self._tcp is not None:
-            for peer, data in self._tcp.receive(filenos, lambda peer: (TCP, peer) not in self._queue):
+            for peer, data in self._tcp.receive(
+                filenos, lambda peer: heard_s((TCP, peer)), lambda peer: (TCP, peer) not in self._queue
+            ):
                 self._queue.push((TCP, peer), data, lambda _: True)
 
     def opened(self) -> list[Place]:
