@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from flightstack.mavlink.signing import LinkSigning, without_signature
 from flightstack.transport.udp import Address
+from gcs_cli.subscription import Subscription
 from gcs_cli.vehicle_view import update
 from gcs_cli.view_types import VehicleView
 
@@ -60,6 +61,10 @@ class Session:
         """System and component of the vehicle; (0, 0), everyone, before one is heard."""
         identity = self.view.identity
         return (_ANYONE, _ANYONE) if identity is None else (identity.system_id, identity.component_id)
+
+    def subscribe(self, rates_hz: Mapping[int, float]) -> None:
+        """Ask the vehicle for messages, id -> rate [Hz], until another service is used."""
+        self.use(Subscription(lambda: self.target, rates_hz))
 
     def use(self, service: Service | None) -> None:
         """Let ``service`` talk to the vehicle from now on, in place of the one before."""

@@ -3,7 +3,8 @@
 What a client does not read is kept up to ``MAX_UNSENT`` octets; beyond, whole frames are dropped, so that its
 stream never holds half of one. A client that takes nothing for ``STALLED_S`` is closed: it is gone, or as good
 as gone. When all places are taken, a client that sent no valid MAVLink for ``SILENT_AFTER_S``, or none at all,
-gives way to a new one; the others stay. The kernel's own buffer is kept small: telemetry that is older than a second helps nobody.
+gives way to a new one; the others stay. The kernel's own buffer is kept small: telemetry that is older than a
+second helps nobody.
 """
 
 from __future__ import annotations

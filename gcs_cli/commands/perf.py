@@ -26,8 +26,11 @@ def perf(
     timeout: TimeoutOption = None,
 ) -> None:
     """Show the timing of the flight stack's loops."""
+    from gcs_cli.subscription import LOOP_TIMING  # noqa: PLC0415
+
     patience_s = settings_of(context).merged(connect, timeout).patience_s
     with meet_vehicle(context, connect, timeout) as connection:
+        connection.session.subscribe(LOOP_TIMING)
         timing = next_timing(connection, None, patience_s)
         _show(timing, as_json)
         try:

@@ -23,8 +23,11 @@ def status(
     timeout: TimeoutOption = None,
 ) -> None:
     """Show how the vehicle is."""
+    from gcs_cli.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
+
     with meet_vehicle(context, connect, timeout) as connection:
         session = connection.session
+        session.subscribe(ROTORS_AND_TIMING)
         # most of what is shown comes several times a second; what the vehicle does not send stays unknown
         connection.wait_for(lambda: _is_full(session.view), GATHER_S)
         view = session.view
@@ -37,7 +40,14 @@ def status(
 
 
 def _is_full(view: VehicleView) -> bool:
-    known = (view.attitude, view.position_ned_m, view.geo, view.mission.current, view.timing)
+    known = (
+        view.attitude,
+        view.position_ned_m,
+        view.geo,
+        view.mission.current,
+        view.timing,
+        view.rotor_rpm or None,
+    )
     return all(part is not None for part in known) and view.landed_state != 0
 
 

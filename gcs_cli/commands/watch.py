@@ -21,8 +21,11 @@ LINE_S = 1.0
 
 def watch(context: typer.Context, connect: ConnectOption = None, timeout: TimeoutOption = None) -> None:
     """Watch the vehicle; q or Ctrl-C ends."""
+    from gcs_cli.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
+
     settings = settings_of(context).merged(connect, timeout)
     with open_link(settings) as connection:
+        connection.session.subscribe(ROTORS_AND_TIMING)
         try:
             if _draws():
                 watch_screen(connection)
