@@ -37,7 +37,8 @@ class Session:
     """The ground station's side of a link.
 
     The first peer from which an autopilot's heartbeat comes is the vehicle; datagrams of others are dropped
-    unless that one has fallen silent. ``record`` gets every frame, sent and received, without its signature.
+    unless that one has fallen silent. With ``peer``, only what comes from there is taken, and with ``system_id``,
+    only that vehicle. ``record`` gets every frame, sent and received, without its signature.
     """
 
     def __init__(
@@ -45,9 +46,14 @@ class Session:
         peer: Address | None = None,
         record: Callable[[bytes], None] | None = None,
         signing: LinkSigning | None = None,
+        system_id: int | None = None,
     ) -> None:
         self.view = VehicleView()
         self.peer = peer
+        self.foreign_systems: set[int] = set()
+        """System ids of vehicles that were heard and are not ours."""
+        self._only_peer = peer
+        self._system_id = system_id
         self.bad = 0
         self._links: dict[Address, Link] = {}
         self._signing = signing
@@ -66,12 +72,19 @@ class Session:
         """Ask the vehicle for messages, id -> rate [Hz], until another service is used."""
         self.use(Subscription(lambda: self.target, rates_hz))
 
+    def keep_vehicle(self) -> None:
+        """Take no other system for the vehicle from now on, however long this one is silent."""
+        assert self.view.identity is not None
+        self._system_id = self.view.identity.system_id
+
     def use(self, service: Service | None) -> None:
         """Let ``service`` talk to the vehicle from now on, in place of the one before."""
         self._service = service
 
     def receive(self, data: bytes, peer: Address, now_s: float) -> None:
         """Take a datagram."""
+        if self._only_peer not in (None, peer):
+            return
         heard = self.view.identity is not None and not self.view.lost(now_s)
         if heard and peer != self.peer:
             return
@@ -90,6 +103,9 @@ class Session:
             return True
         candidate = VehicleView() if self._is_other_system(message) else self.view
         if update(candidate, message, now_s).last_heartbeat_s != now_s:
+            return False
+        if self._system_id not in (None, message.get_srcSystem()):
+            self.foreign_systems.add(message.get_srcSystem())
             return False
         self.view, self.peer = candidate, peer
         self._heartbeat_due_s = now_s

@@ -8,13 +8,12 @@ import select
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from flightstack.port_numbers import vehicle_api_port, vehicle_ground_port
 from flightstack.transport.fair_queue import FairQueue
 from flightstack.transport.tcp_server import TcpServer
 from flightstack.transport.udp import Address, PortBusyError, UdpSocket
 
 GROUND, API, TCP = "ground", "api", "tcp"
-GROUND_LOCAL_PORT, API_LOCAL_PORT, TCP_PORT = 18570, 14580, 5760
-TCP_PORT_STEP = 10
 LOOPBACK = "127.0.0.1"
 OCTETS_A_POLL = 4096
 """Handed out in one poll, all peers together: a millisecond of work at worst, 400 kB/s in real time."""
@@ -23,11 +22,6 @@ LARGEST_DATAGRAM = 2048
 
 Place = tuple[str, Address]
 """A channel, and an address on it."""
-
-
-def tcp_port(instance: int) -> int:
-    """Return the usual TCP port of a vehicle."""
-    return TCP_PORT + TCP_PORT_STEP * instance
 
 
 def is_loopback(host: str) -> bool:
@@ -40,15 +34,15 @@ class PortsConfig:
     """Where the vehicle listens and whom it addresses unasked. Hosts are IPv4 addresses."""
 
     instance: int
-    ground_stations: tuple[Address, ...] = ((LOOPBACK, 14550),)
-    api_client: Address = (LOOPBACK, 14540)
+    ground_stations: tuple[Address, ...]
+    api_client: Address
     listen: str = LOOPBACK
     tcp_port: int = 0
     """0: no TCP."""
 
 
 class VehiclePorts:
-    """Two UDP sockets, bound to 18570 and 14580, each plus the instance, and a TCP server."""
+    """Two UDP sockets, for ground stations and for companions, and a TCP server."""
 
     def __init__(self, config: PortsConfig) -> None:
         """Bind all; raise PortBusyError."""
@@ -57,8 +51,8 @@ class VehiclePorts:
         self._tcp: TcpServer | None = None
         self._queue: FairQueue[Place] = FairQueue()
         try:
-            for channel, port in ((GROUND, GROUND_LOCAL_PORT), (API, API_LOCAL_PORT)):
-                self._sockets[channel] = UdpSocket(config.listen, port + config.instance, LARGEST_DATAGRAM)
+            for channel, port in ((GROUND, vehicle_ground_port), (API, vehicle_api_port)):
+                self._sockets[channel] = UdpSocket(config.listen, port(config.instance), LARGEST_DATAGRAM)
                 self._poller.register(self._sockets[channel], select.POLLIN)
             if config.tcp_port:
                 self._tcp = TcpServer(config.listen, config.tcp_port, self._poller)

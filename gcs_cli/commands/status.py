@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from gcs_cli.settings import ConnectOption, JsonOption, TimeoutOption, meet_vehicle
+from gcs_cli.settings import ConnectOption, InstanceOption, JsonOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
     from gcs_cli.view_types import VehicleView
@@ -21,11 +21,12 @@ def status(
     as_json: JsonOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Show how the vehicle is."""
     from gcs_cli.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
 
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         session = connection.session
         session.subscribe(ROTORS_AND_TIMING)
         # most of what is shown comes several times a second; what the vehicle does not send stays unknown
