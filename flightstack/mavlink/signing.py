@@ -26,8 +26,8 @@ EPOCH_UNIX_S = 1_420_070_400
 LARGEST_TIMESTAMP = 2**48 - 1
 NEW_STREAM_TICKS = 60 * TICKS_PER_S
 """A stream that was never heard may be so much behind our timestamp."""
-AHEAD_TICKS = 60 * TICKS_PER_S
-"""Timestamps are reserved for so long, so that no crash makes us use one twice."""
+KEEP_TICKS = 10 * TICKS_PER_S
+"""The latest timestamp is kept for the next start this often."""
 MAX_STREAMS = 1024
 """Only holders of the key open streams, but even they shall not fill the memory."""
 _ALWAYS_TAKEN = frozenset({int(mavlink.MAVLINK_MSG_ID_RADIO_STATUS)})
@@ -60,26 +60,26 @@ def timestamp_of(unix_s: float) -> int:
 class Signing:
     """The key, our timestamp, and the timestamps of all streams that were heard.
 
-    ``clock`` returns the time since the Unix epoch [s]. ``first`` is above every timestamp used before, and
-    ``reserve`` is called with a new one before any at or above the last reserved is used: it has to be on the
-    disk then. ``allow_unsigned``: take unsigned frames, but never wrongly signed ones.
+    ``clock`` returns the time since the Unix epoch [s]. ``latest`` is what ``keep`` was last called with, before
+    this start: timestamps begin above both. A crash followed by a clock that was set back makes at most
+    KEEP_TICKS of them repeat. ``allow_unsigned``: take unsigned frames, but never wrongly signed ones.
     """
 
     def __init__(
         self,
         key: bytes,
         clock: Callable[[], float],
-        first: int = 0,
-        reserve: Callable[[int], None] = lambda _limit: None,
+        latest: int = 0,
+        keep: Callable[[int], None] = lambda _latest: None,
         allow_unsigned: bool = False,
     ) -> None:
         self.allow_unsigned = allow_unsigned
         self.counts = Counts()
         self._clock = clock
-        self._reserve = reserve
+        self._keep = keep
         self._key = NO_KEY
-        self._timestamp = first
-        self._reserved = first
+        self._timestamp = latest
+        self._kept = latest
         self._streams: dict[bytes, int] = {}
         self.set_key(key)
 
@@ -108,17 +108,16 @@ class Signing:
         At the end of all timestamps, to which only a holder of the key can take us, the last one stays.
         """
         timestamp = min(max(self._timestamp + 1, timestamp_of(self._clock())), LARGEST_TIMESTAMP)
-        if timestamp >= self._reserved:
-            self._reserved = timestamp + AHEAD_TICKS
-            self._reserve(self._reserved)
         self._timestamp = timestamp
+        if timestamp >= self._kept + KEEP_TICKS:
+            self.close()
         return timestamp
 
     def close(self) -> None:
-        """Give back what was reserved and not used, at an orderly end."""
-        if self._reserved > self._timestamp + 1:
-            self._reserved = self._timestamp + 1
-            self._reserve(self._reserved)
+        """Keep the latest timestamp, at an orderly end."""
+        if self._timestamp > self._kept:
+            self._kept = self._timestamp
+            self._keep(self._kept)
 
     def sign(self, frame: bytes, crc_extra: int, link_id: int) -> bytes:
         """Return an unsigned MAVLink 2 frame as a signed one."""
