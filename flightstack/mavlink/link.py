@@ -11,6 +11,7 @@ from fastcrc import crc16
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import MAGIC_V1, MAGIC_V2, Frame, FrameReader
 from flightstack.mavlink.signing import LinkSigning
+from flightstack.mavlink.text import clean_fields
 
 Message: TypeAlias = Any
 """A pymavlink message object."""
@@ -90,7 +91,7 @@ class Link:
     def decode(self, data: bytes) -> Iterator[Message]:
         """Yield the messages that ``data`` completes; what is not a message is counted in ``bad``.
 
-        Each has its frame as it was received in ``get_msgbuf()``.
+        Each has its frame as it was received in ``get_msgbuf()``. Its texts are clean: they may be shown.
         """
         if self._is_one_frame(data):  # the usual datagram: no need to look for frames
             message = self._message(data)
@@ -120,6 +121,7 @@ class Link:
         except mavlink.MAVError:
             self.bad += 1
             return None
+        clean_fields(message)
         self.received += 1
         return message
 

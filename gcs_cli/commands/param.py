@@ -126,13 +126,18 @@ def save(
 ) -> None:
     """Write all parameters to a file, as QGroundControl does."""
     from flightstack.atomic_file import write_text_atomically  # noqa: PLC0415
+    from flightstack.params.param_file import is_parameter_name  # noqa: PLC0415
     from gcs_cli import param_calls  # noqa: PLC0415
     from gcs_cli.param_file import render_parameters  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         told = param_calls.fetch_all(connection)
-        write_text_atomically(file, render_parameters(told, *connection.session.target))
-    typer.echo(f"{len(told)} parameters saved to {file}")
+        kept = [parameter for parameter in told if is_parameter_name(parameter.name)]
+        write_text_atomically(file, render_parameters(kept, *connection.session.target))
+    typer.echo(f"{len(kept)} parameters saved to {file}")
+    if len(kept) < len(told):
+        names = ", ".join(parameter.name for parameter in told if parameter not in kept)
+        typer.echo(f"gcs: left out, as no parameter can have this name: {names}", err=True)
 
 
 @app.command()
