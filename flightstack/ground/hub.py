@@ -13,7 +13,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from flightstack.commands import VehicleContext
 from flightstack.ground.facts import AutopilotFacts
 from flightstack.ground.mission_service import MissionService
-from flightstack.ground.peer import API, Peer, PeerAddress
+from flightstack.ground.peer import API, TCP, Peer, PeerAddress
 from flightstack.ground.router import Router
 from flightstack.ground.service import Service
 from flightstack.ground.services import make_services
@@ -73,7 +73,7 @@ class GroundHub:
         """Begin to talk to ``address``; a permanent one gets heartbeats before it was ever heard."""
         rates = API_RATES_HZ if address.channel == API else GROUND_RATES_HZ
         link = Link(*self._own, keeps_unknown=True, signing=link_signing(self._signing, address))
-        peer = Peer(link, Streams(rates), permanent)
+        peer = Peer(link, Streams(rates), permanent, address.channel == TCP)
         self._peers[address] = peer
         return peer
 
@@ -107,7 +107,7 @@ class GroundHub:
             return
         self._forget_due_s = now_s + HEARTBEAT_S
         for address, peer in list(self._peers.items()):
-            if now_s - peer.heard_s > PEER_FORGOTTEN_S:
+            if now_s - peer.heard_s > PEER_FORGOTTEN_S and not peer.connected:
                 if peer.permanent:
                     peer.heard_s = -math.inf
                     self._router.forget(address)
@@ -178,7 +178,7 @@ class GroundHub:
         for _ in range(min(FORWARDED_A_POLL, len(self._to_forward))):
             address, frame = self._to_forward.popleft()
             peer = self._peers.get(address)
-            if peer is not None and not peer.is_silent(now_s):
+            if peer is not None and peer.is_served(now_s):
                 yield address, frame
 
     def _make(self, message_id: int, facts: VehicleFacts) -> tuple[Message, ...]:
@@ -196,11 +196,11 @@ class GroundHub:
                 self._peers[address].outbox.append(message)
 
     def _due(self, peer: Peer, changed: bool, now_s: float) -> Iterator[Message]:
-        """Yield what ``peer`` is to get now: only heartbeats if it is silent, as its address may be forged."""
+        """Yield what ``peer`` is to get now: only heartbeats if it is silent, as the address of UDP may be forged."""
         if (peer.heard or peer.permanent) and (changed or now_s >= peer.heartbeat_due_s):
             peer.heartbeat_due_s = now_s + HEARTBEAT_S
             yield from self._make(mavlink.MAVLINK_MSG_ID_HEARTBEAT, self._facts)
-        if not peer.is_silent(now_s):
+        if peer.is_served(now_s):
             yield from peer.outbox
             yield from peer.streams.due(self._facts, now_s, self._make)
         peer.outbox.clear()

@@ -9,8 +9,8 @@ from typing import NamedTuple
 from flightstack.mavlink.link import SILENT_AFTER_S, Link, Message
 from flightstack.mavlink.streams import Streams
 
-GROUND, API = "ground", "api"
-"""The channels of ground stations and of companions; any other gets the rates of a ground station."""
+GROUND, API, TCP = "ground", "api", "tcp"
+"""The channels of ground stations, of companions, and of TCP clients, which get the rates of a ground station."""
 
 
 class PeerAddress(NamedTuple):
@@ -28,6 +28,8 @@ class Peer:
     link: Link
     streams: Streams
     permanent: bool
+    connected: bool = False
+    """Whether it has a TCP connection: its address cannot be forged, and it is there until the connection ends."""
     heard_s: float = -math.inf
     heartbeat_due_s: float = -math.inf
     outbox: list[Message] = field(default_factory=list)
@@ -38,5 +40,9 @@ class Peer:
         return self.heard_s > -math.inf
 
     def is_silent(self, now_s: float) -> bool:
-        """Return True if nothing valid came for SILENT_AFTER_S: then heartbeats are all it gets."""
+        """Return True if nothing valid came for SILENT_AFTER_S."""
         return now_s - self.heard_s > SILENT_AFTER_S
+
+    def is_served(self, now_s: float) -> bool:
+        """Return True if it gets more than heartbeats: it is not silent, or connected and heard once."""
+        return self.heard and (self.connected or not self.is_silent(now_s))

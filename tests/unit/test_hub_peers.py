@@ -124,6 +124,15 @@ def test_a_silent_peer_that_speaks_again_gets_its_streams_back(net: Net) -> None
     assert len(alice.take("ATTITUDE")) == 8
 
 
+def test_a_silent_tcp_client_keeps_its_streams(net: Net) -> None:
+    """Scripts that only read are common; the address of a connection cannot be forged."""
+    camera = net.join(CAMERA)
+    net.run(2.0 * PEER_FORGOTTEN_S, step_s=0.1)
+    camera.inbox.clear()
+    net.run(1.0)
+    assert len(camera.take("ATTITUDE")) == pytest.approx(50, abs=1)
+
+
 def test_a_peer_with_heartbeats_at_one_hertz_keeps_its_streams(net: Net) -> None:
     alice = net.join(ALICE)
     for _ in range(20):
