@@ -18,9 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.ports import free_instance, ground_port, simulator_port
+from benchmarks.ports import free_instance
 from benchmarks.real_time import PERIOD_NS, child
 from benchmarks.three_processes import ROOT
+from flightstack.port_numbers import ground_station_port, simulator_port
 
 START_TICKS = 500
 _START_S = 60.0
@@ -68,14 +69,14 @@ def _run(case: Case, seconds: float) -> tuple[np.ndarray, np.ndarray, float]:
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as running:
         file = Path(folder) / "lateness"
         station = running.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
-        station.bind(("127.0.0.1", ground_port(instance)))
+        station.bind(("127.0.0.1", ground_station_port(instance)))
         station.settimeout(1.0)
         port = f"port={simulator_port(instance)}"
         simulator = running.enter_context(child("sim_bridge", f"--{port}", f"--instance={instance}"))
         stack = running.enter_context(
             child(
                 "benchmarks.timed_stack", str(file), "--clock=realtime", f"--sim-{port}",
-                f"--instance={instance}", f"--gcs-port={ground_port(instance)}", "--log=none", "--params=none",
+                f"--instance={instance}", f"--gcs-port={ground_station_port(instance)}", "--log=none", "--params=none",
                 errors=subprocess.PIPE,
             )
         )  # fmt: skip

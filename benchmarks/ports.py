@@ -4,6 +4,14 @@ from __future__ import annotations
 
 import socket
 
+from flightstack.port_numbers import (
+    ground_station_port,
+    simulator_port,
+    tcp_port,
+    vehicle_api_port,
+    vehicle_ground_port,
+)
+
 _FIRST, _LAST = 60, 99
 
 
@@ -18,25 +26,10 @@ def _is_free(kind: socket.SocketKind, port: int) -> bool:
     return True
 
 
-def simulator_port(instance: int) -> int:
-    """TCP port of the simulator."""
-    return 4560 + instance
-
-
-def ground_port(instance: int) -> int:
-    """UDP port of the ground station."""
-    return 14550 + 10 * instance
-
-
-def tcp_port(instance: int) -> int:
-    """TCP port of the vehicle."""
-    return 5760 + 10 * instance
-
-
 def free_instance() -> int:
     """Return the first instance, from 60 on, all of whose ports are free."""
     for instance in range(_FIRST, _LAST + 1):
-        udp = (ground_port(instance), 18570 + instance, 14580 + instance)
+        udp = (ground_station_port(instance), vehicle_ground_port(instance), vehicle_api_port(instance))
         tcp = (simulator_port(instance), tcp_port(instance))
         if all(_is_free(socket.SOCK_STREAM, port) for port in tcp) and all(
             _is_free(socket.SOCK_DGRAM, port) for port in udp

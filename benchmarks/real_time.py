@@ -15,9 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.ports import free_instance, ground_port, simulator_port
+from benchmarks.ports import free_instance
 from benchmarks.three_processes import ROOT
 from flightstack.clock import DeadlineScheduler, LoopTiming, ask_for_punctual_sleeps
+from flightstack.port_numbers import ground_station_port, simulator_port
 
 PERIOD_NS = 2_000_000
 SLICES = 5
@@ -58,7 +59,7 @@ def _our_scheduler(count: int) -> list[float]:
 def _flight_stack(seconds: float) -> list[float]:
     """Run simulator and flight stack, both in real time, and return the lateness of the loop."""
     instance = free_instance()
-    ground = ground_port(instance)
+    ground = ground_station_port(instance)
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as running:
         file = Path(folder) / "lateness"
         station = running.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))

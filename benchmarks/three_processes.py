@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.measure import Figure, figure
-from benchmarks.ports import free_instance, simulator_port
+from benchmarks.ports import free_instance
 from flightstack.config import DEFAULT_HOME
 from flightstack.mavlink.simulator_link import SimulatorLink
 from flightstack.params.vehicle import load_vehicle
+from flightstack.port_numbers import simulator_port
 
 ROOT = Path(__file__).resolve().parent.parent
 PLAN = ROOT / "missions" / "square.plan"

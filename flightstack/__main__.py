@@ -33,7 +33,7 @@ def run(
     sim_timeout: options.SimTimeout = 30.0,
     instance: options.Instance = 0,
     gcs: options.GroundStations = None,
-    gcs_port: options.GcsPort = 14550,
+    gcs_port: options.GcsPort = None,
     api_port: options.ApiPort = None,
     tcp_port: options.TcpPort = None,
     listen: options.Listen = "127.0.0.1",
@@ -54,6 +54,7 @@ def run(
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.firmware.errors import TargetError
     from flightstack.params.errors import ConfigError
+    from flightstack.port_numbers import simulator_port, system_id
     from flightstack.ports import ports_config
     from flightstack.process_config import EXIT_TIMEOUT, EXIT_USAGE, ProcessConfig
     from flightstack.transport.udp import PortBusyError
@@ -67,7 +68,7 @@ def run(
             vehicle, controller, gains, loops, inner_hz,
             nearest_outer_hz(inner_hz) if outer_hz is None else outer_hz,
             ideal_rotors, clock == "lockstep",
-            DEFAULT_HOME if home is None else parse_home(home), instance + 1,
+            DEFAULT_HOME if home is None else parse_home(home), system_id(instance),
             params_file=None if params == "none" else params or f"runs/params-{instance}.params",
             params=tuple(param or []),
         )  # fmt: skip
@@ -79,7 +80,7 @@ def run(
             return
         process = ProcessConfig(
             sim_host,
-            4560 + instance if sim_port is None else sim_port,
+            simulator_port(instance) if sim_port is None else sim_port,
             sim_timeout,
             ports_config(instance, gcs or [], gcs_port, api_port, listen, tcp_port),
             _log_path(log, instance),

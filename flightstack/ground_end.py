@@ -37,7 +37,7 @@ class GroundEnd:
     def serve(self, now_s: float) -> bool:
         """Take what has arrived, and send what is due; return whether anything has arrived."""
         hub, ports, heard = self._hub, self._ports, False
-        for channel, peer, data in ports.receive(self._is_heard):
+        for channel, peer, data in ports.receive(self._heard_s):
             heard = True
             hub.receive(PeerAddress(channel, *peer), data, now_s)
         for channel, peer in ports.opened():
@@ -83,6 +83,6 @@ class GroundEnd:
         """Close the ports."""
         self._ports.close()
 
-    def _is_heard(self, place: Place) -> bool:
+    def _heard_s(self, place: Place) -> float:
         channel, peer = place
-        return self._hub.is_heard(PeerAddress(channel, *peer))
+        return self._hub.heard_s(PeerAddress(channel, *peer))

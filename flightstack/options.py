@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from flightstack.port_numbers import INSTANCES
+
 Vehicle = Annotated[str, typer.Option(help="Built-in vehicle or TOML file.")]
 Controller = Annotated[str, typer.Option(help="Attitude controller: pid, backstepping or yours.")]
 Gains = Annotated[
@@ -29,12 +31,16 @@ Loops = Annotated[
 SimHost = Annotated[str, typer.Option(help="Host of the simulator.")]
 SimPort = Annotated[int | None, typer.Option(help="Port of the simulator [4560 + instance].")]
 SimTimeout = Annotated[float, typer.Option(help="Longest wait for the simulator [s].")]
-Instance = Annotated[int, typer.Option(min=0, max=249, help="Number of this vehicle; shifts ports and id.")]
+Instance = Annotated[
+    int, typer.Option(min=0, max=INSTANCES - 1, help="Number of this vehicle; shifts ports and id.")
+]
 GroundStations = Annotated[
     list[str] | None,
-    typer.Option(help="Ground station to address unasked: HOST:PORT. May be repeated [127.0.0.1:14550]."),
+    typer.Option(help="Ground station to address unasked: HOST:PORT. May be repeated."),
 ]
-GcsPort = Annotated[int, typer.Option(help="UDP port of the ground station, without --gcs.")]
+GcsPort = Annotated[
+    int | None, typer.Option(help="UDP port of the ground station, without --gcs [14550 + instance].")
+]
 ApiPort = Annotated[int | None, typer.Option(help="UDP port of the API client [14540 + instance].")]
 TcpPort = Annotated[
     int | None, typer.Option(help="TCP port to listen on [5760 + 10 per instance]; 0 for none.")

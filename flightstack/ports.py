@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flightstack.params.errors import ConfigError
+from flightstack.port_numbers import api_client_port, ground_station_port, tcp_port
 from flightstack.transport.udp import Address, resolve
-from flightstack.transport.vehicle_ports import LOOPBACK, PortsConfig, is_loopback, tcp_port
+from flightstack.transport.vehicle_ports import LOOPBACK, PortsConfig, is_loopback
 
 _HIGHEST_PORT = 65535
-_API_PORT = 14540
 
 
 def ports_config(
     instance: int,
     stations: Sequence[str],
-    station_port: int,
+    station_port: int | None,
     api_port: int | None,
     listen: str,
     tcp: int | None,
@@ -27,8 +27,9 @@ def ports_config(
         if is_loopback(bound) and not is_loopback(host):
             raise ConfigError("--gcs", text, f"cannot be reached from {bound}: give --listen 0.0.0.0 too")
     if not ground:
-        ground = ((LOOPBACK, _port("--gcs-port", station_port)),)
-    api = _port("--api-port", _API_PORT + instance if api_port is None else api_port)
+        port = ground_station_port(instance) if station_port is None else station_port
+        ground = ((LOOPBACK, _port("--gcs-port", port)),)
+    api = _port("--api-port", api_client_port(instance) if api_port is None else api_port)
     tcp_number = tcp_port(instance) if tcp is None else tcp
     if tcp_number:
         _port("--tcp-port", tcp_number)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import os
 import secrets
 import stat
@@ -9,12 +11,13 @@ import sys
 import time
 from pathlib import Path
 
-from flightstack.mavlink.signing import KEY_SIZE, LARGEST_TIMESTAMP, Signing
+from flightstack.mavlink.signing import KEY_SIZE, LARGEST_TIMESTAMP, LinkSigning, Signing
 from flightstack.params.errors import ConfigError
 
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _LONGEST_FILE = 200  # a key in hexadecimal takes 64 characters
 _OWNER_ONLY = 0o600
+_LINK_IDS = 256
 
 
 def create_key(path: Path) -> bytes:
@@ -59,38 +62,80 @@ def replace_key(path: Path, key: bytes) -> None:
 
 
 def open_signing(path: Path, role: str, allow_unsigned: bool = False) -> Signing:
-    """Return signing with the key at ``path``; raise ConfigError.
+    """Return signing with the key at ``path``, for the only process of its ``role``; raise ConfigError.
 
-    ``role`` tells the processes apart that use one key file: each keeps its timestamp in a file of its own.
+    The latest timestamp of a role is kept beside the key.
     """
-    key = load_key(path)
-    timestamps = path.with_name(f"{path.name}.{role}.timestamp")
-    first = _load_timestamp(timestamps)
-    try:
-        _write_atomically(timestamps, f"{first}\n")  # to fail now, and not in flight
-    except OSError as error:
-        raise _problem(timestamps, error) from None
-    return Signing(key, time.time, first, _Reserve(timestamps), allow_unsigned)
+    key, kept = load_key(path), _TimestampFile(path, role)
+    return Signing(key, time.time, kept.open(), kept.keep, allow_unsigned)
 
 
-class _Reserve:
-    """Writes the timestamp file. A full disk must not end a flight: it is told once, and the flight goes on."""
+def open_shared_signing(path: Path, role: str) -> LinkSigning:
+    """Return signing with the key at ``path``, for one of many processes of a ``role``; raise ConfigError.
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    Each has a link id of its own while it runs, as timestamps have to rise on each stream (system, component,
+    link id). The id is random, so that programs on other machines with the same key seldom have it too.
+    """
+    key, kept = load_key(path), _TimestampFile(path, role, is_shared=True)
+    return LinkSigning(Signing(key, time.time, kept.open(), kept.keep), kept.claim_link_id())
+
+
+class _TimestampFile:
+    """The latest timestamp that any process of a role has used: it never goes back.
+
+    A disk that is full must not end a flight: it is told once, and the flight goes on.
+    """
+
+    def __init__(self, key_path: Path, role: str, is_shared: bool = False) -> None:
+        self._path = key_path.with_name(f"{key_path.name}.{role}.timestamp")
+        self._lock_path = key_path.with_name(f"{key_path.name}.{role}.lock") if is_shared else None
+        self._lock: int | None = None  # it stays open: the end of the process frees what it has locked
         self._has_failed = False
 
-    def __call__(self, limit: int) -> None:
+    def open(self) -> int:
+        """Return the timestamp kept last, and make sure that another one can be kept; raise ConfigError."""
+        latest = _load_timestamp(self._path)
         try:
-            _write_atomically(self._path, f"{limit}\n")
+            if self._lock_path is not None:
+                self._lock = os.open(self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, _OWNER_ONLY)
+            self._write(latest)
         except OSError as error:
+            raise _problem(self._path, error) from None
+        return latest
+
+    def keep(self, timestamp: int) -> None:
+        """Keep ``timestamp``, unless another process has kept a later one."""
+        try:
+            self._write(timestamp)
+        except (OSError, ConfigError) as error:
             if not self._has_failed:
                 self._has_failed = True
+                reason = _problem(self._path, error) if isinstance(error, OSError) else error
                 print(
-                    f"{_problem(self._path, error)}: after a crash, wait a minute",
+                    f"{reason}: after a crash, signed messages may be refused for a minute",
                     file=sys.stderr,
                     flush=True,
                 )
+
+    def claim_link_id(self) -> int:
+        """Return a link id that no other process of the role has claimed; any one if there is none left."""
+        assert self._lock is not None
+        first = secrets.randbelow(_LINK_IDS)
+        for link_id in ((first + offset) % _LINK_IDS for offset in range(_LINK_IDS)):
+            with contextlib.suppress(OSError):  # another process has locked this octet of the file
+                fcntl.lockf(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, link_id)
+                return link_id
+        return first
+
+    def _write(self, timestamp: int) -> None:
+        if self._lock is None:
+            _write_atomically(self._path, f"{timestamp}\n")
+            return
+        fcntl.lockf(self._lock, fcntl.LOCK_EX, 1, _LINK_IDS)  # the octet behind those of the link ids
+        try:
+            _write_atomically(self._path, f"{max(timestamp, _load_timestamp(self._path))}\n")
+        finally:
+            fcntl.lockf(self._lock, fcntl.LOCK_UN, 1, _LINK_IDS)
 
 
 def _load_timestamp(path: Path) -> int:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
-from gcs_cli.settings import ConnectOption, Settings, SigningKeyOption, TimeoutOption
+from gcs_cli.settings import ConnectOption, InstanceOption, Settings, SigningKeyOption, TimeoutOption
 
 app = typer.Typer(
     name="gcs",
@@ -48,11 +48,12 @@ def options(
     context: typer.Context,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
     signing_key: SigningKeyOption = None,
     version: _VersionOption = False,  # its callback does all
 ) -> None:
     """Hold the flags that are given before the command."""
-    context.obj = Settings(connect, timeout, signing_key)
+    context.obj = Settings(connect, timeout, signing_key, instance)
 
 
 def _register() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from flightstack.mavlink.signing import LinkSigning
 from flightstack.plan import MissionResult
-from flightstack.transport.udp import PortBusyError, UdpSocket, resolve
+from flightstack.transport.udp import Address, PortBusyError, UdpSocket, resolve
 from gcs_cli.calls import Answer, Call
 from gcs_cli.endpoint import VEHICLE_CONNECTION, Endpoint
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError, PortInUseError
@@ -20,7 +20,8 @@ _LONGEST_WAIT_S = 0.25
 class Connection:
     """Runs a ``Session`` over UDP. Raises CliError when the port is busy.
 
-    ``signing``: sign what is sent, and take what is signed with the same key.
+    ``signing``: sign what is sent, and take what is signed with the same key. ``vehicle``: take only what comes
+    from this address, although the vehicle sends first. ``system_id``: take only this vehicle for ours.
     """
 
     def __init__(
@@ -28,18 +29,22 @@ class Connection:
         endpoint: Endpoint,
         record: Callable[[bytes], None] | None = None,
         signing: LinkSigning | None = None,
+        *,
+        vehicle: Address | None = None,
+        system_id: int | None = None,
     ) -> None:
         self.endpoint = endpoint
+        self._system_id = system_id
         self._signing = signing
         try:
             if endpoint.listens:
                 self._socket = UdpSocket(endpoint.host, endpoint.port)
-                self.session = Session(record=record, signing=signing)
+                self.session = Session(vehicle, record, signing, system_id)
             else:
                 host = resolve(endpoint.host)
                 # the loopback interface reaches nobody else, so that nobody else reaches us
                 self._socket = UdpSocket("127.0.0.1" if host.startswith("127.") else "0.0.0.0")
-                self.session = Session((host, endpoint.port), record, signing)
+                self.session = Session((host, endpoint.port), record, signing, system_id)
         except PortBusyError as error:
             sentence = f"{error}: end the other ground station, or use --connect {VEHICLE_CONNECTION}"
             if error.is_in_use:
@@ -74,19 +79,28 @@ class Connection:
         return True
 
     def meet(self, timeout_s: float) -> None:
-        """Wait for the vehicle's heartbeat; raise CliError (no answer)."""
+        """Wait for the vehicle's heartbeat, and keep to that vehicle; raise CliError (no answer)."""
         if not self.wait_for(lambda: self.session.view.identity is not None, timeout_s):
             if self._signing is not None and self._signing.signing.counts.refused:
                 raise CliError(
                     f"the vehicle at {self.endpoint} does not sign with this key: check --signing-key on both sides",
                     NO_ANSWER,
                 )
-            way = "sent to" if self.endpoint.listens else "answered at"
-            raise CliError(
-                f"no vehicle {way} {self.endpoint} within {timeout_s:g} s: start `sim-bridge` and "
-                "`flightstack`, or name its link with --connect",
-                NO_ANSWER,
+            raise CliError(self._no_vehicle(timeout_s), NO_ANSWER)
+        self.session.keep_vehicle()
+
+    def _no_vehicle(self, timeout_s: float) -> str:
+        way = "sent to" if self.endpoint.listens else "answered at"
+        foreign = ", ".join(str(number) for number in sorted(self.session.foreign_systems))
+        if foreign:
+            return (
+                f"no vehicle with system id {self._system_id} {way} {self.endpoint} within {timeout_s:g} s, only "
+                f"system {foreign}: leave --instance out and name its link with --connect"
             )
+        return (
+            f"no vehicle {way} {self.endpoint} within {timeout_s:g} s: start `sim-bridge` and "
+            "`flightstack`, or name its link with --connect"
+        )
 
     def complete(self, call: Call, name: str, *, may_lack: bool = False) -> Answer:
         """Run a request to its end; raise CliError when the vehicle refuses ``name`` or does not answer.

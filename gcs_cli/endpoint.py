@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from flightstack.port_numbers import ground_station_port, vehicle_ground_port
 from gcs_cli.errors import USAGE, CliError
-
-DEFAULT_CONNECTION = "udp:127.0.0.1:14550"
-VEHICLE_CONNECTION = "udpout:127.0.0.1:18570"
-_FORMS = "udp:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
 
 LOOPBACK = "127.0.0.1"
 """Where we listen unless told otherwise; ``udp:0.0.0.0:14550`` listens on every network."""
+
+DEFAULT_CONNECTION = f"udp:{LOOPBACK}:{ground_station_port(0)}"
+
+
+def vehicle_connection(instance: int) -> str:
+    """Return the link that calls a vehicle of this machine at its own port."""
+    return f"udpout:{LOOPBACK}:{vehicle_ground_port(instance)}"
+
+
+VEHICLE_CONNECTION = vehicle_connection(0)
+_FORMS = "udp:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
 
 
 class Endpoint(NamedTuple):

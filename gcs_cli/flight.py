@@ -17,6 +17,7 @@ from gcs_cli.flight_outcome import Outcome, ends_in_air, judged
 from gcs_cli.flight_watch import STALL_S, Watch, no_state, no_vehicle
 from gcs_cli.plan_parts import Uploads
 from gcs_cli.session import Session
+from gcs_cli.subscription import LOOP_TIMING
 from gcs_cli.view_types import VehicleView
 
 READY_PAUSE_S = 0.1
@@ -173,6 +174,7 @@ class Flight:
     def _start(self, now_s: float) -> None:
         if self._answered("the vehicle refused to start the mission: ", now_s):
             self.began_s = now_s
+            self._session.subscribe(LOOP_TIMING)
             self._watch.begin(self._start_time_s, now_s)
             self.phase = Phase.FLY
 

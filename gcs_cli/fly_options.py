@@ -15,6 +15,13 @@ from flightstack.geodesy import GeoPoint
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
+from flightstack.port_numbers import (
+    INSTANCES,
+    ground_station_port,
+    simulator_port,
+    vehicle_api_port,
+    vehicle_ground_port,
+)
 from flightstack.transport.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.plan_parts import plan_problem
@@ -24,7 +31,6 @@ CONTROLLERS = "flightstack.attitude_controllers"
 PLANTS = ("rigid", "multibody", "paper")
 DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
 GCS_LOSS_S = 5.0
-MOST_INSTANCES = 100
 _RETURN = Command.NAV_RETURN_TO_LAUNCH
 
 
@@ -70,12 +76,12 @@ class FlyOptions:
     @property
     def gcs_port(self) -> int:
         """UDP port to which the vehicle sends."""
-        return 14550 + 10 * self.instance
+        return ground_station_port(self.instance)
 
     @property
     def simulator_port(self) -> int:
         """TCP port on which the simulator listens."""
-        return 4560 + self.instance
+        return simulator_port(self.instance)
 
 
 def checked_plan(options: FlyOptions) -> Plan:
@@ -122,7 +128,7 @@ def _check_flags(options: FlyOptions) -> None:
     _number("--gust", options.gust or 0.0, 0.0, 50.0)
     _number("--torque-gust", options.torque_gust or 0.0, 0.0, 100.0)
     _number("--seed", options.seed, 0, 2**31 - 1)
-    _number("--instance", options.instance, 0, MOST_INSTANCES - 1)
+    _number("--instance", options.instance, 0, INSTANCES - 1)
     _number("--timeout", options.timeout_s, 0.1, 86_400.0)
     _number("--limit", options.limit_s, 1.0, 1e6)
     _number("--battery-start", _or(options.battery_start, 100.0), 0.0, 100.0)
@@ -147,7 +153,7 @@ def check_ports(options: FlyOptions) -> None:
     """Make sure that the children find their ports free; raise CliError (usage) naming a busy one."""
     local = "127.0.0.1"
     try:
-        for port in (18570 + options.instance, 14580 + options.instance):
+        for port in (vehicle_ground_port(options.instance), vehicle_api_port(options.instance)):
             UdpSocket(local, port).close()
     except PortBusyError as error:
         raise busy(error) from None

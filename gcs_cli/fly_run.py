@@ -11,8 +11,10 @@ from types import FrameType
 from typing import Any, NamedTuple
 
 from flightstack.plan import Plan
+from flightstack.port_numbers import vehicle_ground_port
+from flightstack.transport.udp import Address
 from gcs_cli.connection import Connection
-from gcs_cli.endpoint import Endpoint
+from gcs_cli.endpoint import LOOPBACK, Endpoint
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.flight import Flight
 from gcs_cli.flight_outcome import Outcome
@@ -77,8 +79,9 @@ class Interruption:
 
 def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> Flown:
     """Fly ``plan`` with children of our own; raise CliError when nothing could be started."""
-    local = Endpoint("127.0.0.1", options.gcs_port, listens=True)
-    with Interruption() as interruption, _open(local) as connection:
+    local = Endpoint(LOOPBACK, options.gcs_port, listens=True)
+    vehicle = (LOOPBACK, vehicle_ground_port(options.instance))
+    with Interruption() as interruption, _open(local, vehicle) as connection:
         check_ports(options)
         folder = make_run_directory(options.plan_path, out)
         flight = Flight(
@@ -116,9 +119,9 @@ def _recording(connection: Connection, folder: Path) -> Iterator[None]:
             connection.session.record = None
 
 
-def _open(endpoint: Endpoint) -> Connection:
+def _open(endpoint: Endpoint, vehicle: Address) -> Connection:
     try:
-        return Connection(endpoint)
+        return Connection(endpoint, vehicle=vehicle)
     except CliError as error:
         sentence = str(error).partition(": end the other")[0]
         raise CliError(

@@ -9,6 +9,7 @@ from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.ftp_client import FtpClient, FtpDone
 from flightstack.mavlink.services.log_client import LogClient, LogDone, LogEntry, LogFailed
 from flightstack.mavlink.services.virtual_files import Entry
+from flightstack.mavlink.text import REPLACEMENT
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
 from gcs_cli.session import COMPONENT_ID, SYSTEM_ID
 
@@ -71,8 +72,13 @@ def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: P
 
 
 def is_plain_name(name: str) -> bool:
-    """Tell whether a name from the vehicle may name a file here: no path, nothing hidden, nothing unprintable."""
-    return bool(name) and name.isprintable() and not name.startswith(".") and not set(name) & set("/\\:")
+    """Tell whether a name from the vehicle may name a file here: no path, nothing hidden, nothing replaced."""
+    return (
+        bool(name)
+        and name.isprintable()
+        and not name.startswith(".")
+        and not set(name) & {*"/\\:", REPLACEMENT}
+    )
 
 
 def _run(

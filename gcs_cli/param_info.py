@@ -10,6 +10,7 @@ import lzma
 import math
 from typing import Any, NamedTuple
 
+from flightstack.mavlink.text import clean
 from flightstack.params.spec import shortest
 
 METADATA_PATH = "etc/extras/parameters.json.xz"
@@ -61,7 +62,7 @@ def parse_metadata(packed: bytes) -> dict[str, ParamInfo]:
     if not isinstance(entries, list):
         return {}
     return {
-        entry["name"]: _info(entry)
+        _text(entry["name"]): _info(entry)
         for entry in entries
         if isinstance(entry, dict) and isinstance(entry.get("name"), str)
     }
@@ -96,5 +97,5 @@ def _number(value: Any) -> float | None:
 
 
 def _text(value: Any) -> str:
-    """Return ``value`` if it is a text, without what a terminal would obey."""
-    return "".join(c for c in value if c.isprintable()) if isinstance(value, str) else ""
+    """Return ``value``, fit to be shown, if it is a text."""
+    return clean(value) if isinstance(value, str) else ""

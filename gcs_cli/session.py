@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from flightstack.mavlink.signing import LinkSigning, without_signature
 from flightstack.transport.udp import Address
+from gcs_cli.subscription import Subscription
 from gcs_cli.vehicle_view import update
 from gcs_cli.view_types import VehicleView
 
@@ -36,7 +37,8 @@ class Session:
     """The ground station's side of a link.
 
     The first peer from which an autopilot's heartbeat comes is the vehicle; datagrams of others are dropped
-    unless that one has fallen silent. ``record`` gets every frame, sent and received, without its signature.
+    unless that one has fallen silent. With ``peer``, only what comes from there is taken, and with ``system_id``,
+    only that vehicle. ``record`` gets every frame, sent and received, without its signature.
     """
 
     def __init__(
@@ -44,9 +46,14 @@ class Session:
         peer: Address | None = None,
         record: Callable[[bytes], None] | None = None,
         signing: LinkSigning | None = None,
+        system_id: int | None = None,
     ) -> None:
         self.view = VehicleView()
         self.peer = peer
+        self.foreign_systems: set[int] = set()
+        """System ids of vehicles that were heard and are not ours."""
+        self._only_peer = peer
+        self._system_id = system_id
         self.bad = 0
         self._links: dict[Address, Link] = {}
         self._signing = signing
@@ -61,12 +68,23 @@ class Session:
         identity = self.view.identity
         return (_ANYONE, _ANYONE) if identity is None else (identity.system_id, identity.component_id)
 
+    def subscribe(self, rates_hz: Mapping[int, float]) -> None:
+        """Ask the vehicle for messages, id -> rate [Hz], until another service is used."""
+        self.use(Subscription(lambda: self.target, rates_hz))
+
+    def keep_vehicle(self) -> None:
+        """Take no other system for the vehicle from now on, however long this one is silent."""
+        assert self.view.identity is not None
+        self._system_id = self.view.identity.system_id
+
     def use(self, service: Service | None) -> None:
         """Let ``service`` talk to the vehicle from now on, in place of the one before."""
         self._service = service
 
     def receive(self, data: bytes, peer: Address, now_s: float) -> None:
         """Take a datagram."""
+        if self._only_peer not in (None, peer):
+            return
         heard = self.view.identity is not None and not self.view.lost(now_s)
         if heard and peer != self.peer:
             return
@@ -85,6 +103,9 @@ class Session:
             return True
         candidate = VehicleView() if self._is_other_system(message) else self.view
         if update(candidate, message, now_s).last_heartbeat_s != now_s:
+            return False
+        if self._system_id not in (None, message.get_srcSystem()):
+            self.foreign_systems.add(message.get_srcSystem())
             return False
         self.view, self.peer = candidate, peer
         self._heartbeat_due_s = now_s

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from gcs_cli.endpoint import DEFAULT_CONNECTION, VEHICLE_CONNECTION, Endpoint, parse_endpoint
+from flightstack.port_numbers import INSTANCES, system_id
+from gcs_cli.endpoint import (
+    DEFAULT_CONNECTION,
+    VEHICLE_CONNECTION,
+    Endpoint,
+    parse_endpoint,
+    vehicle_connection,
+)
 from gcs_cli.errors import USAGE, CliError
 
 if TYPE_CHECKING:
@@ -24,6 +31,17 @@ ConnectOption = Annotated[
         metavar="LINK",
         help="Where the vehicle is: udp:PORT, udpin:HOST:PORT or udpout:HOST:PORT.  "
         f"[default: {DEFAULT_CONNECTION}, or {VEHICLE_CONNECTION} while another program listens there]",
+        show_default=False,
+    ),
+]
+InstanceOption = Annotated[
+    int | None,
+    typer.Option(
+        "--instance",
+        metavar="N",
+        min=0,
+        max=INSTANCES - 1,
+        help="Command the vehicle of `flightstack --instance N`, and no other.",
         show_default=False,
     ),
 ]
@@ -56,19 +74,28 @@ class Settings(NamedTuple):
     connect: str | None = None
     timeout_s: float | None = None
     signing_key: Path | None = None
+    instance: int | None = None
 
-    def merged(self, connect: str | None, timeout_s: float | None) -> Settings:
+    def merged(self, connect: str | None, timeout_s: float | None, instance: int | None) -> Settings:
         """Return these with those given after the command, which win."""
         return Settings(
             self.connect if connect is None else connect,
             self.timeout_s if timeout_s is None else timeout_s,
             self.signing_key,
+            self.instance if instance is None else instance,
         )
 
     @property
     def endpoint(self) -> Endpoint:
         """Where the vehicle is; raise CliError (usage)."""
+        if self.connect is None and self.instance is not None:
+            return parse_endpoint(vehicle_connection(self.instance))
         return parse_endpoint(DEFAULT_CONNECTION if self.connect is None else self.connect)
+
+    @property
+    def system_id(self) -> int | None:
+        """System id of the vehicle; None for any."""
+        return None if self.instance is None else system_id(self.instance)
 
     @property
     def patience_s(self) -> float:
@@ -96,7 +123,7 @@ def open_link(settings: Settings) -> Connection:
 
     signing = open_signing(settings.signing_key)
     try:
-        return Connection(settings.endpoint, signing=signing)
+        return Connection(settings.endpoint, signing=signing, system_id=settings.system_id)
     except PortInUseError as error:
         if settings.connect is not None:
             raise
@@ -105,9 +132,11 @@ def open_link(settings: Settings) -> Connection:
         return Connection(other, signing=signing)
 
 
-def meet_vehicle(context: typer.Context, connect: str | None, timeout_s: float | None) -> Connection:
+def meet_vehicle(
+    context: typer.Context, connect: str | None, timeout_s: float | None, instance: int | None
+) -> Connection:
     """Open the link and wait for the vehicle; raise CliError."""
-    settings = settings_of(context).merged(connect, timeout_s)
+    settings = settings_of(context).merged(connect, timeout_s, instance)
     patience_s = settings.patience_s
     connection = open_link(settings)
     try:

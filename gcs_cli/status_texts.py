@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from flightstack.mavlink.text import clean
 from gcs_cli.view_types import TEXTS_KEPT, PartialText, StatusText, VehicleView
 
 PIECE_OCTETS = 50
@@ -38,7 +39,7 @@ def _shown(view: VehicleView) -> VehicleView:
     partial = view.partial_text
     if partial is None:
         return view
-    text = "".join(c for c in partial.octets.decode("utf-8", "replace") if c.isprintable())
+    text = clean(partial.octets.decode("utf-8", "replace"))
     entry = StatusText(view.text_count, partial.severity, text, partial.received_s, partial.vehicle_time_s)
     texts = (*view.texts, entry)[-TEXTS_KEPT:]
     return view._replace(texts=texts, text_count=view.text_count + 1, partial_text=None)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Set
 from flightstack.commands import VehicleContext
 from flightstack.ground.facts import AutopilotFacts
 from flightstack.ground.mission_service import MissionService
-from flightstack.ground.peer import API, Peer, PeerAddress
+from flightstack.ground.peer import API, TCP, Peer, PeerAddress
 from flightstack.ground.router import Router
 from flightstack.ground.service import Service
 from flightstack.ground.services import make_services
@@ -30,8 +30,6 @@ HEARTBEAT_S = 1.0
 PEER_FORGOTTEN_S = 30.0
 MAX_PEERS = 64
 """Peers that came by themselves; those addressed unasked, and TCP clients, have limits of their own."""
-GIVES_WAY_S = 5.0
-"""A peer silent for so long gives way to a new one when all places are taken: five heartbeats are missing."""
 FORWARDED_A_POLL = 64
 MAX_TO_FORWARD = 4096
 
@@ -77,7 +75,7 @@ class GroundHub:
         """Begin to talk to ``address``; a permanent one gets heartbeats before it was ever heard."""
         rates = API_RATES_HZ if address.channel == API else GROUND_RATES_HZ
         link = Link(*self._own, keeps_unknown=True, signing=link_signing(self._signing, address))
-        peer = Peer(link, Streams(rates), permanent)
+        peer = Peer(link, Streams(rates), permanent, address.channel == TCP)
         self._peers[address] = peer
         return peer
 
@@ -96,10 +94,10 @@ class GroundHub:
         self._peers.pop(address, None)
         self._router.forget(address)
 
-    def is_heard(self, address: PeerAddress) -> bool:
-        """Tell whether a valid message of ``address`` has come, not too long ago."""
+    def heard_s(self, address: PeerAddress) -> float:
+        """Return when the last valid message of ``address`` came; −inf if none did, or too long ago."""
         peer = self._peers.get(address)
-        return peer is not None and peer.heard
+        return -math.inf if peer is None else peer.heard_s
 
     def _peer_at(self, address: Hashable) -> Peer:
         """Find the peer that a service names: one that it heard, in the same call."""
@@ -114,7 +112,7 @@ class GroundHub:
             return
         self._forget_due_s = now_s + HEARTBEAT_S
         for address, peer in list(self._peers.items()):
-            if now_s - peer.heard_s > PEER_FORGOTTEN_S:
+            if now_s - peer.heard_s > PEER_FORGOTTEN_S and not peer.connected:
                 if peer.permanent:
                     peer.heard_s = -math.inf
                     self._router.forget(address)
@@ -122,25 +120,33 @@ class GroundHub:
                     self.drop_peer(address)
 
     def _admit(self, address: PeerAddress, data: bytes, now_s: float) -> Peer | None:
-        """Make a peer of a stranger who sends a valid frame, if there is room: noise takes no place."""
-        if not any(frame.known for frame in FrameReader().feed(data)):
+        """Add the sender of a valid frame, signed where a signature is required, if there is room."""
+        signing = link_signing(self._signing, address)
+        frames = [frame.data for frame in FrameReader().feed(data) if frame.known]
+        if not any(signing is None or signing.authenticates(frame) for frame in frames):
             return None
         passing = [(peer.heard_s, where) for where, peer in self._peers.items() if not peer.permanent]
         if len(passing) >= MAX_PEERS:
-            silent_s, silent = min(passing)
-            if now_s - silent_s < GIVES_WAY_S:
+            _, longest_silent = min(passing)
+            if not self._peers[longest_silent].is_silent(now_s):
                 return None
-            self.drop_peer(silent)
+            self.drop_peer(longest_silent)
         return self.add_peer(address)
 
     # ------------------------------------------------------------------ receiving
 
     def receive(self, address: PeerAddress, data: bytes, now_s: float) -> None:
-        """Take a datagram, or a piece of a stream; whatever it holds, nothing is raised."""
+        """Take a datagram, or a piece of a stream; whatever it holds, nothing is raised.
+
+        A message without the signature that the link requires (RADIO_STATUS may come so) has no effect: its
+        sender does not count as heard, and no route is learned from it.
+        """
         peer = self._peers.get(address) or self._admit(address, data, now_s)
         if peer is None:
             return
         for message in peer.link.decode(data):
+            if not peer.link.is_authentic(message):
+                continue
             if not is_unknown(message):
                 peer.heard_s = self.last_heard_s = now_s
             route = self._router.route(message, address, now_s)
@@ -172,14 +178,15 @@ class GroundHub:
                 frames = [peer.link.encode_shared(message) for message in self._due(peer, changed, now_s)]
                 for frame in frames:
                     yield address, frame
-        yield from self._forwarded()
+        yield from self._forwarded(now_s)
         self._forget_silent(now_s)
 
-    def _forwarded(self) -> Iterator[tuple[PeerAddress, bytes]]:
+    def _forwarded(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
         """Pass on what peers sent each other, so much at a time."""
         for _ in range(min(FORWARDED_A_POLL, len(self._to_forward))):
             address, frame = self._to_forward.popleft()
-            if address in self._peers:
+            peer = self._peers.get(address)
+            if peer is not None and peer.is_served(now_s):
                 yield address, frame
 
     def _make(self, message_id: int, facts: VehicleFacts) -> tuple[Message, ...]:
@@ -197,14 +204,14 @@ class GroundHub:
                 self._peers[address].outbox.append(message)
 
     def _due(self, peer: Peer, changed: bool, now_s: float) -> Iterator[Message]:
+        """Yield what ``peer`` is to get now: only heartbeats if it is silent, as the address of UDP may be forged."""
         if (peer.heard or peer.permanent) and (changed or now_s >= peer.heartbeat_due_s):
             peer.heartbeat_due_s = now_s + HEARTBEAT_S
             yield from self._make(mavlink.MAVLINK_MSG_ID_HEARTBEAT, self._facts)
-        if peer.outbox:
+        if peer.is_served(now_s):
             yield from peer.outbox
-            peer.outbox.clear()
-        if peer.heard:
             yield from peer.streams.due(self._facts, now_s, self._make)
+        peer.outbox.clear()
 
     def _note_changes(self) -> bool:
         """Announce reached items and another home; tell whether mode or arming changed."""

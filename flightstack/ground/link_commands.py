@@ -84,6 +84,8 @@ class LinkCommands:
         if number == mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA:
             peer.outbox.append(self._metadata.message(boot_ms(self._facts)))
             return Answer(ACCEPTED)
+        if number == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
+            peer.streams.add_standard_modes()
         if not is_available(number):
             return Answer(DENIED)  # without a text: ground stations ask each vehicle for gimbals and cameras
         peer.outbox.extend(messages(number, self._facts, argument))

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.link import SILENT_AFTER_S, Link, Message
 from flightstack.mavlink.streams import Streams
 
-GROUND, API = "ground", "api"
-"""The channels of ground stations and of companions; any other gets the rates of a ground station."""
+GROUND, API, TCP = "ground", "api", "tcp"
+"""The channels of ground stations, of companions, and of TCP clients, which get the rates of a ground station."""
 
 
 class PeerAddress(NamedTuple):
@@ -28,11 +28,21 @@ class Peer:
     link: Link
     streams: Streams
     permanent: bool
+    connected: bool = False
+    """Whether it has a TCP connection: its address cannot be forged, and it is there until the connection ends."""
     heard_s: float = -math.inf
     heartbeat_due_s: float = -math.inf
     outbox: list[Message] = field(default_factory=list)
 
     @property
     def heard(self) -> bool:
-        """Whether it has ever sent a valid message: only then telemetry is streamed to it."""
+        """Whether it has sent a valid message and is not forgotten since: only then it gets heartbeats unasked."""
         return self.heard_s > -math.inf
+
+    def is_silent(self, now_s: float) -> bool:
+        """Return True if nothing valid came for SILENT_AFTER_S."""
+        return now_s - self.heard_s > SILENT_AFTER_S
+
+    def is_served(self, now_s: float) -> bool:
+        """Return True if it gets more than heartbeats: it is not silent, or connected and heard once."""
+        return self.heard and (self.connected or not self.is_silent(now_s))

@@ -11,9 +11,13 @@ from fastcrc import crc16
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import MAGIC_V1, MAGIC_V2, Frame, FrameReader
 from flightstack.mavlink.signing import LinkSigning
+from flightstack.mavlink.text import clean_fields
 
 Message: TypeAlias = Any
 """A pymavlink message object."""
+
+SILENT_AFTER_S = 5.0
+"""A peer that sent nothing valid for so long counts as gone: five heartbeats are missing."""
 
 _HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, two flags, sequence, system, component, id (24 bits)
 _crc16 = crc16.mcrf4xx
@@ -75,6 +79,10 @@ class Link:
         self.sent += 1
         return self._outgoing(frame + crc.to_bytes(2, "little"), message)
 
+    def is_authentic(self, message: Message) -> bool:
+        """Return True if a decoded message carried the signature that this link requires, if any."""
+        return self._signing is None or self._signing.is_authentic(bytes(message.get_msgbuf()))
+
     @property
     def has_partial(self) -> bool:
         """Tell whether the decoder holds the beginning of a frame."""
@@ -83,7 +91,7 @@ class Link:
     def decode(self, data: bytes) -> Iterator[Message]:
         """Yield the messages that ``data`` completes; what is not a message is counted in ``bad``.
 
-        Each has its frame as it was received in ``get_msgbuf()``.
+        Each has its frame as it was received in ``get_msgbuf()``. Its texts are clean: they may be shown.
         """
         if self._is_one_frame(data):  # the usual datagram: no need to look for frames
             message = self._message(data)
@@ -113,6 +121,7 @@ class Link:
         except mavlink.MAVError:
             self.bad += 1
             return None
+        clean_fields(message)
         self.received += 1
         return message
 

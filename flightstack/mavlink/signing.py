@@ -26,8 +26,8 @@ EPOCH_UNIX_S = 1_420_070_400
 LARGEST_TIMESTAMP = 2**48 - 1
 NEW_STREAM_TICKS = 60 * TICKS_PER_S
 """A stream that was never heard may be so much behind our timestamp."""
-AHEAD_TICKS = 60 * TICKS_PER_S
-"""Timestamps are reserved for so long, so that no crash makes us use one twice."""
+KEEP_TICKS = 10 * TICKS_PER_S
+"""The latest timestamp is kept for the next start this often."""
 MAX_STREAMS = 1024
 """Only holders of the key open streams, but even they shall not fill the memory."""
 _ALWAYS_TAKEN = frozenset({int(mavlink.MAVLINK_MSG_ID_RADIO_STATUS)})
@@ -60,26 +60,26 @@ def timestamp_of(unix_s: float) -> int:
 class Signing:
     """The key, our timestamp, and the timestamps of all streams that were heard.
 
-    ``clock`` returns the time since the Unix epoch [s]. ``first`` is above every timestamp used before, and
-    ``reserve`` is called with a new one before any at or above the last reserved is used: it has to be on the
-    disk then. ``allow_unsigned``: take unsigned frames, but never wrongly signed ones.
+    ``clock`` returns the time since the Unix epoch [s]. ``latest`` is what ``keep`` was last called with, before
+    this start: timestamps begin above both. A crash followed by a clock that was set back makes at most
+    KEEP_TICKS of them repeat. ``allow_unsigned``: take unsigned frames, but never wrongly signed ones.
     """
 
     def __init__(
         self,
         key: bytes,
         clock: Callable[[], float],
-        first: int = 0,
-        reserve: Callable[[int], None] = lambda _limit: None,
+        latest: int = 0,
+        keep: Callable[[int], None] = lambda _latest: None,
         allow_unsigned: bool = False,
     ) -> None:
         self.allow_unsigned = allow_unsigned
         self.counts = Counts()
         self._clock = clock
-        self._reserve = reserve
+        self._keep = keep
         self._key = NO_KEY
-        self._timestamp = first
-        self._reserved = first
+        self._timestamp = latest
+        self._kept = latest
         self._streams: dict[bytes, int] = {}
         self.set_key(key)
 
@@ -108,17 +108,16 @@ class Signing:
         At the end of all timestamps, to which only a holder of the key can take us, the last one stays.
         """
         timestamp = min(max(self._timestamp + 1, timestamp_of(self._clock())), LARGEST_TIMESTAMP)
-        if timestamp >= self._reserved:
-            self._reserved = timestamp + AHEAD_TICKS
-            self._reserve(self._reserved)
         self._timestamp = timestamp
+        if timestamp >= self._kept + KEEP_TICKS:
+            self.close()
         return timestamp
 
     def close(self) -> None:
-        """Give back what was reserved and not used, at an orderly end."""
-        if self._reserved > self._timestamp + 1:
-            self._reserved = self._timestamp + 1
-            self._reserve(self._reserved)
+        """Keep the latest timestamp, at an orderly end."""
+        if self._timestamp > self._kept:
+            self._kept = self._timestamp
+            self._keep(self._kept)
 
     def sign(self, frame: bytes, crc_extra: int, link_id: int) -> bytes:
         """Return an unsigned MAVLink 2 frame as a signed one."""
@@ -136,28 +135,37 @@ class Signing:
         """
         if not self.is_on:
             return True
-        if frame[0] == MAGIC_V2 and frame[2] & _SIGNED:
-            outcome = self._check(frame)
+        if is_signed(frame):
+            outcome = self._judge(frame)
+            if outcome == "good":
+                timestamp = _timestamp_in(frame)
+                self._streams[_stream_of(frame)] = timestamp
+                self._timestamp = max(self._timestamp, timestamp)
         else:
             taken = trusted or self.allow_unsigned or _message_id(frame) in _ALWAYS_TAKEN
             outcome = "unsigned_taken" if taken else "unsigned_refused"
         self.counts = self.counts._replace(**{outcome: getattr(self.counts, outcome) + 1})
         return outcome in ("good", "unsigned_taken")
 
-    def _check(self, frame: bytes) -> str:
+    def authenticates(self, frame: bytes, trusted: bool = False) -> bool:
+        """Return True if ``frame`` proves that its sender may use the link; nothing is counted or remembered.
+
+        An unsigned RADIO_STATUS is accepted, but proves nothing.
+        """
+        if self.is_on and is_signed(frame):
+            return self._judge(frame) == "good"
+        return trusted or self.allow_unsigned or not self.is_on
+
+    def _judge(self, frame: bytes) -> str:
         """Return what to count a signed frame as."""
         if not hmac.compare_digest(self._signature(frame[:-6]), frame[-6:]):
             return "bad_signature"
-        timestamp = int.from_bytes(frame[-12:-6], "little")
-        stream = frame[5:7] + frame[-SIGNATURE_SIZE : -SIGNATURE_SIZE + 1]  # system, component, link
-        last = self._streams.get(stream)
+        timestamp, last = _timestamp_in(frame), self._streams.get(_stream_of(frame))
         if last is not None and timestamp <= last:
             return "replayed"
         now = max(self._timestamp, timestamp_of(self._clock()))
         if last is None and (timestamp + NEW_STREAM_TICKS < now or len(self._streams) >= MAX_STREAMS):
             return "too_old"
-        self._streams[stream] = timestamp
-        self._timestamp = max(self._timestamp, timestamp)
         return "good"
 
     def _signature(self, octets: bytes) -> bytes:
@@ -180,14 +188,36 @@ class LinkSigning(NamedTuple):
         """Tell whether a received frame may be used, and count it."""
         return self.signing.accepts(frame, self.trusted)
 
+    def authenticates(self, frame: bytes) -> bool:
+        """Return True if a received frame, not accepted yet, proves that its sender may use the link."""
+        return self.signing.authenticates(frame, self.trusted)
+
+    def is_authentic(self, frame: bytes) -> bool:
+        """Return True if a frame that was accepted had the signature that this link requires, if any."""
+        return is_signed(frame) or self.trusted or self.signing.allow_unsigned or not self.signing.is_on
+
 
 def without_signature(frame: bytes, crc_extra: int) -> bytes:
     """Return a frame without its signature, as it belongs into a log; an unsigned one stays as it is."""
-    if frame[0] != MAGIC_V2 or not frame[2] & _SIGNED:
+    if not is_signed(frame):
         return frame
     body = bytes((*frame[:2], frame[2] & ~_SIGNED)) + frame[3 : HEADER_V2 + frame[1]]
     checksum: int = _crc16(body[1:] + bytes((crc_extra,)))
     return body + checksum.to_bytes(2, "little")
+
+
+def is_signed(frame: bytes) -> bool:
+    """Return True if ``frame`` has a signature, right or wrong."""
+    return frame[0] == MAGIC_V2 and bool(frame[2] & _SIGNED)
+
+
+def _timestamp_in(frame: bytes) -> int:
+    return int.from_bytes(frame[-12:-6], "little")
+
+
+def _stream_of(frame: bytes) -> bytes:
+    """Return system, component and link id of a signed frame."""
+    return frame[5:7] + frame[-SIGNATURE_SIZE : -SIGNATURE_SIZE + 1]
 
 
 def _message_id(frame: bytes) -> int:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeAlias
 
-from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
+from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.telemetry import MAKERS, VehicleFacts, messages
 
@@ -19,7 +19,9 @@ M = mavlink
 LONGEST_INTERVAL_US = 2**31 - 1
 """What MESSAGE_INTERVAL can say."""
 
-# messages per second: PX4's defaults on its two links, in simulation, for what this vehicle has
+# messages per second: PX4's defaults on its two links, in simulation, for what this vehicle has. What pymavlink's
+# releases do not know (ESC_STATUS, CURRENT_MODE, AVAILABLE_MODES_MONITOR, our own dialect) is sent on request only:
+# MAVProxy and scripts count each message that they cannot decode as a lost packet.
 GROUND_RATES_HZ: dict[int, float] = {
     M.MAVLINK_MSG_ID_ATTITUDE: 50.0,
     M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50.0,
@@ -28,21 +30,22 @@ GROUND_RATES_HZ: dict[int, float] = {
     M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 50.0,
     M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
     M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 50.0,
-    EscStatus.id: 10.0,
     M.MAVLINK_MSG_ID_GPS_RAW_INT: 5.0,
     M.MAVLINK_MSG_ID_VFR_HUD: 4.0,
     M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
     M.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
-    FS_LOOP_TIMING_ID: 2.0,
     M.MAVLINK_MSG_ID_ALTITUDE: 1.0,
     M.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
     M.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
     M.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
     M.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 0.5,
+}
+STANDARD_MODES_RATES_HZ: dict[int, float] = {
     M.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
     M.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 0.3,
 }
+"""For clients that ask for AVAILABLE_MODES: they know the protocol of standard modes."""
 API_RATES_HZ: dict[int, float] = {
     **GROUND_RATES_HZ,
     M.MAVLINK_MSG_ID_ATTITUDE: 100.0,
@@ -63,10 +66,9 @@ GROUPS: dict[int, tuple[int, ...]] = {
         M.MAVLINK_MSG_ID_SYS_STATUS,
         M.MAVLINK_MSG_ID_MISSION_CURRENT,
         M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
-        M.MAVLINK_MSG_ID_CURRENT_MODE,
     ),
     M.MAV_DATA_STREAM_RC_CHANNELS: (M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,),
-    M.MAV_DATA_STREAM_RAW_CONTROLLER: (EscStatus.id, M.MAVLINK_MSG_ID_ATTITUDE_TARGET),
+    M.MAV_DATA_STREAM_RAW_CONTROLLER: (M.MAVLINK_MSG_ID_ATTITUDE_TARGET,),
     M.MAV_DATA_STREAM_POSITION: (
         M.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
         M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
@@ -133,6 +135,12 @@ class Streams:
             self._streams[message_id] = _Stream(message_id, interval_us * 1e-6)
         self._soonest_s = -math.inf
         return True
+
+    def add_standard_modes(self) -> None:
+        """Send the messages of STANDARD_MODES_RATES_HZ, at their rates unless another one was set."""
+        for message_id, rate_hz in STANDARD_MODES_RATES_HZ.items():
+            if message_id not in self._streams:
+                self.set_interval(message_id, 1e6 / rate_hz)
 
     def set_group(self, group: int, rate_hz: float) -> None:
         """Set the rate of a MAV_DATA_STREAM group as REQUEST_DATA_STREAM says; 0 stops it."""

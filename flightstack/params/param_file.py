@@ -53,6 +53,11 @@ def format_params(lines: Iterable[ParamLine], system_id: int = 1) -> str:
     return "\n".join([*head, *rows, _END]) + "\n"
 
 
+def is_parameter_name(name: str) -> bool:
+    """Return True if a parameter may have this name, and a file hold it."""
+    return re.fullmatch(rf"[A-Za-z0-9_]{{1,{LARGEST_NAME}}}", name) is not None
+
+
 def parse_params(text: str, file: object) -> list[ParamLine]:
     """Read the text of a parameter file; raise ConfigError with ``file`` and line."""
     lines: dict[str, ParamLine] = {}
@@ -87,7 +92,7 @@ def _parse_row(row: str, file: object, number: int) -> ParamLine:
         raise error(f"vehicle {vehicle[:20]!r} and component {component[:20]!r} must be numbers")
     if int(component) != _AUTOPILOT:
         raise error(f"{name} belongs to component {component}, not to the autopilot, {_AUTOPILOT}")
-    if not re.fullmatch(rf"[A-Za-z0-9_]{{1,{LARGEST_NAME}}}", name):
+    if not is_parameter_name(name):
         raise error(f"{name[:40]!r} is no name of a parameter")
     if not kind.isdecimal() or int(kind) not in (*_INTEGER_TYPES, *_FLOAT_TYPES):
         raise error(f"{name}: {kind[:20]!r} is no MAV_PARAM_TYPE of a number")

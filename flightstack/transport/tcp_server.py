@@ -2,19 +2,23 @@
 
 What a client does not read is kept up to ``MAX_UNSENT`` octets; beyond, whole frames are dropped, so that its
 stream never holds half of one. A client that takes nothing for ``STALLED_S`` is closed: it is gone, or as good
-as gone. The kernel's own buffer is kept small: telemetry that is older than a second helps nobody.
+as gone. When all places are taken, a client that sent no valid MAVLink for ``SILENT_AFTER_S``, or none at all,
+gives way to a new one; the others stay. The kernel's own buffer is kept small: telemetry that is older than a
+second helps nobody.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import math
 import select
 import socket
 import struct
 import time
 from collections.abc import Callable, Iterator
 
+from flightstack.mavlink.link import SILENT_AFTER_S
 from flightstack.transport.udp import Address, PortBusyError
 
 MAX_CLIENTS = 64
@@ -45,7 +49,6 @@ class _Client:
         self.unsent = bytearray()
         self.moved_s = now_s
         """When the kernel last took something, or nothing waited."""
-        self.silent = True
 
 
 class TcpServer:
@@ -94,20 +97,24 @@ class TcpServer:
     # ------------------------------------------------------------------ receiving
 
     def receive(
-        self, filenos: list[int], wants: Callable[[Address], bool] = lambda _: True
+        self,
+        filenos: list[int],
+        heard_s: Callable[[Address], float] = lambda _: -math.inf,
+        wants: Callable[[Address], bool] = lambda _: True,
     ) -> Iterator[tuple[Address, bytes]]:
         """Accept clients, and yield a piece of each whose descriptor is among ``filenos`` and whom ``wants`` names.
 
-        What is not read stays in the kernel, and its sender has to wait.
+        ``heard_s`` tells when a client sent its last valid message, by our clock; −inf if it sent none. What is
+        not read stays in the kernel, and its sender has to wait.
         """
         for fileno in filenos:
             address = self._by_fileno.get(fileno)
-            if fileno == self._listener.fileno():
-                self._accept()
-            elif address is not None and wants(address):
+            if address is not None and wants(address):
                 data = self._read(address)
                 if data:
                     yield address, data
+        if self._listener.fileno() in filenos:
+            self._accept(heard_s)
 
     def _read(self, address: Address) -> bytes | None:
         client = self._clients[address]
@@ -120,16 +127,15 @@ class TcpServer:
         if not data:
             self._drop(address)
             return None
-        client.silent = False
         return data
 
-    def _accept(self) -> None:
+    def _accept(self, heard_s: Callable[[Address], float]) -> None:
         for _ in range(_ACCEPTED_AT_ONCE):
             try:
                 connection, peer = self._listener.accept()
             except OSError:  # nobody more, or gone before we came, or no descriptor left: later
                 return
-            if len(self._clients) >= MAX_CLIENTS and not self._make_room():
+            if len(self._clients) >= MAX_CLIENTS and not self._make_room(heard_s):
                 connection.close()
                 continue
             address = (str(peer[0]), int(peer[1]))
@@ -139,13 +145,13 @@ class TcpServer:
                 poller.register(connection, select.POLLIN)
             self._opened.append(address)
 
-    def _make_room(self) -> bool:
-        """Close the oldest client that never said anything; return whether there was one."""
-        for address, client in self._clients.items():
-            if client.silent:
-                self._drop(address)
-                return True
-        return False
+    def _make_room(self, heard_s: Callable[[Address], float]) -> bool:
+        """Close the client that is silent for longest, the oldest of those never heard; False if none is silent."""
+        longest_silent = min(self._clients, key=heard_s)
+        if self._now_s() - heard_s(longest_silent) <= SILENT_AFTER_S:
+            return False
+        self._drop(longest_silent)
+        return True
 
     # ------------------------------------------------------------------ sending
 

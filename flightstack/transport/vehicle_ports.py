@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import ipaddress
+import math
 import select
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from flightstack.port_numbers import vehicle_api_port, vehicle_ground_port
 from flightstack.transport.fair_queue import FairQueue
 from flightstack.transport.tcp_server import TcpServer
 from flightstack.transport.udp import Address, PortBusyError, UdpSocket
 
 GROUND, API, TCP = "ground", "api", "tcp"
-GROUND_LOCAL_PORT, API_LOCAL_PORT, TCP_PORT = 18570, 14580, 5760
-TCP_PORT_STEP = 10
 LOOPBACK = "127.0.0.1"
 OCTETS_A_POLL = 4096
 """Handed out in one poll, all peers together: a millisecond of work at worst, 400 kB/s in real time."""
@@ -22,11 +22,6 @@ LARGEST_DATAGRAM = 2048
 
 Place = tuple[str, Address]
 """A channel, and an address on it."""
-
-
-def tcp_port(instance: int) -> int:
-    """Return the usual TCP port of a vehicle."""
-    return TCP_PORT + TCP_PORT_STEP * instance
 
 
 def is_loopback(host: str) -> bool:
@@ -39,15 +34,15 @@ class PortsConfig:
     """Where the vehicle listens and whom it addresses unasked. Hosts are IPv4 addresses."""
 
     instance: int
-    ground_stations: tuple[Address, ...] = ((LOOPBACK, 14550),)
-    api_client: Address = (LOOPBACK, 14540)
+    ground_stations: tuple[Address, ...]
+    api_client: Address
     listen: str = LOOPBACK
     tcp_port: int = 0
     """0: no TCP."""
 
 
 class VehiclePorts:
-    """Two UDP sockets, bound to 18570 and 14580, each plus the instance, and a TCP server."""
+    """Two UDP sockets, for ground stations and for companions, and a TCP server."""
 
     def __init__(self, config: PortsConfig) -> None:
         """Bind all; raise PortBusyError."""
@@ -56,8 +51,8 @@ class VehiclePorts:
         self._tcp: TcpServer | None = None
         self._queue: FairQueue[Place] = FairQueue()
         try:
-            for channel, port in ((GROUND, GROUND_LOCAL_PORT), (API, API_LOCAL_PORT)):
-                self._sockets[channel] = UdpSocket(config.listen, port + config.instance, LARGEST_DATAGRAM)
+            for channel, port in ((GROUND, vehicle_ground_port), (API, vehicle_api_port)):
+                self._sockets[channel] = UdpSocket(config.listen, port(config.instance), LARGEST_DATAGRAM)
                 self._poller.register(self._sockets[channel], select.POLLIN)
             if config.tcp_port:
                 self._tcp = TcpServer(config.listen, config.tcp_port, self._poller)
@@ -69,26 +64,33 @@ class VehiclePorts:
         """Those whom the vehicle addresses unasked."""
 
     def receive(
-        self, is_known: Callable[[Place], bool] = lambda _: False, octets: int = OCTETS_A_POLL
+        self, heard_s: Callable[[Place], float] = lambda _: -math.inf, octets: int = OCTETS_A_POLL
     ) -> Iterator[tuple[str, Address, bytes]]:
         """Yield pieces (channel, peer, data) of what is here, ``octets`` in all, peer by peer in turns.
 
-        ``is_known`` tells from whom a valid message has come: strangers have to share what is left to them.
+        ``heard_s`` tells when the last valid message came from a place (−inf: none did). Places that were never
+        heard share a limited number of turns, and a TCP client that is silent gives way to a new one.
         """
         filenos = [fileno for fileno, _ in self._poller.poll(0)]
         if filenos:
-            self._collect(filenos, is_known)
+            self._collect(filenos, heard_s)
         for (channel, peer), data in self._queue.take(octets):
             yield channel, peer, data
 
-    def _collect(self, filenos: list[int], is_known: Callable[[Place], bool]) -> None:
+    def _collect(self, filenos: list[int], heard_s: Callable[[Place], float]) -> None:
         """Move what is here into the queue: a UDP socket is shared by peers, and so by those who flood it."""
+
+        def is_known(place: Place) -> bool:
+            return heard_s(place) > -math.inf
+
         for channel, udp in self._sockets.items():
             if udp.fileno() in filenos:
                 for data, peer in udp.receive():
                     self._queue.push((channel, peer), data, is_known)
         if self._tcp is not None:
-            for peer, data in self._tcp.receive(filenos, lambda peer: (TCP, peer) not in self._queue):
+            for peer, data in self._tcp.receive(
+                filenos, lambda peer: heard_s((TCP, peer)), lambda peer: (TCP, peer) not in self._queue
+            ):
                 self._queue.push((TCP, peer), data, lambda _: True)
 
     def opened(self) -> list[Place]:

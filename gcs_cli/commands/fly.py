@@ -53,7 +53,9 @@ def fly(
         typer.Option("--out", "-o", help="Directory of the results.  [default: runs/<stamp>-<plan>]"),
     ] = None,
     vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
-    instance: Annotated[int, typer.Option(help="Shifts all ports, to fly beside another one.")] = 0,
+    instance: Annotated[
+        int | None, typer.Option(metavar="N", help="Shifts all ports, to fly beside another one.")
+    ] = None,
     ideal_rotors: Annotated[
         bool, typer.Option("--ideal-rotors", help="Rotors without limits, lag and spin-up torque.")
     ] = False,
@@ -76,12 +78,12 @@ def fly(
     from gcs_cli.fly_run import write_results  # noqa: PLC0415
     from gcs_cli.run_directory import REPORT_NAME  # noqa: PLC0415
 
-    settings = settings_of(context).merged(None, timeout)
+    settings = settings_of(context).merged(None, timeout, instance)
     if settings.connect is not None:
         raise CliError("fly starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
     options = FlyOptions(
         plan, controller, gains, plant, speed, inner_hz, outer_hz, seed, wind, gust, torque_gust, vehicle,
-        instance, ideal_rotors, 180.0 if settings.timeout_s is None else settings.timeout_s, limit,
+        settings.instance or 0, ideal_rotors, 180.0 if settings.timeout_s is None else settings.timeout_s, limit,
         battery_start, battery_capacity, battery_drain, tuple(fault or ()), params, loops,
     )  # fmt: skip
     items = checked_plan(options)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcs_cli.errors import FAILED, USAGE, CliError
-from gcs_cli.settings import ConnectOption, JsonOption, TimeoutOption, meet_vehicle
+from gcs_cli.settings import ConnectOption, InstanceOption, JsonOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
     from flightstack.mavlink.services.log_client import LogEntry
@@ -28,11 +28,12 @@ def list_logs(
     as_json: JsonOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """List the logs, the oldest first."""
     from gcs_cli import log_calls  # noqa: PLC0415
 
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         logs = log_calls.fetch_list(connection)
         files = log_calls.fetch_files(connection) if logs else ()
     named = [(log, log_calls.file_of(log, logs, files)) for log in logs]
@@ -61,6 +62,7 @@ def download(
     ] = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Fetch a log, or all of them."""
     from gcs_cli import log_calls  # noqa: PLC0415
@@ -68,7 +70,7 @@ def download(
     number = _number(log_id)
     if everything and log_id != "latest":
         raise CliError("give either a log or --all", USAGE)
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         logs = log_calls.fetch_list(connection)
         if not logs:
             raise CliError("the vehicle has no logs")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcs_cli.settings import ConnectOption, TimeoutOption, meet_vehicle
+from gcs_cli.settings import ConnectOption, InstanceOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
     from flightstack.plan import MissionItem
@@ -34,6 +34,7 @@ def upload(
     file: FileArgument,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Replace the vehicle's plans by those of a file.
 
@@ -46,7 +47,7 @@ def upload(
     plan = load_plan(file)
     parts = [part for part in plan_parts(plan) if part.items or part.kind == 0]
     done: list[str] = []
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         for part in parts:
             name = f"upload of the {part.name} of {file}" if len(parts) > 1 else f"upload of {file}"
             if done:
@@ -85,6 +86,7 @@ def download(
     ] = None,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Fetch the vehicle's mission, geofence and rally points."""
     from flightstack.geodesy import GeoPoint  # noqa: PLC0415
@@ -92,7 +94,7 @@ def download(
     from gcs_cli import calls  # noqa: PLC0415
     from gcs_cli.plan_parts import plan_parts  # noqa: PLC0415
 
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         session = connection.session
         items, fence, rally = (
             connection.complete(
@@ -121,6 +123,7 @@ def clear(
     part: Annotated[Part, typer.Option("--type", help="What to remove.")] = Part.MISSION,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Remove the vehicle's mission, geofence or rally points."""
     from flightstack.plan import MissionType  # noqa: PLC0415
@@ -133,18 +136,23 @@ def clear(
         Part.ALL: "mission, geofence and rally points",
     }
     said = name.get(part, "mission")
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         connection.complete(calls.clear(connection.session, kind), f"clearing the {said}")
     typer.echo(f"{said} cleared")
 
 
 @app.command()
-def start(context: typer.Context, connect: ConnectOption = None, timeout: TimeoutOption = None) -> None:
+def start(
+    context: typer.Context,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
+) -> None:
     """Start the mission; the vehicle arms for it."""
     from gcs_cli import calls  # noqa: PLC0415
     from gcs_cli.commands.actions import order  # noqa: PLC0415
 
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         order(connection, calls.START_MISSION, "mission start")
     typer.echo("mission started")
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcs_cli.errors import FAILED, USAGE, CliError
-from gcs_cli.settings import ConnectOption, JsonOption, TimeoutOption, meet_vehicle
+from gcs_cli.settings import ConnectOption, InstanceOption, JsonOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -38,12 +38,13 @@ def list_parameters(
     as_json: JsonOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """List the parameters; those that are not at their default stand out."""
     from gcs_cli import param_calls  # noqa: PLC0415
     from gcs_cli.param_table import matching  # noqa: PLC0415
 
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         found = matching(param_calls.fetch_all(connection), pattern)
         infos = param_calls.fetch_metadata(connection) if found else {}
     if not found:
@@ -58,13 +59,14 @@ def get(
     as_json: JsonOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Show one parameter."""
     from gcs_cli import param_calls  # noqa: PLC0415
     from gcs_cli.param_info import UNKNOWN  # noqa: PLC0415
     from gcs_cli.param_table import description, facts  # noqa: PLC0415
 
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         told = param_calls.fetch(connection, name.upper())
         infos = param_calls.fetch_metadata(connection)
     if as_json:
@@ -80,6 +82,7 @@ def set_parameter(
     value: Annotated[str, typer.Argument(metavar="VALUE", show_default=False)],
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Set a parameter."""
     from gcs_cli import param_calls  # noqa: PLC0415
@@ -87,7 +90,7 @@ def set_parameter(
     from gcs_cli.param_table import change_line  # noqa: PLC0415
 
     number = _number(value)
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         before = param_calls.fetch(connection, name.upper())
         after = param_calls.change(connection, name.upper(), number)
         infos = param_calls.fetch_metadata(connection)
@@ -101,11 +104,12 @@ def reset(
     everything: Annotated[bool, typer.Option("--all", help="All parameters.")] = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Give parameters their defaults back."""
     if bool(names) == everything:
         raise CliError("reset: expected names of parameters, or --all", USAGE)
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         if everything:
             _reset_all(connection)
         else:
@@ -118,16 +122,22 @@ def save(
     file: Annotated[Path, typer.Argument(help="Where to write them.", show_default=False)],
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Write all parameters to a file, as QGroundControl does."""
     from flightstack.atomic_file import write_text_atomically  # noqa: PLC0415
+    from flightstack.params.param_file import is_parameter_name  # noqa: PLC0415
     from gcs_cli import param_calls  # noqa: PLC0415
     from gcs_cli.param_file import render_parameters  # noqa: PLC0415
 
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         told = param_calls.fetch_all(connection)
-        write_text_atomically(file, render_parameters(told, *connection.session.target))
-    typer.echo(f"{len(told)} parameters saved to {file}")
+        kept = [parameter for parameter in told if is_parameter_name(parameter.name)]
+        write_text_atomically(file, render_parameters(kept, *connection.session.target))
+    typer.echo(f"{len(kept)} parameters saved to {file}")
+    if len(kept) < len(told):
+        names = ", ".join(parameter.name for parameter in told if parameter not in kept)
+        typer.echo(f"gcs: left out, as no parameter can have this name: {names}", err=True)
 
 
 @app.command()
@@ -138,13 +148,14 @@ def load(
     ],
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Set the parameters that a file has; the others stay as they are."""
     from gcs_cli import param_calls  # noqa: PLC0415
     from gcs_cli.param_file import load_parameters  # noqa: PLC0415
 
     wanted = load_parameters(file)
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         present = {told.name: told for told in param_calls.fetch_all(connection)}
         failures: list[str] = []
         changed = 0
@@ -176,6 +187,7 @@ def diff(
     as_json: JsonOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Show what differs from the defaults, or from a file."""
     from gcs_cli import param_calls  # noqa: PLC0415
@@ -184,7 +196,7 @@ def diff(
     from gcs_cli.param_table import is_changed  # noqa: PLC0415
 
     wanted = None if file is None else load_parameters(file)
-    with meet_vehicle(context, connect, timeout) as connection:
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         told = param_calls.fetch_all(connection)
         infos = param_calls.fetch_metadata(connection)
     if wanted is not None:  # the file takes the place of the defaults

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcs_cli.errors import NO_ANSWER, CliError
-from gcs_cli.settings import ConnectOption, JsonOption, TimeoutOption, meet_vehicle, settings_of
+from gcs_cli.settings import (
+    ConnectOption,
+    InstanceOption,
+    JsonOption,
+    TimeoutOption,
+    meet_vehicle,
+    settings_of,
+)
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -24,10 +31,14 @@ def perf(
     as_json: JsonOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Show the timing of the flight stack's loops."""
-    patience_s = settings_of(context).merged(connect, timeout).patience_s
-    with meet_vehicle(context, connect, timeout) as connection:
+    from gcs_cli.subscription import LOOP_TIMING  # noqa: PLC0415
+
+    patience_s = settings_of(context).merged(connect, timeout, instance).patience_s
+    with meet_vehicle(context, connect, timeout, instance) as connection:
+        connection.session.subscribe(LOOP_TIMING)
         timing = next_timing(connection, None, patience_s)
         _show(timing, as_json)
         try:

@@ -70,7 +70,9 @@ def fly(
         bool, typer.Option("--ideal-rotors", help="Rotors without limits, lag and spin-up torque.")
     ] = False,
     params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None,
-    instance: Annotated[int, typer.Option(help="Shifts all ports, to fly beside another one.")] = 0,
+    instance: Annotated[
+        int | None, typer.Option(metavar="N", help="Shifts all ports, to fly beside another one.")
+    ] = None,
     out: OutOption = None,
     fail_over: FailOverOption = False,
     open_report: OpenOption = False,
@@ -87,12 +89,12 @@ def fly(
     from gcs_cli.pil.run import run  # noqa: PLC0415
     from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
 
-    settings = settings_of(context).merged(None, timeout)
+    settings = settings_of(context).merged(None, timeout, instance)
     if settings.connect is not None:
         raise CliError("pil starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
     options = FlyOptions(
         plan, controller, gains, plant, inner_hz=inner_hz, outer_hz=outer_hz, seed=seed, wind=wind, gust=gust,
-        vehicle=vehicle, instance=instance, ideal_rotors=ideal_rotors, params=params, limit_s=limit,
+        vehicle=vehicle, instance=settings.instance or 0, ideal_rotors=ideal_rotors, params=params, limit_s=limit,
         timeout_s=180.0 if settings.timeout_s is None else settings.timeout_s,
     )  # fmt: skip
     checked_target(target)

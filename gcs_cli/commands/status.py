@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from gcs_cli.settings import ConnectOption, JsonOption, TimeoutOption, meet_vehicle
+from gcs_cli.settings import ConnectOption, InstanceOption, JsonOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
     from gcs_cli.view_types import VehicleView
@@ -21,10 +21,14 @@ def status(
     as_json: JsonOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
 ) -> None:
     """Show how the vehicle is."""
-    with meet_vehicle(context, connect, timeout) as connection:
+    from gcs_cli.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
+
+    with meet_vehicle(context, connect, timeout, instance) as connection:
         session = connection.session
+        session.subscribe(ROTORS_AND_TIMING)
         # most of what is shown comes several times a second; what the vehicle does not send stays unknown
         connection.wait_for(lambda: _is_full(session.view), GATHER_S)
         view = session.view
@@ -37,7 +41,14 @@ def status(
 
 
 def _is_full(view: VehicleView) -> bool:
-    known = (view.attitude, view.position_ned_m, view.geo, view.mission.current, view.timing)
+    known = (
+        view.attitude,
+        view.position_ned_m,
+        view.geo,
+        view.mission.current,
+        view.timing,
+        view.rotor_rpm or None,
+    )
     return all(part is not None for part in known) and view.landed_state != 0
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from gcs_cli.settings import ConnectOption, TimeoutOption, open_link, settings_of
+from gcs_cli.settings import ConnectOption, InstanceOption, TimeoutOption, open_link, settings_of
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -19,10 +19,18 @@ FRAME_S = 0.125
 LINE_S = 1.0
 
 
-def watch(context: typer.Context, connect: ConnectOption = None, timeout: TimeoutOption = None) -> None:
+def watch(
+    context: typer.Context,
+    connect: ConnectOption = None,
+    timeout: TimeoutOption = None,
+    instance: InstanceOption = None,
+) -> None:
     """Watch the vehicle; q or Ctrl-C ends."""
-    settings = settings_of(context).merged(connect, timeout)
+    from gcs_cli.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
+
+    settings = settings_of(context).merged(connect, timeout, instance)
     with open_link(settings) as connection:
+        connection.session.subscribe(ROTORS_AND_TIMING)
         try:
             if _draws():
                 watch_screen(connection)

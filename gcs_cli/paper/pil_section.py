@@ -22,7 +22,7 @@ from flightstack.geodesy import LocalFrame
 from flightstack.plan import Command, Frame, MissionItem, Plan, save_plan
 from flightstack.transport.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.fly_options import DEFAULT_HOME, MOST_INSTANCES, FlyOptions, check_ports, checked_plan
+from gcs_cli.fly_options import DEFAULT_HOME, FlyOptions, check_ports, checked_plan
 from gcs_cli.paper.trajectory import Trajectory, load_trajectory, sample
 from gcs_cli.pil.run import JSON_NAME, Finished
 from gcs_cli.pil.run import run as run_pil
@@ -184,7 +184,7 @@ def _fly(
 
 def _free_instance() -> int:
     """Return an instance whose ports nobody uses: no flight of the user's is disturbed."""
-    for instance in range(_FIRST_INSTANCE, MOST_INSTANCES):
+    for instance in range(_FIRST_INSTANCE, _FIRST_INSTANCE + 10):
         options = FlyOptions(Path(), instance=instance)
         try:
             check_ports(options)

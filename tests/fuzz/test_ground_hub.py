@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -114,6 +116,8 @@ def test_what_is_not_for_the_vehicle_or_not_signed_changes_no_bit_of_its_flight(
             data = inputs.datagram() if signed else noise_for_others(inputs)
             noisy.stack.ground.receive(address(inputs.random.randrange(9)), data, noisy._link_now_s())
     assert quiet.altitude > 1.0
+    if signed:
+        assert noisy.stack.ground.addresses() == quiet.stack.ground.addresses()
     assert flight_content(noisy) == flight_content(quiet)
 
 
@@ -174,8 +178,8 @@ def test_the_work_is_bounded_by_the_size_of_what_arrives(data: bytes) -> None:
     hub.receive(address(1), Link(255, 190).encode(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)), 0.0)
     assert calls(lambda: hub.receive(address(1), data, 0.0)) < CALLS_PER_OCTET * len(data)
     assert calls(lambda: hub.receive(address(2), data, 0.0)) < CALLS_PER_OCTET * len(data)
-    assert hub.is_heard(address(1))
-    assert not hub.is_heard(address(2))
+    assert hub.heard_s(address(1)) == 0.0
+    assert hub.heard_s(address(2)) == -math.inf
 
 
 def test_one_message_asks_for_a_bounded_answer() -> None:

@@ -26,13 +26,14 @@ LONG = [b"\xfd" * 65_000, b"\xfe" * 65_000, b"\xfe\x00" * 30_000, b"\xfd\xff\x00
 
 
 def show(session: Session, now_s: float) -> None:
-    """Draw and write the view, at all three sizes."""
+    """Draw and write the view, at all three sizes; nothing that a terminal obeys comes out."""
     for width, height in ((40, 10), (90, 30), (200, 60)):
         console = Console(file=io.StringIO(), width=width, height=height)
         console.print(render(session.view, now_s, width, height))
-    state_line(session.view, now_s)
-    for text in session.view.texts:
-        text_line(text)
+        assert isinstance(console.file, io.StringIO)
+        assert console.file.getvalue().replace("\n", "").isprintable()
+    assert state_line(session.view, now_s).isprintable()
+    assert all(text_line(text).isprintable() for text in session.view.texts)
 
 
 @pytest.mark.parametrize("make", SERVICES)

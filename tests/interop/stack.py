@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flightstack.port_numbers import api_client_port, ground_station_port, tcp_port
 from tests.support.free_instance import free_instance
 from tests.support.process import Process
 
@@ -17,14 +18,14 @@ class RealVehicle:
         """Start both; ``directory`` takes logs and parameters, ``options`` go to ``flightstack``."""
         self.speed = speed
         self.instance = free_instance()
-        self.api_port = 14540 + self.instance
-        self.gcs_port = 14550 + 10 * self.instance
-        self.tcp_port = 5760 + 10 * self.instance
+        self.api_port = api_client_port(self.instance)
+        self.gcs_port = ground_station_port(self.instance)
+        self.tcp_port = tcp_port(self.instance)
         self.log = directory / "flight.ulg"
         number = ("--instance", str(self.instance))
         self.simulator = Process("sim_bridge", *number, "--speed", str(speed))
         self.stack = Process(
-            "flightstack", *number, "--gcs-port", str(self.gcs_port), "--log", str(self.log),
+            "flightstack", *number, "--log", str(self.log),
             "--params", str(directory / "vehicle.params"), *options,
         )  # fmt: skip
         try:

@@ -177,3 +177,8 @@ def test_it_reads_parameters_one_by_one_over_udp(station_vehicle: RealVehicle, t
     finally:
         proxy.kill()
     assert proxy.complaints() == []
+
+
+def test_it_counts_no_packet_as_lost(proxy: MavProxy) -> None:
+    """It counts each message that it cannot decode."""
+    proxy.tell("link", " 0 lost, 0.0% loss")

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.port_numbers import ground_station_port, simulator_port, vehicle_ground_port
 from gcs_cli.processes import Child, Children
 from tests.support.free_instance import free_instance
 from tests.support.gcs import gcs
@@ -157,9 +158,9 @@ def test_a_flight_is_never_overwritten(tmp_path: Path) -> None:
     assert (tmp_path / "flight.ulg").read_bytes() == b"precious"
 
 
-@pytest.mark.parametrize(("kind", "base", "step"), [("UDP", 14550, 10), ("UDP", 18570, 1), ("TCP", 4560, 1)])
-def test_a_busy_port_is_named_and_nothing_is_started(tmp_path: Path, kind: str, base: int, step: int) -> None:
-    port = base + step * INSTANCE
+@pytest.mark.parametrize("number", [ground_station_port, vehicle_ground_port, simulator_port])
+def test_a_busy_port_is_named_and_nothing_is_started(tmp_path: Path, number: Callable[[int], int]) -> None:
+    port, kind = number(INSTANCE), "TCP" if number is simulator_port else "UDP"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if kind == "UDP" else socket.SOCK_STREAM) as taken:
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # past links of the port are no matter
         taken.bind(("127.0.0.1", port))

@@ -10,7 +10,7 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.transport.vehicle_ports import tcp_port
+from flightstack.port_numbers import tcp_port
 from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from pyulog import ULog
 
+from flightstack.port_numbers import ground_station_port
 from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process
 from tests.support.world import World
@@ -73,7 +74,7 @@ def test_the_same_flight_gives_the_same_log_at_any_speed_and_in_one_process(tmp_
 def flying(start: Start, tmp_path: Path) -> dict[str, Process]:
     """Three processes in the middle of a mission, started one by one as in three terminals."""
     instance = free_instance()
-    port = 14550 + 10 * instance
+    port = ground_station_port(instance)
     processes = {
         "simulator": start("sim_bridge", "--instance", str(instance), "--speed", "2"),
         "stack": start(
@@ -168,7 +169,7 @@ def test_bad_arguments_are_one_sentence_and_exit_2(start: Start, arguments: list
 def test_real_time_clock_flies_with_a_simulator_that_does_not_wait(start: Start, tmp_path: Path) -> None:
     log = tmp_path / "flight.ulg"
     instance = free_instance()
-    port = 14550 + 10 * instance
+    port = ground_station_port(instance)
     start("sim_bridge", "--instance", str(instance))
     stack = start(
         "flightstack",

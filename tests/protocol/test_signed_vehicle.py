@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import pytest
 from pymavlink.dialects.v20 import common
 
+from flightstack.ground.hub import MAX_PEERS
 from flightstack.ground.peer import GROUND, PeerAddress
 from flightstack.mavlink.signing import NO_KEY, Signing, timestamp_of
 from tests.support.world import World
@@ -60,6 +61,7 @@ class SignedVehicle(NamedTuple):
     signing: Signing
     stored: list[bytes]
     """Keys that were kept for the next start."""
+    heard_before_s: float
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +74,7 @@ def vehicle(shared: World) -> SignedVehicle:
     """The vehicle on the ground, with a key and no peers."""
     for address in list(shared.stack.ground._peers):
         shared.stack.ground.drop_peer(address)
-    signed = SignedVehicle(shared, Signing(KEY, lambda: NOW_S), [])
+    signed = SignedVehicle(shared, Signing(KEY, lambda: NOW_S), [], shared.stack.ground.last_heard_s)
     shared.stack.ground.use_signing(signed.signing, signed.stored.append)
     return signed
 
@@ -92,6 +94,60 @@ def test_who_does_not_sign_with_the_key_is_not_heard(vehicle: SignedVehicle, key
     set_frame = station.frame(common.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 9.0, 9))
     station.send(set_frame)
     assert vehicle.world.stack.params.value("MIS_TAKEOFF_ALT") != 9.0
+
+
+RADIO_STATUS = common.MAVLink_radio_status_message(1, 2, 3, 4, 5, 6, 7)
+
+
+def test_an_unsigned_radio_status_admits_no_peer(vehicle: SignedVehicle) -> None:
+    radio = Station(vehicle, None, ELSEWHERE, system=51)
+    assert radio.ask(RADIO_STATUS) == []
+    assert vehicle.world.stack.ground.addresses() == []
+    assert vehicle.world.stack.ground.last_heard_s == vehicle.heard_before_s
+
+
+def test_an_unsigned_radio_status_does_not_keep_a_peer_alive(vehicle: SignedVehicle) -> None:
+    """It may come from anywhere with the address of a peer, which would be streamed to for ever."""
+    station = Station(vehicle, KEY)
+    station.ask(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    radio = Station(vehicle, None, system=51)
+    radio.address = station.address
+    for _ in range(8):
+        station.send(radio.frame(RADIO_STATUS))
+    answers = station.send(radio.frame(RADIO_STATUS))
+    assert {message.get_type() for message in answers} == {"HEARTBEAT"}
+
+
+def test_an_unsigned_radio_status_teaches_no_route(vehicle: SignedVehicle) -> None:
+    station, other = Station(vehicle, KEY), Station(vehicle, KEY, system=77)
+    other.ask(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    station.ask(common.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+    radio = Station(vehicle, None, system=51)
+    other.send(radio.frame(RADIO_STATUS))
+    command = station.frame(common.MAVLink_param_request_list_message(51, 0))
+    station.hub.receive(station.address, command, station.now_s)
+    assert command not in [data for _, data in station.hub.poll(station.now_s)]
+
+
+def test_unsigned_strangers_take_no_peer_slot(vehicle: SignedVehicle) -> None:
+    for system in range(1, MAX_PEERS + 10):
+        station = Station(vehicle, None, ELSEWHERE, system=system)
+        station.send(station.frame(RADIO_STATUS), station.frame(REQUEST_LIST))
+    assert vehicle.world.stack.ground.addresses() == []
+    assert of_type(Station(vehicle, KEY).ask(REQUEST_LIST), "PARAM_VALUE") != []
+
+
+def test_a_replay_from_another_address_takes_no_peer_slot(vehicle: SignedVehicle) -> None:
+    station = Station(vehicle, KEY)
+    frame = station.frame(REQUEST_LIST)
+    station.send(frame)
+    Station(vehicle, KEY, ELSEWHERE, system=77).send(frame)
+    assert [address for address, _ in vehicle.world.stack.ground.addresses()] == [station.address]
+
+
+def test_where_unsigned_is_allowed_it_admits_a_peer(vehicle: SignedVehicle) -> None:
+    vehicle.signing.allow_unsigned = True
+    assert of_type(Station(vehicle, None).ask(REQUEST_LIST), "PARAM_VALUE") != []
 
 
 def test_a_heard_command_cannot_be_sent_again_from_another_port(vehicle: SignedVehicle) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
 from flightstack.transport.udp import UdpSocket
 
-ARM, START, SHUT_DOWN, REQUEST, RETURN = 400, 300, 246, 512, 20
+ARM, START, SHUT_DOWN, REQUEST, RETURN, SET_INTERVAL = 400, 300, 246, 512, 20, 511
 HOLD, MISSION, RTL = (4 << 16 | sub << 24 for sub in (3, 4, 5))
 ACCEPTED, REJECTED, UNSUPPORTED = 0, 1, 3
 STEP_S = 0.05
@@ -55,6 +55,7 @@ class FakeVehicle:
         self._type = 0
         self.commands: list[tuple[int, tuple[float, ...]]] = []
         self.heard: list[str] = []
+        self.asked: set[int] = set()
         self.armed = self.silent = self.powered_off = self.complete = False
         self.mode, self.current, self.time_s = HOLD, 0, 0.0
         self._uploading: list[Any] = []
@@ -102,6 +103,11 @@ class FakeVehicle:
             self._become(mode=RTL)
         elif command == SHUT_DOWN:
             self.powered_off = True
+        elif command == SET_INTERVAL:
+            if params[0] not in self._on_request():
+                return UNSUPPORTED
+            self.asked.add(int(params[0]))
+            self._out.append(self._on_request()[int(params[0])])
         elif command not in (21, 22, 176):
             return UNSUPPORTED
         return ACCEPTED
@@ -243,9 +249,6 @@ class FakeVehicle:
 
     def _telemetry(self) -> list[Any]:
         ms = int(self.time_s * 1e3)
-        timing = FsLoopTiming(
-            ms * 1000, ms // 2, 3, 0, 500.0, 100.0, 52.5, 12.0, 20.0, 90.0, 0.0, 0.0, 0.0, 0
-        )
         return [
             mavlink.MAVLink_attitude_message(ms, 0.1, -0.05, 1.5, 0.0, 0.0, 0.0),
             mavlink.MAVLink_local_position_ned_message(ms, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0),
@@ -257,9 +260,17 @@ class FakeVehicle:
             ),
             mavlink.MAVLink_extended_sys_state_message(0, 2 if self.armed else 1),
             self._mission_current(),
-            EscStatus(0, ms * 1000, [2310, 2290, 2305, 2400], [0.0] * 4, [0.0] * 4),
-            timing,
+            *(message for number, message in self._on_request().items() if number in self.asked),
         ]
+
+    def _on_request(self) -> dict[int, Any]:
+        """What is streamed only when it was asked for, by message id."""
+        ms = int(self.time_s * 1e3)
+        timing = FsLoopTiming(
+            ms * 1000, ms // 2, 3, 0, 500.0, 100.0, 52.5, 12.0, 20.0, 90.0, 0.0, 0.0, 0.0, 0
+        )
+        esc = EscStatus(0, ms * 1000, [2310, 2290, 2305, 2400], [0.0] * 4, [0.0] * 4)
+        return {timing.id: timing, esc.id: esc}
 
 
 @contextmanager

@@ -54,7 +54,7 @@ class ParamVehicle(FakeVehicle):
         return super().poll(now_s)
 
     def _is_integer(self, name: str) -> bool:
-        return self._about[name]["type"] == "Int32"
+        return self._about.get(name, {}).get("type") == "Int32"
 
     def _tell(self, name: str) -> None:
         value, kind = self.values[name], REAL32

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from gcs_cli.endpoint import vehicle_connection
 from tests.support.free_instance import free_instance
 
 LONG_S = 60.0
@@ -27,7 +28,7 @@ class VehicleProcesses:
     @property
     def link(self) -> str:
         """What ``gcs --connect`` needs."""
-        return f"udpout:127.0.0.1:{18570 + self.instance}"
+        return vehicle_connection(self.instance)
 
 
 @contextlib.contextmanager
@@ -47,8 +48,7 @@ def vehicle(
             return process
 
         simulator = run("sim_bridge", "--speed", speed) if with_simulator else None
-        options = ("--gcs-port", 14550 + 200 + instance, *arguments)
-        stack = run("flightstack", *options)
+        stack = run("flightstack", *arguments)
         assert stack.stdout is not None
         assert stack.stdout.readline(), "flightstack ended at its start"
         yield VehicleProcesses(instance, simulator, stack, folder)

@@ -91,7 +91,7 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
         ({"battery_start": 101.0}, "--battery-start 101.0: expected a number"),
         ({"battery_capacity": 0.0}, "--battery-capacity 0.0: expected a number"),
         ({"battery_drain": math.nan}, "--battery-drain nan: expected a number"),
-        ({"instance": 100}, "--instance 100: expected a number from 0 to 99"),
+        ({"instance": 250}, "--instance 250: expected a number from 0 to 249"),
         ({"limit_s": float("nan")}, "--limit nan"),
         ({"timeout_s": 0.0}, "--timeout 0.0"),
     ],
@@ -234,7 +234,7 @@ def test_the_children_are_told_everything() -> None:
     assert stack_arguments(options, home, Path("runs/x")) == [
         "--vehicle=x_quad", "--controller=backstepping", "--gains=paper", "--loops=c",
         "--inner-hz=1000.0", "--outer-hz=250.0", "--sim-port=4562", "--sim-timeout=12",
-        "--instance=2", "--gcs-port=14570", "--log=runs/x/flight.ulg",
+        "--instance=2", "--gcs-port=14552", "--log=runs/x/flight.ulg",
         "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--params=none",
         "--wait-for-start", "--ideal-rotors",
     ]  # fmt: skip

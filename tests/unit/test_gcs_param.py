@@ -39,6 +39,29 @@ def vehicle() -> ParamVehicle:
 # ---------------------------------------------------------------------- commands
 
 
+EVIL_NAMES = {"\x1b[2J": 1.0, "A\tB\nC": 2.0, "X\x07\x08\rY": 3.0, "[red]R[/]": 4.0, "\x7f\x00Z": 5.0}
+
+
+def test_names_from_the_vehicle_cannot_command_the_terminal(vehicle: ParamVehicle) -> None:
+    vehicle.values.update(EVIL_NAMES)
+    for words in (["list"], ["list", "--json"], ["diff"], ["diff", "--json"]):
+        result = told(vehicle, *words)
+        assert result.returncode == 0, result.stderr
+        assert all(line.isprintable() for line in result.stdout.splitlines())
+    names = {entry["name"] for entry in json.loads(told(vehicle, "list", "--json").stdout)}
+    assert names > {"�[2J", "A B C", "X�� Y", "[red]R[/]", "�"}
+    assert "[red]R[/]" in told(vehicle, "list").stdout
+
+
+def test_names_from_the_vehicle_cannot_add_lines_to_a_file(vehicle: ParamVehicle, tmp_path: Path) -> None:
+    vehicle.values.update({**EVIL_NAMES, "A\t9\t9\n1\t1\tB": 6.0})
+    result = told(vehicle, "save", tmp_path / "saved.params")
+    assert result.stdout == f"3 parameters saved to {tmp_path / 'saved.params'}\n"
+    assert result.stderr.startswith("gcs: left out, as no parameter can have this name: ")
+    assert result.stderr.rstrip("\n").isprintable()
+    assert set(load_parameters(tmp_path / "saved.params")) == {"MPC_XY_CRUISE", "MPC_YAW_MODE", "ROLL_P"}
+
+
 def test_the_list_shows_value_unit_range_and_help(vehicle: ParamVehicle) -> None:
     result = told(vehicle, "list")
     assert (result.stderr, result.returncode) == ("", 0)

@@ -67,6 +67,32 @@ def test_a_vehicle_that_fell_silent_gives_way_to_the_next() -> None:
     assert session.view.last_heartbeat_s == 5.1
 
 
+def test_a_called_vehicle_is_not_replaced_by_another_peer() -> None:
+    """Another vehicle may still send to the port, which an earlier program had."""
+    session = met(Session(peer=HERE), FakeVehicle(2), THERE)
+    assert (session.target, session.peer) == ((0, 0), HERE)
+    met(session, FakeVehicle(1))
+    met(session, FakeVehicle(2), THERE, 6.0)
+    assert (session.target, session.peer) == ((1, 1), HERE)
+
+
+def test_only_the_named_system_is_taken_for_the_vehicle() -> None:
+    session = met(Session(system_id=1), FakeVehicle(2), THERE)
+    assert (session.target, session.foreign_systems) == ((0, 0), {2})
+    met(session, FakeVehicle(1), HERE, 0.1)
+    assert (session.target, session.peer) == ((1, 1), HERE)
+
+
+def test_a_vehicle_that_was_met_is_not_replaced_when_it_falls_silent() -> None:
+    """A request under way would take the answers of the next vehicle for its own."""
+    session = met(Session(), FakeVehicle(1))
+    session.keep_vehicle()
+    met(session, FakeVehicle(2), THERE, 6.0)
+    assert session.target == (1, 1)
+    met(session, FakeVehicle(1), THERE, 7.0)
+    assert (session.target, session.peer) == ((1, 1), THERE)
+
+
 def test_a_vehicle_that_comes_back_from_another_port_is_the_same() -> None:
     session = met(Session(), FakeVehicle(1))
     texts_before = session.view.link.received

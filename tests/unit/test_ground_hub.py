@@ -7,12 +7,13 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega
 
 from flightstack.assembly import build
 from flightstack.config import StackConfig
 from flightstack.ground.hub import MAX_PEERS
 from flightstack.ground.peer import GROUND, PeerAddress
-from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.modes import Mode
 from flightstack.snapshot import NOTICE
@@ -157,7 +158,36 @@ def test_an_unheard_permanent_peer_gets_heartbeats_only(net: Net) -> None:
     assert len(station.inbox) == pytest.approx(10, abs=1)
     station.heartbeat()
     net.run(1.0)
-    assert {"ATTITUDE", "SYS_STATUS", "ESC_STATUS"} <= {message.get_type() for message in station.inbox}
+    assert {"ATTITUDE", "SYS_STATUS", "VFR_HUD"} <= {message.get_type() for message in station.inbox}
+
+
+@pytest.mark.parametrize("address", [ALICE, BOB], ids=["ground station", "companion"])
+def test_nothing_is_sent_unasked_that_pymavlink_cannot_decode(net: Net, address: PeerAddress) -> None:
+    """MAVProxy counts such messages as lost. Its own requests change nothing: all streams, at 4 Hz."""
+    station = net.join(address)
+    net.run(4.5)
+    station.send(mavlink.MAVLink_request_data_stream_message(7, 1, 0, 4, 1))
+    net.run(4.5)
+    kinds = {message.get_type() for message in station.inbox}
+    assert len(kinds) > 15
+    assert kinds <= {kind.msgname for kind in ardupilotmega.mavlink_map.values()}
+
+
+def test_loop_timing_is_sent_to_the_peer_that_asks_for_it(net: Net) -> None:
+    alice, bob = net.join(ALICE), net.join(BOB)
+    alice.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, FS_LOOP_TIMING_ID, 500_000)
+    net.run(4.0)
+    assert len(alice.take("FS_LOOP_TIMING")) == 8
+    assert bob.take("FS_LOOP_TIMING") == []
+
+
+def test_a_client_that_asks_for_modes_is_told_of_their_changes(net: Net) -> None:
+    alice, bob = net.join(ALICE), net.join(BOB)
+    assert alice.ask(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES) == ACCEPTED
+    net.run(4.0)
+    for kind in ("CURRENT_MODE", "AVAILABLE_MODES_MONITOR"):
+        assert len(alice.take(kind)) >= 2
+        assert bob.take(kind) == []
 
 
 def test_an_unknown_sender_of_junk_gets_nothing_and_is_forgotten(net: Net) -> None:

@@ -9,11 +9,12 @@ import pytest
 
 from flightstack.assembly import build
 from flightstack.config import StackConfig
-from flightstack.ground.hub import FORWARDED_A_POLL, GIVES_WAY_S, MAX_PEERS, PEER_FORGOTTEN_S
+from flightstack.ground.hub import FORWARDED_A_POLL, MAX_PEERS, PEER_FORGOTTEN_S
 from flightstack.ground.peer import GROUND, PeerAddress
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link
+from flightstack.mavlink.link import SILENT_AFTER_S, Link
 from flightstack.reboot import carry_over
+from flightstack.snapshot import NOTICE
 from tests.unit.test_ground_hub import ALICE, BOB, Net
 
 CAMERA = PeerAddress("tcp", "camera", 3)
@@ -87,20 +88,64 @@ def test_new_peers_take_the_place_of_silent_ones_and_never_of_one_that_is_heard(
     station = net.join(ALICE)
     for number in range(MAX_PEERS - 1):
         net.join(address(number))
-    net.run(GIVES_WAY_S + 0.5)
+    net.run(SILENT_AFTER_S + 0.5)
     station.heartbeat()
     for number in range(1000, 1000 + 2 * MAX_PEERS):  # somebody opens port after port
         net.join(address(number))
-    assert net.hub.is_heard(ALICE)
-    assert net.hub.is_heard(address(1000))
+    assert net.hub.heard_s(ALICE) > -math.inf
+    assert net.hub.heard_s(address(1000)) > -math.inf
     assert len(net.hub._peers) == MAX_PEERS
+
+
+def test_a_silent_peer_gets_heartbeats_only(net: Net) -> None:
+    """One forged datagram draws telemetry for five seconds, not for half a minute."""
+    alice, bob = net.join(ALICE), net.join(BOB, system=251)
+    net.run(SILENT_AFTER_S)
+    bob.heartbeat()
+    assert len(alice.take("ATTITUDE")) > 200
+    net.autopilot.say(NOTICE, "for those present")
+    alice.frames.clear()
+    alice.inbox.clear()
+    for _ in range(3):
+        net.run(SILENT_AFTER_S)
+        bob.heartbeat()  # passed on to those that are not silent
+    assert {message.get_type() for message in alice.inbox} == {"HEARTBEAT"}
+    assert sum(map(len, alice.frames)) < 16 * 21 + 1
+    assert len(bob.take("ATTITUDE")) > 900
+
+
+def test_a_silent_peer_that_speaks_again_gets_its_streams_back(net: Net) -> None:
+    alice = net.join(ALICE)
+    alice.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_ATTITUDE, 500_000)
+    net.run(2.0 * SILENT_AFTER_S)
+    alice.inbox.clear()
+    alice.heartbeat()
+    net.run(4.0)
+    assert len(alice.take("ATTITUDE")) == 8
+
+
+def test_a_silent_tcp_client_keeps_its_streams(net: Net) -> None:
+    """Scripts that only read are common; the address of a connection cannot be forged."""
+    camera = net.join(CAMERA)
+    net.run(2.0 * PEER_FORGOTTEN_S, step_s=0.1)
+    camera.inbox.clear()
+    net.run(1.0)
+    assert len(camera.take("ATTITUDE")) == pytest.approx(50, abs=1)
+
+
+def test_a_peer_with_heartbeats_at_one_hertz_keeps_its_streams(net: Net) -> None:
+    alice = net.join(ALICE)
+    for _ in range(20):
+        net.run(1.0)
+        alice.heartbeat()
+    assert len(alice.take("ATTITUDE")) == 1000
 
 
 def test_peers_that_are_addressed_unasked_take_no_place_from_others(net: Net) -> None:
     for number in range(MAX_PEERS):
         net.hub.add_peer(PeerAddress("tcp", "silent", number), permanent=True)
     net.join(ALICE)
-    assert net.hub.is_heard(ALICE)
+    assert net.hub.heard_s(ALICE) > -math.inf
 
 
 def test_a_poll_may_be_taken_in_parts_while_messages_arrive(net: Net) -> None:

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import common
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import (
-    AHEAD_TICKS,
+    KEEP_TICKS,
     LARGEST_TIMESTAMP,
     MAX_STREAMS,
     NEW_STREAM_TICKS,
@@ -137,7 +137,7 @@ def test_a_signature_is_pymavlinks_octet_by_octet(key: bytes, link_id: int, time
     expected = packed(codec, text("same"))
     codec.signing.sign_outgoing, codec.seq = False, 0
     unsigned = packed(codec, text("same"))
-    ours = Signing(key, Clock(0.0), first=timestamp - 1)
+    ours = Signing(key, Clock(0.0), latest=timestamp - 1)
     assert ours.sign(unsigned, common.MAVLink_statustext_message.crc_extra, link_id) == expected
 
 
@@ -273,37 +273,54 @@ def test_a_heard_timestamp_takes_ours_along() -> None:
 
 
 @settings(derandomize=True, deadline=None)
-@given(st.lists(st.tuples(st.floats(-5.0, 70.0), st.integers(0, 9_000_000), st.booleans()), max_size=30))
-def test_no_crash_makes_us_use_a_timestamp_twice(steps: list[tuple[float, int, bool]]) -> None:
-    """Frames sent and heard, a clock that jumps, and crashes and orderly ends at any time."""
+@given(st.lists(st.tuples(st.floats(0.0, 70.0), st.integers(0, 9_000_000), st.booleans()), max_size=30))
+def test_timestamps_rise_over_orderly_ends(steps: list[tuple[float, int, bool]]) -> None:
+    """Frames sent and heard, a clock that is set back now and then, and starts anew."""
     disk, used, clock = [0], [], Clock()
 
     def start() -> Signing:
-        return Signing(KEY, clock, disk[0], lambda limit: disk.__setitem__(0, limit))
+        return Signing(KEY, clock, disk[0], lambda latest: disk.__setitem__(0, latest))
 
     own = start()
-    for seconds, heard_ahead, crashes in steps:
-        clock.now_s += seconds
+    for seconds, heard_ahead, ends in steps:
+        clock.now_s += seconds - 20.0
         if heard_ahead % 2:
             ahead = max(own.timestamp, timestamp_of(clock.now_s)) + heard_ahead
             own.accepts(packed(peer(timestamp=ahead, link_id=len(used) % 256)))
         used.append(own.next_timestamp())
-        assert used[-1] < disk[0]  # it was on the disk before it was used
-        if crashes:
-            own = start()
-        elif heard_ahead % 3 == 0:
+        if ends:
             own.close()
             own = start()
     assert used == sorted(set(used))
 
 
-def test_an_orderly_end_gives_back_what_was_reserved() -> None:
+@settings(derandomize=True, deadline=None)
+@given(st.lists(st.tuples(st.floats(1e-4, 70.0), st.booleans()), max_size=30))
+def test_timestamps_follow_the_clock_over_crashes(steps: list[tuple[float, bool]]) -> None:
+    disk, clock = [0], Clock()
+
+    def start() -> Signing:
+        return Signing(KEY, clock, disk[0], lambda latest: disk.__setitem__(0, latest))
+
+    own = start()
+    for seconds, crashes in steps:
+        clock.now_s += seconds
+        assert own.next_timestamp() == timestamp_of(clock.now_s)
+        assert timestamp_of(clock.now_s) - disk[0] < KEEP_TICKS
+        if crashes:
+            own = start()
+
+
+def test_an_orderly_end_keeps_the_latest_timestamp() -> None:
     kept: list[int] = []
-    own = Signing(KEY, Clock(), reserve=kept.append)
+    clock = Clock()
+    own = Signing(KEY, clock, keep=kept.append)
+    own.next_timestamp()
+    clock.now_s += 1.0
     own.next_timestamp()
     own.close()
     own.close()
-    assert kept == [NOW + AHEAD_TICKS, NOW + 1]
+    assert kept == [NOW, NOW + TICKS_PER_S]
 
 
 def test_the_last_timestamp_of_all_is_no_end() -> None:

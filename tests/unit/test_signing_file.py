@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Hashable
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -12,9 +15,9 @@ import pytest
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.signing_setup import SigningSetup
-from flightstack.mavlink.signing import AHEAD_TICKS, NO_KEY, Signing
+from flightstack.mavlink.signing import KEEP_TICKS, NO_KEY, Signing, timestamp_of
 from flightstack.params.errors import ConfigError
-from flightstack.signing_file import create_key, load_key, open_signing, replace_key
+from flightstack.signing_file import create_key, load_key, open_shared_signing, open_signing, replace_key
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))
 
@@ -72,13 +75,65 @@ def test_timestamps_go_on_after_a_crash_and_after_an_orderly_end(key_file: Path)
     first = open_signing(key_file, "vehicle")
     used = first.next_timestamp()
     second = open_signing(key_file, "vehicle")  # the first one crashed
-    assert used < second.next_timestamp() <= used + AHEAD_TICKS + 100_000_000
+    assert used < second.next_timestamp() <= timestamp_of(time.time())
     second.close()
     third = open_signing(key_file, "vehicle")
     assert third.next_timestamp() > second.timestamp
     timestamps = key_file.with_name("vehicle.key.vehicle.timestamp")
     assert timestamps.stat().st_mode & 0o777 == 0o600
     assert sorted(path.name for path in key_file.parent.iterdir()) == [key_file.name, timestamps.name]
+
+
+def test_timestamps_of_processes_that_share_a_key_stay_with_the_clock(key_file: Path) -> None:
+    """Each run took a minute in advance, until the vehicle refused all: two minutes after three runs."""
+    long_lived = open_shared_signing(key_file, "gcs").signing
+    used = [long_lived.next_timestamp()]
+    for _ in range(5):
+        before = timestamp_of(time.time())
+        one, other = (open_shared_signing(key_file, "gcs").signing for _ in range(2))
+        used += [one.next_timestamp(), other.next_timestamp()]
+        assert before <= used[-2] <= timestamp_of(time.time()) + len(used)
+        one.close()
+    assert long_lived.next_timestamp() <= timestamp_of(time.time()) + len(used)
+
+
+def test_a_kept_timestamp_never_goes_back(key_file: Path) -> None:
+    """A process that ends late keeps the timestamp of another one that was ahead."""
+    first, second = (open_shared_signing(key_file, "gcs").signing for _ in range(2))
+    first.next_timestamp()
+    second.set_key(KEY, timestamp_of(time.time()) + 50)
+    second.close()
+    first.close()
+    assert open_shared_signing(key_file, "gcs").signing.timestamp == second.timestamp
+
+
+def test_a_timestamp_ahead_of_the_clock_is_restored(key_file: Path) -> None:
+    ahead = timestamp_of(time.time()) + 10**7
+    key_file.with_name("vehicle.key.gcs.timestamp").write_text(f"{ahead}\n")
+    assert open_shared_signing(key_file, "gcs").signing.next_timestamp() == ahead + 1
+
+
+def test_processes_that_share_a_key_have_different_link_ids(key_file: Path) -> None:
+    program = (
+        "import sys; from pathlib import Path; from flightstack.signing_file import open_shared_signing\n"
+        "link = open_shared_signing(Path(sys.argv[1]), 'gcs'); print(link.link_id, flush=True); sys.stdin.read()"
+    )
+    taken = sorted({0, 100, 255})
+    with ExitStack() as running:
+        found = []
+        for number in (*taken, taken[0]):
+            command = [
+                sys.executable,
+                "-c",
+                f"import secrets; secrets.randbelow = lambda _: {number}\n{program}",
+            ]
+            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+            process = running.enter_context(subprocess.Popen([*command, str(key_file)], **pipes))
+            assert process.stdin is not None
+            assert process.stdout is not None
+            running.callback(process.stdin.close)
+            found.append(int(process.stdout.readline()))
+    assert found == [*taken, 1]
 
 
 def test_two_processes_with_one_key_do_not_share_a_timestamp(key_file: Path) -> None:
@@ -100,9 +155,9 @@ def test_a_disk_that_fails_in_flight_is_told_once(key_file: Path, capsys: pytest
     (key_file.parent / "vehicle.key.vehicle.timestamp").unlink()
     (key_file.parent / "vehicle.key.vehicle.timestamp").mkdir()  # no file can take its place
     signing.next_timestamp()
-    signing.set_key(KEY, signing.timestamp + 2 * AHEAD_TICKS)
+    signing.set_key(KEY, signing.timestamp + 2 * KEEP_TICKS)
     signing.next_timestamp()
-    assert capsys.readouterr().err.count("after a crash, wait a minute") == 1
+    assert capsys.readouterr().err.count("after a crash, signed messages may be refused") == 1
 
 
 # ---------------------------------------------------------------------- SETUP_SIGNING

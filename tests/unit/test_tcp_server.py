@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import select
 import socket
 import struct
@@ -11,7 +12,7 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import FrameReader
-from flightstack.mavlink.link import Link
+from flightstack.mavlink.link import SILENT_AFTER_S, Link
 from flightstack.transport.tcp_server import MAX_CLIENTS, MAX_UNSENT, STALLED_S, TcpServer
 from flightstack.transport.udp import Address, PortBusyError
 
@@ -27,6 +28,7 @@ class Server:
         self.now_s = 0.0
         self.tcp = TcpServer("127.0.0.1", 0, self.poller, lambda: self.now_s)
         self.clients: list[socket.socket] = []
+        self.heard_s: dict[Address, float] = {}
 
     def connect(self) -> socket.socket:
         client = socket.create_connection(self.tcp.address, timeout=10.0)
@@ -34,7 +36,10 @@ class Server:
         return client
 
     def step(self, wait_ms: int = 0) -> list[tuple[Address, bytes]]:
-        return list(self.tcp.receive([fileno for fileno, _ in self.poller.poll(wait_ms)]))
+        return list(self.tcp.receive([fileno for fileno, _ in self.poller.poll(wait_ms)], self.heard))
+
+    def heard(self, address: Address) -> float:
+        return self.heard_s.get(address, -math.inf)
 
     def until(self, done: Callable[[], bool]) -> list[tuple[Address, bytes]]:
         """Step whenever a socket is ready, until ``done``; a socket that never becomes ready fails the test."""
@@ -42,7 +47,7 @@ class Server:
         while not done():
             ready = self.poller.poll(WAIT_MS)
             assert ready, "nothing arrived"
-            received += self.tcp.receive([fileno for fileno, _ in ready])
+            received += self.tcp.receive([fileno for fileno, _ in ready], self.heard)
         return received
 
     def joined(self) -> tuple[socket.socket, Address]:
@@ -184,23 +189,38 @@ def test_a_thousand_connections_leave_nothing_behind(server: Server) -> None:
     assert len(server.tcp) == len(server.tcp._by_fileno) == 0
 
 
-def test_when_all_places_are_taken_the_oldest_silent_client_gives_way(server: Server) -> None:
+def test_a_client_that_never_spoke_mavlink_gives_way_to_a_new_one(server: Server) -> None:
+    """Its octets do not count: the hub judges what is valid."""
     speaker, first = server.joined()
-    speaker.sendall(FRAME)
-    server.until(lambda: not server.tcp._clients[first].silent)
-    others = [server.joined()[1] for _ in range(MAX_CLIENTS - 1)]
+    server.heard_s[first] = server.now_s
+    others = []
+    for _ in range(MAX_CLIENTS - 1):
+        client, address = server.joined()
+        client.sendall(b"x")
+        others.append(address)
     latest = server.connect()
     server.until(lambda: latest.getsockname() in server.tcp._clients)
     assert server.tcp.closed() == [others[0]]
     assert len(server.tcp) == MAX_CLIENTS
-    assert first in server.tcp._clients
+    speaker.sendall(FRAME)
+    assert (first, FRAME) in server.step(WAIT_MS)
 
 
-def test_when_all_clients_speak_a_new_one_is_turned_away(server: Server) -> None:
-    for _ in range(MAX_CLIENTS):
-        client, address = server.joined()
-        client.sendall(FRAME)
-        server.until(lambda address=address: not server.tcp._clients[address].silent)
+def test_the_client_silent_for_longest_gives_way_to_a_new_one(server: Server) -> None:
+    addresses = [server.joined()[1] for _ in range(MAX_CLIENTS)]
+    server.now_s = 2.0 * SILENT_AFTER_S
+    server.heard_s = dict.fromkeys(addresses, server.now_s)
+    server.heard_s[addresses[7]] = 0.1
+    server.heard_s[addresses[9]] = 0.2
+    latest = server.connect()
+    server.until(lambda: latest.getsockname() in server.tcp._clients)
+    assert server.tcp.closed() == [addresses[7]]
+
+
+def test_a_live_client_never_gives_way_to_a_new_one(server: Server) -> None:
+    addresses = [server.joined()[1] for _ in range(MAX_CLIENTS)]
+    server.now_s = SILENT_AFTER_S
+    server.heard_s = dict.fromkeys(addresses, 0.0)
     late = server.connect()
     server.step(WAIT_MS)
     assert late.recv(10) == b""
@@ -208,11 +228,20 @@ def test_when_all_clients_speak_a_new_one_is_turned_away(server: Server) -> None
     assert server.tcp.closed() == []
 
 
+def test_a_hundred_idle_connections_do_not_lock_out_a_client(server: Server) -> None:
+    for _ in range(100):
+        server.connect().sendall(b"\xfd")
+        server.step(WAIT_MS)
+    client = server.connect()
+    server.until(lambda: client.getsockname() in server.tcp._clients)
+    assert len(server.tcp) == MAX_CLIENTS
+
+
 def test_what_is_not_wanted_now_stays_with_its_sender(server: Server) -> None:
     client, address = server.joined()
     client.sendall(FRAME)
     ready = [fileno for fileno, _ in server.poller.poll(WAIT_MS)]
-    assert list(server.tcp.receive(ready, lambda _: False)) == []
+    assert list(server.tcp.receive(ready, wants=lambda _: False)) == []
     assert list(server.tcp.receive(ready)) == [(address, FRAME)]
 
 

@@ -25,6 +25,7 @@ from flightstack.mavlink.services.ftp_messages import (
 )
 from flightstack.mavlink.services.missing import MAX_SIZE, Missing
 from flightstack.mavlink.services.virtual_files import Entry
+from flightstack.mavlink.text import clean
 
 RETRY_S = 0.3
 """Silence after which a request is sent again, until answers have shown how long they take."""
@@ -308,8 +309,8 @@ def _entries(lines: list[bytes]) -> Iterator[Entry]:
     for line in lines:
         kind, text = line[:1], line[1:].decode(errors="replace")
         if kind == b"D":
-            yield Entry(text, None)
+            yield Entry(clean(text), None)
         elif kind == b"F":
             fields = text.split("\t")
             size = fields[1] if len(fields) > 1 else ""
-            yield Entry(fields[0], int(size) if size.isascii() and size.isdecimal() else 0)
+            yield Entry(clean(fields[0]), int(size) if size.isascii() and size.isdecimal() else 0)

@@ -105,7 +105,7 @@ class ParamServer:
             return
         if name not in self._index:
             self._refuse(message, peer, DOES_NOT_EXIST)
-            self._explain(f"Parameter {_printable(name)} refused: there is no such parameter", now_s)
+            self._explain(f"Parameter {name} refused: there is no such parameter", now_s)
             return
         value = self._value_of(message)
         if value is None:
@@ -194,7 +194,3 @@ class ParamServer:
         if self._errors or self._answers:
             return -math.inf
         return self._next_step_s if self._changed or self._lists else None
-
-
-def _printable(name: str) -> str:
-    return "".join(letter if letter.isprintable() else "?" for letter in name)

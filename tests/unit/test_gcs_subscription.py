@@ -1,0 +1,69 @@
+"""Streams that the ground station asks for: once, again when they stop, and never again when they are refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, FsLoopTiming, mavlink
+from gcs_cli.subscription import RENEW_S, RETRY_S, ROTORS_AND_TIMING, Subscription
+
+VEHICLE = (7, 1)
+SET_INTERVAL = int(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
+TIMING = FsLoopTiming(0, 0, 0, 0, *[0.0] * 9, 0)
+
+
+def ack(result: int) -> Any:
+    return mavlink.MAVLink_command_ack_message(SET_INTERVAL, result)
+
+
+def asked(subscription: Subscription, now_s: float) -> list[tuple[int, int, float]]:
+    return [(m.target_system, int(m.param1), m.param2) for m in subscription.poll(now_s)]
+
+
+@pytest.fixture
+def subscription() -> Subscription:
+    return Subscription(lambda: VEHICLE, ROTORS_AND_TIMING)
+
+
+def test_a_subscription_asks_for_one_stream_after_the_other(subscription: Subscription) -> None:
+    assert asked(subscription, 0.0) == [(7, FS_LOOP_TIMING_ID, 500_000.0)]
+    assert asked(subscription, 0.1) == []
+    subscription.receive(ack(0), 0.2)
+    assert asked(subscription, 0.2) == [(7, EscStatus.id, 100_000.0)]
+
+
+def test_a_request_without_an_answer_is_repeated(subscription: Subscription) -> None:
+    asked(subscription, 0.0)
+    assert subscription.next_deadline() == RETRY_S
+    assert asked(subscription, RETRY_S) == [(7, FS_LOOP_TIMING_ID, 500_000.0)]
+
+
+def test_a_stream_that_stops_is_asked_for_again(subscription: Subscription) -> None:
+    for _ in range(2):
+        asked(subscription, 0.0)
+        subscription.receive(ack(0), 0.0)
+    subscription.receive(TIMING, 1.0)
+    assert asked(subscription, RENEW_S) == [(7, EscStatus.id, 100_000.0)]
+    subscription.receive(ack(0), RENEW_S)
+    assert asked(subscription, 1.0 + RENEW_S) == [(7, FS_LOOP_TIMING_ID, 500_000.0)]
+
+
+def test_a_refused_stream_is_not_asked_for_again(subscription: Subscription) -> None:
+    for _ in range(2):
+        asked(subscription, 0.0)
+        subscription.receive(ack(mavlink.MAV_RESULT_UNSUPPORTED), 0.0)
+    assert asked(subscription, 1e6) == []
+    assert subscription.next_deadline() is None
+
+
+def test_another_vehicle_is_asked_anew() -> None:
+    vehicle = [(0, 0)]
+    subscription = Subscription(lambda: vehicle[0], {FS_LOOP_TIMING_ID: 2.0})
+    assert (asked(subscription, 0.0), subscription.next_deadline()) == ([], None)
+    vehicle[0] = VEHICLE
+    assert len(asked(subscription, 1.0)) == 1
+    subscription.receive(ack(mavlink.MAV_RESULT_UNSUPPORTED), 1.0)
+    vehicle[0] = (9, 1)
+    assert asked(subscription, 2.0) == [(9, FS_LOOP_TIMING_ID, 500_000.0)]
