@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from flightstack import options
+from flightstack import console, options
+from flightstack.console import say
 
 if TYPE_CHECKING:  # the rest is imported when it runs: help stays quick
     from flightstack.app import App
@@ -40,6 +41,7 @@ def run(
     signing_key: options.SigningKey = None,
     allow_unsigned: options.AllowUnsigned = False,
     log: options.LogFile = None,
+    overwrite: options.Overwrite = False,
     param: options.Assignments = None,
     params: options.ParamFile = None,
     home: options.Home = None,
@@ -50,12 +52,15 @@ def run(
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.app import App
+    from flightstack.atomic_file import check_new
     from flightstack.clock import nearest_outer_hz
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.firmware.errors import TargetError
     from flightstack.params.errors import ConfigError
+    from flightstack.params.gains_file import hidden_gains
+    from flightstack.params.vehicle import hidden_vehicle
     from flightstack.ports import ports_config
-    from flightstack.process_config import EXIT_TIMEOUT, EXIT_USAGE, ProcessConfig
+    from flightstack.process_config import EXIT_TIMEOUT, EXIT_USAGE, ProcessConfig, complain
     from flightstack.transport.udp import PortBusyError
 
     try:
@@ -71,6 +76,9 @@ def run(
             params_file=None if params == "none" else params or f"runs/params-{instance}.params",
             params=tuple(param or []),
         )  # fmt: skip
+        for sentence in (hidden_vehicle(vehicle), hidden_gains(gains)):
+            if sentence is not None:
+                complain(sentence)
         named_file = None if params in (None, "none") else Path(str(params))
         if named_file is not None:
             _mention_new(named_file)
@@ -87,15 +95,18 @@ def run(
             exit_on_gcs_loss,
             signing_key,
             allow_unsigned,
+            overwrite,
         )
+        if log is not None and process.log is not None:
+            check_new(process.log, overwrite)
         if named_file is not None:
             _begin_new(named_file, config)
         vehicle_process = App(config, process)
     except (ConfigError, PortBusyError) as error:
-        print(f"flightstack: {error}", file=sys.stderr)
+        complain(error)
         sys.exit(EXIT_USAGE)
     except TargetError as error:
-        print(f"flightstack: {error}", file=sys.stderr)
+        complain(error)
         sys.exit(EXIT_TIMEOUT)
     _introduce(vehicle_process, config, process)
     sys.exit(vehicle_process.run())
@@ -133,7 +144,7 @@ def _check(config: StackConfig) -> None:
 
     stack = build(config, lambda: None)
     stack.loops.close()
-    print(f"flightstack: {stack.vehicle.name} with {config.controller} ({config.gains}) is ready to fly")
+    say(f"flightstack: {stack.vehicle.name} with {config.controller} ({config.gains}) is ready to fly")
 
 
 def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig) -> None:
@@ -147,11 +158,10 @@ def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig
         if unknown is not None:
             complain(unknown)
     clock = "lockstep" if config.lockstep else "realtime"
-    print(
+    say(
         f"flightstack: {stack.vehicle.name}, {config.controller} ({config.gains}), "
         f"{_loops_words(config)}{config.inner_hz:g}/{config.outer_hz:g} Hz, {clock}; "
-        f"simulator {process.simulator_host}:{process.simulator_port}, {described(process.ports)}",
-        flush=True,
+        f"simulator {process.simulator_host}:{process.simulator_port}, {described(process.ports)}"
     )
     signed = process.signing_key is not None and not process.allow_unsigned
     if (caution := warning(process.ports, signed=signed)) is not None:
@@ -164,7 +174,12 @@ def _loops_words(config: StackConfig) -> str:
 
 def main() -> None:
     """Run the command."""
-    app()
+    try:
+        app()
+    except OSError as error:  # stdout cannot be written: typer ends quietly itself where its reader went away
+        console.drop(sys.stdout)
+        console.complain(f"flightstack: {error.strerror or error}")
+        sys.exit(1)
 
 
 if __name__ == "__main__":

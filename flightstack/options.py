@@ -56,6 +56,7 @@ LogFile = Annotated[
         "Ground stations see the logs of its folder."
     ),
 ]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let --log replace a file that exists.")]
 Assignments = Annotated[list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")]
 ParamFile = Annotated[
     str | None,

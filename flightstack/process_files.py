@@ -6,6 +6,7 @@ from pathlib import Path
 
 from flightstack.assembly import Stack, build
 from flightstack.config import StackConfig
+from flightstack.console import say
 from flightstack.firmware.targets import finish_loops
 from flightstack.logging.flight_log import FlightLog
 from flightstack.logging.log_files import LogFiles
@@ -25,7 +26,7 @@ class ProcessFiles:
 
     def __init__(self, process: ProcessConfig) -> None:
         self._process = process
-        self._logs = LogFiles(process.log)
+        self._logs = LogFiles(process.log, process.overwrite_log)
         self._stack: Stack | None = None
         self._saver: ParamSaver | None = None
         self._signing: Signing | None = None
@@ -91,7 +92,7 @@ class ProcessFiles:
             return None
         if not path.exists():
             create_key(path)
-            print(f"flightstack: a new signing key is in {path}", flush=True)
+            say(f"flightstack: a new signing key is in {path}")
         role = f"vehicle-{self._process.ports.instance}"
         signing = open_signing(path, role, self._process.allow_unsigned)
         stack.ground.use_signing(signing, lambda key: replace_key(path, key))

@@ -5,16 +5,16 @@ from __future__ import annotations
 import os
 import secrets
 import stat
-import sys
 import time
 from pathlib import Path
 
+from flightstack.atomic_file import OWNER_ONLY, write_bytes_atomically
+from flightstack.console import complain
 from flightstack.mavlink.signing import KEY_SIZE, LARGEST_TIMESTAMP, Signing
 from flightstack.params.errors import ConfigError
 
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _LONGEST_FILE = 200  # a key in hexadecimal takes 64 characters
-_OWNER_ONLY = 0o600
 
 
 def create_key(path: Path) -> bytes:
@@ -22,9 +22,13 @@ def create_key(path: Path) -> bytes:
     key = secrets.token_bytes(KEY_SIZE)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _OWNER_ONLY)
-        with os.fdopen(descriptor, "w", encoding="ascii") as file:
-            file.write(key.hex() + "\n")
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, OWNER_ONLY)
+        try:
+            with os.fdopen(descriptor, "w", encoding="ascii") as file:
+                file.write(key.hex() + "\n")
+        except OSError:
+            path.unlink(missing_ok=True)  # half a key would end every later start
+            raise
     except OSError as error:
         raise _problem(path, error) from None
     return key
@@ -55,7 +59,7 @@ def load_key(path: Path) -> bytes:
 
 def replace_key(path: Path, key: bytes) -> None:
     """Write another key in place of the one there; raise OSError, and the old one stays."""
-    _write_atomically(path, key.hex() + "\n")
+    write_bytes_atomically(path, f"{key.hex()}\n".encode(), OWNER_ONLY)
 
 
 def open_signing(path: Path, role: str, allow_unsigned: bool = False) -> Signing:
@@ -67,7 +71,7 @@ def open_signing(path: Path, role: str, allow_unsigned: bool = False) -> Signing
     timestamps = path.with_name(f"{path.name}.{role}.timestamp")
     first = _load_timestamp(timestamps)
     try:
-        _write_atomically(timestamps, f"{first}\n")  # to fail now, and not in flight
+        _write_timestamp(timestamps, first)  # to fail now, and not in flight
     except OSError as error:
         raise _problem(timestamps, error) from None
     return Signing(key, time.time, first, _Reserve(timestamps), allow_unsigned)
@@ -82,15 +86,16 @@ class _Reserve:
 
     def __call__(self, limit: int) -> None:
         try:
-            _write_atomically(self._path, f"{limit}\n")
+            _write_timestamp(self._path, limit)
         except OSError as error:
             if not self._has_failed:
                 self._has_failed = True
-                print(
-                    f"{_problem(self._path, error)}: after a crash, wait a minute",
-                    file=sys.stderr,
-                    flush=True,
-                )
+                complain(f"{_problem(self._path, error)}: after a crash, wait a minute")
+
+
+def _write_timestamp(path: Path, timestamp: int) -> None:
+    """Replace the file. It is not forced to the disk: a power cut sets the clock forward anyway."""
+    write_bytes_atomically(path, f"{timestamp}\n".encode(), OWNER_ONLY, survives_power_loss=False)
 
 
 def _load_timestamp(path: Path) -> int:
@@ -105,18 +110,6 @@ def _load_timestamp(path: Path) -> int:
             path, "", "is no timestamp: remove it if no frame of the last minute can have been heard"
         )
     return int(text)
-
-
-def _write_atomically(path: Path, text: str) -> None:
-    """Replace the file. It is not forced to the disk: a power cut sets the clock forward anyway."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, _OWNER_ONLY)
-        with os.fdopen(descriptor, "w", encoding="ascii") as file:
-            file.write(text)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _problem(path: Path, error: OSError) -> ConfigError:

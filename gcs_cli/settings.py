@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from flightstack.console import complain
 from gcs_cli.endpoint import DEFAULT_CONNECTION, VEHICLE_CONNECTION, Endpoint, parse_endpoint
 from gcs_cli.errors import USAGE, CliError
 
@@ -27,6 +27,7 @@ ConnectOption = Annotated[
         show_default=False,
     ),
 ]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists already.")]
 TimeoutOption = Annotated[
     float | None,
     typer.Option(
@@ -101,7 +102,7 @@ def open_link(settings: Settings) -> Connection:
         if settings.connect is not None:
             raise
         other = parse_endpoint(VEHICLE_CONNECTION)
-        print(f"gcs: {error.port} is in use: calling the vehicle at {other}", file=sys.stderr, flush=True)
+        complain(f"gcs: {error.port} is in use: calling the vehicle at {other}")
         return Connection(other, signing=signing)
 
 

@@ -54,12 +54,13 @@ class LogFileReader:
             self._descriptor = -1
 
 
-def create_log_file(path: Path) -> BinaryIO:
-    """Open a new log for writing, unbuffered; raise OSError.
+def create_log_file(path: Path, overwrite: bool = False) -> BinaryIO:
+    """Open a new log for writing, unbuffered; raise OSError, FileExistsError for a file unless ``overwrite``.
 
     A lock that lasts until it is closed tells every process, this one too, that it is being written.
     """
-    file = open(path, "wb", buffering=0)  # noqa: SIM115  # its owner closes it
+    is_file = path.is_file() or not path.exists()  # a device or a pipe is written to
+    file = open(path, "xb" if is_file and not overwrite else "wb", buffering=0)  # noqa: SIM115  # its owner closes it
     with contextlib.suppress(OSError):  # some file systems know no locks
         fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
     return file

@@ -246,7 +246,9 @@ def test_the_command_takes_an_installed_controller_and_lists_them_for_an_unknown
 def test_a_controller_that_is_gone_leaves_the_others_compilable(installed: Path) -> None:
     """Our functions' caches name no type of a user's package: Numba would import it to read any of them."""
     build(StackConfig(controller="lqr"), lambda: None)
-    indices = list(Path(numba.config.CACHE_DIR).parent.rglob("*.nbi"))  # a directory for each state of sources
+    indices = list(
+        Path(numba.config.CACHE_DIR).parent.rglob("*.nbi")
+    )  # a directory for each state of sources
     kernels = [path for path in indices if "inner_kernel__lqr" in path.name]
     assert kernels
     for path in indices:

@@ -91,7 +91,7 @@ def test_nothing_but_logs_of_the_folder_is_opened(folder: Path, name: str) -> No
 
 def test_erasing_keeps_the_open_log_and_all_that_is_none(folder: Path) -> None:
     library = LogLibrary(folder)
-    with create_log_file(folder / "new.ulg") as log, create_log_file(folder / "a.ulg"):
+    with create_log_file(folder / "new.ulg") as log, create_log_file(folder / "a.ulg", overwrite=True):
         log.write(b"in flight")
         assert library.erase() == 2
         assert {log.name for log in library.logs()} == {"a.ulg", "new.ulg"}
