@@ -7,6 +7,7 @@ from pathlib import Path
 from flightstack.assembly import Stack, build
 from flightstack.config import StackConfig
 from flightstack.console import say
+from flightstack.file_saver import FileSaver
 from flightstack.firmware.targets import finish_loops
 from flightstack.logging.flight_log import FlightLog
 from flightstack.logging.log_files import LogFiles
@@ -15,10 +16,10 @@ from flightstack.logging.log_tail import FileTail
 from flightstack.mavlink.services.log_store import NO_LOGS
 from flightstack.mavlink.signing import Signing
 from flightstack.params.identity import SYSTEM_ID
-from flightstack.params.saver import ParamSaver
+from flightstack.params.param_file import save
 from flightstack.process_config import ProcessConfig, complain
 from flightstack.signing_file import create_key, open_signing, replace_key
-from flightstack.snapshot import ERROR
+from flightstack.snapshot import CRITICAL
 
 
 class ProcessFiles:
@@ -28,7 +29,7 @@ class ProcessFiles:
         self._process = process
         self._logs = LogFiles(process.log, process.overwrite_log)
         self._stack: Stack | None = None
-        self._saver: ParamSaver | None = None
+        self._params: FileSaver | None = None
         self._signing: Signing | None = None
 
     def build(self, config: StackConfig) -> Stack:
@@ -39,18 +40,29 @@ class ProcessFiles:
         stack.ground.vehicle.open_log_tail = self._open_tail
         self._signing = self._open_signing(stack)
         if config.params_file is not None:
-            system_id = int(stack.params.value(SYSTEM_ID))
-            self._saver = ParamSaver(stack.params, stack.loaded_params, Path(config.params_file), system_id)
+            self._params = _param_saver(stack, Path(config.params_file))
         return stack
 
-    def take_problem(self) -> str | None:
-        """Return the sentence why parameters were not saved, once for each time."""
-        return None if self._saver is None else self._saver.take_error()
+    def tell_problems(self) -> None:
+        """Tell ground stations and user of files that cannot be written any more, once for each."""
+        assert self._stack is not None
+        error = self._stack.recorder.take_error()
+        if error is not None:
+            reason = error.strerror or str(error)
+            self._tell(f"Logging stopped: {reason}", f"the log {self._logs.current} ends early: {reason}")
+        problem = None if self._params is None else self._params.take_error()
+        if problem is not None:
+            self._tell(problem[0].upper() + problem[1:], problem)
+
+    def _tell(self, text: str, sentence: str) -> None:
+        assert self._stack is not None
+        self._stack.autopilot.say(CRITICAL, text)
+        complain(sentence)
 
     def close_parameters(self) -> None:
         """Save what has changed; a second call does nothing."""
-        if self._saver is not None:
-            self._saver.close()
+        if self._params is not None:
+            self._params.close()
 
     def close_loops(self) -> None:
         """End the loops; those of a target leave the record of their link beside the log."""
@@ -74,8 +86,9 @@ class ProcessFiles:
             return self._logs.open(len(self._stack.vehicle.rotors))
         except OSError as error:
             path = self._logs.current
-            self._stack.autopilot.say(ERROR, f"No log: {path}: {error.strerror}")
-            complain(f"no log can be written to {path}: {error.strerror}")
+            self._tell(
+                f"No log: {path}: {error.strerror}", f"no log can be written to {path}: {error.strerror}"
+            )
             return None
 
     def _open_tail(self) -> FileTail | None:
@@ -97,3 +110,14 @@ class ProcessFiles:
         signing = open_signing(path, role, self._process.allow_unsigned)
         stack.ground.use_signing(signing, lambda key: replace_key(path, key))
         return signing
+
+
+def _param_saver(stack: Stack, path: Path) -> FileSaver:
+    """Save the parameters of a stack to ``path`` at every change."""
+    system_id = int(stack.params.value(SYSTEM_ID))
+    saver = FileSaver(
+        lambda: save(stack.params, stack.loaded_params, path, system_id),
+        f"the parameters are not saved to {path}",
+    )
+    stack.params.subscribe(lambda *_: saver.change())
+    return saver

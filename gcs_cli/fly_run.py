@@ -10,6 +10,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
+from flightstack.console import complain
 from flightstack.plan import Plan
 from gcs_cli.connection import Connection
 from gcs_cli.endpoint import Endpoint
@@ -114,6 +115,9 @@ def _recording(connection: Connection, folder: Path) -> Iterator[None]:
             yield
         finally:
             connection.session.record = None
+            if tlog.error is not None:
+                reason = tlog.error.strerror or tlog.error
+                complain(f"gcs: the telemetry log {folder / TLOG_NAME} ends early: {reason}")
 
 
 def _open(endpoint: Endpoint) -> Connection:
