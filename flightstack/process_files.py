@@ -35,8 +35,11 @@ class ProcessFiles:
     def build(self, config: StackConfig) -> Stack:
         """Build a stack and join it to the files; raise ConfigError."""
         log = self._process.log
-        stack = build(config, self._open_log, NO_LOGS if log is None else LogLibrary(log.parent))
+        library = None if log is None else LogLibrary(log.parent, self._own_log)
+        stack = build(config, self._open_log, library or NO_LOGS)
         self._stack = stack
+        if library is not None:
+            library.logs()  # every log is examined now, and not in flight
         stack.ground.vehicle.open_log_tail = self._open_tail
         self._signing = self._open_signing(stack)
         if config.params_file is not None:
@@ -90,6 +93,11 @@ class ProcessFiles:
                 f"No log: {path}: {error.strerror}", f"no log can be written to {path}: {error.strerror}"
             )
             return None
+
+    def _own_log(self) -> object:
+        """Return something else whenever a log of this process has begun or ended."""
+        assert self._stack is not None
+        return self._logs.current, self._stack.recorder.is_logging
 
     def _open_tail(self) -> FileTail | None:
         stack = self._stack
