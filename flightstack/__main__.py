@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -44,6 +45,7 @@ def run(
     overwrite: options.Overwrite = False,
     param: options.Assignments = None,
     params: options.ParamFile = None,
+    state: options.State = None,
     home: options.Home = None,
     ideal_rotors: options.IdealRotors = False,
     wait_for_start: options.WaitForStart = False,
@@ -68,12 +70,13 @@ def run(
             raise ConfigError("--clock", clock, "is not one of lockstep, realtime")
         if allow_unsigned and signing_key is None:
             raise ConfigError("--allow-unsigned", "", "is for --signing-key: without a key all is unsigned")
+        kept_in = _state_directory(state, params, instance)
         config = StackConfig(
             vehicle, controller, gains, loops, inner_hz,
             nearest_outer_hz(inner_hz) if outer_hz is None else outer_hz,
             ideal_rotors, clock == "lockstep",
             DEFAULT_HOME if home is None else parse_home(home), instance + 1,
-            params_file=None if params == "none" else params or f"runs/params-{instance}.params",
+            params_file=_param_file(params, kept_in),
             params=tuple(param or []),
         )  # fmt: skip
         for sentence in (hidden_vehicle(vehicle), hidden_gains(gains)):
@@ -96,7 +99,10 @@ def run(
             signing_key,
             allow_unsigned,
             overwrite,
+            kept_in,
         )
+        if state is not None and kept_in is not None:
+            _make_directory(kept_in)
         if log is not None and process.log is not None:
             check_new(process.log, overwrite)
         if named_file is not None:
@@ -110,6 +116,33 @@ def run(
         sys.exit(EXIT_TIMEOUT)
     _introduce(vehicle_process, config, process)
     sys.exit(vehicle_process.run())
+
+
+def _state_directory(state: str | None, params: str | None, instance: int) -> Path | None:
+    """Return where the vehicle keeps parameters and plans, or None if it is to keep nothing."""
+    if state == "none" or (state is None and params == "none"):
+        return None
+    return Path(f"runs/state-{instance}" if state is None else state)
+
+
+def _param_file(params: str | None, state: Path | None) -> str | None:
+    from flightstack.plan_file import PARAMS_NAME
+
+    if params is not None:
+        return None if params == "none" else params
+    return None if state is None else str(state / PARAMS_NAME)
+
+
+def _make_directory(state: Path) -> None:
+    """Make a state directory that was named; raise ConfigError if nothing can be kept there."""
+    from flightstack.params.errors import ConfigError
+
+    try:
+        state.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError("--state", str(state), f"cannot be made: {error.strerror}") from None
+    if not os.access(state, os.W_OK | os.X_OK):
+        raise ConfigError("--state", str(state), "nothing can be written there: permission denied")
 
 
 def _log_path(log: str | None, instance: int) -> Path | None:
@@ -161,11 +194,21 @@ def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig
     say(
         f"flightstack: {stack.vehicle.name}, {config.controller} ({config.gains}), "
         f"{_loops_words(config)}{config.inner_hz:g}/{config.outer_hz:g} Hz, {clock}; "
-        f"simulator {process.simulator_host}:{process.simulator_port}, {described(process.ports)}"
+        f"simulator {process.simulator_host}:{process.simulator_port}, {described(process.ports)}, "
+        f"{_kept_words(config, process)}"
     )
     signed = process.signing_key is not None and not process.allow_unsigned
     if (caution := warning(process.ports, signed=signed)) is not None:
         complain(caution)
+
+
+def _kept_words(config: StackConfig, process: ProcessConfig) -> str:
+    """Say where parameters and plans are kept."""
+    words = "no state kept" if process.state is None else f"state in {process.state}"
+    named = config.params_file is not None and (
+        process.state is None or Path(config.params_file).parent != process.state
+    )
+    return f"{words}, parameters in {config.params_file}" if named else words
 
 
 def _loops_words(config: StackConfig) -> str:

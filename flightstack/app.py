@@ -114,7 +114,7 @@ class App:
     def _reboot(self) -> None:
         old = self.stack
         old.recorder.close()
-        self._files.tell_problems()
+        self._files.attend()
         self._ground.leave(time.monotonic())  # with the command's answer
         self._files.close_parameters()
         self._files.close_signing()
@@ -144,7 +144,9 @@ class App:
         self.stack.recorder.close()
         self._files.close_loops()
         self._files.close_parameters()
-        self._files.tell_problems()
+        self._files.attend()
+        self._files.close_plans()
+        self._files.attend()
         if orderly:
             self._ground.farewell()
         self._files.close_signing()
@@ -260,8 +262,9 @@ class App:
         if now_s >= self._next_report_s:
             self._next_report_s = now_s + REPORT_S
             self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
-        self._files.tell_problems()
-        return self._ground.serve(now_s)
+        heard = self._ground.serve(now_s)
+        self._files.attend()
+        return heard
 
     def _meanwhile(self) -> None:
         """Do what must go on while the simulator is waited for."""

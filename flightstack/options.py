@@ -61,7 +61,15 @@ Assignments = Annotated[list[str] | None, typer.Option(help="Set a parameter: NA
 ParamFile = Annotated[
     str | None,
     typer.Option(
-        help="Parameter file [runs/params-<instance>.params]; 'none' for none.", metavar="FILE|none"
+        help="Parameter file [vehicle.params in the state directory]; 'none' for none.", metavar="FILE|none"
+    ),
+]
+State = Annotated[
+    str | None,
+    typer.Option(
+        help="Directory of what the vehicle keeps over a restart: parameters, mission, geofence, rally points, home "
+        "[runs/state-<instance>; none with --params none]; 'none' for none.",
+        metavar="DIR|none",
     ),
 ]
 Home = Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of the local origin.")]

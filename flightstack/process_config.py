@@ -26,6 +26,8 @@ class ProcessConfig:
     """File of the key that signs MAVLink; None: nothing is signed."""
     allow_unsigned: bool = False
     overwrite_log: bool = False
+    state: Path | None = None
+    """Directory of what the vehicle keeps; None: it keeps nothing but, maybe, parameters."""
 
 
 class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops

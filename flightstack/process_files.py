@@ -17,6 +17,7 @@ from flightstack.mavlink.services.log_store import NO_LOGS
 from flightstack.mavlink.signing import Signing
 from flightstack.params.identity import SYSTEM_ID
 from flightstack.params.param_file import save
+from flightstack.plan_file import PLANS_NAME, PlanFile
 from flightstack.process_config import ProcessConfig, complain
 from flightstack.signing_file import create_key, open_signing, replace_key
 from flightstack.snapshot import CRITICAL
@@ -30,6 +31,7 @@ class ProcessFiles:
         self._logs = LogFiles(process.log, process.overwrite_log)
         self._stack: Stack | None = None
         self._params: FileSaver | None = None
+        self._plans = None if process.state is None else PlanFile(process.state / PLANS_NAME)
         self._signing: Signing | None = None
 
     def build(self, config: StackConfig) -> Stack:
@@ -37,35 +39,47 @@ class ProcessFiles:
         log = self._process.log
         library = None if log is None else LogLibrary(log.parent, self._own_log)
         stack = build(config, self._open_log, library or NO_LOGS)
-        self._stack = stack
+        is_first, self._stack = self._stack is None, stack
         if library is not None:
             library.logs()  # every log is examined now, and not in flight
         stack.ground.vehicle.open_log_tail = self._open_tail
         self._signing = self._open_signing(stack)
         if config.params_file is not None:
             self._params = _param_saver(stack, Path(config.params_file))
+        if self._plans is not None and is_first:
+            self._tell(self._plans.restore(stack))
         return stack
 
-    def tell_problems(self) -> None:
-        """Tell ground stations and user of files that cannot be written any more, once for each."""
+    def attend(self) -> None:
+        """Save plans that have changed; tell ground stations and user once of a file that cannot be written."""
         assert self._stack is not None
+        if self._plans is not None:
+            self._plans.watch(self._stack)
+            self._tell(self._plans.take_error())
+        if self._params is not None:
+            self._tell(self._params.take_error())
         error = self._stack.recorder.take_error()
         if error is not None:
             reason = error.strerror or str(error)
-            self._tell(f"Logging stopped: {reason}", f"the log {self._logs.current} ends early: {reason}")
-        problem = None if self._params is None else self._params.take_error()
-        if problem is not None:
-            self._tell(problem[0].upper() + problem[1:], problem)
+            self._tell(f"the log {self._logs.current} ends early: {reason}", f"Logging stopped: {reason}")
 
-    def _tell(self, text: str, sentence: str) -> None:
+    def _tell(self, sentence: str | None, text: str | None = None) -> None:
+        """Say a sentence, to ground stations perhaps as a shorter ``text``."""
+        if sentence is None:
+            return
         assert self._stack is not None
-        self._stack.autopilot.say(CRITICAL, text)
+        self._stack.autopilot.say(CRITICAL, text or sentence[0].upper() + sentence[1:])
         complain(sentence)
 
     def close_parameters(self) -> None:
         """Save what has changed; a second call does nothing."""
         if self._params is not None:
             self._params.close()
+
+    def close_plans(self) -> None:
+        """Save what has changed; a second call does nothing."""
+        if self._plans is not None:
+            self._plans.close()
 
     def close_loops(self) -> None:
         """End the loops; those of a target leave the record of their link beside the log."""
@@ -89,9 +103,7 @@ class ProcessFiles:
             return self._logs.open(len(self._stack.vehicle.rotors))
         except OSError as error:
             path = self._logs.current
-            self._tell(
-                f"No log: {path}: {error.strerror}", f"no log can be written to {path}: {error.strerror}"
-            )
+            self._tell(f"no log can be written to {path}: {error.strerror}")
             return None
 
     def _own_log(self) -> object:

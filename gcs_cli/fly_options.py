@@ -215,6 +215,7 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path) -> list[s
         f"--home={_home(home)}",
         f"--exit-on-gcs-loss={GCS_LOSS_S:g}",
         f"--params={options.params or 'none'}",
+        "--state=none",  # a flight depends on its command line alone
         "--wait-for-start",
     ]
     return [*arguments, "--ideal-rotors"] if options.ideal_rotors else arguments
