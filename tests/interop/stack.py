@@ -14,7 +14,7 @@ class RealVehicle:
     """``sim-bridge`` and ``flightstack`` at an instance of their own, at a speed against real time."""
 
     def __init__(self, directory: Path, speed: float, *options: str) -> None:
-        """Start both; ``directory`` takes logs and parameters, ``options`` go to ``flightstack``."""
+        """Start both; ``directory`` takes logs, parameters and plans, ``options`` go to ``flightstack``."""
         self.speed = speed
         self.instance = free_instance()
         self.api_port = 14540 + self.instance
@@ -25,7 +25,7 @@ class RealVehicle:
         self.simulator = Process("sim_bridge", *number, "--speed", str(speed))
         self.stack = Process(
             "flightstack", *number, "--gcs-port", str(self.gcs_port), "--log", str(self.log),
-            "--params", str(directory / "vehicle.params"), *options,
+            "--state", str(directory), *options,
         )  # fmt: skip
         try:
             self.stack.wait_for("flightstack: paper_quad")
