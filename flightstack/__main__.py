@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -9,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from flightstack import options
+from flightstack import console, options
+from flightstack.console import say
 
 if TYPE_CHECKING:  # the rest is imported when it runs: help stays quick
     from flightstack.app import App
@@ -40,8 +42,10 @@ def run(
     signing_key: options.SigningKey = None,
     allow_unsigned: options.AllowUnsigned = False,
     log: options.LogFile = None,
+    overwrite: options.Overwrite = False,
     param: options.Assignments = None,
     params: options.ParamFile = None,
+    state: options.State = None,
     home: options.Home = None,
     ideal_rotors: options.IdealRotors = False,
     wait_for_start: options.WaitForStart = False,
@@ -50,13 +54,16 @@ def run(
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.app import App
+    from flightstack.atomic_file import check_new
     from flightstack.clock import nearest_outer_hz
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.firmware.errors import TargetError
     from flightstack.params.errors import ConfigError
+    from flightstack.params.gains_file import hidden_gains
+    from flightstack.params.vehicle import hidden_vehicle
     from flightstack.port_numbers import simulator_port, system_id
     from flightstack.ports import ports_config
-    from flightstack.process_config import EXIT_TIMEOUT, EXIT_USAGE, ProcessConfig
+    from flightstack.process_config import EXIT_TIMEOUT, EXIT_USAGE, ProcessConfig, complain
     from flightstack.transport.udp import PortBusyError
 
     try:
@@ -64,14 +71,18 @@ def run(
             raise ConfigError("--clock", clock, "is not one of lockstep, realtime")
         if allow_unsigned and signing_key is None:
             raise ConfigError("--allow-unsigned", "", "is for --signing-key: without a key all is unsigned")
+        kept_in = _state_directory(state, params, instance)
         config = StackConfig(
             vehicle, controller, gains, loops, inner_hz,
             nearest_outer_hz(inner_hz) if outer_hz is None else outer_hz,
             ideal_rotors, clock == "lockstep",
             DEFAULT_HOME if home is None else parse_home(home), system_id(instance),
-            params_file=None if params == "none" else params or f"runs/params-{instance}.params",
+            params_file=_param_file(params, kept_in),
             params=tuple(param or []),
         )  # fmt: skip
+        for sentence in (hidden_vehicle(vehicle), hidden_gains(gains)):
+            if sentence is not None:
+                complain(sentence)
         named_file = None if params in (None, "none") else Path(str(params))
         if named_file is not None:
             _mention_new(named_file)
@@ -88,18 +99,51 @@ def run(
             exit_on_gcs_loss,
             signing_key,
             allow_unsigned,
+            overwrite,
+            kept_in,
         )
+        if state is not None and kept_in is not None:
+            _make_directory(kept_in)
+        if log is not None and process.log is not None:
+            check_new(process.log, overwrite)
         if named_file is not None:
             _begin_new(named_file, config)
         vehicle_process = App(config, process)
     except (ConfigError, PortBusyError) as error:
-        print(f"flightstack: {error}", file=sys.stderr)
+        complain(error)
         sys.exit(EXIT_USAGE)
     except TargetError as error:
-        print(f"flightstack: {error}", file=sys.stderr)
+        complain(error)
         sys.exit(EXIT_TIMEOUT)
     _introduce(vehicle_process, config, process)
     sys.exit(vehicle_process.run())
+
+
+def _state_directory(state: str | None, params: str | None, instance: int) -> Path | None:
+    """Return where the vehicle keeps parameters and plans, or None if it is to keep nothing."""
+    if state == "none" or (state is None and params == "none"):
+        return None
+    return Path(f"runs/state-{instance}" if state is None else state)
+
+
+def _param_file(params: str | None, state: Path | None) -> str | None:
+    from flightstack.plan_file import PARAMS_NAME
+
+    if params is not None:
+        return None if params == "none" else params
+    return None if state is None else str(state / PARAMS_NAME)
+
+
+def _make_directory(state: Path) -> None:
+    """Make a state directory that was named; raise ConfigError if nothing can be kept there."""
+    from flightstack.params.errors import ConfigError
+
+    try:
+        state.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError("--state", str(state), f"cannot be made: {error.strerror}") from None
+    if not os.access(state, os.W_OK | os.X_OK):
+        raise ConfigError("--state", str(state), "nothing can be written there: permission denied")
 
 
 def _log_path(log: str | None, instance: int) -> Path | None:
@@ -134,7 +178,7 @@ def _check(config: StackConfig) -> None:
 
     stack = build(config, lambda: None)
     stack.loops.close()
-    print(f"flightstack: {stack.vehicle.name} with {config.controller} ({config.gains}) is ready to fly")
+    say(f"flightstack: {stack.vehicle.name} with {config.controller} ({config.gains}) is ready to fly")
 
 
 def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig) -> None:
@@ -148,15 +192,24 @@ def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig
         if unknown is not None:
             complain(unknown)
     clock = "lockstep" if config.lockstep else "realtime"
-    print(
+    say(
         f"flightstack: {stack.vehicle.name}, {config.controller} ({config.gains}), "
         f"{_loops_words(config)}{config.inner_hz:g}/{config.outer_hz:g} Hz, {clock}; "
-        f"simulator {process.simulator_host}:{process.simulator_port}, {described(process.ports)}",
-        flush=True,
+        f"simulator {process.simulator_host}:{process.simulator_port}, {described(process.ports)}, "
+        f"{_kept_words(config, process)}"
     )
     signed = process.signing_key is not None and not process.allow_unsigned
     if (caution := warning(process.ports, signed=signed)) is not None:
         complain(caution)
+
+
+def _kept_words(config: StackConfig, process: ProcessConfig) -> str:
+    """Say where parameters and plans are kept."""
+    words = "no state kept" if process.state is None else f"state in {process.state}"
+    named = config.params_file is not None and (
+        process.state is None or Path(config.params_file).parent != process.state
+    )
+    return f"{words}, parameters in {config.params_file}" if named else words
 
 
 def _loops_words(config: StackConfig) -> str:
@@ -165,7 +218,12 @@ def _loops_words(config: StackConfig) -> str:
 
 def main() -> None:
     """Run the command."""
-    app()
+    try:
+        app()
+    except OSError as error:  # stdout cannot be written: typer ends quietly itself where its reader went away
+        console.drop(sys.stdout)
+        console.complain(f"flightstack: {error.strerror or error}")
+        sys.exit(1)
 
 
 if __name__ == "__main__":

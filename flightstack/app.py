@@ -26,7 +26,7 @@ from flightstack.process_config import (
 from flightstack.process_files import ProcessFiles
 from flightstack.reboot import carry_over, config_after
 from flightstack.simulator_end import check_deadline, connect, wait_for_state
-from flightstack.snapshot import ERROR, NOTICE
+from flightstack.snapshot import NOTICE
 from flightstack.transport.processor import Follower
 from flightstack.transport.tcp import LinkClosedError, TcpClient
 
@@ -114,6 +114,7 @@ class App:
     def _reboot(self) -> None:
         old = self.stack
         old.recorder.close()
+        self._files.attend()
         self._ground.leave(time.monotonic())  # with the command's answer
         self._files.close_parameters()
         self._files.close_signing()
@@ -143,8 +144,9 @@ class App:
         self.stack.recorder.close()
         self._files.close_loops()
         self._files.close_parameters()
-        if (problem := self._files.take_problem()) is not None:
-            complain(problem)
+        self._files.attend()
+        self._files.close_plans()
+        self._files.attend()
         if orderly:
             self._ground.farewell()
         self._files.close_signing()
@@ -155,8 +157,6 @@ class App:
                     simulator.send(self.stack.simulator.heartbeat(armed, leaving=True))
             simulator.close()
         self._ground.close()
-        if self.stack.recorder.error is not None:
-            complain(f"the log is incomplete: {self.stack.recorder.error}")
 
     # ------------------------------------------------------------------ start
 
@@ -262,9 +262,9 @@ class App:
         if now_s >= self._next_report_s:
             self._next_report_s = now_s + REPORT_S
             self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
-            if (problem := self._files.take_problem()) is not None:
-                self.stack.autopilot.say(ERROR, problem[0].upper() + problem[1:])
-        return self._ground.serve(now_s)
+        heard = self._ground.serve(now_s)
+        self._files.attend()
+        return heard
 
     def _meanwhile(self) -> None:
         """Do what must go on while the simulator is waited for."""

@@ -62,11 +62,20 @@ LogFile = Annotated[
         "Ground stations see the logs of its folder."
     ),
 ]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let --log replace a file that exists.")]
 Assignments = Annotated[list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")]
 ParamFile = Annotated[
     str | None,
     typer.Option(
-        help="Parameter file [runs/params-<instance>.params]; 'none' for none.", metavar="FILE|none"
+        help="Parameter file [vehicle.params in the state directory]; 'none' for none.", metavar="FILE|none"
+    ),
+]
+State = Annotated[
+    str | None,
+    typer.Option(
+        help="Directory of what the vehicle keeps over a restart: parameters, mission, geofence, rally points, home "
+        "[runs/state-<instance>; none with --params none]; 'none' for none.",
+        metavar="DIR|none",
     ),
 ]
 Home = Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of the local origin.")]

@@ -35,6 +35,7 @@ Speed = Annotated[
 NoWords = Annotated[
     bool, typer.Option("--no-words", help="Leave out figures, numbers of places and the scale.")
 ]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that exist already.")]
 
 
 class PictureOptions(NamedTuple):
@@ -52,6 +53,7 @@ class PictureOptions(NamedTuple):
     end: float | None = None
     speed: float | None = None
     no_words: bool = False
+    overwrite: bool = False
 
     def arguments(self) -> list[str]:
         """Return the command line that asks for the same."""
@@ -60,7 +62,7 @@ class PictureOptions(NamedTuple):
             "--camera": self.camera, "--size": self.size, "--fps": self.fps, "--from": self.begin,
             "--to": self.end, "--speed": self.speed,
         }  # fmt: skip
-        flags = {"--view": self.view, "--no-words": self.no_words}
+        flags = {"--view": self.view, "--no-words": self.no_words, "--overwrite": self.overwrite}
         return [
             *(f"{flag}={value}" for flag, value in given.items() if value is not None),
             *(flag for flag, is_set in flags.items() if is_set),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from flightstack import console
 from flightstack.transport.vehicle_ports import PortsConfig
 
 EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
@@ -25,6 +25,9 @@ class ProcessConfig:
     signing_key: Path | None = None
     """File of the key that signs MAVLink; None: nothing is signed."""
     allow_unsigned: bool = False
+    overwrite_log: bool = False
+    state: Path | None = None
+    """Directory of what the vehicle keeps; None: it keeps nothing but, maybe, parameters."""
 
 
 class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops
@@ -40,5 +43,5 @@ class RebootRequestedError(Exception):
 
 
 def complain(sentence: object) -> None:
-    """Say a sentence on stderr, where it is seen at once."""
-    print(f"flightstack: {sentence}", file=sys.stderr, flush=True)
+    """Say a sentence on stderr, where it is seen at once; a closed stderr does not end the flight."""
+    console.complain(f"flightstack: {sentence}")

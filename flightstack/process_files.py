@@ -6,6 +6,8 @@ from pathlib import Path
 
 from flightstack.assembly import Stack, build
 from flightstack.config import StackConfig
+from flightstack.console import say
+from flightstack.file_saver import FileSaver
 from flightstack.firmware.targets import finish_loops
 from flightstack.logging.flight_log import FlightLog
 from flightstack.logging.log_files import LogFiles
@@ -14,10 +16,11 @@ from flightstack.logging.log_tail import FileTail
 from flightstack.mavlink.services.log_store import NO_LOGS
 from flightstack.mavlink.signing import Signing
 from flightstack.params.identity import SYSTEM_ID
-from flightstack.params.saver import ParamSaver
+from flightstack.params.param_file import save
+from flightstack.plan_file import PLANS_NAME, PlanFile
 from flightstack.process_config import ProcessConfig, complain
 from flightstack.signing_file import create_key, open_signing, replace_key
-from flightstack.snapshot import ERROR
+from flightstack.snapshot import CRITICAL
 
 
 class ProcessFiles:
@@ -25,31 +28,58 @@ class ProcessFiles:
 
     def __init__(self, process: ProcessConfig) -> None:
         self._process = process
-        self._logs = LogFiles(process.log)
+        self._logs = LogFiles(process.log, process.overwrite_log)
         self._stack: Stack | None = None
-        self._saver: ParamSaver | None = None
+        self._params: FileSaver | None = None
+        self._plans = None if process.state is None else PlanFile(process.state / PLANS_NAME)
         self._signing: Signing | None = None
 
     def build(self, config: StackConfig) -> Stack:
         """Build a stack and join it to the files; raise ConfigError."""
         log = self._process.log
-        stack = build(config, self._open_log, NO_LOGS if log is None else LogLibrary(log.parent))
-        self._stack = stack
+        library = None if log is None else LogLibrary(log.parent, self._own_log)
+        stack = build(config, self._open_log, library or NO_LOGS)
+        is_first, self._stack = self._stack is None, stack
+        if library is not None:
+            library.logs()  # every log is examined now, and not in flight
         stack.ground.vehicle.open_log_tail = self._open_tail
         self._signing = self._open_signing(stack)
         if config.params_file is not None:
-            system_id = int(stack.params.value(SYSTEM_ID))
-            self._saver = ParamSaver(stack.params, stack.loaded_params, Path(config.params_file), system_id)
+            self._params = _param_saver(stack, Path(config.params_file))
+        if self._plans is not None and is_first:
+            self._tell(self._plans.restore(stack))
         return stack
 
-    def take_problem(self) -> str | None:
-        """Return the sentence why parameters were not saved, once for each time."""
-        return None if self._saver is None else self._saver.take_error()
+    def attend(self) -> None:
+        """Save plans that have changed; tell ground stations and user once of a file that cannot be written."""
+        assert self._stack is not None
+        if self._plans is not None:
+            self._plans.watch(self._stack)
+            self._tell(self._plans.take_error())
+        if self._params is not None:
+            self._tell(self._params.take_error())
+        error = self._stack.recorder.take_error()
+        if error is not None:
+            reason = error.strerror or str(error)
+            self._tell(f"the log {self._logs.current} ends early: {reason}", f"Logging stopped: {reason}")
+
+    def _tell(self, sentence: str | None, text: str | None = None) -> None:
+        """Say a sentence, to ground stations perhaps as a shorter ``text``."""
+        if sentence is None:
+            return
+        assert self._stack is not None
+        self._stack.autopilot.say(CRITICAL, text or sentence[0].upper() + sentence[1:])
+        complain(sentence)
 
     def close_parameters(self) -> None:
         """Save what has changed; a second call does nothing."""
-        if self._saver is not None:
-            self._saver.close()
+        if self._params is not None:
+            self._params.close()
+
+    def close_plans(self) -> None:
+        """Save what has changed; a second call does nothing."""
+        if self._plans is not None:
+            self._plans.close()
 
     def close_loops(self) -> None:
         """End the loops; those of a target leave the record of their link beside the log."""
@@ -73,9 +103,13 @@ class ProcessFiles:
             return self._logs.open(len(self._stack.vehicle.rotors))
         except OSError as error:
             path = self._logs.current
-            self._stack.autopilot.say(ERROR, f"No log: {path}: {error.strerror}")
-            complain(f"no log can be written to {path}: {error.strerror}")
+            self._tell(f"no log can be written to {path}: {error.strerror}")
             return None
+
+    def _own_log(self) -> object:
+        """Return something else whenever a log of this process has begun or ended."""
+        assert self._stack is not None
+        return self._logs.current, self._stack.recorder.is_logging
 
     def _open_tail(self) -> FileTail | None:
         stack = self._stack
@@ -91,8 +125,19 @@ class ProcessFiles:
             return None
         if not path.exists():
             create_key(path)
-            print(f"flightstack: a new signing key is in {path}", flush=True)
+            say(f"flightstack: a new signing key is in {path}")
         role = f"vehicle-{self._process.ports.instance}"
         signing = open_signing(path, role, self._process.allow_unsigned)
         stack.ground.use_signing(signing, lambda key: replace_key(path, key))
         return signing
+
+
+def _param_saver(stack: Stack, path: Path) -> FileSaver:
+    """Save the parameters of a stack to ``path`` at every change."""
+    system_id = int(stack.params.value(SYSTEM_ID))
+    saver = FileSaver(
+        lambda: save(stack.params, stack.loaded_params, path, system_id),
+        f"the parameters are not saved to {path}",
+    )
+    stack.params.subscribe(lambda *_: saver.change())
+    return saver

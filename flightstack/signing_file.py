@@ -7,16 +7,16 @@ import fcntl
 import os
 import secrets
 import stat
-import sys
 import time
 from pathlib import Path
 
+from flightstack.atomic_file import OWNER_ONLY, write_bytes_atomically
+from flightstack.console import complain
 from flightstack.mavlink.signing import KEY_SIZE, LARGEST_TIMESTAMP, LinkSigning, Signing
 from flightstack.params.errors import ConfigError
 
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _LONGEST_FILE = 200  # a key in hexadecimal takes 64 characters
-_OWNER_ONLY = 0o600
 _LINK_IDS = 256
 
 
@@ -25,9 +25,13 @@ def create_key(path: Path) -> bytes:
     key = secrets.token_bytes(KEY_SIZE)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _OWNER_ONLY)
-        with os.fdopen(descriptor, "w", encoding="ascii") as file:
-            file.write(key.hex() + "\n")
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, OWNER_ONLY)
+        try:
+            with os.fdopen(descriptor, "w", encoding="ascii") as file:
+                file.write(key.hex() + "\n")
+        except OSError:
+            path.unlink(missing_ok=True)  # half a key would end every later start
+            raise
     except OSError as error:
         raise _problem(path, error) from None
     return key
@@ -58,7 +62,7 @@ def load_key(path: Path) -> bytes:
 
 def replace_key(path: Path, key: bytes) -> None:
     """Write another key in place of the one there; raise OSError, and the old one stays."""
-    _write_atomically(path, key.hex() + "\n")
+    write_bytes_atomically(path, f"{key.hex()}\n".encode(), OWNER_ONLY)
 
 
 def open_signing(path: Path, role: str, allow_unsigned: bool = False) -> Signing:
@@ -97,7 +101,7 @@ class _TimestampFile:
         latest = _load_timestamp(self._path)
         try:
             if self._lock_path is not None:
-                self._lock = os.open(self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, _OWNER_ONLY)
+                self._lock = os.open(self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, OWNER_ONLY)
             self._write(latest)
         except OSError as error:
             raise _problem(self._path, error) from None
@@ -111,11 +115,7 @@ class _TimestampFile:
             if not self._has_failed:
                 self._has_failed = True
                 reason = _problem(self._path, error) if isinstance(error, OSError) else error
-                print(
-                    f"{reason}: after a crash, signed messages may be refused for a minute",
-                    file=sys.stderr,
-                    flush=True,
-                )
+                complain(f"{reason}: after a crash, signed messages may be refused for a minute")
 
     def claim_link_id(self) -> int:
         """Return a link id that no other process of the role has claimed; any one if there is none left."""
@@ -129,13 +129,17 @@ class _TimestampFile:
 
     def _write(self, timestamp: int) -> None:
         if self._lock is None:
-            _write_atomically(self._path, f"{timestamp}\n")
+            self._replace(timestamp)
             return
         fcntl.lockf(self._lock, fcntl.LOCK_EX, 1, _LINK_IDS)  # the octet behind those of the link ids
         try:
-            _write_atomically(self._path, f"{max(timestamp, _load_timestamp(self._path))}\n")
+            self._replace(max(timestamp, _load_timestamp(self._path)))
         finally:
             fcntl.lockf(self._lock, fcntl.LOCK_UN, 1, _LINK_IDS)
+
+    def _replace(self, timestamp: int) -> None:
+        """Write the file anew. It is not forced to the disk: a power cut sets the clock forward anyway."""
+        write_bytes_atomically(self._path, f"{timestamp}\n".encode(), OWNER_ONLY, survives_power_loss=False)
 
 
 def _load_timestamp(path: Path) -> int:
@@ -150,18 +154,6 @@ def _load_timestamp(path: Path) -> int:
             path, "", "is no timestamp: remove it if no frame of the last minute can have been heard"
         )
     return int(text)
-
-
-def _write_atomically(path: Path, text: str) -> None:
-    """Replace the file. It is not forced to the disk: a power cut sets the clock forward anyway."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, _OWNER_ONLY)
-        with os.fdopen(descriptor, "w", encoding="ascii") as file:
-            file.write(text)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _problem(path: Path, error: OSError) -> ConfigError:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
-import os
 import signal
 import sys
 from typing import Annotated, Any
 
 import typer
 
+from flightstack.console import complain, drop
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
 from gcs_cli.settings import ConnectOption, InstanceOption, Settings, SigningKeyOption, TimeoutOption
 
@@ -92,30 +91,23 @@ def main(argv: list[str] | None = None) -> int:
     except (KeyboardInterrupt, typer.Abort):
         sentence, code = "interrupted", FAILED
     except (BrokenPipeError, SystemExit):  # `gcs watch | head`, which typer ends itself
-        _drop_output()
+        drop(sys.stdout)
         return DONE
     except OSError as error:
-        _drop_output()  # which may be what failed
+        drop(sys.stdout)  # which may be what failed
         where = "" if error.filename is None else f"{error.filename}: "
         sentence, code = f"{where}{error.strerror or error}", FAILED
     except _UsageError as error:
         if type(error).__name__ == "NoArgsIsHelpError":  # `gcs` and `gcs mission`: its message is the help
-            print(error.format_message(), file=sys.stderr)
+            complain(error.format_message())
             return USAGE
         sentence, code = error.format_message(), USAGE
     except CliError as error:
         sentence, code = str(error), error.exit_code
     except Exception as error:
         sentence, code = _config_problem(error), USAGE
-    print(f"gcs: {sentence}", file=sys.stderr)
+    complain(f"gcs: {sentence}")
     return code
-
-
-def _drop_output() -> None:
-    """Send what Python still holds for stdout nowhere, or it would complain at its end."""
-    if sys.stdout is not None:
-        with open(os.devnull, "wb") as nowhere, contextlib.suppress(OSError):  # it may have no descriptor
-            os.dup2(nowhere.fileno(), sys.stdout.fileno())
 
 
 def _config_problem(error: Exception) -> str:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import time
-from typing import Protocol
+from typing import Any, Protocol
 
 from rich.console import Console, RenderableType
 from rich.live import Live
@@ -13,6 +12,7 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
+from flightstack.console import drop
 from gcs_cli.flight import Flight, Phase
 from gcs_cli.view_types import StatusText
 from gcs_cli.watch_lines import text_line
@@ -23,14 +23,19 @@ _WARNING = 4  # MAV_SEVERITY_WARNING
 
 
 class FlyConsole(Console):
-    """A console that a flight outlives: when the reader of a pipe goes away, the rest is not printed."""
+    """A console whose broken pipe or full disk does not end the flight: the rest is not printed."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print; an output that cannot be written gets no more."""
+        try:
+            super().print(*objects, **options)
+        except OSError:
+            self.on_broken_pipe()
 
     def on_broken_pipe(self) -> None:
         """Send what is still to be printed nowhere."""
         self.quiet = True
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, self.file.fileno())
-        os.close(nowhere)
+        drop(self.file)
 
 
 class Display(Protocol):

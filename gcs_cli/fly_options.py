@@ -10,10 +10,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from flightstack.clock import nearest_outer_hz, rates
+from flightstack.console import complain
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.geodesy import GeoPoint
-from flightstack.params.gains_file import open_gains
-from flightstack.params.vehicle import load_vehicle
+from flightstack.params.gains_file import hidden_gains, open_gains
+from flightstack.params.vehicle import hidden_vehicle, load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
 from flightstack.port_numbers import (
     INSTANCES,
@@ -90,6 +91,9 @@ def checked_plan(options: FlyOptions) -> Plan:
     plan = load_plan(options.plan_path)
     load_vehicle(options.vehicle)
     open_gains(options.gains)
+    for sentence in (hidden_vehicle(options.vehicle), hidden_gains(options.gains)):
+        if sentence is not None:
+            complain(f"gcs: {sentence}")
     if options.params is not None and not options.params.is_file():
         raise CliError(f"--params {options.params}: there is no such file", USAGE)
     rates(options.inner_hz, options.outer_rate_hz)
@@ -217,6 +221,7 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path) -> list[s
         f"--home={_home(home)}",
         f"--exit-on-gcs-loss={GCS_LOSS_S:g}",
         f"--params={options.params or 'none'}",
+        "--state=none",  # a flight depends on its command line alone
         "--wait-for-start",
     ]
     return [*arguments, "--ideal-rotors"] if options.ideal_rotors else arguments

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
+from flightstack.console import complain
 from flightstack.plan import Plan
 from flightstack.port_numbers import vehicle_ground_port
 from flightstack.transport.udp import Address
@@ -117,6 +118,9 @@ def _recording(connection: Connection, folder: Path) -> Iterator[None]:
             yield
         finally:
             connection.session.record = None
+            if tlog.error is not None:
+                reason = tlog.error.strerror or tlog.error
+                complain(f"gcs: the telemetry log {folder / TLOG_NAME} ends early: {reason}")
 
 
 def _open(endpoint: Endpoint, vehicle: Address) -> Connection:

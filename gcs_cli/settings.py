@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from flightstack.console import complain
 from flightstack.port_numbers import INSTANCES, system_id
 from gcs_cli.endpoint import (
     DEFAULT_CONNECTION,
@@ -45,6 +45,7 @@ InstanceOption = Annotated[
         show_default=False,
     ),
 ]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists already.")]
 TimeoutOption = Annotated[
     float | None,
     typer.Option(
@@ -128,7 +129,7 @@ def open_link(settings: Settings) -> Connection:
         if settings.connect is not None:
             raise
         other = parse_endpoint(VEHICLE_CONNECTION)
-        print(f"gcs: {error.port} is in use: calling the vehicle at {other}", file=sys.stderr, flush=True)
+        complain(f"gcs: {error.port} is in use: calling the vehicle at {other}")
         return Connection(other, signing=signing)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -13,21 +16,29 @@ from flightstack.mavlink.tlog import Record, decode_records, encode_record
 class TlogFile:
     """Writes a tlog, each record at once, so that a killed process leaves a readable file.
 
-    A log that cannot be written must not end the session: the first error is kept in ``error``.
+    A log that cannot be written must not end the session: the first error is kept in ``error``, and the file ends
+    with the last whole record.
     """
 
     def __init__(self, path: Path) -> None:
         """Create or replace the file at ``path``; raise OSError when that fails."""
         self._file = path.open("wb", buffering=0)
+        self._size = 0
         self.error: OSError | None = None
 
     def write(self, time_us: int, frame: bytes | memoryview) -> None:
         """Write one frame, received or sent at ``time_us`` since the Unix epoch."""
-        if self.error is None:
-            try:
-                self._file.write(encode_record(time_us, frame))
-            except OSError as error:
-                self.error = error
+        if self.error is not None:
+            return
+        record = encode_record(time_us, frame)
+        try:
+            if self._file.write(record) < len(record):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            self._size += len(record)
+        except OSError as error:
+            self.error = error
+            with contextlib.suppress(OSError):  # a pipe cannot
+                self._file.truncate(self._size)
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""

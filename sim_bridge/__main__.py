@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from flightstack import console
 from flightstack.contract import Vector3
 from flightstack.params.errors import ConfigError
 from sim_bridge import arguments, options
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.export_command import export_mjcf
 from sim_bridge.live_view import LiveView
+from sim_bridge.output import complain, load_named_vehicle, print_result
 from sim_bridge.render_command import render, require
 
 if TYPE_CHECKING:
@@ -73,11 +74,10 @@ def run(
     arguments.plant(plant)
     arguments.in_range("--instance", instance, 0, 250)
     arguments.in_range("--seed", seed, 0, 2**63)
-    from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
     from sim_bridge.plant import PlantOptions  # noqa: PLC0415
     from sim_bridge.server import ServerOptions  # noqa: PLC0415
 
-    loaded = load_vehicle(vehicle)
+    loaded = load_named_vehicle(vehicle)
     battery = arguments.battery(loaded, battery_start, battery_capacity, battery_drain)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
     served = ServerOptions(
@@ -141,11 +141,9 @@ def open_loop(
     arguments.in_range("--dt", dt, 1e-6, 1.0)
     arguments.in_range("--seed", seed, 0, 2**63)
     initial = _initial(pos, vel, euler_deg, rates, no_ground)
-    from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
-    from sim_bridge.server import complain  # noqa: PLC0415
 
-    loaded = load_vehicle(vehicle)
+    loaded = load_named_vehicle(vehicle)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
     state = run_open_loop(
         OpenLoop(
@@ -154,7 +152,7 @@ def open_loop(
         ),
         warn=complain,
     )  # fmt: skip
-    _print(json.dumps(state) if as_json else _table(state))
+    print_result(json.dumps(state) if as_json else _table(state))
 
 
 def _initial(pos: str, vel: str, euler_deg: str, rates: str, no_ground: bool) -> InitialState:
@@ -172,16 +170,6 @@ app.command()(render)
 app.command()(export_mjcf)
 
 
-def _print(text: str) -> None:
-    try:
-        print(text, flush=True)
-    except OSError as error:
-        sys.stdout = open(os.devnull, "w", encoding="ascii")  # noqa: SIM115  # Python tries again at its end
-        if not isinstance(error, BrokenPipeError):  # who closed a pipe has read enough
-            print(f"sim-bridge: cannot write the result: {error.strerror}", file=sys.stderr)
-        raise typer.Exit(1) from None
-
-
 def _table(state: dict[str, Any]) -> str:
     lines = []
     for name, value in state.items():
@@ -195,13 +183,17 @@ def main(argv: list[str] | None = None) -> int:
     try:
         return app(argv, standalone_mode=False) or 0
     except PlantDivergedError as error:
-        print(f"sim-bridge: {error}", file=sys.stderr)
+        complain(error)
         return 1
     except _UsageError as error:
         message: str = getattr(error, "format_message", error.__str__)()
-        print(f"sim-bridge: {message}", file=sys.stderr)
+        complain(message)
     except (UsageProblemError, ConfigError) as error:
-        print(f"sim-bridge: {error}", file=sys.stderr)
+        complain(error)
+    except OSError as error:  # stdout cannot be written
+        console.drop(sys.stdout)
+        complain(error.strerror or error)
+        return 1
     return 2
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from flightstack import console
+from flightstack.atomic_file import check_new, write_text_atomically
+from flightstack.picture_options import Overwrite
 from sim_bridge.errors import UsageProblemError
+from sim_bridge.output import complain, load_named_vehicle, print_result
 
 
 def export_mjcf(
@@ -19,39 +21,29 @@ def export_mjcf(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="FILE", help="Where to write it.  [default: stdout]")
     ] = None,
+    overwrite: Overwrite = False,
     scene: Annotated[bool, typer.Option("--scene", help="With sky, landmarks, light and cameras.")] = False,
 ) -> None:
     """Write a vehicle's multibody model as MJCF.
 
     A table of the masses goes to stderr.
     """
-    from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
     from sim_bridge.multibody.assembly import TOLERANCE, assemble  # noqa: PLC0415
     from sim_bridge.multibody.mass_table import mass_table  # noqa: PLC0415
     from sim_bridge.multibody.mjcf import model_xml  # noqa: PLC0415
 
-    loaded = load_vehicle(vehicle)
+    if out is not None:
+        check_new(out, overwrite)
+    loaded = load_named_vehicle(vehicle)
     text = model_xml(loaded, scene=scene)
     assembly = assemble(loaded)
-    print(mass_table(loaded, assembly), file=sys.stderr)
+    console.complain(mass_table(loaded, assembly))
     if assembly.worst_miss > TOLERANCE:
-        print(f"sim-bridge: {assembly.worst_line()}: it flies as it is built", file=sys.stderr)
+        complain(f"{assembly.worst_line()}: it flies as it is built")
     if out is None:
-        _print(text)
+        print_result(text.removesuffix("\n"))
         return
     try:
-        part = out.with_name(f".{out.name}.part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(out)
+        write_text_atomically(out, text)
     except OSError as error:
         raise UsageProblemError(f"--out {out}: cannot be written: {error.strerror}") from None
-
-
-def _print(text: str) -> None:
-    try:
-        print(text, end="", flush=True)
-    except OSError as error:
-        sys.stdout = open(os.devnull, "w", encoding="ascii")  # noqa: SIM115  # Python tries again at its end
-        if not isinstance(error, BrokenPipeError):  # who closed a pipe has read enough
-            print(f"sim-bridge: cannot write the result: {error.strerror}", file=sys.stderr)
-        raise typer.Exit(1) from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import signal
-import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,7 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flightstack import console
 from flightstack import picture_options as asked
+from flightstack.atomic_file import check_new
 from flightstack.params.errors import ConfigError
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.render_wish import Wish, wish_of
@@ -46,11 +47,12 @@ def render(
     speed: asked.Speed = None,
     vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the file's]")] = None,
     no_words: asked.NoWords = False,
+    overwrite: asked.Overwrite = False,
     caller: Annotated[str, typer.Option(hidden=True, help="Command that complaints name.")] = _NAME,
 ) -> None:
     """Draw pictures or a film of a flight."""
     options = asked.PictureOptions(
-        png, sheet, video, view, at, camera, size, fps, begin, end, speed, no_words
+        png, sheet, video, view, at, camera, size, fps, begin, end, speed, no_words, overwrite
     )
     with _orderly(caller):
         _render(poses, options, vehicle, caller)
@@ -84,9 +86,19 @@ def _write(wish: Wish, vehicle: Vehicle, path: FlightPath, first: float, last: f
     from sim_bridge.multibody.offscreen import choose  # noqa: PLC0415
 
     choose()
-    from sim_bridge.multibody.pictures import SHEET_PICTURES, Look, Pictures, film_of, spread  # noqa: PLC0415
+    from sim_bridge.multibody.pictures import (  # noqa: PLC0415
+        SHEET_PICTURES,
+        Look,
+        Pictures,
+        film_of,
+        numbered,
+        spread,
+    )
 
     times = [_within("--at", time_s, path) for time_s in wish.times_s]
+    if wish.png is not None:
+        for file in numbered(wish.png, len(times) or 1):
+            check_new(file, wish.overwrite)
     film = None if wish.video is None else film_of(wish.video, first, last, wish.fps, wish.speed)
     if film is not None and film.frames > _MOST_FRAMES:
         raise UsageProblemError(
@@ -103,7 +115,7 @@ def _write(wish: Wish, vehicle: Vehicle, path: FlightPath, first: float, last: f
             pictures.write_film(film)
             written.append(film.path)
     for file in written:
-        print(file)
+        console.say(file)
 
 
 @contextlib.contextmanager
@@ -122,7 +134,7 @@ def _orderly(caller: str) -> Iterator[None]:
         sentence, code = str(error), 2
     else:
         return
-    print(f"{program}: {sentence}", file=sys.stderr)
+    console.complain(f"{program}: {sentence}")
     raise typer.Exit(code)
 
 

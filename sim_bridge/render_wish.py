@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
+from flightstack.atomic_file import check_new
 from flightstack.picture_options import PictureOptions
 from sim_bridge import arguments
 from sim_bridge.errors import UsageProblemError
@@ -28,10 +29,11 @@ class Wish(NamedTuple):
     speed: float
     times_s: tuple[float, ...]
     words: bool
+    overwrite: bool
 
 
 def wish_of(options: PictureOptions) -> Wish:
-    """Check what was asked for as far as it can be without the file; raise UsageProblemError."""
+    """Check what was asked for as far as it can be without the file; raise UsageProblemError, ConfigError."""
     _check_company(options)
     is_gif = options.video is not None and options.video.suffix.lower() == ".gif"
     width, height = _size(options.size or ("480x270" if is_gif else "1280x720"))
@@ -40,7 +42,7 @@ def wish_of(options: PictureOptions) -> Wish:
     times_s = () if options.at is None else arguments.times("--at", options.at, _MOST_PICTURES)
     wish = Wish(
         options.png, options.sheet, options.video, options.camera, width, height, fps, speed, times_s,
-        not options.no_words,
+        not options.no_words, options.overwrite,
     )  # fmt: skip
     _check(wish)
     return wish
@@ -79,6 +81,7 @@ def _check(wish: Wish) -> None:
             )
         if file.suffix.lower() not in endings:
             raise UsageProblemError(f"{flag} {file}: the name must end in {' or '.join(endings)}")
+        check_new(file, wish.overwrite)
         if not file.parent.is_dir():
             raise UsageProblemError(f"{flag} {file}: there is no directory {file.parent}")
     if wish.camera not in CAMERAS:

@@ -7,7 +7,6 @@ import errno
 import math
 import select
 import socket
-import sys
 from typing import NamedTuple
 
 from flightstack.clock import ask_for_punctual_sleeps
@@ -26,6 +25,7 @@ from sim_bridge.errors import PlantDivergedError
 from sim_bridge.faults import Fault
 from sim_bridge.live_view import LiveView
 from sim_bridge.lockstep import SimulatorLink
+from sim_bridge.output import complain, say
 from sim_bridge.plant import PlantOptions
 from sim_bridge.session import Session
 from sim_bridge.simulator import Simulator
@@ -50,16 +50,6 @@ class ServerOptions(NamedTuple):
     timeout_s: float | None  # None: wait for a client for ever
     faults: tuple[Fault, ...] = ()
     view: LiveView | None = None
-
-
-def say(text: str) -> None:
-    """Print a line for the user."""
-    print(f"sim-bridge: {text}", flush=True)
-
-
-def complain(text: str) -> None:
-    """Print a warning or an error."""
-    print(f"sim-bridge: {text}", file=sys.stderr, flush=True)
 
 
 def serve(options: ServerOptions) -> int:

@@ -28,9 +28,10 @@ table says "at the next start". Defaults of the loops are those of the vehicle {
 give other defaults, normalised in the same way.
 
 Values come, each stronger than the one before, from the defaults, the gains file (`--gains`), the parameter file
-(`--params FILE`, of `flightstack` by default `runs/params-<instance>.params`) and the command line
-(`--param NAME=VALUE`, for this run alone). What a ground station sets is saved in the parameter file, in
+(`--params FILE`, of `flightstack` by default `vehicle.params` in its state directory, `runs/state-<instance>`) and the
+command line (`--param NAME=VALUE`, for this run alone). What a ground station sets is saved in the parameter file, in
 QGroundControl's `.params` format. `gcs fly` starts without one, so that a flight depends on its command line alone.
+The state directory holds the plans, too: docs/mavlink.md, "What survives a restart".
 
 A changed integral gain keeps what the integral contributes at that moment, so it makes no bump. A value has the
 precision of a float32, which MAVLink carries. Parameters of a controller of your own: docs/controllers.md.

@@ -101,21 +101,20 @@ def _folder(state: str) -> Path:
 
 
 def _compile(place: Path, command: list[str]) -> None:
-    fresh = place.with_name(f"{place.name}.{os.getpid()}")
     libraries = [] if "-nostdlib" in command else ["-lm"]
     try:
-        done = subprocess.run(
-            [*command, *libraries, "-o", str(fresh)], capture_output=True, text=True, check=False,
-            timeout=COMPILE_LIMIT_S,
-        )  # fmt: skip
-        if done.returncode != 0:
-            said = next((line for line in done.stderr.splitlines() if "error" in line), "it said nothing")
-            raise BuildError(f"the firmware does not compile with {command[0]}: {said}")
-        fresh.replace(place)
+        with tempfile.TemporaryDirectory(dir=place.parent, prefix=".") as folder:
+            fresh = Path(folder) / place.name
+            done = subprocess.run(
+                [*command, *libraries, "-o", str(fresh)], capture_output=True, text=True, check=False,
+                timeout=COMPILE_LIMIT_S,
+            )  # fmt: skip
+            if done.returncode != 0:
+                said = next((line for line in done.stderr.splitlines() if "error" in line), "it said nothing")
+                raise BuildError(f"the firmware does not compile with {command[0]}: {said}")
+            fresh.replace(place)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise BuildError(f"the firmware cannot be compiled with {command[0]}: {error}") from error
-    finally:
-        fresh.unlink(missing_ok=True)
 
 
 def definitions(compiler: Compiler) -> list[str]:

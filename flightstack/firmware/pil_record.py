@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.atomic_file import write_text_atomically
+from flightstack.atomic_file import write_bytes_atomically, write_text_atomically
 from flightstack.contract import LoopFlags
 from flightstack.mavlink.services.pil_client import PilCounters
 from flightstack.mavlink.services.pil_operations import PilReport
@@ -75,8 +76,9 @@ class PilRecord:
         folder.mkdir(parents=True, exist_ok=True)
         content = {**self.summary(counters, ending), "texts": texts}
         write_text_atomically(folder / f"{prefix}{LINK_FILE}", json.dumps(content, indent=2) + "\n")
-        with (folder / f"{prefix}{STEPS_FILE}").open("wb") as file:
-            np.savez_compressed(file, steps=self.steps)
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, steps=self.steps)
+        write_bytes_atomically(folder / f"{prefix}{STEPS_FILE}", buffer.getvalue())
 
 
 def _figures(values: np.ndarray[Any, Any]) -> dict[str, float]:

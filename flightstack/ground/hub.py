@@ -25,11 +25,14 @@ from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.signing import Signing
 from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
 from flightstack.mavlink.telemetry import MAKERS, VehicleFacts, heartbeat, messages, status_texts
+from flightstack.plan.kept_plans import KeptPlans
 
 HEARTBEAT_S = 1.0
 PEER_FORGOTTEN_S = 30.0
 MAX_PEERS = 64
 """Peers that came by themselves; those addressed unasked, and TCP clients, have limits of their own."""
+KEPT_TEXTS = 16
+"""Texts that wait while no peer is heard, so that a ground station learns what happened at the start."""
 FORWARDED_A_POLL = 64
 MAX_TO_FORWARD = 4096
 
@@ -85,9 +88,18 @@ class GroundHub:
 
     def adopt_plans(self, other: GroundHub) -> None:
         """Take the plans that another hub's vehicle holds; before a reboot it was this one's."""
-        for service in self._services:
-            if isinstance(service, MissionService):
-                service.adopt(*(s for s in other._services if isinstance(s, MissionService)))
+        self.restore_plans(other.plans())
+
+    def plans(self) -> KeptPlans:
+        """Return the plans in force."""
+        return self._missions().plans()
+
+    def restore_plans(self, plans: KeptPlans) -> str | None:
+        """Put plans in force that were before; return the first reason against one of them, or None."""
+        return self._missions().restore(plans)
+
+    def _missions(self) -> MissionService:
+        return next(service for service in self._services if isinstance(service, MissionService))
 
     def drop_peer(self, address: PeerAddress) -> None:
         """Forget a peer whose connection has ended."""
@@ -233,6 +245,9 @@ class GroundHub:
 
     def _spread_texts(self) -> None:
         texts = self._autopilot.now.texts
+        if not any(peer.heard for peer in self._peers.values()):
+            del texts[:-KEPT_TEXTS]  # for the first one that is heard
+            return
         for text in texts:
             for message in status_texts(text.severity, text.text):
                 self._to_all(message)

@@ -16,6 +16,7 @@ from flightstack.mavlink.services.mission_store import (
     MissionReplaced,
 )
 from flightstack.plan import PLAN_NAMES, MissionType
+from flightstack.plan.kept_plans import KeptPlans
 from flightstack.snapshot import NOTICE, WARNING
 
 
@@ -40,13 +41,34 @@ class MissionService:
             MissionType.RALLY: autopilot.set_rally,
         }
 
-    def adopt(self, other: MissionService) -> None:
-        """Take the other's plans, the geofence first: the others were checked against it."""
+    def plans(self) -> KeptPlans:
+        """Return the plans in force; a mission that was flown to its end begins anew."""
+        mission, fence, rally = (self._server.items(kind) for kind in self._setters)
+        places, progress = self._autopilot.places, self._autopilot.now.progress
+        goes_on = not progress.finished and progress.current < len(mission)
+        home = places.home_point if places.home_is_chosen else None
+        return KeptPlans(mission, fence, rally, progress.current if goes_on else 0, home)
+
+    def restore(self, plans: KeptPlans) -> str | None:
+        """Put plans in force that were before; return the first reason against one of them, or None.
+
+        Home and the geofence come first: the others were checked against them, and are not taken without them.
+        """
+        refusal = None if plans.home is None else self._autopilot.set_home(plans.home)
+        if refusal is not None:
+            return f"home: {refusal}"
+        reasons: list[str] = []
         for kind in (MissionType.FENCE, MissionType.MISSION, MissionType.RALLY):
-            items = other._server.items(kind)
-            if items:
-                self._server.restore(kind, items)
-        self._take_events()
+            items = plans.items(kind)
+            rejection = self._server.restore(kind, items) if items else None
+            self._take_events()
+            if rejection is not None:
+                reasons.append(f"{PLAN_NAMES[kind]}: {rejection.reason}")
+                if kind is MissionType.FENCE:
+                    break
+            elif kind is MissionType.MISSION and plans.current:
+                self._autopilot.set_current_item(plans.current)
+        return reasons[0] if reasons else None
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a message of the mission protocol."""

@@ -7,6 +7,7 @@ goes in: the same flight gives the same bytes.
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Callable, Mapping
 from typing import Protocol
@@ -29,6 +30,9 @@ class LogFile(Protocol):
 
     def write(self, data: bytes | memoryview, /) -> int | None:
         """Write bytes; return how many were written."""
+
+    def truncate(self, size: int, /) -> int:
+        """Shorten the file; raise OSError."""
 
     def close(self) -> None:
         """Close the file."""
@@ -85,8 +89,8 @@ class _EventTopic:
 class FlightLog:
     """Writes one flight into ``file``, which it owns from then on.
 
-    A file that cannot be written (disk full) must not end the flight: the first error is kept in ``error``
-    and nothing more is written.
+    A file that cannot be written (disk full) must not end the flight: the first error is kept in ``error``, the file
+    ends with the last whole message, and nothing more is written.
     """
 
     def __init__(self, file: LogFile, rotors: int, capacity: int = DEFAULT_CAPACITY) -> None:
@@ -95,6 +99,7 @@ class FlightLog:
         self.inner = Trace(capacity, LoopRow.SIZE, self.flush)
         self.outer = Trace(capacity, OUTER.size, self.flush)
         self.error: OSError | None = None
+        self._size = 0  # of what was written whole
         self._closed = False
         first_outer_id = len(self._inner_topics)
         first_event_id = first_outer_id + len(OUTER_TOPICS)
@@ -122,7 +127,8 @@ class FlightLog:
             {"ref_lat": origin.latitude_deg, "ref_lon": origin.longitude_deg, "ref_alt": origin.altitude_m},
         )
         topics = (*self._inner_topics, *OUTER_TOPICS, *EVENT_TOPICS)
-        parts = [ulog.file_header(time_us)]
+        self._write(ulog.file_header(time_us), ulog.HEADER_SIZE)
+        parts = []
         for topic in topics:
             fields = [("uint64_t", 0, "timestamp"), *((f.type, f.length, f.name) for f in topic.fields)]
             parts.append(ulog.format_definition(topic.name, fields))
@@ -168,15 +174,20 @@ class FlightLog:
         except OSError as error:
             self.error = self.error or error
 
-    def _write(self, data: bytes | memoryview) -> None:
+    def _write(self, data: bytes | memoryview, header_size: int = 0) -> None:
+        """Write whole messages, after ``header_size`` bytes that are none."""
+        written = 0
         try:
-            while self.error is None and len(data):
-                written = self._file.write(data)
-                if not written:
+            while self.error is None and written < len(data):
+                now = self._file.write(data[written:])
+                if not now:
                     raise OSError("the log file takes no more data")
-                data = data[written:]
+                written += now
         except OSError as error:
             self.error = error
+            with contextlib.suppress(OSError):  # a pipe cannot
+                self._file.truncate(self._size + ulog.whole_messages(data, written, header_size))
+        self._size += written
 
 
 def vehicle_info(vehicle: Vehicle) -> dict[str, str | int | float]:

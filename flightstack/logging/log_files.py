@@ -22,25 +22,38 @@ def default_log(instance: int, stamp: str) -> Path:
 
 
 class LogFiles:
-    """Opens ``first`` for the first flight, and for the next ones files with a number behind its name."""
+    """Opens ``first`` for the first flight, and for the next ones files with a number behind its name.
 
-    def __init__(self, first: Path | None) -> None:
+    A file that exists is left alone, and the next free number taken; but ``first`` may be overwritten if the user
+    said so.
+    """
+
+    def __init__(self, first: Path | None, overwrite: bool = False) -> None:
         self._first = first
+        self._overwrite = overwrite
         self._count = 0
         self.current: Path | None = None
         """The newest log, finished or not."""
 
     def open(self, rotors: int) -> FlightLog | None:
         """Begin the next log; None if there are to be none. Raise OSError."""
-        path = self._first
-        if path is None:
+        if self._first is None:
             return None
-        self._count += 1
-        if self._count > 1:
-            path = path.with_name(f"{path.stem}-{self._count}{path.suffix}")
-        self.current = path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        return FlightLog(create_log_file(path), rotors)
+        while True:
+            self._count += 1
+            path = self.current = self._numbered(self._first)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                file = create_log_file(path, self._overwrite and self._count == 1)
+            except FileExistsError:
+                continue
+            return FlightLog(file, rotors)
+
+    def _numbered(self, first: Path) -> Path:
+        is_device = first.exists() and not first.is_file()
+        if self._count == 1 or is_device:
+            return first
+        return first.with_name(f"{first.stem}-{self._count}{first.suffix}")
 
     def tail(self, is_logging: Callable[[], bool]) -> FileTail | None:
         """Return the log that is being written, to be read along; None while there is none."""

@@ -52,7 +52,8 @@ class FlightRecorder:
         self._store_outer = direct(store_outer_row, *(np.zeros(size) for size in sizes), 0)
         self._mission = (MissionProgress(0, -1, False, False), 0)
         self._missions = 0
-        self.error: OSError | None = None
+        self._armed = False
+        self._error: OSError | None = None
 
     @property
     def is_logging(self) -> bool:
@@ -80,8 +81,9 @@ class FlightRecorder:
 
     def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
         """Record mode and arming, and whether a failsafe acts; arming begins a log, disarming ends it."""
-        if status.armed and self._log is None:
+        if status.armed and not self._armed:  # not again in a flight whose log could not be written
             self._begin(time_us)
+        self._armed = status.armed
         if self._log is None:
             return
         self._log.event(
@@ -159,10 +161,17 @@ class FlightRecorder:
         if self._log is not None:
             self._log.message(time_us, severity, text)
 
+    def take_error(self) -> OSError | None:
+        """Return the error that ended a log early, once; None if there is none. The flight goes on without a log."""
+        if self._log is not None and self._log.error is not None:
+            self.close()
+        error, self._error = self._error, None
+        return error
+
     def close(self) -> None:
         """End the log in good order; a later flight opens the next."""
         if self._log is not None:
             self._log.close()
-            self.error = self.error or self._log.error
+            self._error = self._log.error
             self._log = None
             self.inner_row = self._no_row

@@ -18,6 +18,8 @@ _LOGGED_STRING = struct.Struct("<BQ")
 _FLAG_BITS = bytes(40)  # no compatible or incompatible flag, no appended data
 _MAX_CONTENT = 0xFFFF
 
+HEADER_SIZE = len(MAGIC) + 1 + 8
+"""Bytes of the file header, before the first message."""
 DATA_HEADER = struct.Struct("<HBH")  # size, type 'D', subscription id
 DATA_TYPE = ord("D")
 
@@ -46,6 +48,17 @@ def _message(kind: str, content: bytes) -> bytes:
 def file_header(time_us: int) -> bytes:
     """Return the file header and the flag bits, which must come first. ``time_us``: start of the log."""
     return MAGIC + struct.pack("<BQ", VERSION, time_us) + _message("B", _FLAG_BITS)
+
+
+def whole_messages(data: bytes | memoryview, count: int, begin: int = 0) -> int:
+    """Return how many of the first ``count`` bytes are whole messages; they begin after ``begin`` other bytes."""
+    end = begin
+    while end + _MESSAGE.size <= count:
+        after = end + _MESSAGE.size + _MESSAGE.unpack_from(data, end)[0]
+        if after > count:
+            break
+        end = after
+    return end if end <= count else 0
 
 
 def format_definition(name: str, fields: Iterable[tuple[str, int, str]]) -> bytes:

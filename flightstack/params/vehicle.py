@@ -11,11 +11,12 @@ import numpy as np
 from flightstack.contract import MAX_ROTORS, FloatArray
 from flightstack.params.assembly import Part, read_parts
 from flightstack.params.battery import Battery, read_battery
-from flightstack.params.errors import ConfigError
+from flightstack.params.named_file import built_in_names, find_file, hidden_file
 from flightstack.params.toml_reader import Table, read_toml
 
 BUILT_IN = Path(__file__).parent / "vehicles"
 DEFAULT_VEHICLE = "paper_quad"
+KIND = "a built-in vehicle"
 GRAVITY_M_S2 = 9.81  # the paper's Table I
 SYSTEM_TYPES = {3: 15, 4: 2, 6: 13, 8: 14}
 """MAV_TYPE by number of rotors: tricopter, quadrotor, hexarotor, octorotor."""
@@ -97,18 +98,17 @@ class Vehicle:
 
 def built_in_vehicles() -> list[str]:
     """Names of the vehicles that come with the package."""
-    return sorted(path.stem for path in BUILT_IN.glob("*.toml"))
+    return built_in_names(BUILT_IN)
+
+
+def hidden_vehicle(name_or_path: str) -> str | None:
+    """Return the sentence for a file in the working directory that a built-in name hides, or None."""
+    return hidden_file(name_or_path, KIND)
 
 
 def load_vehicle(name_or_path: str) -> Vehicle:
     """Read a vehicle by the name of a built-in one or by the path of a TOML file; raise ConfigError."""
-    path = Path(name_or_path)
-    if not path.suffix and not path.is_file():
-        if name_or_path not in built_in_vehicles():
-            known = ", ".join(built_in_vehicles())
-            raise ConfigError(name_or_path, "", f"is neither a file nor a built-in vehicle ({known})")
-        path = BUILT_IN / f"{name_or_path}.toml"
-    return _vehicle(read_toml(path))
+    return _vehicle(read_toml(find_file(name_or_path, BUILT_IN, KIND)))
 
 
 def _vehicle(top: Table) -> Vehicle:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
+from flightstack.atomic_file import write_text_atomically
 from flightstack.params.errors import ConfigError
 from flightstack.plan.plan import Plan
 from flightstack.plan.qgc_plan import read_plan
@@ -56,19 +56,7 @@ def save_plan(path: str | Path, plan: Plan) -> None:
         allowed = ", ".join(PLAN_SUFFIXES + WAYPOINTS_SUFFIXES)
         raise ConfigError(path, "", f"the suffix {path.suffix!r} must be one of {allowed}")
     try:
-        _replace_file(path.resolve(), text)  # the target of a link is replaced, not the link
+        write_text_atomically(path, text)
     except (OSError, ValueError) as error:
         problem = error.strerror if isinstance(error, OSError) else error
         raise ConfigError(path, "", f"cannot be written: {problem}") from error
-
-
-def _replace_file(path: Path, text: str) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with temporary.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

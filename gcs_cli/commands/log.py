@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcs_cli.errors import FAILED, USAGE, CliError
-from gcs_cli.settings import ConnectOption, InstanceOption, JsonOption, TimeoutOption, meet_vehicle
+from gcs_cli.settings import (
+    ConnectOption,
+    InstanceOption,
+    JsonOption,
+    OverwriteOption,
+    TimeoutOption,
+    meet_vehicle,
+)
 
 if TYPE_CHECKING:
     from flightstack.mavlink.services.log_client import LogEntry
@@ -60,6 +67,7 @@ def download(
     everything: Annotated[
         bool, typer.Option("--all", help="All logs; those that are here already are left out.")
     ] = False,
+    overwrite: OverwriteOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
     instance: InstanceOption = None,
@@ -81,18 +89,15 @@ def download(
             if everything and path.exists() and path.stat().st_size == log.size:
                 typer.echo(f"{path} is here already")
             else:
-                _fetch(connection, log, file, path, may_replace=output is not None and not everything)
+                _fetch(connection, log, file, path, overwrite)
 
 
-def _fetch(
-    connection: Connection, log: LogEntry, file: Entry | None, path: Path, *, may_replace: bool
-) -> None:
-    from flightstack.atomic_file import write_bytes_atomically  # noqa: PLC0415
+def _fetch(connection: Connection, log: LogEntry, file: Entry | None, path: Path, overwrite: bool) -> None:
+    from flightstack.atomic_file import check_new, write_bytes_atomically  # noqa: PLC0415
     from gcs_cli import log_calls  # noqa: PLC0415
     from gcs_cli.transfer_bar import TransferBar  # noqa: PLC0415
 
-    if path.exists() and not may_replace:
-        raise CliError(f"{path} exists: name another file with --output", USAGE)
+    check_new(path, overwrite)
     began_s = connection.now_s
     with TransferBar(f"log {log.log_id}") as bar:
         content = log_calls.fetch_log(connection, log, file, bar.show)

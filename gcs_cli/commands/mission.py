@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcs_cli.settings import ConnectOption, InstanceOption, TimeoutOption, meet_vehicle
+from gcs_cli.settings import ConnectOption, InstanceOption, OverwriteOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
     from flightstack.plan import MissionItem
@@ -84,16 +84,20 @@ def download(
     file: Annotated[
         Path | None, typer.Argument(help="Where to write it; without, it is printed.", show_default=False)
     ] = None,
+    overwrite: OverwriteOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
     instance: InstanceOption = None,
 ) -> None:
     """Fetch the vehicle's mission, geofence and rally points."""
+    from flightstack.atomic_file import check_new  # noqa: PLC0415
     from flightstack.geodesy import GeoPoint  # noqa: PLC0415
     from flightstack.plan import MissionType, Plan, save_plan  # noqa: PLC0415
     from gcs_cli import calls  # noqa: PLC0415
     from gcs_cli.plan_parts import plan_parts  # noqa: PLC0415
 
+    if file is not None:
+        check_new(file, overwrite)
     with meet_vehicle(context, connect, timeout, instance) as connection:
         session = connection.session
         items, fence, rally = (

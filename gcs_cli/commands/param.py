@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcs_cli.errors import FAILED, USAGE, CliError
-from gcs_cli.settings import ConnectOption, InstanceOption, JsonOption, TimeoutOption, meet_vehicle
+from gcs_cli.settings import (
+    ConnectOption,
+    InstanceOption,
+    JsonOption,
+    OverwriteOption,
+    TimeoutOption,
+    meet_vehicle,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -120,16 +127,18 @@ def reset(
 def save(
     context: typer.Context,
     file: Annotated[Path, typer.Argument(help="Where to write them.", show_default=False)],
+    overwrite: OverwriteOption = False,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
     instance: InstanceOption = None,
 ) -> None:
     """Write all parameters to a file, as QGroundControl does."""
-    from flightstack.atomic_file import write_text_atomically  # noqa: PLC0415
+    from flightstack.atomic_file import check_new, write_text_atomically  # noqa: PLC0415
     from flightstack.params.param_file import is_parameter_name  # noqa: PLC0415
     from gcs_cli import param_calls  # noqa: PLC0415
     from gcs_cli.param_file import render_parameters  # noqa: PLC0415
 
+    check_new(file, overwrite)
     with meet_vehicle(context, connect, timeout, instance) as connection:
         told = param_calls.fetch_all(connection)
         kept = [parameter for parameter in told if is_parameter_name(parameter.name)]

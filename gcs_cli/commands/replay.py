@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from flightstack import picture_options as asked
+from flightstack.console import complain
 from gcs_cli.errors import FAILED, CliError
 
 _NAME = "gcs replay"
@@ -32,6 +33,7 @@ def replay(
     speed: asked.Speed = None,
     vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the log's]")] = None,
     no_words: asked.NoWords = False,
+    overwrite: asked.Overwrite = False,
 ) -> None:
     """Draw a flight: pictures, a film, or a window.
 
@@ -46,11 +48,11 @@ def replay(
     flight = read_flight(found.log)
     poses = poses_of(flight, found, vehicle)
     if flight.damaged:
-        print(f"gcs: warning: the log is damaged; drawn up to {poses.time_s[-1]:.1f} s", file=sys.stderr)
+        complain(f"gcs: warning: the log is damaged; drawn up to {poses.time_s[-1]:.1f} s")
     if not (png or sheet or video or view):
-        video = found.film
+        video, overwrite = found.film, True  # it belongs to the run, as its report does
     options = asked.PictureOptions(
-        png, sheet, video, view, at, camera, size, fps, begin, end, speed, no_words
+        png, sheet, video, view, at, camera, size, fps, begin, end, speed, no_words, overwrite
     )
     with tempfile.TemporaryDirectory(prefix="gcs-replay-") as folder:
         file = Path(folder) / "poses.npz"

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import math
-import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from PIL import Image
 
-from flightstack.atomic_file import write_bytes_atomically
+from flightstack.atomic_file import replacing, write_bytes_atomically
 
 FILMS = (".mp4", ".gif")
 PALETTE_FRAMES = 8
@@ -58,19 +56,8 @@ def drawn_for(path: Path, count: int) -> int:
 
 def write_film(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
     """Write a film of ``count`` frames by the ending of its name, one of ``FILMS``; raise OSError."""
-    with _replacing(path) as temporary:
+    with replacing(path) as temporary:
         (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(temporary, frame_at, count, fps)
-
-
-@contextlib.contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """Give a name to write to, which becomes ``path`` at the end; nothing is left when something goes wrong."""
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix.lower()}")
-    try:
-        yield temporary
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _write_mp4(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:

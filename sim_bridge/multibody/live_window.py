@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flightstack.console import complain
 from flightstack.contract import FloatArray
 from flightstack.params.errors import ConfigError
 from flightstack.params.vehicle import load_vehicle
@@ -92,7 +93,7 @@ def main(vehicle: str) -> int:
         loaded = load_vehicle(vehicle)
         stage = Stage(loaded)
     except (UsageProblemError, ConfigError, ImportError) as error:
-        print(error, file=sys.stderr)
+        complain(error)
         return 2
     flight = LiveFlight(len(loaded.rotors), MOST_TRAIL)
     marks = Marks(flight.trail, NO_POINTS, stage.span_m, stage.ground_m)

@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from flightstack.console import complain
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.multibody.marks import Marks
@@ -83,7 +84,7 @@ def play(vehicle: Vehicle, path: FlightPath, begin_s: float, end_s: float, speed
     """Play a flight until the window is closed; ``caller`` is the command that was given."""
     require_display()
     playback = Playback(begin_s, end_s, speed)
-    print(f"{caller.split(maxsplit=1)[0]}: {HELP}", file=sys.stderr, flush=True)
+    complain(f"{caller.split(maxsplit=1)[0]}: {HELP}")
 
     def moments() -> Iterable[Moment]:
         while True:

@@ -15,7 +15,7 @@ class RealVehicle:
     """``sim-bridge`` and ``flightstack`` at an instance of their own, at a speed against real time."""
 
     def __init__(self, directory: Path, speed: float, *options: str) -> None:
-        """Start both; ``directory`` takes logs and parameters, ``options`` go to ``flightstack``."""
+        """Start both; ``directory`` takes logs, parameters and plans, ``options`` go to ``flightstack``."""
         self.speed = speed
         self.instance = free_instance()
         self.api_port = api_client_port(self.instance)
@@ -25,8 +25,7 @@ class RealVehicle:
         number = ("--instance", str(self.instance))
         self.simulator = Process("sim_bridge", *number, "--speed", str(speed))
         self.stack = Process(
-            "flightstack", *number, "--log", str(self.log),
-            "--params", str(directory / "vehicle.params"), *options,
+            "flightstack", *number, "--log", str(self.log), "--state", str(directory), *options,
         )  # fmt: skip
         try:
             self.stack.wait_for("flightstack: paper_quad")

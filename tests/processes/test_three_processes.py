@@ -79,7 +79,7 @@ def flying(start: Start, tmp_path: Path) -> dict[str, Process]:
         "simulator": start("sim_bridge", "--instance", str(instance), "--speed", "2"),
         "stack": start(
             "flightstack", "--instance", str(instance), "--gcs-port", str(port), "--log", str(tmp_path / "flight.ulg"),
-            "--exit-on-gcs-loss", "3",
+            "--params", "none", "--exit-on-gcs-loss", "3",
         ),
     }  # fmt: skip
     processes["stack"].wait_for("flightstack: paper_quad")
@@ -129,16 +129,26 @@ def test_ctrl_c_in_flight_leaves_a_readable_log_and_everyone_ends_in_order(
 
 def test_without_a_simulator_the_stack_says_so(start: Start) -> None:
     instance = free_instance()
-    stack = start("flightstack", "--instance", str(instance), "--sim-timeout", "0.2", "--log", "none")
+    stack = start(
+        "flightstack",
+        "--instance",
+        str(instance),
+        "--sim-timeout",
+        "0.2",
+        "--log",
+        "none",
+        "--params",
+        "none",
+    )
     assert stack.end() == 3
     assert f"no simulator at 127.0.0.1:{4560 + instance} within 0.2 s" in stack.output
 
 
 def test_a_busy_port_is_named(start: Start) -> None:
     instance = free_instance()
-    first = start("flightstack", "--instance", str(instance), "--log", "none")
+    first = start("flightstack", "--instance", str(instance), "--log", "none", "--params", "none")
     first.wait_for("flightstack: paper_quad")
-    second = start("flightstack", "--instance", str(instance), "--log", "none")
+    second = start("flightstack", "--instance", str(instance), "--log", "none", "--params", "none")
     assert second.end() == 2
     assert f"UDP port {18570 + instance} on 127.0.0.1 is in use" in second.output
 
@@ -181,6 +191,8 @@ def test_real_time_clock_flies_with_a_simulator_that_does_not_wait(start: Start,
         "realtime",
         "--log",
         str(log),
+        "--params",
+        "none",
     )
     stack.wait_for("flightstack: paper_quad")
     for arguments in (["takeoff", "--alt", "1"], ["arm"]):

@@ -107,14 +107,14 @@ def test_gains_that_are_not_there() -> None:
         open_gains("no/such.toml")
 
 
-def test_a_directory_of_that_name_is_in_nobodys_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_directory_does_not_hide_built_in_gains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "paper").mkdir()
     monkeypatch.chdir(tmp_path)
     assert open_gains("paper").text("description") == open_gains(str(BUILT_IN / "paper.toml")).text(
         "description"
     )
     (tmp_path / "soft").write_text(TUNED)
-    make("soft")  # a file without a suffix is one
+    make("./soft")
 
 
 def test_the_error_of_a_file_travels_between_processes() -> None:

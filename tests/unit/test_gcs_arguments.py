@@ -236,6 +236,7 @@ def test_the_children_are_told_everything() -> None:
         "--inner-hz=1000.0", "--outer-hz=250.0", "--sim-port=4562", "--sim-timeout=12",
         "--instance=2", "--gcs-port=14552", "--log=runs/x/flight.ulg",
         "--home=47.1,-8.2,3.5", "--exit-on-gcs-loss=5", "--params=none",
+        "--state=none",
         "--wait-for-start", "--ideal-rotors",
     ]  # fmt: skip
 

@@ -6,8 +6,8 @@ import subprocess
 import sys
 
 HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich")
-LIGHT = ("flightstack.picture_options", "flightstack.port_numbers")
-"""Of the flight stack's modules only those that hold words and numbers for the help."""
+LIGHT = ("flightstack.console", "flightstack.picture_options", "flightstack.port_numbers")
+"""Of the flight stack's modules only those that print, or hold words and numbers for the help."""
 
 
 def test_help_imports_nothing_heavy() -> None:

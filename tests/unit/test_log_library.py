@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.logging import log_library
 from flightstack.logging.log_files import LogFiles, default_log
 from flightstack.logging.log_library import LogLibrary, create_log_file
 from flightstack.mavlink.services.log_store import DatedLogs, FlatLogs, LogInfo
@@ -38,12 +39,12 @@ def folder(tmp_path: Path) -> Path:
 
 def test_logs_are_listed_from_the_oldest_on(folder: Path) -> None:
     logs = LogLibrary(folder).logs()
-    assert logs == [LogInfo("c.ulg", 5, 1_000), LogInfo("b.ulg", 6, 2_000), LogInfo("a.ulg", 7, 90_000)]
+    assert logs == (LogInfo("c.ulg", 5, 1_000), LogInfo("b.ulg", 6, 2_000), LogInfo("a.ulg", 7, 90_000))
 
 
 def test_a_folder_that_is_not_there_has_no_logs(tmp_path: Path) -> None:
     library = LogLibrary(tmp_path / "none")
-    assert library.logs() == []
+    assert library.logs() == ()
     assert library.open("a.ulg") is None
     assert library.erase() == 0
 
@@ -91,7 +92,7 @@ def test_nothing_but_logs_of_the_folder_is_opened(folder: Path, name: str) -> No
 
 def test_erasing_keeps_the_open_log_and_all_that_is_none(folder: Path) -> None:
     library = LogLibrary(folder)
-    with create_log_file(folder / "new.ulg") as log, create_log_file(folder / "a.ulg"):
+    with create_log_file(folder / "new.ulg") as log, create_log_file(folder / "a.ulg", overwrite=True):
         log.write(b"in flight")
         assert library.erase() == 2
         assert {log.name for log in library.logs()} == {"a.ulg", "new.ulg"}
@@ -99,7 +100,7 @@ def test_erasing_keeps_the_open_log_and_all_that_is_none(folder: Path) -> None:
     assert (folder / "link.ulg").is_symlink()
     assert (folder.parent / "secret.ulg").read_bytes() == b"secret"
     assert library.erase() == 2
-    assert library.logs() == []
+    assert library.logs() == ()
 
 
 def test_logs_as_directories(folder: Path) -> None:
@@ -135,3 +136,86 @@ def test_each_instance_lists_and_erases_its_own_logs(tmp_path: Path, monkeypatch
         assert sorted(log.name for log in library.logs()) == names
     assert libraries[0].erase() == 2
     assert [len(library.logs()) for library in libraries] == [0, 2, 2]
+
+
+class Clock:
+    """Stands for the module ``time``, and counts the looks at the disk."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s = 1e6
+        self.listed = self.examined = 0
+        scandir, status = os.scandir, os.stat
+        monkeypatch.setattr(log_library.time, "time", lambda: self.now_s)
+
+        def count_listed(*words: object) -> object:
+            self.listed += 1
+            return scandir(*words)  # type: ignore[call-overload]
+
+        def count_examined(*words: object, **options: object) -> os.stat_result:
+            self.examined += 1
+            return status(*words, **options)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(log_library.os, "scandir", count_listed)
+        monkeypatch.setattr(log_library.os, "stat", count_examined)
+
+    def take(self) -> tuple[int, int]:
+        """Return how often the folder was listed, and a file examined, since the last call."""
+        taken = self.listed, self.examined - 1  # the folder itself
+        self.listed = self.examined = 0
+        return taken
+
+
+@pytest.fixture
+def thousand(tmp_path: Path) -> Path:
+    for number in range(1000):
+        write(tmp_path / f"{number:04}.ulg", b"log", 1_000 + number)
+    os.utime(tmp_path, (1_000, 1_000))
+    return tmp_path
+
+
+def test_a_list_of_logs_examines_the_folder_once_an_interval(
+    thousand: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Clock(monkeypatch)
+    library = LogLibrary(thousand)
+    first = library.logs()
+    assert (len(first), clock.take()) == (1000, (1, 1000))
+    assert all(library.logs() is first for _ in range(118))
+    assert clock.take() == (0, -1)
+    clock.now_s += log_library.LOOK_S
+    assert library.logs() is first
+    assert clock.take() == (0, 0)
+
+
+def test_changes_by_other_programs_show_in_the_next_interval(
+    thousand: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Clock(monkeypatch)
+    library = LogLibrary(thousand)
+    library.logs()
+    (thousand / "0007.ulg").unlink()
+    write(thousand / "new.ulg", b"new", int(clock.now_s))
+    write(thousand / "copy", b"longer log", 1_001)
+    (thousand / "copy").rename(thousand / "0001.ulg")
+    os.utime(thousand, (2_000, 2_000))
+    clock.take()
+    clock.now_s += log_library.LOOK_S
+    logs = {log.name: log.size for log in library.logs()}
+    assert (len(logs), logs["new.ulg"], logs["0001.ulg"]) == (1000, 3, 10)
+    assert clock.take() == (1, 2)
+    write(thousand / "new.ulg", b"it grows", int(clock.now_s))
+    clock.now_s += log_library.LOOK_S
+    assert library.logs()[-1] == LogInfo("new.ulg", 8, 1_000_001)
+
+
+def test_a_log_of_this_process_shows_at_once(thousand: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Clock(monkeypatch)
+    own: list[str] = []
+    library = LogLibrary(thousand, lambda: tuple(own))
+    library.logs()
+    write(thousand / "own.ulg", b"begun", 999_999)
+    own.append("is being written")
+    assert library.logs()[-1] == LogInfo("own.ulg", 5, 999_999)
+    write(thousand / "own.ulg", b"begun and ended", 1_000_000)
+    own.clear()
+    assert library.logs()[-1] == LogInfo("own.ulg", 15, 1_000_000)

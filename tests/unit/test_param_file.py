@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from flightstack import atomic_file
 from flightstack.assembly import build
 from flightstack.config import StackConfig
+from flightstack.file_saver import FileSaver
 from flightstack.params.errors import ConfigError
 from flightstack.params.param_file import (
     NOTHING_LOADED,
@@ -26,7 +27,6 @@ from flightstack.params.param_file import (
     read_param_file,
     save,
 )
-from flightstack.params.saver import ParamSaver
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore
 from tests.support.world import PEER
@@ -194,13 +194,19 @@ def test_the_process_may_die_between_writing_and_renaming(tmp_path: Path) -> Non
     assert read_param_file(path)[0].value == 5.0
 
 
+def saver_of(store: ParamStore, path: Path) -> FileSaver:
+    saver = FileSaver(lambda: save(store, NOTHING_LOADED, path, 1), f"the parameters are not saved to {path}")
+    store.subscribe(lambda *_: saver.change())
+    return saver
+
+
 def test_the_saver_writes_changes_and_the_next_start_has_them(tmp_path: Path) -> None:
     path = tmp_path / "new folder" / "my.params"
     store = ParamStore(SPECS)
-    saver = ParamSaver(store, NOTHING_LOADED, path, 1)
+    saver = saver_of(store, path)
     saver.close()
     assert not path.exists(), "nothing changed, nothing is written"
-    saver = ParamSaver(store, NOTHING_LOADED, path, 1)
+    saver = saver_of(store, path)
     for speed in range(1, 20):
         store.set("FS_SPEED", float(speed))
     store.set("FS_MODE", 3)
@@ -215,11 +221,27 @@ def test_a_disk_that_fails_is_reported_once(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     path = tmp_path / "file" / "my.params"
     store = ParamStore(SPECS)
-    saver = ParamSaver(store, NOTHING_LOADED, path, 1)
+    saver = saver_of(store, path)
     store.set("FS_SPEED", 5.0)
     saver.close()
-    assert saver.take_error() == f"parameters are not saved: {path}: File exists"
+    assert saver.take_error() == f"the parameters are not saved to {path}: File exists"
     assert saver.take_error() is None
+
+
+def test_a_row_of_failed_saves_is_one_sentence() -> None:
+    errors: list[OSError | None] = [OSError(28, "full"), OSError(28, "full"), None, OSError(5, "broken")]
+
+    def write() -> None:
+        error = errors.pop(0)
+        if error is not None:
+            raise error
+
+    saver = FileSaver(write, "not saved")
+    said = []
+    for _ in range(4):
+        saver._save()
+        said.append(saver.take_error())
+    assert said == ["not saved: full", None, None, "not saved: broken"]
 
 
 # ---------------------------------------------------------------------- the vehicle

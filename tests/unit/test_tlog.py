@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import resource
 from pathlib import Path
 
 import pytest
@@ -108,3 +109,18 @@ def test_a_full_disk_does_not_end_the_session() -> None:
     log.write(START_US, frames()[1])
     log.close()
     assert isinstance(log.error, OSError)
+
+
+def test_a_tlog_that_ends_early_ends_with_a_whole_record(tmp_path: Path) -> None:
+    path = tmp_path / "gcs.tlog"
+    with TlogFile(path) as tlog:
+        tlog.write(1, b"\xfd" + bytes(20))
+        before, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (40, hard))  # the kernel refuses more, as a full disk does
+        try:
+            tlog.write(2, b"\xfd" + bytes(20))
+            tlog.write(3, b"\xfd" + bytes(20))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (before, hard))
+        assert tlog.error is not None
+    assert path.stat().st_size == 29

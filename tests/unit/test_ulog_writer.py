@@ -234,6 +234,16 @@ class FullDisk(KeptBytes):
         return super().write(part)
 
 
+def whole_length(content: bytes) -> int:
+    """Bytes up to the end of the last whole message, by the format's definition: size, type, content."""
+    end = 16 if len(content) >= 16 else 0
+    while 16 <= end <= len(content) - 3 and end + 3 + int.from_bytes(content[end : end + 2], "little") <= len(
+        content
+    ):
+        end += 3 + int.from_bytes(content[end : end + 2], "little")
+    return end
+
+
 def test_a_full_disk_ends_the_log_but_not_the_flight(traces: tuple[np.ndarray, np.ndarray]) -> None:
     complete = random_log(*traces).content
     file = FullDisk(room=12345)
@@ -246,7 +256,23 @@ def test_a_full_disk_ends_the_log_but_not_the_flight(traces: tuple[np.ndarray, n
     log.close()
     log.close()
     assert isinstance(log.error, OSError)
-    assert file.content == complete[:12345]
+    assert len(file.content) == whole_length(complete[:12345])
+    assert complete.startswith(file.content)
+    assert not ULog(io.BytesIO(file.content)).file_corruption
+
+
+@pytest.mark.parametrize("room", [0, 1, 15, 16, 17, 60, 5000, 20_000])
+def test_a_log_that_ends_early_ends_with_a_whole_message(
+    traces: tuple[np.ndarray, np.ndarray], room: int
+) -> None:
+    file = FullDisk(room)
+    log = FlightLog(file, ROTORS, 16)
+    log.start(0, INFO, PARAMETERS, HOME)
+    for index, row in enumerate(traces[0]):
+        log.inner.append(2000 * index)[:] = row
+    log.close()
+    assert len(file.content) == whole_length(file.content)
+    assert len(file.content) <= room
 
 
 def test_partial_writes_are_completed(traces: tuple[np.ndarray, np.ndarray]) -> None:

@@ -214,7 +214,7 @@ def test_what_is_wrong_is_one_sentence_with_file_key_and_range(tmp_path: Path, n
     [
         ("nope", "nope: is neither a file nor a built-in vehicle (paper_quad, x_quad)"),
         ("no/such.toml", "no/such.toml: cannot be read: No such file or directory"),
-        ("/", "/: is neither a file nor a built-in vehicle (paper_quad, x_quad)"),
+        ("/", "/: cannot be read: Is a directory"),
     ],
 )
 def test_files_that_are_not_there(name: str, sentence: str) -> None:

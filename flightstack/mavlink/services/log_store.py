@@ -29,7 +29,7 @@ class LogStore(Protocol):
     """The logs of one vehicle."""
 
     def logs(self) -> Sequence[LogInfo]:
-        """Return all logs, the oldest first."""
+        """Return all logs, the oldest first: the same object until something changes."""
         ...
 
     def open(self, name: str) -> VirtualFile | None:
@@ -65,10 +65,15 @@ class FlatLogs:
 
     def __init__(self, store: LogStore) -> None:
         self._store = store
+        self._shown: Sequence[LogInfo] = ()
+        self._entries: list[Entry] = []
 
     def list(self, path: str) -> list[Entry] | None:
         """Return the logs, in the order of their ids."""
-        return None if path else [Entry(log.name, log.size) for log in self._store.logs()]
+        logs = self._store.logs()
+        if logs is not self._shown:
+            self._shown, self._entries = logs, [Entry(log.name, log.size) for log in logs]
+        return None if path else self._entries
 
     def open(self, path: str) -> VirtualFile | None:
         """Open a log by its name."""
@@ -80,16 +85,27 @@ class DatedLogs:
 
     def __init__(self, store: LogStore) -> None:
         self._store = store
+        self._shown: Sequence[LogInfo] = ()
+        self._by_day: dict[str, dict[str, Entry]] = {}
 
     def list(self, path: str) -> list[Entry] | None:
         """Return the days, or the logs of a day."""
-        logs = self._store.logs()
+        days = self._days()
         if not path:
-            return [Entry(day, None) for day in sorted({log.day for log in logs})]
-        return [Entry(log.name, log.size) for log in logs if log.day == path] or None
+            return [Entry(day, None) for day in days]
+        return list(days.get(path, {}).values()) or None
 
     def open(self, path: str) -> VirtualFile | None:
         """Open ``day/name``."""
         day, _, name = (clean_path(path) or "").partition("/")
-        is_there = any(log.day == day and log.name == name for log in self._store.logs())
-        return self._store.open(name) if is_there else None
+        return self._store.open(name) if name in self._days().get(day, {}) else None
+
+    def _days(self) -> dict[str, dict[str, Entry]]:
+        """Return the logs of each day by name, the days in order; made anew only when the logs have changed."""
+        logs = self._store.logs()
+        if logs is not self._shown:
+            by_day: dict[str, dict[str, Entry]] = {}
+            for log in logs:
+                by_day.setdefault(log.day, {})[log.name] = Entry(log.name, log.size)
+            self._shown, self._by_day = logs, dict(sorted(by_day.items()))
+        return self._by_day

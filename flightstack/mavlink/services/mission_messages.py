@@ -5,6 +5,7 @@ The protocol: https://mavlink.io/en/services/mission.html
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Sequence
@@ -111,7 +112,8 @@ def mission_id(items: Sequence[MissionItem]) -> int:
     """
     checksum = 0
     for item in items:
-        floats = [as_float32(value) for value in (*item.params, item.z)]
+        # one NaN for all: senders have many, which mean the same
+        floats = [math.nan if math.isnan(v) else as_float32(v) for v in (*item.params, item.z)]
         checksum = zlib.crc32(
             _ITEM.pack(*floats[:4], item.x, item.y, floats[4], item.command, item.frame, item.autocontinue),
             checksum,

@@ -61,13 +61,14 @@ class MissionServer:
         """Return MAVLink's opaque id of the plan in force, for MISSION_CURRENT; 0 for none."""
         return self._store.plan_id(mission_type)
 
-    def restore(self, mission_type: MissionType, items: Items) -> None:
-        """Put a plan in force that was accepted before, if it still is."""
+    def restore(self, mission_type: MissionType, items: Items) -> Rejection | None:
+        """Put a plan in force that was accepted before; return why it no longer is, or None."""
         outcome = self._store.replace(mission_type, items)
         if isinstance(outcome, Rejection):
             self._refused(outcome.result, outcome.seq, outcome.reason, mission_type)
-        else:
-            self._events.append(outcome)
+            return outcome
+        self._events.append(outcome)
+        return None
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take any message from ``peer``; what is not of this protocol or not for us is ignored."""

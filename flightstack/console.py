@@ -1,0 +1,40 @@
+"""What a process prints: a reader that went away, or a full disk behind the output, never ends the process."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import IO
+
+
+def say(line: object) -> Exception | None:
+    """Print a line on stdout; return the error that prevents it, or None."""
+    return _print(line, sys.stdout)
+
+
+def complain(line: object) -> None:
+    """Print a line on stderr, where it is seen at once, if that can be."""
+    _print(line, sys.stderr)
+
+
+def _print(line: object, stream: IO[str] | None) -> Exception | None:
+    if stream is None:  # it was closed when the process began
+        return None
+    try:
+        print(line, file=stream, flush=True)
+    except (OSError, ValueError) as error:  # ValueError: the stream was closed since
+        drop(stream)
+        return error
+    return None
+
+
+def drop(stream: IO[str] | None) -> None:
+    """Send what is still to be written nowhere: Python would complain at its end."""
+    if stream is None:
+        return
+    try:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+    except (OSError, ValueError):  # it has no descriptor, or is closed
+        return

@@ -1,0 +1,65 @@
+"""Programs whose output goes nowhere: a closed pipe or a full disk ends none of them with a traceback."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.gcs import gcs
+from tests.support.vehicle_processes import LONG_S, vehicle
+
+PROGRAMS = ("flightstack", "sim_bridge", "gcs_cli")
+
+
+def closed_pipe() -> int:
+    """Return the end of a pipe that nothing reads."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    return writer
+
+
+def run(command: list[str], **streams: int) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", *command], text=True, timeout=LONG_S, check=False,
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_help_into_a_closed_pipe_ends_quietly(program: str) -> None:
+    pipe = closed_pipe()
+    assert run([program, "--help"], stdout=pipe).stderr == ""
+    os.close(pipe)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_help_onto_a_full_disk_is_one_sentence(program: str) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = run([program, "--help"], stdout=full.fileno())
+    name = {"sim_bridge": "sim-bridge", "gcs_cli": "gcs"}.get(program, program)
+    assert (done.stderr, done.returncode) == (f"{name}: No space left on device\n", 1)
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_an_error_into_a_closed_pipe_keeps_its_exit_code(program: str) -> None:
+    pipe = closed_pipe()
+    wrong = {"gcs_cli": ["--connect", "nonsense", "status"]}.get(program, ["--vehicle", "no_such"])
+    assert run([program, *wrong], stderr=pipe).returncode == 2
+    os.close(pipe)
+
+
+def test_a_vehicle_goes_on_when_its_output_is_closed(tmp_path: Path) -> None:
+    with vehicle(tmp_path, "--log", "/dev/full", "--params", "none") as there:
+        for stream in (there.stack.stdout, there.stack.stderr):
+            assert stream is not None
+            stream.close()  # as `head -1` does when it has read enough
+        # arming opens the log, which fails, and the complaint goes nowhere
+        for words in (("arm",), ("disarm", "--force"), ("reboot",), ("status",)):
+            done = gcs("--connect", there.link, "--timeout", 60, *words)
+            assert done.returncode == 0, (words, done.stderr)
+        there.stack.terminate()
+        assert there.stack.wait(LONG_S) == 0

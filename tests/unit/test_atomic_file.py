@@ -1,0 +1,101 @@
+"""Files that are written whole or not at all, and never over a file that the user did not mean."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from flightstack import atomic_file
+from flightstack.atomic_file import (
+    OWNER_ONLY,
+    check_new,
+    replacing,
+    write_bytes_atomically,
+    write_text_atomically,
+)
+from flightstack.params.errors import ConfigError
+
+
+def test_a_replaced_file_leaves_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    write_text_atomically(path, "old")
+    write_text_atomically(path, "new")
+    assert path.read_text() == "new"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_temporary_names_are_unpredictable_and_new(tmp_path: Path) -> None:
+    path = tmp_path / "film.mp4"
+    names = set()
+    for _ in range(3):
+        with replacing(path) as temporary:
+            names.add(temporary.name)
+            assert temporary.stat().st_size == 0
+            assert temporary.suffix == ".mp4"
+    assert len(names) == 3
+
+
+def test_a_temporary_name_that_is_taken_is_not_written_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(atomic_file.secrets, "token_hex", lambda _: "guessed")
+    victim = tmp_path / "victim"
+    victim.write_text("precious")
+    (tmp_path / ".guessed.a.txt").symlink_to(victim)
+    with pytest.raises(FileExistsError):
+        write_text_atomically(tmp_path / "a.txt", "new")
+    assert victim.read_text() == "precious"
+
+
+def test_modes_follow_the_umask_or_keep_a_key_private(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        write_bytes_atomically(tmp_path / "open", b"")
+        write_bytes_atomically(tmp_path / "key", b"", OWNER_ONLY)
+    finally:
+        os.umask(before)
+    assert (tmp_path / "open").stat().st_mode & 0o777 == 0o640
+    assert (tmp_path / "key").stat().st_mode & 0o777 == 0o600
+
+
+def test_the_target_of_a_link_is_replaced_not_the_link(tmp_path: Path) -> None:
+    (tmp_path / "target").write_text("old")
+    (tmp_path / "link").symlink_to("target")
+    write_text_atomically(tmp_path / "link", "new")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "target").read_text() == "new"
+
+
+def test_a_device_is_written_to_not_replaced() -> None:
+    write_text_atomically(Path("/dev/null"), "gone")
+    assert Path("/dev/null").is_char_device()
+    with pytest.raises(OSError, match="No space left on device") as raised:
+        write_text_atomically(Path("/dev/full"), "too much")
+    assert (raised.value.errno, raised.value.filename) == (errno.ENOSPC, "/dev/full")
+
+
+def test_a_failed_write_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+
+    def fail(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(atomic_file.os, "fsync", fail)
+    with pytest.raises(OSError, match="No space left") as raised:
+        write_text_atomically(path, "new")
+    assert raised.value.filename == str(path)
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_an_existing_file_is_refused_unless_it_may_be_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    check_new(path, overwrite=False)
+    path.write_text("mine")
+    check_new(path, overwrite=True)
+    with pytest.raises(ConfigError, match=r"a.txt: exists already: name another file, or give --overwrite$"):
+        check_new(path, overwrite=False)
