@@ -50,7 +50,9 @@ def run(
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.app import App
+    from flightstack.assembly import kernels_of
     from flightstack.clock import nearest_outer_hz
+    from flightstack.compile_notice import announce_compilation
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.firmware.errors import TargetError
     from flightstack.params.errors import ConfigError
@@ -74,6 +76,7 @@ def run(
         named_file = None if params in (None, "none") else Path(str(params))
         if named_file is not None:
             _mention_new(named_file)
+        announce_compilation("flightstack", kernels_of(config))
         if check:
             _check(config)
             return

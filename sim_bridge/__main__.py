@@ -141,12 +141,15 @@ def open_loop(
     arguments.in_range("--dt", dt, 1e-6, 1.0)
     arguments.in_range("--seed", seed, 0, 2**63)
     initial = _initial(pos, vel, euler_deg, rates, no_ground)
+    from flightstack.compile_notice import announce_compilation  # noqa: PLC0415
     from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
+    from sim_bridge.plants import kernels_of  # noqa: PLC0415
     from sim_bridge.server import complain  # noqa: PLC0415
 
     loaded = load_vehicle(vehicle)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
+    announce_compilation("sim-bridge", kernels_of(plant))
     state = run_open_loop(
         OpenLoop(
             loaded, plant, arguments.rotor_speeds(rotors, loaded), initial,

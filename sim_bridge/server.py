@@ -11,6 +11,7 @@ import sys
 from typing import NamedTuple
 
 from flightstack.clock import ask_for_punctual_sleeps
+from flightstack.compile_notice import announce_compilation
 from flightstack.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.connection import (
@@ -27,6 +28,7 @@ from sim_bridge.faults import Fault
 from sim_bridge.live_view import LiveView
 from sim_bridge.lockstep import SimulatorLink
 from sim_bridge.plant import PlantOptions
+from sim_bridge.plants import kernels_of
 from sim_bridge.session import Session
 from sim_bridge.simulator import Simulator
 
@@ -75,6 +77,7 @@ def serve(options: ServerOptions) -> int:
     with listener:
         stop = StopSignal()
         _introduce(options, listener.getsockname()[1])
+        announce_compilation("sim-bridge", kernels_of(options.plant))
         simulator = _simulator(options)  # compiles where nothing is cached; a client may connect meanwhile
         try:
             client = _await_client(listener, stop, options.timeout_s)
