@@ -7,16 +7,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from flightstack import options
+from flightstack.command_line import UsageError, Version, make_app
 
 if TYPE_CHECKING:  # the rest is imported when it runs: help stays quick
     from flightstack.app import App
     from flightstack.config import StackConfig
     from flightstack.process_config import ProcessConfig
 
-app = typer.Typer(add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
+app = make_app(name="flightstack")
 
 
 @app.command()
@@ -47,6 +46,7 @@ def run(
     wait_for_start: options.WaitForStart = False,
     check: options.Check = False,
     exit_on_gcs_loss: options.ExitOnGcsLoss = None,
+    version: Version = False,  # its callback does all
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.app import App
@@ -167,7 +167,11 @@ def _loops_words(config: StackConfig) -> str:
 
 def main() -> None:
     """Run the command."""
-    app()
+    try:
+        sys.exit(app(prog_name="flightstack", standalone_mode=False))
+    except UsageError as error:
+        print(f"flightstack: {error.format_message()}", file=sys.stderr)
+        sys.exit(2)
 
 
 if __name__ == "__main__":

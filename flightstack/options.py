@@ -12,10 +12,10 @@ Controller = Annotated[str, typer.Option(help="Attitude controller: pid, backste
 Gains = Annotated[
     str, typer.Option(help="Gains: tuned, paper, paper_rate_fed, backstepping_poles or a TOML file.")
 ]
-InnerHz = Annotated[float, typer.Option(help="Rate of the inner loop [Hz].")]
+InnerHz = Annotated[float, typer.Option(help="Rate of the inner loop, Hz.")]
 OuterHz = Annotated[
     float | None,
-    typer.Option(help="Rate of the outer loop [Hz]; divides the inner rate [nearest to 100]."),
+    typer.Option(help="Rate of the outer loop, Hz; divides the inner one.  [default: about 100]"),
 ]
 Clock = Annotated[str, typer.Option(help="lockstep (the simulator owns time) or realtime.")]
 Loops = Annotated[
@@ -27,17 +27,19 @@ Loops = Annotated[
     ),
 ]
 SimHost = Annotated[str, typer.Option(help="Host of the simulator.")]
-SimPort = Annotated[int | None, typer.Option(help="Port of the simulator [4560 + instance].")]
-SimTimeout = Annotated[float, typer.Option(help="Longest wait for the simulator [s].")]
+SimPort = Annotated[int | None, typer.Option(help="Port of the simulator.  [default: 4560 + instance]")]
+SimTimeout = Annotated[float, typer.Option(help="Longest wait for the simulator, s.")]
 Instance = Annotated[int, typer.Option(min=0, max=249, help="Number of this vehicle; shifts ports and id.")]
 GroundStations = Annotated[
     list[str] | None,
-    typer.Option(help="Ground station to address unasked: HOST:PORT. May be repeated [127.0.0.1:14550]."),
+    typer.Option(
+        help="Ground station to address unasked: HOST:PORT; may be repeated.  [default: 127.0.0.1:14550]"
+    ),
 ]
 GcsPort = Annotated[int, typer.Option(help="UDP port of the ground station, without --gcs.")]
-ApiPort = Annotated[int | None, typer.Option(help="UDP port of the API client [14540 + instance].")]
+ApiPort = Annotated[int | None, typer.Option(help="UDP port of the API client.  [default: 14540 + instance]")]
 TcpPort = Annotated[
-    int | None, typer.Option(help="TCP port to listen on [5760 + 10 per instance]; 0 for none.")
+    int | None, typer.Option(help="TCP port to listen on; 0 for none.  [default: 5760 + 10 x instance]")
 ]
 Listen = Annotated[
     str, typer.Option(help="Address of this machine to listen on for MAVLink; 0.0.0.0 for all.")
@@ -52,19 +54,21 @@ AllowUnsigned = Annotated[
 LogFile = Annotated[
     str | None,
     typer.Option(
-        help="Log file [<stamp>-flight.ulg in runs, or runs/instance-<instance>]; 'none' for no log. "
-        "Ground stations see the logs of its folder."
+        help="Log file; 'none' for no log. Ground stations see the logs of its folder.  "
+        "[default: runs/<stamp>-flight.ulg, or runs/instance-<instance>/<stamp>-flight.ulg]"
     ),
 ]
-Assignments = Annotated[list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")]
+Assignments = Annotated[list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE; may be repeated.")]
 ParamFile = Annotated[
     str | None,
     typer.Option(
-        help="Parameter file [runs/params-<instance>.params]; 'none' for none.", metavar="FILE|none"
+        help="Parameter file; 'none' for none.  [default: runs/params-<instance>.params]", metavar="FILE|none"
     ),
 ]
 Home = Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of the local origin.")]
 IdealRotors = Annotated[bool, typer.Option(help="Rotors without lag and limits, as the paper assumes.")]
 WaitForStart = Annotated[bool, typer.Option(help="Keep time at zero until a mission is started.")]
 Check = Annotated[bool, typer.Option("--check", help="Check the configuration, compile the loops, end.")]
-ExitOnGcsLoss = Annotated[float | None, typer.Option(help="End when no ground station is heard [s].")]
+ExitOnGcsLoss = Annotated[
+    float | None, typer.Option(help="End when no ground station is heard for so long, s.")
+]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from flightstack.command_line import UsageError, Version, make_app
 from flightstack.contract import Vector3
 from flightstack.params.errors import ConfigError
 from sim_bridge import arguments, options
@@ -22,10 +23,7 @@ if TYPE_CHECKING:
     from sim_bridge.plant import InitialState
     from sim_bridge.server import ServerOptions
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None)
-
-# typer brings its own copy of click in some versions: the base of all complaints about usage in either
-_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+app = make_app(name="sim-bridge")
 
 _ZERO = "0,0,0"
 
@@ -66,6 +64,7 @@ def run(
     home: options.Home = "47.397742,8.545594,488.0",
     view: options.View = False,
     timeout: options.Timeout = None,
+    version: Version = False,  # its callback does all
 ) -> None:
     """Simulate a vehicle for one flight stack that connects over TCP; Ctrl-C ends."""
     if context.invoked_subcommand is not None:
@@ -196,11 +195,11 @@ def _table(state: dict[str, Any]) -> str:
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     try:
-        return app(argv, standalone_mode=False) or 0
+        return app(argv, prog_name="sim-bridge", standalone_mode=False) or 0
     except PlantDivergedError as error:
         print(f"sim-bridge: {error}", file=sys.stderr)
         return 1
-    except _UsageError as error:
+    except UsageError as error:
         message: str = getattr(error, "format_message", error.__str__)()
         print(f"sim-bridge: {message}", file=sys.stderr)
     except (UsageProblemError, ConfigError) as error:

@@ -13,7 +13,6 @@ from flightstack.compiled import as_tuple, compiled, direct, specialise, store
 from flightstack.contract import (
     ATTITUDE_TARGET_SIZE,
     MAX_ROTORS,
-    STATE_SIZE,
     AttitudeReference,
     FloatArray,
     LoopRow,

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flightstack.command_line import make_app
 from gcs_cli.settings import ConnectOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
     from flightstack.plan import MissionItem
 
-app = typer.Typer(help="The vehicle's mission.", no_args_is_help=True)
+app = make_app(help="The vehicle's mission.", no_args_is_help=True)
 
 
 class Part(StrEnum):

@@ -9,29 +9,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from flightstack.command_line import HELP_FLAGS, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.settings import JsonOption, settings_of
 
 if TYPE_CHECKING:
     from gcs_cli.pil.result import Outcome
 
-_FLY, _HELP = "fly", ("--help",)
+_FLY = "fly"
 
 
 class _MissionGroup(TyperGroup):
     """Takes what is no command for the mission: ``gcs pil square.plan`` is ``gcs pil fly square.plan``."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if args and args[0] not in self.commands and args[0] not in _HELP:
+        if args and args[0] not in self.commands and args[0] not in HELP_FLAGS:
             args = [_FLY, *args]
         return super().parse_args(ctx, args)
 
 
-app = typer.Typer(
+app = make_app(
     cls=_MissionGroup,
     help="Check the loops in C and on a target.\n\n`gcs pil MISSION` flies it as MIL, SIL and PIL.",
     no_args_is_help=True,
-    rich_markup_mode=None,
 )
 
 TargetOption = Annotated[

@@ -60,7 +60,11 @@ def loaded_kernels(setup: str) -> list[str]:
     """Names of the kernels that a process with warm caches reads: those that it calls, not what these call."""
     for _ in range(2):  # the first one may have to compile them
         run = subprocess.run(
-            [sys.executable, "-c", LOADED.format(setup=setup)], cwd=ROOT, capture_output=True, text=True, check=True
+            [sys.executable, "-c", LOADED.format(setup=setup)],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
         )
         if run.stdout.strip() != "compiled":
             break

@@ -6,7 +6,12 @@ import subprocess
 import sys
 
 HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich")
-LIGHT = ("flightstack.picture_options",)
+LIGHT = (
+    "flightstack.command_line",
+    "flightstack.options",
+    "flightstack.picture_options",
+    "flightstack.simulation_options",
+)
 """Of the flight stack's modules only those that hold words for the help."""
 
 
