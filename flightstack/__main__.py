@@ -119,7 +119,7 @@ def _mention_new(file: Path) -> None:
     from flightstack.process_config import complain
 
     if not file.exists():
-        complain(f"{file}: there is no such file: it begins with the defaults")
+        complain(f"warning: {file}: there is no such file: it begins with the defaults")
 
 
 def _begin_new(file: Path, config: StackConfig) -> None:
@@ -148,7 +148,7 @@ def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig
     if config.params_file is not None:
         unknown = stack.loaded_params.warning(Path(config.params_file))
         if unknown is not None:
-            complain(unknown)
+            complain(f"warning: {unknown}")
     clock = "lockstep" if config.lockstep else "realtime"
     print(
         f"flightstack: {stack.vehicle.name}, {config.controller} ({config.gains}), "

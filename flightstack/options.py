@@ -58,7 +58,9 @@ LogFile = Annotated[
         "[default: runs/<stamp>-flight.ulg, or runs/instance-<instance>/<stamp>-flight.ulg]"
     ),
 ]
-Assignments = Annotated[list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE; may be repeated.")]
+Assignments = Annotated[
+    list[str] | None, typer.Option(metavar="NAME=VALUE", help="Set a parameter; may be repeated.")
+]
 ParamFile = Annotated[
     str | None,
     typer.Option(

@@ -58,7 +58,7 @@ class ProcessFiles:
         try:
             finish_loops(self._stack.loops, self._process.log)
         except OSError as error:
-            complain(f"the record of the target's link cannot be written: {error}")
+            complain(f"warning: the record of the target's link cannot be written: {error}")
 
     def close_signing(self) -> None:
         """Keep the time of the newest signature, and end; nothing is signed after it."""
@@ -74,7 +74,7 @@ class ProcessFiles:
         except OSError as error:
             path = self._logs.current
             self._stack.autopilot.say(ERROR, f"No log: {path}: {error.strerror}")
-            complain(f"no log can be written to {path}: {error.strerror}")
+            complain(f"warning: no log can be written to {path}: {error.strerror}")
             return None
 
     def _open_tail(self) -> FileTail | None:

@@ -47,6 +47,9 @@ SigningKeyOption = Annotated[
         show_envvar=True,
     ),
 ]
+OverwriteOption = Annotated[
+    bool, typer.Option("--overwrite", help="Replace the results of another flight in --out.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 

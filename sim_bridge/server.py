@@ -104,7 +104,7 @@ def _introduce(options: ServerOptions, port: int) -> None:
     )
     warning = wind_warning(options.vehicle, options.plant, options.plant_options.disturbance)
     if warning:
-        complain(warning)
+        complain(f"warning: {warning}")
 
 
 def _await_client(listener: socket.socket, stop: StopSignal, timeout_s: float | None) -> socket.socket:

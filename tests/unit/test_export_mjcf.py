@@ -13,7 +13,8 @@ from flightstack.contract import Vector3
 from flightstack.mavlink.hot_frames import ARMED_FLAG
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.errors import CliError
-from gcs_cli.fly_options import FlyOptions, checked_plan
+from gcs_cli.fly_flags import FlyOptions
+from gcs_cli.fly_options import checked_plan
 from sim_bridge.__main__ import main
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.plant import MultibodyPlant
