@@ -19,16 +19,14 @@ import typer
 
 from flightstack import options as stack
 from flightstack import simulation_options as world
+from gcs_cli.plan_files import DEFAULT_PLAN, PlanArgument
 
 
 @dataclass(frozen=True)
 class FlyOptions:
     """What is flown, and under what."""
 
-    plan_path: Annotated[
-        Path,
-        typer.Argument(metavar="PLAN", help="A .plan or .waypoints file.", show_default=False),
-    ]
+    plan_path: PlanArgument = Path(DEFAULT_PLAN)
     controller: stack.Controller = "pid"
     gains: stack.Gains = "tuned"
     plant: Annotated[str, world.PLANT] = "rigid"
@@ -129,7 +127,7 @@ def flies(without: Collection[str] = ()) -> Callable[[Callable[..., None]], Call
         inspect.Parameter(
             field.name,
             inspect.Parameter.KEYWORD_ONLY,
-            default=inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default,
+            default=field.default,
             annotation=hints[field.name],
         )
         for field in dataclasses.fields(FlyOptions)

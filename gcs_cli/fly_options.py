@@ -10,6 +10,7 @@ from pathlib import Path
 
 from flightstack.clock import rates
 from flightstack.config import parse_home
+from flightstack.extras import INSTALL_MULTIBODY
 from flightstack.firmware.choice import parse_loops
 from flightstack.geodesy import GeoPoint
 from flightstack.params.gains_file import open_gains
@@ -65,7 +66,7 @@ def _check_flags(options: FlyOptions) -> None:
     if options.plant not in PLANTS:
         raise CliError(f"--plant {options.plant}: expected {', '.join(PLANTS[:-1])} or {PLANTS[-1]}", USAGE)
     if options.plant == "multibody" and find_spec("mujoco") is None:
-        raise CliError("--plant multibody needs MuJoCo: pip install 'flightstack[multibody]'", USAGE)
+        raise CliError(f"--plant multibody needs MuJoCo: {INSTALL_MULTIBODY}", USAGE)
     parse_loops(options.loops)
     if options.speed != "max":
         _number("--speed", options.speed, 0.001, 10_000.0)

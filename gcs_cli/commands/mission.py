@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flightstack.command_line import make_app
+from gcs_cli.plan_files import PlanArgument
 from gcs_cli.settings import ConnectOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
@@ -26,13 +27,10 @@ class Part(StrEnum):
     ALL = "all"
 
 
-FileArgument = Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)]
-
-
 @app.command()
 def upload(
     context: typer.Context,
-    file: FileArgument,
+    file: PlanArgument,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
 ) -> None:
@@ -59,7 +57,7 @@ def upload(
 
 
 @app.command()
-def check(file: FileArgument) -> None:
+def check(file: PlanArgument) -> None:
     """Check a file as the vehicle does, without one.
 
     Mission, geofence and rally points.
