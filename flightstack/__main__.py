@@ -8,9 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from flightstack import console, options
+from flightstack.command_line import UsageError, Version, make_app
 from flightstack.console import say
 
 if TYPE_CHECKING:  # the rest is imported when it runs: help stays quick
@@ -18,7 +17,7 @@ if TYPE_CHECKING:  # the rest is imported when it runs: help stays quick
     from flightstack.config import StackConfig
     from flightstack.process_config import ProcessConfig
 
-app = typer.Typer(add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
+app = make_app(name="flightstack")
 
 
 @app.command()
@@ -51,11 +50,14 @@ def run(
     wait_for_start: options.WaitForStart = False,
     check: options.Check = False,
     exit_on_gcs_loss: options.ExitOnGcsLoss = None,
+    version: Version = False,  # its callback does all
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.app import App
+    from flightstack.assembly import kernels_of
     from flightstack.atomic_file import check_new
     from flightstack.clock import nearest_outer_hz
+    from flightstack.compile_notice import announce_compilation
     from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.firmware.errors import TargetError
     from flightstack.params.errors import ConfigError
@@ -86,6 +88,7 @@ def run(
         named_file = None if params in (None, "none") else Path(str(params))
         if named_file is not None:
             _mention_new(named_file)
+        announce_compilation("flightstack", kernels_of(config))
         if check:
             _check(config)
             return
@@ -161,7 +164,7 @@ def _mention_new(file: Path) -> None:
     from flightstack.process_config import complain
 
     if not file.exists():
-        complain(f"{file}: there is no such file: it begins with the defaults")
+        complain(f"warning: {file}: there is no such file: it begins with the defaults")
 
 
 def _begin_new(file: Path, config: StackConfig) -> None:
@@ -190,7 +193,7 @@ def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig
     if config.params_file is not None:
         unknown = stack.loaded_params.warning(Path(config.params_file))
         if unknown is not None:
-            complain(unknown)
+            complain(f"warning: {unknown}")
     clock = "lockstep" if config.lockstep else "realtime"
     say(
         f"flightstack: {stack.vehicle.name}, {config.controller} ({config.gains}), "
@@ -219,10 +222,14 @@ def _loops_words(config: StackConfig) -> str:
 def main() -> None:
     """Run the command."""
     try:
-        app()
-    except OSError as error:  # stdout cannot be written: typer ends quietly itself where its reader went away
+        sys.exit(app(prog_name="flightstack", standalone_mode=False))
+    except UsageError as error:
+        console.complain(f"flightstack: {error.format_message()}")
+        sys.exit(2)
+    except OSError as error:  # stdout cannot be written
         console.drop(sys.stdout)
-        console.complain(f"flightstack: {error.strerror or error}")
+        if not isinstance(error, BrokenPipeError):  # a reader that closed the pipe has read enough
+            console.complain(f"flightstack: {error.strerror or error}")
         sys.exit(1)
 
 

@@ -16,6 +16,7 @@ from flightstack.config import StackConfig
 from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import load_controller
 from flightstack.firmware.c_loops import LoopsSetup
+from flightstack.firmware.choice import PYTHON
 from flightstack.firmware.targets import make_loops
 from flightstack.ground.facts import AutopilotFacts
 from flightstack.ground.hub import GroundHub
@@ -30,6 +31,11 @@ from flightstack.params.param_file import LoadedParams
 from flightstack.params.store import ParamStore
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.timing_report import TimingReport
+
+_LOOP_KERNELS = ("inner_kernel", "outer_kernel")
+_KERNELS = (
+    "store_outer_row", "follow_rotors", "detect", "mission_start", "stream_kernel", "goal_kernel", "fence_step",
+)  # fmt: skip
 
 
 class Stack(NamedTuple):
@@ -53,6 +59,11 @@ def vehicle_of(config: StackConfig) -> Vehicle:
     """Load the vehicle; raise ConfigError."""
     vehicle = load_vehicle(config.vehicle)
     return vehicle.with_ideal_rotors() if config.ideal_rotors else vehicle
+
+
+def kernels_of(config: StackConfig) -> tuple[str, ...]:
+    """Names of the kernels that ``build`` compiles, or reads from the cache."""
+    return (*(_LOOP_KERNELS if config.loops == PYTHON else ()), *_KERNELS)
 
 
 def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> Stack:

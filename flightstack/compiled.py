@@ -88,6 +88,10 @@ def _as_tuple(array, count):  # type: ignore[no-untyped-def]  # Numba compares t
 
 @compiled
 def store(out: np.ndarray[Any, np.dtype[np.float64]], values: Any) -> None:
-    """Write a flat tuple of floats to the start of ``out``."""
+    """Write a flat tuple or an array of floats to the start of ``out``.
+
+    An array is written item by item because ``out[:] = values`` takes Numba two seconds to compile: it comes with
+    the sentence about shapes that do not match.
+    """
     for index in range(len(values)):
         out[index] = values[index]

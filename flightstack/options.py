@@ -14,10 +14,10 @@ Controller = Annotated[str, typer.Option(help="Attitude controller: pid, backste
 Gains = Annotated[
     str, typer.Option(help="Gains: tuned, paper, paper_rate_fed, backstepping_poles or a TOML file.")
 ]
-InnerHz = Annotated[float, typer.Option(help="Rate of the inner loop [Hz].")]
+InnerHz = Annotated[float, typer.Option(help="Rate of the inner loop, Hz.")]
 OuterHz = Annotated[
     float | None,
-    typer.Option(help="Rate of the outer loop [Hz]; divides the inner rate [nearest to 100]."),
+    typer.Option(help="Rate of the outer loop, Hz; divides the inner one.  [default: about 100]"),
 ]
 Clock = Annotated[str, typer.Option(help="lockstep (the simulator owns time) or realtime.")]
 Loops = Annotated[
@@ -29,21 +29,22 @@ Loops = Annotated[
     ),
 ]
 SimHost = Annotated[str, typer.Option(help="Host of the simulator.")]
-SimPort = Annotated[int | None, typer.Option(help="Port of the simulator [4560 + instance].")]
-SimTimeout = Annotated[float, typer.Option(help="Longest wait for the simulator [s].")]
+SimPort = Annotated[int | None, typer.Option(help="Port of the simulator.  [default: 4560 + instance]")]
+SimTimeout = Annotated[float, typer.Option(help="Longest wait for the simulator, s.")]
 Instance = Annotated[
     int, typer.Option(min=0, max=INSTANCES - 1, help="Number of this vehicle; shifts ports and id.")
 ]
 GroundStations = Annotated[
     list[str] | None,
-    typer.Option(help="Ground station to address unasked: HOST:PORT. May be repeated."),
+    typer.Option(help="Ground station to address unasked: HOST:PORT; may be repeated."),
 ]
 GcsPort = Annotated[
-    int | None, typer.Option(help="UDP port of the ground station, without --gcs [14550 + instance].")
+    int | None,
+    typer.Option(help="UDP port of the ground station, without --gcs.  [default: 14550 + instance]"),
 ]
-ApiPort = Annotated[int | None, typer.Option(help="UDP port of the API client [14540 + instance].")]
+ApiPort = Annotated[int | None, typer.Option(help="UDP port of the API client.  [default: 14540 + instance]")]
 TcpPort = Annotated[
-    int | None, typer.Option(help="TCP port to listen on [5760 + 10 per instance]; 0 for none.")
+    int | None, typer.Option(help="TCP port to listen on; 0 for none.  [default: 5760 + 10 x instance]")
 ]
 Listen = Annotated[
     str, typer.Option(help="Address of this machine to listen on for MAVLink; 0.0.0.0 for all.")
@@ -58,23 +59,26 @@ AllowUnsigned = Annotated[
 LogFile = Annotated[
     str | None,
     typer.Option(
-        help="Log file [<stamp>-flight.ulg in runs, or runs/instance-<instance>]; 'none' for no log. "
-        "Ground stations see the logs of its folder."
+        help="Log file; 'none' for no log. Ground stations see the logs of its folder.  "
+        "[default: runs/<stamp>-flight.ulg, or runs/instance-<instance>/<stamp>-flight.ulg]"
     ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let --log replace a file that exists.")]
-Assignments = Annotated[list[str] | None, typer.Option(help="Set a parameter: NAME=VALUE. May be repeated.")]
+Assignments = Annotated[
+    list[str] | None, typer.Option(metavar="NAME=VALUE", help="Set a parameter; may be repeated.")
+]
 ParamFile = Annotated[
     str | None,
     typer.Option(
-        help="Parameter file [vehicle.params in the state directory]; 'none' for none.", metavar="FILE|none"
+        help="Parameter file; 'none' for none.  [default: vehicle.params in the state directory]",
+        metavar="FILE|none",
     ),
 ]
 State = Annotated[
     str | None,
     typer.Option(
-        help="Directory of what the vehicle keeps over a restart: parameters, mission, geofence, rally points, home "
-        "[runs/state-<instance>; none with --params none]; 'none' for none.",
+        help="Directory of what the vehicle keeps over a restart: parameters, mission, geofence, rally points, home; "
+        "'none' for none.  [default: runs/state-<instance>; none with --params none]",
         metavar="DIR|none",
     ),
 ]
@@ -82,4 +86,6 @@ Home = Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of t
 IdealRotors = Annotated[bool, typer.Option(help="Rotors without lag and limits, as the paper assumes.")]
 WaitForStart = Annotated[bool, typer.Option(help="Keep time at zero until a mission is started.")]
 Check = Annotated[bool, typer.Option("--check", help="Check the configuration, compile the loops, end.")]
-ExitOnGcsLoss = Annotated[float | None, typer.Option(help="End when no ground station is heard [s].")]
+ExitOnGcsLoss = Annotated[
+    float | None, typer.Option(help="End when no ground station is heard for so long, s.")
+]

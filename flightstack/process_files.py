@@ -88,7 +88,7 @@ class ProcessFiles:
         try:
             finish_loops(self._stack.loops, self._process.log)
         except OSError as error:
-            complain(f"the record of the target's link cannot be written: {error}")
+            complain(f"warning: the record of the target's link cannot be written: {error}")
 
     def close_signing(self) -> None:
         """Keep the time of the newest signature, and end; nothing is signed after it."""

@@ -57,7 +57,7 @@ def _tell_silent(stack: Stack, process: ProcessConfig) -> None:
     sentence = f"the simulator at {where} is connected but sends no state"
     stack.autopilot.say(WARNING, f"Waiting: {sentence}")
     complain(
-        f"{sentence} for {SIMULATOR_NOTICE_S:g} s; it hangs, or compiles; waiting up to "
+        f"warning: {sentence} for {SIMULATOR_NOTICE_S:g} s; it hangs, or compiles; waiting up to "
         f"{process.simulator_timeout_s:g} s"
     )
 

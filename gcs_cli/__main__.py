@@ -5,38 +5,19 @@ from __future__ import annotations
 import io
 import signal
 import sys
-from typing import Annotated, Any
 
 import typer
 
+from flightstack.command_line import UsageError, Version, make_app
 from flightstack.console import complain, drop
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
 from gcs_cli.settings import ConnectOption, InstanceOption, Settings, SigningKeyOption, TimeoutOption
 
-app = typer.Typer(
+app = make_app(
     name="gcs",
     help="Ground station on the command line: fly missions, command and watch a vehicle over MAVLink.",
-    add_completion=False,
     no_args_is_help=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
 )
-
-# the base of all complaints about usage, in typer with its own copy of click and without
-_UsageError: Any = typer.BadParameter.__mro__[1]
-
-
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        from flightstack import __version__  # noqa: PLC0415
-
-        print(f"gcs {__version__}")
-        raise typer.Exit
-
-
-_VersionOption = Annotated[
-    bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
-]
 
 _TYPER_INTERRUPTED = 130
 """What typer makes of a KeyboardInterrupt; none of our exit codes."""
@@ -49,7 +30,7 @@ def options(
     timeout: TimeoutOption = None,
     instance: InstanceOption = None,
     signing_key: SigningKeyOption = None,
-    version: _VersionOption = False,  # its callback does all
+    version: Version = False,  # its callback does all
 ) -> None:
     """Hold the flags that are given before the command."""
     context.obj = Settings(connect, timeout, signing_key, instance)
@@ -97,7 +78,7 @@ def main(argv: list[str] | None = None) -> int:
         drop(sys.stdout)  # which may be what failed
         where = "" if error.filename is None else f"{error.filename}: "
         sentence, code = f"{where}{error.strerror or error}", FAILED
-    except _UsageError as error:
+    except UsageError as error:
         if type(error).__name__ == "NoArgsIsHelpError":  # `gcs` and `gcs mission`: its message is the help
             complain(error.format_message())
             return USAGE

@@ -54,6 +54,11 @@ class Connection:
             raise CliError(f"--connect: there is no host named {endpoint.host}", USAGE) from None
 
     @property
+    def local_port(self) -> int:
+        """The UDP port that we use."""
+        return self._socket.address[1]
+
+    @property
     def now_s(self) -> float:
         """The clock that the session counts on."""
         return time.monotonic()

@@ -24,7 +24,6 @@ READY_PAUSE_S = 0.1
 """Between two questions whether the vehicle is ready."""
 SHUT_DOWN_PATIENCE_S = 3.0
 _FACTOR_NEEDS_S = 0.05
-_LONG_WAIT_S = 3.0
 _IN_AIR = 2  # MAV_LANDED_STATE
 
 
@@ -73,7 +72,6 @@ class Flight:
         self._start_time_s: float | None = None
         self._watch = Watch(stall_s, connect_s)
         self._phase_due_s = 0.0
-        self._now_s = self._phase_since_s = now_s
 
     @property
     def view(self) -> VehicleView:
@@ -84,12 +82,6 @@ class Flight:
     def over(self) -> bool:
         """Whether there is nothing left to do."""
         return self.phase is Phase.OVER
-
-    @property
-    def may_compile(self) -> bool:
-        """Whether what keeps us waiting, for a while now, may be that simulator or flight stack compile kernels."""
-        waits = self.phase in (Phase.CONNECT, Phase.READY) or self._watch.is_first_step
-        return waits and self._now_s - self._phase_since_s > _LONG_WAIT_S
 
     @property
     def flown_s(self) -> float | None:
@@ -118,14 +110,12 @@ class Flight:
 
     def step(self, now_s: float) -> None:
         """Go on as far as possible."""
-        self._now_s, before = now_s, None
+        before = None
         while before is not self.phase and not self.over:
             before = self.phase
             if self.outcome is None and self.phase is not Phase.CONNECT:
                 self._watch_vehicle(now_s)
             _STEPS[self.phase](self, now_s)
-            if self.phase is not before:
-                self._phase_since_s = now_s
 
     def _watch_vehicle(self, now_s: float) -> None:
         at = "" if self.view.time_s is None else f" at t = {self.view.time_s:.1f} s"

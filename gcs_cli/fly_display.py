@@ -44,6 +44,9 @@ class Display(Protocol):
     def update(self, flight: Flight) -> None:
         """Show how the flight stands."""
 
+    def note(self, line: str) -> None:
+        """Show a warning, or progress, of simulator or flight stack."""
+
     def close(self) -> None:
         """Leave the terminal as it was."""
 
@@ -94,6 +97,10 @@ class BarDisplay:
             width = self._live.console.width
             self._live.update(progress(flight, now_s, self._spinner, width), refresh=True)
 
+    def note(self, line: str) -> None:
+        """Print it above the live line."""
+        self._live.console.print(Text(line, style="yellow"), soft_wrap=True)
+
     def close(self) -> None:
         """Remove the line."""
         self._live.stop()
@@ -115,6 +122,10 @@ class LineDisplay:
         if words != self._before:
             self._before = words
             self._print("  ".join(part for part in (words, place_words(flight), speed_words(flight)) if part))
+
+    def note(self, line: str) -> None:
+        """Print it."""
+        self._print(line)
 
     def _print(self, text: str) -> None:
         self._console.print(text, markup=False, highlight=False, soft_wrap=True)
@@ -153,9 +164,8 @@ def _share(flight: Flight) -> tuple[float, float]:
 
 
 def phase_words(flight: Flight) -> str:
-    """Say what is going on: the mode in flight, else the phase; and what a long wait may be for."""
-    words = flight.view.mode or "flying" if flight.phase is Phase.FLY else flight.phase.value
-    return f"{words} (it may be compiling, once)" if flight.may_compile else words
+    """Say what is going on: the mode in flight, else the phase."""
+    return flight.view.mode or "flying" if flight.phase is Phase.FLY else flight.phase.value
 
 
 def item_words(flight: Flight) -> str:

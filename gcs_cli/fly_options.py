@@ -1,30 +1,27 @@
-"""What ``gcs fly`` is asked for: checked, and turned into the arguments of its two children."""
+"""What ``gcs fly`` is asked for: checked, and turned into the command lines of its two children."""
 
 from __future__ import annotations
 
 import math
 import socket
-from dataclasses import dataclass
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 
-from flightstack.clock import nearest_outer_hz, rates
+from flightstack.clock import rates
+from flightstack.config import parse_home
 from flightstack.console import complain
-from flightstack.firmware.choice import PYTHON, parse_loops
+from flightstack.extras import INSTALL_MULTIBODY
+from flightstack.firmware.choice import parse_loops
 from flightstack.geodesy import GeoPoint
 from flightstack.params.gains_file import hidden_gains, open_gains
 from flightstack.params.vehicle import hidden_vehicle, load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
-from flightstack.port_numbers import (
-    INSTANCES,
-    ground_station_port,
-    simulator_port,
-    vehicle_api_port,
-    vehicle_ground_port,
-)
+from flightstack.port_numbers import INSTANCES, vehicle_api_port, vehicle_ground_port
 from flightstack.transport.udp import PortBusyError, UdpSocket
+from gcs_cli.endpoint import LOOPBACK
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.fly_flags import TO_SIMULATOR, TO_STACK, FlyOptions, passed
 from gcs_cli.plan_parts import plan_problem
 from gcs_cli.run_directory import LOG_NAME
 
@@ -33,56 +30,6 @@ PLANTS = ("rigid", "multibody", "paper")
 DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
 GCS_LOSS_S = 5.0
 _RETURN = Command.NAV_RETURN_TO_LAUNCH
-
-
-@dataclass(frozen=True)
-class FlyOptions:
-    """The flags of ``gcs fly``."""
-
-    plan_path: Path
-    controller: str = "pid"
-    gains: str = "tuned"
-    plant: str = "rigid"
-    speed: str = "max"
-    inner_hz: float = 500.0
-    outer_hz: float | None = None
-    seed: int = 1
-    wind: str | None = None
-    gust: float | None = None
-    torque_gust: float | None = None
-    vehicle: str = "paper_quad"
-    instance: int = 0
-    ideal_rotors: bool = False
-    timeout_s: float = 60.0
-    limit_s: float = 3600.0
-    battery_start: float | None = None
-    battery_capacity: float | None = None
-    battery_drain: float | None = None
-    faults: tuple[str, ...] = ()
-    params: Path | None = None
-    loops: str = PYTHON
-
-    @property
-    def outer_rate_hz(self) -> float:
-        """Rate of the outer loop: as given, else the one nearest to 100 Hz that divides the inner one."""
-        if self.outer_hz is not None:
-            return self.outer_hz
-        return nearest_outer_hz(self.inner_hz)
-
-    @property
-    def speed_factor(self) -> float:
-        """How many times real time the flight shall be; infinite for ``max``."""
-        return math.inf if self.speed == "max" else float(self.speed)
-
-    @property
-    def gcs_port(self) -> int:
-        """UDP port to which the vehicle sends."""
-        return ground_station_port(self.instance)
-
-    @property
-    def simulator_port(self) -> int:
-        """TCP port on which the simulator listens."""
-        return simulator_port(self.instance)
 
 
 def checked_plan(options: FlyOptions) -> Plan:
@@ -99,7 +46,7 @@ def checked_plan(options: FlyOptions) -> Plan:
     rates(options.inner_hz, options.outer_rate_hz)
     if not plan.items:
         raise CliError(f"{options.plan_path}: holds no mission to fly", USAGE)
-    problem = plan_problem(plan, plan.home or DEFAULT_HOME)
+    problem = plan_problem(plan, home_of(options, plan))
     if problem is not None:
         raise CliError(f"{options.plan_path}: {problem}", USAGE)
     moving = (item.command for item in plan.items if item.command in POSITION_COMMANDS | {_RETURN})
@@ -107,6 +54,11 @@ def checked_plan(options: FlyOptions) -> Plan:
         problem = "the mission begins with a landing or a return, and the vehicle stands on the ground"
         raise CliError(f"{options.plan_path}: {problem}", USAGE)
     return plan
+
+
+def home_of(options: FlyOptions, plan: Plan) -> GeoPoint:
+    """Return where the vehicle stands: as given, else the plan's home; raise ConfigError."""
+    return plan.home or DEFAULT_HOME if options.home is None else parse_home(options.home)
 
 
 def _check_flags(options: FlyOptions) -> None:
@@ -118,7 +70,7 @@ def _check_flags(options: FlyOptions) -> None:
     if options.plant not in PLANTS:
         raise CliError(f"--plant {options.plant}: expected {', '.join(PLANTS[:-1])} or {PLANTS[-1]}", USAGE)
     if options.plant == "multibody" and find_spec("mujoco") is None:
-        raise CliError("--plant multibody needs MuJoCo: pip install 'flightstack[multibody]'", USAGE)
+        raise CliError(f"--plant multibody needs MuJoCo: {INSTALL_MULTIBODY}", USAGE)
     parse_loops(options.loops)
     if options.speed != "max":
         _number("--speed", options.speed, 0.001, 10_000.0)
@@ -155,19 +107,18 @@ def _number(flag: str, value: str | float, low: float, high: float) -> None:
 
 def check_ports(options: FlyOptions) -> None:
     """Make sure that the children find their ports free; raise CliError (usage) naming a busy one."""
-    local = "127.0.0.1"
     try:
         for port in (vehicle_ground_port(options.instance), vehicle_api_port(options.instance)):
-            UdpSocket(local, port).close()
+            UdpSocket(LOOPBACK, port).close()
     except PortBusyError as error:
         raise busy(error) from None
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind((local, options.simulator_port))
+            probe.bind((LOOPBACK, options.simulator_port))
             probe.listen(1)
         except OSError:
-            problem = PortBusyError("TCP", (local, options.simulator_port), "is in use")
+            problem = PortBusyError("TCP", (LOOPBACK, options.simulator_port), "is in use")
             raise busy(problem) from None
 
 
@@ -178,45 +129,23 @@ def busy(error: PortBusyError) -> CliError:
 
 def simulator_arguments(options: FlyOptions, home: GeoPoint) -> list[str]:
     """Return the command line of ``sim-bridge``."""
-    arguments = [
-        f"--vehicle={options.vehicle}",
-        f"--plant={options.plant}",
-        f"--speed={options.speed}",
+    return [
+        *passed(options, TO_SIMULATOR),
         f"--port={options.simulator_port}",
-        f"--instance={options.instance}",
-        f"--seed={options.seed}",
         f"--home={_home(home)}",
         f"--timeout={options.timeout_s:g}",
     ]
-    if options.wind is not None:
-        arguments.append(f"--wind={options.wind}")
-    if options.gust is not None:
-        arguments.append(f"--gust={options.gust}")
-    if options.torque_gust is not None:
-        arguments.append(f"--torque-gust={options.torque_gust}")
-    battery = {
-        "start": options.battery_start,
-        "capacity": options.battery_capacity,
-        "drain": options.battery_drain,
-    }
-    arguments += [f"--battery-{name}={value!r}" for name, value in battery.items() if value is not None]
-    arguments += [f"--fault={fault}" for fault in options.faults]  # the simulator knows what they may be
-    return [*arguments, "--ideal-rotors"] if options.ideal_rotors else arguments
 
 
-def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path) -> list[str]:
-    """Return the command line of ``flightstack``."""
-    arguments = [
-        f"--vehicle={options.vehicle}",
-        f"--controller={options.controller}",
-        f"--gains={options.gains}",
-        f"--loops={options.loops}",
-        f"--inner-hz={options.inner_hz!r}",
+def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_port: int) -> list[str]:
+    """Return the command line of ``flightstack``: it calls us at ``ground_port``, and the usual ground station."""
+    return [
+        *passed(options, TO_STACK),
         f"--outer-hz={options.outer_rate_hz!r}",
         f"--sim-port={options.simulator_port}",
         f"--sim-timeout={options.timeout_s:g}",
-        f"--instance={options.instance}",
-        f"--gcs-port={options.gcs_port}",
+        f"--gcs={LOOPBACK}:{ground_port}",
+        f"--gcs={LOOPBACK}:{options.gcs_port}",
         f"--log={folder / LOG_NAME}",
         f"--home={_home(home)}",
         f"--exit-on-gcs-loss={GCS_LOSS_S:g}",
@@ -224,7 +153,6 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path) -> list[s
         "--state=none",  # a flight depends on its command line alone
         "--wait-for-start",
     ]
-    return [*arguments, "--ideal-rotors"] if options.ideal_rotors else arguments
 
 
 def _home(home: GeoPoint) -> str:

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 from flightstack.console import complain
 from flightstack.plan import Plan
 from flightstack.port_numbers import vehicle_ground_port
-from flightstack.transport.udp import Address
 from gcs_cli.connection import Connection
 from gcs_cli.endpoint import LOOPBACK, Endpoint
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
@@ -21,13 +20,8 @@ from gcs_cli.flight import Flight
 from gcs_cli.flight_outcome import Outcome
 from gcs_cli.flight_watch import STALL_S
 from gcs_cli.fly_display import Display
-from gcs_cli.fly_options import (
-    DEFAULT_HOME,
-    FlyOptions,
-    check_ports,
-    simulator_arguments,
-    stack_arguments,
-)
+from gcs_cli.fly_flags import FlyOptions
+from gcs_cli.fly_options import check_ports, home_of, simulator_arguments, stack_arguments
 from gcs_cli.processes import Child, Children
 from gcs_cli.run_directory import (
     LOG_NAME,
@@ -78,13 +72,18 @@ class Interruption:
             signal.signal(number, handler)
 
 
-def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> Flown:
-    """Fly ``plan`` with children of our own; raise CliError when nothing could be started."""
-    local = Endpoint(LOOPBACK, options.gcs_port, listens=True)
+def fly(
+    options: FlyOptions, plan: Plan, out: Path | None, display: Display, overwrite: bool = False
+) -> Flown:
+    """Fly ``plan`` with children of our own; raise CliError when nothing could be started.
+
+    The vehicle calls us at a port of our own, so that other ground stations may hold the usual one.
+    """
     vehicle = (LOOPBACK, vehicle_ground_port(options.instance))
-    with Interruption() as interruption, _open(local, vehicle) as connection:
+    own_port = Endpoint(LOOPBACK, 0, listens=True)
+    with Interruption() as interruption, Connection(own_port, vehicle=vehicle) as connection:
         check_ports(options)
-        folder = make_run_directory(options.plan_path, out)
+        folder = make_run_directory(options.plan_path, out, overwrite=overwrite)
         flight = Flight(
             connection.session,
             plan,
@@ -94,12 +93,14 @@ def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> 
             STALL_S / min(1.0, options.speed_factor),
         )
         with _recording(connection, folder), Children(folder) as children:
-            home = plan.home or DEFAULT_HOME
+            home = home_of(options, plan)
             children.start(SIMULATOR, "sim_bridge", simulator_arguments(options, home))
-            children.start(STACK, "flightstack", stack_arguments(options, home, folder))
+            told = stack_arguments(options, home, folder, connection.local_port)
+            children.start(STACK, "flightstack", told)
             _run(flight, connection, children, interruption, display)
             if flight.shut_down_accepted:
                 children.wait(_END_PATIENCE_S)
+            _show_notices(children, display)
     assert flight.outcome is not None
     wall_time_s = None
     if flight.began_s is not None and flight.ended_s is not None:
@@ -123,16 +124,6 @@ def _recording(connection: Connection, folder: Path) -> Iterator[None]:
                 complain(f"gcs: the telemetry log {folder / TLOG_NAME} ends early: {reason}")
 
 
-def _open(endpoint: Endpoint, vehicle: Address) -> Connection:
-    try:
-        return Connection(endpoint, vehicle=vehicle)
-    except CliError as error:
-        sentence = str(error).partition(": end the other")[0]
-        raise CliError(
-            f"{sentence}: end the other ground station, or fly beside it with --instance N", USAGE
-        ) from None
-
-
 def _run(
     flight: Flight, connection: Connection, children: Children, interruption: Interruption, display: Display
 ) -> None:
@@ -147,10 +138,16 @@ def _run(
             code = casualty.exit_code if casualty.exit_code in (USAGE, NO_ANSWER) else FAILED
             gone = any(child.name == STACK for child in children.ended())
             flight.abort(casualty.obituary, code, now_s, vehicle_is_gone=gone)
+        _show_notices(children, display)
         flight.step(now_s)
         display.update(flight)
         if not flight.over:
             connection.step(now_s + _STEP_S)
+
+
+def _show_notices(children: Children, display: Display) -> None:
+    for line in children.notices():
+        display.note(line)
 
 
 def _casualty(flight: Flight, children: Children) -> Child | None:
@@ -191,12 +188,15 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
         wind=options.wind,
         gust=options.gust,
         torque_gust=options.torque_gust,
+        force=options.force,
+        torque=options.torque,
         battery_start=options.battery_start,
         battery_capacity=options.battery_capacity,
         battery_drain=options.battery_drain,
-        faults=options.faults,
+        faults=tuple(options.faults or ()),
         ideal_rotors=options.ideal_rotors,
         params=None if options.params is None else str(options.params),
+        param=tuple(options.param or ()),
         inner_hz=options.inner_hz,
         outer_hz=options.outer_rate_hz,
         overruns=flown.overruns,

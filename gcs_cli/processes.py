@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import time
@@ -11,6 +12,8 @@ from typing import Protocol, TypeVar
 
 _TAIL_BYTES = 4096
 _POLL_S = 0.02
+_NOTICE = re.compile(r"\S+: (warning: |compiling )|.*\wWarning: ")
+"""A line to show in flight: a warning of the child or of a library of its, or progress of compilation."""
 _BLAME = ("lost at", "lost:", "was shut down")  # in the words of simulator and flight stack
 
 
@@ -60,6 +63,7 @@ class Child:
     def __init__(self, name: str, arguments: Sequence[str], log_path: Path) -> None:
         self.name = name
         self._log_path = log_path
+        self._read = 0
         with log_path.open("wb") as log:
             self._process = subprocess.Popen(
                 arguments,
@@ -78,6 +82,14 @@ class Child:
     def exit_code(self) -> int | None:
         """Exit code; negative when a signal ended it, None while it runs."""
         return self._process.poll()
+
+    def notices(self) -> list[str]:
+        """Return warnings and progress that it wrote since the last call, whole lines."""
+        with self._log_path.open("rb") as log:
+            log.seek(self._read)
+            text, newline, _ = log.read().rpartition(b"\n")
+        self._read += len(text) + len(newline)
+        return [line for line in text.decode(errors="replace").splitlines() if _NOTICE.match(line)]
 
     @property
     def last_line(self) -> str:
@@ -131,6 +143,10 @@ class Children:
     def add(self, child: Child) -> None:
         """Take charge of a child."""
         self._all.append(child)
+
+    def notices(self) -> list[str]:
+        """Return the warnings and the progress that the children wrote since the last call."""
+        return [line for child in self._all for line in child.notices()]
 
     def ended(self) -> list[Child]:
         """Return those that have ended."""

@@ -27,9 +27,11 @@ def flown(summary: Mapping[str, Any]) -> list[str]:
 def conditions(summary: Mapping[str, Any]) -> list[str]:
     """Return what the simulator did to the vehicle: wind, gusts, battery, faults, and the seed of it all."""
     parts = [
-        _wind(summary.get("wind_m_s")),
+        _vector("wind", summary.get("wind_m_s"), "m/s", ("north", "east", "down")),
         _amount("gusts", summary.get("gust_m_s"), " m/s"),
         _amount("gusty torque", summary.get("torque_gust_n_m"), " N m"),
+        _vector("force", summary.get("force_n"), "N", ("north", "east", "down")),
+        _vector("torque", summary.get("torque_n_m"), "N m", ("roll", "pitch", "yaw")),
         _amount("battery from", summary.get("battery_start_percent"), " %"),
         _amount("battery of", summary.get("battery_capacity_mah"), " mAh"),
         _amount("battery drained", summary.get("battery_drain"), " times as fast"),
@@ -38,6 +40,7 @@ def conditions(summary: Mapping[str, Any]) -> list[str]:
     if summary.get("ideal_rotors"):
         parts.append("rotors without lag and limits")
     parts.append(_named("parameters of", summary.get("params")))
+    parts += summary.get("param") or ()
     told = [part for part in parts if part] or ["no wind, no faults"]
     return [*told, *([f"seed {summary['seed']}"] if summary.get("seed") is not None else [])]
 
@@ -50,11 +53,8 @@ def _amount(name: str, value: float | None, unit: str) -> str:
     return "" if value is None else f"{name} {value:g}{unit}"
 
 
-def _wind(wind_m_s: Sequence[float] | None) -> str:
-    if wind_m_s is None:
+def _vector(name: str, values: Sequence[float] | None, unit: str, axes: Sequence[str]) -> str:
+    if values is None:
         return ""
-    parts = (
-        f"{value:g} m/s {axis}".replace("-", "−")
-        for value, axis in zip(wind_m_s, ("north", "east", "down"), strict=False)
-    )
-    return f"wind {', '.join(parts)}"
+    parts = (f"{value:g} {unit} {axis}".replace("-", "−") for value, axis in zip(values, axes, strict=False))
+    return f"{name} {', '.join(parts)}"

@@ -22,17 +22,20 @@ _LEFT_OVER = (
 )  # fmt: skip
 
 
-def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS) -> Path:
+def make_run_directory(plan: Path, out: Path | None, base: Path = RUNS, *, overwrite: bool = False) -> Path:
     """Make and return the directory; raise CliError (usage) when it cannot be, or holds a flight.
 
-    What a flight that never began has left there goes, for it tells nothing of the one that begins now.
+    The files of a flight that never began are removed; with ``overwrite``, those of any other flight too.
     """
     try:
         if out is None:
             return _fresh(base, plan.stem)
         log = out / LOG_NAME
-        if log.exists() and log.stat().st_size:
-            raise CliError(f"--out {out}: {LOG_NAME} of another flight is there; choose another one", USAGE)
+        if log.exists() and log.stat().st_size and not overwrite:
+            raise CliError(
+                f"--out {out}: {LOG_NAME} of another flight is there; choose another one, or give --overwrite",
+                USAGE,
+            )
         out.mkdir(parents=True, exist_ok=True)
         if not os.access(out, os.W_OK | os.X_OK):
             raise CliError(f"--out {out}: nothing can be written there: permission denied", USAGE)

@@ -45,7 +45,7 @@ InstanceOption = Annotated[
         show_default=False,
     ),
 ]
-OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists already.")]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace what exists already.")]
 TimeoutOption = Annotated[
     float | None,
     typer.Option(

@@ -40,12 +40,15 @@ class RunInfo:
     wind: str | None = None
     gust: float | None = None
     torque_gust: float | None = None
+    force: str | None = None
+    torque: str | None = None
     battery_start: float | None = None
     battery_capacity: float | None = None
     battery_drain: float | None = None
     faults: tuple[str, ...] = ()
     ideal_rotors: bool | None = None
     params: str | None = None
+    param: tuple[str, ...] = ()
     inner_hz: float | None = None
     outer_hz: float | None = None
     overruns: int | None = None
@@ -82,18 +85,24 @@ def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
 
 def _conditions(run: RunInfo) -> dict[str, Any]:
     """What the simulator was asked to do to the vehicle, in the units of the flags; null where nothing was."""
-    wind = None if run.wind is None else [float(part) for part in run.wind.split(",")]
     return {
-        "wind_m_s": wind,
+        "wind_m_s": _numbers(run.wind),
         "gust_m_s": run.gust,
         "torque_gust_n_m": run.torque_gust,
+        "force_n": _numbers(run.force),
+        "torque_n_m": _numbers(run.torque),
         "battery_start_percent": run.battery_start,
         "battery_capacity_mah": run.battery_capacity,
         "battery_drain": run.battery_drain,
         "faults": list(run.faults),
         "ideal_rotors": run.ideal_rotors,
         "params": run.params,
+        "param": list(run.param),
     }
+
+
+def _numbers(text: str | None) -> list[float] | None:
+    return None if text is None else [float(part) for part in text.split(",")]
 
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from flightstack import console
+from flightstack.command_line import UsageError, Version, make_app
 from flightstack.contract import Vector3
 from flightstack.params.errors import ConfigError
 from sim_bridge import arguments, options
@@ -23,10 +24,7 @@ if TYPE_CHECKING:
     from sim_bridge.plant import InitialState
     from sim_bridge.server import ServerOptions
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None)
-
-# typer brings its own copy of click in some versions: the base of all complaints about usage in either
-_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+app = make_app(name="sim-bridge")
 
 _ZERO = "0,0,0"
 
@@ -67,6 +65,7 @@ def run(
     home: options.Home = "47.397742,8.545594,488.0",
     view: options.View = False,
     timeout: options.Timeout = None,
+    version: Version = False,  # its callback does all
 ) -> None:
     """Simulate a vehicle for one flight stack that connects over TCP; Ctrl-C ends."""
     if context.invoked_subcommand is not None:
@@ -141,10 +140,13 @@ def open_loop(
     arguments.in_range("--dt", dt, 1e-6, 1.0)
     arguments.in_range("--seed", seed, 0, 2**63)
     initial = _initial(pos, vel, euler_deg, rates, no_ground)
+    from flightstack.compile_notice import announce_compilation  # noqa: PLC0415
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
+    from sim_bridge.plants import kernels_of  # noqa: PLC0415
 
     loaded = load_named_vehicle(vehicle)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
+    announce_compilation("sim-bridge", kernels_of(plant))
     state = run_open_loop(
         OpenLoop(
             loaded, plant, arguments.rotor_speeds(rotors, loaded), initial,
@@ -181,11 +183,11 @@ def _table(state: dict[str, Any]) -> str:
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     try:
-        return app(argv, standalone_mode=False) or 0
+        return app(argv, prog_name="sim-bridge", standalone_mode=False) or 0
     except PlantDivergedError as error:
         complain(error)
         return 1
-    except _UsageError as error:
+    except UsageError as error:
         message: str = getattr(error, "format_message", error.__str__)()
         complain(message)
     except (UsageProblemError, ConfigError) as error:

@@ -108,7 +108,7 @@ def run_open_loop(run: OpenLoop, warn: Callable[[str], None] = lambda _: None) -
     plant.show()
     for warning in (wind_warning(vehicle, run.plant, run.disturbance), start_warning(plant, run.ground)):
         if warning:
-            warn(warning)
+            warn(f"warning: {warning}")
     for steps, length_s in ((count, step_s), (1 if rest_s > 0.0 else 0, rest_s)):
         if steps:
             _fly(plant, command, steps, length_s, run.ground)

@@ -6,47 +6,31 @@ from typing import Annotated
 
 import typer
 
+from flightstack import simulation_options as shared
+
 # of both commands
-Vehicle = Annotated[str, typer.Option(help="Built-in vehicle (paper_quad, x_quad) or a TOML file.")]
-Plant = Annotated[str, typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")]
-Wind = Annotated[str, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")]
-Gust = Annotated[float, typer.Option(help="Standard deviation of the gusts, m/s.")]
-Force = Annotated[str, typer.Option(metavar="N,E,D", help="Constant external force, N.")]
-Torque = Annotated[str, typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")]
-TorqueGust = Annotated[
-    float, typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
-]
-Seed = Annotated[int, typer.Option(help="Seed of the gusts.")]
+Vehicle = Annotated[str, shared.VEHICLE]
+Plant = Annotated[str, shared.PLANT]
+Wind = Annotated[str, shared.WIND]
+Gust = Annotated[float, shared.GUST]
+Force = Annotated[str, shared.FORCE]
+Torque = Annotated[str, shared.TORQUE]
+TorqueGust = Annotated[float, shared.TORQUE_GUST]
+Seed = Annotated[int, shared.SEED]
 
 # of the simulator
-Speed = Annotated[str, typer.Option(metavar="max|N", help="N times real time, or as fast as it goes.")]
+Speed = Annotated[str, shared.SPEED]
 Host = Annotated[str, typer.Option(help="Address to listen on.")]
 Port = Annotated[int | None, typer.Option(help="TCP port; 0 takes a free one.  [default: 4560 + instance]")]
 Instance = Annotated[int, typer.Option(help="Number of the vehicle, from 0.")]
-IdealRotors = Annotated[
-    bool,
-    typer.Option("--ideal-rotors", help="Rotors without limits, without lag and without spin-up torque."),
-]
-PhysicsHz = Annotated[float, typer.Option(help="Lowest rate of the integration steps.")]
-BatteryStart = Annotated[
-    float | None, typer.Option(metavar="PERCENT", help="Charge at the start.  [default: 100]")
-]
-BatteryCapacity = Annotated[
-    float | None, typer.Option(metavar="MAH", help="Capacity.  [default: the vehicle's]")
-]
-BatteryDrain = Annotated[
-    float | None, typer.Option(metavar="FACTOR", help="Let the charge fall so many times as fast.")
-]
-Faults = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="SPEC",
-        help="rotor:N:off, rotor:N:weak=SHARE, rotor:N:stuck=RAD_S, state:freeze, state:nan, state:drop or "
-        "battery:level=SHARE, each with @BEGIN or @BEGIN-END in seconds; may be repeated.",
-    ),
-]
+IdealRotors = Annotated[bool, shared.IDEAL_ROTORS]
+PhysicsHz = Annotated[float, shared.PHYSICS_HZ]
+BatteryStart = Annotated[float | None, shared.BATTERY_START]
+BatteryCapacity = Annotated[float | None, shared.BATTERY_CAPACITY]
+BatteryDrain = Annotated[float | None, shared.BATTERY_DRAIN]
+Faults = Annotated[list[str] | None, shared.FAULTS]
 Home = Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Where the vehicle stands.")]
-View = Annotated[bool, typer.Option("--view", help="Show the vehicle in a window.")]
+View = Annotated[bool, shared.VIEW]
 Timeout = Annotated[
     float | None,
     typer.Option(

@@ -1,6 +1,8 @@
 """Names of the plants, for the command line: without loading what they are made of."""
 
+from flightstack.extras import INSTALL_MULTIBODY
+
 MULTIBODY = "multibody"
 PLANT_NAMES = ("rigid", "paper", MULTIBODY)
 
-NO_MUJOCO = "the multibody plant needs MuJoCo: pip install 'flightstack[multibody]'"
+NO_MUJOCO = f"the multibody plant needs MuJoCo: {INSTALL_MULTIBODY}"

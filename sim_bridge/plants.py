@@ -8,6 +8,13 @@ from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant import Plant, PlantOptions
 from sim_bridge.plant_names import MULTIBODY, NO_MUJOCO
 
+_KERNELS = ("settle", "quaternion_from_euler", "rotate")
+
+
+def kernels_of(plant: str) -> tuple[str, ...]:
+    """Names of the kernels that a simulator with this plant compiles, or reads from the cache."""
+    return (*_KERNELS, *(("show_pose", "show_state") if plant == MULTIBODY else ("_advance",)))
+
 
 def make_plant(vehicle: Vehicle, name: str, options: PlantOptions) -> Plant:
     """Return the plant of this name, one of ``plant_names``.

@@ -14,6 +14,7 @@ import typer
 from flightstack import console
 from flightstack import picture_options as asked
 from flightstack.atomic_file import check_new
+from flightstack.extras import INSTALL_MULTIBODY
 from flightstack.params.errors import ConfigError
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.render_wish import Wish, wish_of
@@ -29,7 +30,7 @@ _NAME = "sim-bridge render"
 def require(what: str, *modules: str) -> None:
     """Raise UsageProblemError when a module of the extra ``multibody`` is not installed."""
     if any(find_spec(module) is None for module in ("mujoco", *modules)):
-        raise UsageProblemError(f"{what} needs MuJoCo: pip install 'flightstack[multibody]'")
+        raise UsageProblemError(f"{what} needs MuJoCo: {INSTALL_MULTIBODY}")
 
 
 def render(

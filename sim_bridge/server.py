@@ -10,6 +10,7 @@ import socket
 from typing import NamedTuple
 
 from flightstack.clock import ask_for_punctual_sleeps
+from flightstack.compile_notice import announce_compilation
 from flightstack.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.connection import (
@@ -27,6 +28,7 @@ from sim_bridge.live_view import LiveView
 from sim_bridge.lockstep import SimulatorLink
 from sim_bridge.output import complain, say
 from sim_bridge.plant import PlantOptions
+from sim_bridge.plants import kernels_of
 from sim_bridge.session import Session
 from sim_bridge.simulator import Simulator
 
@@ -65,6 +67,7 @@ def serve(options: ServerOptions) -> int:
     with listener:
         stop = StopSignal()
         _introduce(options, listener.getsockname()[1])
+        announce_compilation("sim-bridge", kernels_of(options.plant))
         simulator = _simulator(options)  # compiles where nothing is cached; a client may connect meanwhile
         try:
             client = _await_client(listener, stop, options.timeout_s)
@@ -91,7 +94,7 @@ def _introduce(options: ServerOptions, port: int) -> None:
     )
     warning = wind_warning(options.vehicle, options.plant, options.plant_options.disturbance)
     if warning:
-        complain(warning)
+        complain(f"warning: {warning}")
 
 
 def _await_client(listener: socket.socket, stop: StopSignal, timeout_s: float | None) -> socket.socket:

@@ -13,7 +13,6 @@ from flightstack.compiled import as_tuple, compiled, direct, specialise, store
 from flightstack.contract import (
     ATTITUDE_TARGET_SIZE,
     MAX_ROTORS,
-    STATE_SIZE,
     AttitudeReference,
     FloatArray,
     LoopRow,
@@ -188,7 +187,7 @@ def inner_kernel(
     m = memory[0]
     target, last, dt_s = m["target"], m["last"], m["dt_s"]
     if not (all_finite(state) and all_finite(target)):
-        row[:] = last
+        store(row, last)
         row[STATUS_AT] = INPUT_NOT_FINITE
         return
     mixer = Mixer(m["allocation"], m["effectiveness"], m["low"], m["high"], m["spin"])
@@ -220,7 +219,7 @@ def inner_kernel(
     for value in advanced:
         sound = sound and math.isfinite(value)
     if not sound:
-        row[:] = last
+        store(row, last)
         row[STATUS_AT] = OUTPUT_NOT_FINITE
         return
     demanded = Wrench(aim.thrust_n, torque)
@@ -228,13 +227,13 @@ def inner_kernel(
     store(m["reference"], filtered)
     for index in range(CONTROLLER_MEMORY_SIZE):
         m["controller"][index] = advanced[index]
-    row[:STATE_SIZE] = state
+    store(row, state)
     _store_reference(row, reference)
     _store_wrenches(row, demanded, achieved)
     row[COMMAND_AT + n : SPEED_AT] = 0.0
-    row[SPEED_AT:STATUS_AT] = rotor_speed_rad_s
+    store(row[SPEED_AT:], rotor_speed_rad_s)
     row[STATUS_AT] = _status(row)
-    last[:] = row
+    store(last, row)
 
 
 class PythonLoops:

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from flightstack.extras import INSTALL_FIRMWARE
 from flightstack.firmware.sources import PORTABLE, c_files, digest, files, firmware_root, source_hash
 
 EXACT = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
@@ -51,9 +52,7 @@ def host_compiler() -> Compiler:
     if version := compiler_version(zig):
         return Compiler((*zig, "-fno-sanitize=all"), f"zig {version}")
     names = ", ".join([*([named] if named else []), "cc", "gcc", "clang"])
-    raise BuildError(
-        f"there is no C compiler: tried {names} and zig (pip install 'flightstack[firmware]' brings it)"
-    )
+    raise BuildError(f"there is no C compiler: tried {names} and zig ({INSTALL_FIRMWARE})")
 
 
 def compiler_version(command: Sequence[str]) -> str:

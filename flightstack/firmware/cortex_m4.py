@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from flightstack.extras import INSTALL_FIRMWARE
 from flightstack.firmware.build import (
     EXACT,
     BuildError,
@@ -38,7 +39,7 @@ def cross_compiler() -> Compiler:
     zig = (sys.executable, "-m", "ziglang", "cc")
     version = compiler_version(zig)
     if not version:
-        raise BuildError("zig is not installed: pip install 'flightstack[firmware]' brings it")
+        raise BuildError(f"zig is not installed: {INSTALL_FIRMWARE}")
     return Compiler(zig, f"zig {version}")
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from flightstack.control.backend import ControlBackend
 from flightstack.control.loops import PythonLoops
+from flightstack.extras import INSTALL_FIRMWARE
 from flightstack.firmware.build import BuildError, host_library, host_program
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import EMULATED, PYTHON, SERIAL, C, LoopsChoice, parse_loops
@@ -60,7 +61,7 @@ def _emulated() -> ByteLink:
         from flightstack.firmware.cortex_m4 import emulated_target  # noqa: PLC0415  # unicorn is an extra
         from flightstack.firmware.emulated import EmulationError  # noqa: PLC0415
     except ImportError as error:
-        raise BuildError("unicorn is not installed: pip install 'flightstack[firmware]' brings it") from error
+        raise BuildError(f"unicorn is not installed: {INSTALL_FIRMWARE}") from error
     try:
         return emulated_target()
     except EmulationError as error:

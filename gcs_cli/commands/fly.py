@@ -3,77 +3,39 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.settings import JsonOption, settings_of
+from gcs_cli.fly_flags import FlyOptions, flies
+from gcs_cli.settings import JsonOption, OverwriteOption, settings_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
+@flies()
 def fly(
     context: typer.Context,
-    plan: Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)],
-    controller: Annotated[str, typer.Option(help="pid, backstepping, or the name of one of yours.")] = "pid",
-    gains: Annotated[
-        str, typer.Option(help="tuned, paper, paper_rate_fed, backstepping_poles, or a TOML file.")
-    ] = "tuned",
-    plant: Annotated[str, typer.Option(help="rigid, multibody or paper.")] = "rigid",
-    speed: Annotated[str, typer.Option(metavar="max|N", help="N times real time.")] = "max",
-    inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop.")] = 500.0,
-    outer_hz: Annotated[
-        float | None,
-        typer.Option(help="Rate of the outer loop; divides the inner one.  [default: about 100]"),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the gusts.")] = 1,
-    wind: Annotated[str | None, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")] = None,
-    gust: Annotated[float | None, typer.Option(help="Standard deviation of the gusts, m/s.")] = None,
-    torque_gust: Annotated[
-        float | None, typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
-    ] = None,
-    battery_start: Annotated[
-        float | None, typer.Option(metavar="PERCENT", help="Charge at the start.  [default: 100]")
-    ] = None,
-    battery_capacity: Annotated[
-        float | None, typer.Option(metavar="MAH", help="Capacity.  [default: the vehicle's]")
-    ] = None,
-    battery_drain: Annotated[
-        float | None, typer.Option(metavar="FACTOR", help="Let the charge fall so many times as fast.")
-    ] = None,
-    fault: Annotated[
-        list[str] | None,
-        typer.Option(metavar="SPEC", help="As of sim-bridge, for example rotor:2:off@12.5; may be repeated."),
-    ] = None,
+    options: FlyOptions,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="Directory of the results.  [default: runs/<stamp>-<plan>]"),
     ] = None,
-    vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
+    overwrite: OverwriteOption = False,
     instance: Annotated[
         int | None, typer.Option(metavar="N", help="Shifts all ports, to fly beside another one.")
     ] = None,
-    ideal_rotors: Annotated[
-        bool, typer.Option("--ideal-rotors", help="Rotors without limits, lag and spin-up torque.")
-    ] = False,
-    params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None,
-    loops: Annotated[
-        str,
-        typer.Option(
-            metavar="LOOPS", help="python, c, or those of a target: host, emulated, serial:DEVICE[:BAUD]."
-        ),
-    ] = "python",
     open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
     as_json: JsonOption = False,
     timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 180]")] = None,
-    limit: Annotated[float, typer.Option(help="Longest flight, s of simulated time.")] = 3600.0,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""
     from gcs_cli.fly_display import FlyConsole, make_display  # noqa: PLC0415
-    from gcs_cli.fly_options import FlyOptions, checked_plan  # noqa: PLC0415
+    from gcs_cli.fly_options import checked_plan  # noqa: PLC0415
     from gcs_cli.fly_run import fly as fly_plan  # noqa: PLC0415
     from gcs_cli.fly_run import write_results  # noqa: PLC0415
     from gcs_cli.run_directory import REPORT_NAME  # noqa: PLC0415
@@ -81,16 +43,13 @@ def fly(
     settings = settings_of(context).merged(None, timeout, instance)
     if settings.connect is not None:
         raise CliError("fly starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
-    options = FlyOptions(
-        plan, controller, gains, plant, speed, inner_hz, outer_hz, seed, wind, gust, torque_gust, vehicle,
-        settings.instance or 0, ideal_rotors, 180.0 if settings.timeout_s is None else settings.timeout_s, limit,
-        battery_start, battery_capacity, battery_drain, tuple(fault or ()), params, loops,
-    )  # fmt: skip
+    timeout_s = FlyOptions.timeout_s if settings.timeout_s is None else settings.timeout_s
+    options = replace(options, instance=settings.instance or 0, timeout_s=timeout_s)
     items = checked_plan(options)
     console = FlyConsole(stderr=as_json, highlight=False)
     display = make_display(console)
     try:
-        flown = fly_plan(options, items, out, display)
+        flown = fly_plan(options, items, out, display, overwrite)
     finally:
         display.close()
     summary, outcome = write_results(options, items, flown)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flightstack.command_line import make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.settings import (
     ConnectOption,
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from flightstack.mavlink.services.virtual_files import Entry
     from gcs_cli.connection import Connection
 
-app = typer.Typer(help="The vehicle's flight logs.", no_args_is_help=True)
+app = make_app(help="The vehicle's flight logs.", no_args_is_help=True)
 
 _KILO = 1000.0
 

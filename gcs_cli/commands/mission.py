@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flightstack.command_line import make_app
+from gcs_cli.plan_files import PlanArgument
 from gcs_cli.settings import ConnectOption, InstanceOption, OverwriteOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
     from flightstack.plan import MissionItem
 
-app = typer.Typer(help="The vehicle's mission.", no_args_is_help=True)
+app = make_app(help="The vehicle's mission.", no_args_is_help=True)
 
 
 class Part(StrEnum):
@@ -25,13 +27,10 @@ class Part(StrEnum):
     ALL = "all"
 
 
-FileArgument = Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)]
-
-
 @app.command()
 def upload(
     context: typer.Context,
-    file: FileArgument,
+    file: PlanArgument,
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
     instance: InstanceOption = None,
@@ -59,7 +58,7 @@ def upload(
 
 
 @app.command()
-def check(file: FileArgument) -> None:
+def check(file: PlanArgument) -> None:
     """Check a file as the vehicle does, without one.
 
     Mission, geofence and rally points.

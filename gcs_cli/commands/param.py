@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flightstack.command_line import make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.settings import (
     ConnectOption,
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from gcs_cli.connection import Connection
     from gcs_cli.param_info import ParamInfo
 
-app = typer.Typer(help="The vehicle's parameters.", no_args_is_help=True)
+app = make_app(help="The vehicle's parameters.", no_args_is_help=True)
 
 NameArgument = Annotated[str, typer.Argument(metavar="NAME", show_default=False)]
 _WIDE = 200  # columns where nobody looks: a pipe or a file

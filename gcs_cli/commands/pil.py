@@ -3,35 +3,37 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+from flightstack.command_line import HELP_FLAGS, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
-from gcs_cli.settings import JsonOption, settings_of
+from gcs_cli.fly_flags import FlyOptions, flies
+from gcs_cli.settings import JsonOption, OverwriteOption, settings_of
 
 if TYPE_CHECKING:
     from gcs_cli.pil.result import Outcome
 
-_FLY, _HELP = "fly", ("--help",)
+_FLY = "fly"
 
 
 class _MissionGroup(TyperGroup):
     """Takes what is no command for the mission: ``gcs pil square.plan`` is ``gcs pil fly square.plan``."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if args and args[0] not in self.commands and args[0] not in _HELP:
+        if args and args[0] not in self.commands and args[0] not in HELP_FLAGS:
             args = [_FLY, *args]
         return super().parse_args(ctx, args)
 
 
-app = typer.Typer(
+app = make_app(
     cls=_MissionGroup,
     help="Check the loops in C and on a target.\n\n`gcs pil MISSION` flies it as MIL, SIL and PIL.",
     no_args_is_help=True,
-    rich_markup_mode=None,
 )
 
 TargetOption = Annotated[
@@ -48,59 +50,39 @@ OpenOption = Annotated[bool, typer.Option("--open", help="Open the report afterw
 
 
 @app.command(_FLY)
+@flies(without=("loops", "speed"))
 def fly(
     context: typer.Context,
-    plan: Annotated[Path, typer.Argument(help="A .plan or .waypoints file.", show_default=False)],
+    options: FlyOptions,
     target: TargetOption = "emulated",
-    controller: Annotated[str, typer.Option(help="pid or backstepping.")] = "pid",
-    gains: Annotated[
-        str, typer.Option(help="tuned, paper, paper_rate_fed, backstepping_poles, or a TOML file.")
-    ] = "tuned",
-    vehicle: Annotated[str, typer.Option(help="paper_quad, x_quad, or a TOML file.")] = "paper_quad",
-    plant: Annotated[str, typer.Option(help="rigid, multibody or paper.")] = "rigid",
-    inner_hz: Annotated[float, typer.Option(help="Rate of the inner loop.")] = 500.0,
-    outer_hz: Annotated[
-        float | None,
-        typer.Option(help="Rate of the outer loop; divides the inner one.  [default: about 100]"),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the gusts.")] = 1,
-    wind: Annotated[str | None, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")] = None,
-    gust: Annotated[float | None, typer.Option(help="Standard deviation of the gusts, m/s.")] = None,
-    ideal_rotors: Annotated[
-        bool, typer.Option("--ideal-rotors", help="Rotors without limits, lag and spin-up torque.")
-    ] = False,
-    params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None,
     instance: Annotated[
         int | None, typer.Option(metavar="N", help="Shifts all ports, to fly beside another one.")
     ] = None,
     out: OutOption = None,
+    overwrite: OverwriteOption = False,
     fail_over: FailOverOption = False,
     open_report: OpenOption = False,
     as_json: JsonOption = False,
     timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 180]")] = None,
-    limit: Annotated[float, typer.Option(help="Longest flight, s of simulated time.")] = 3600.0,
 ) -> None:
     """Fly a mission with each of the loops, and compare.
 
     The loops fly in Python (MIL), in C (SIL) and on a target (PIL).
     """
     from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
-    from gcs_cli.fly_options import FlyOptions, checked_plan  # noqa: PLC0415
+    from gcs_cli.fly_options import checked_plan  # noqa: PLC0415
     from gcs_cli.pil.run import run  # noqa: PLC0415
     from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
 
     settings = settings_of(context).merged(None, timeout, instance)
     if settings.connect is not None:
         raise CliError("pil starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
-    options = FlyOptions(
-        plan, controller, gains, plant, inner_hz=inner_hz, outer_hz=outer_hz, seed=seed, wind=wind, gust=gust,
-        vehicle=vehicle, instance=settings.instance or 0, ideal_rotors=ideal_rotors, params=params, limit_s=limit,
-        timeout_s=180.0 if settings.timeout_s is None else settings.timeout_s,
-    )  # fmt: skip
+    timeout_s = FlyOptions.timeout_s if settings.timeout_s is None else settings.timeout_s
+    options = replace(options, instance=settings.instance or 0, timeout_s=timeout_s)
     checked_target(target)
     items = checked_plan(options)
     console = FlyConsole(stderr=as_json, highlight=False)
-    finished = run(options, items, target, out, console)
+    finished = run(options, items, target, out, console, overwrite)
     _tell(finished.outcome, finished.folder, console, as_json, open_report)
     if finished.problem is not None:
         raise finished.problem
@@ -119,6 +101,7 @@ def replay(
     out: OutOption = None,
     fail_over: FailOverOption = False,
     open_report: OpenOption = False,
+    overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Feed a target with the inputs of a flight log.
@@ -132,7 +115,7 @@ def replay(
 
     choice = checked_target(target, more=("c",))
     prepared = replay_run.prepared(log, vehicle)
-    folder = make_pil_directory(log.stem, out)
+    folder = make_pil_directory(log.stem, out, overwrite)
     console = FlyConsole(stderr=as_json, highlight=False)
     outcome = replay_run.replay(log, choice, target, prepared, folder, console)
     write_outcome(folder, outcome)

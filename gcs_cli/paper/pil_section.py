@@ -22,7 +22,8 @@ from flightstack.geodesy import LocalFrame
 from flightstack.plan import Command, Frame, MissionItem, Plan, save_plan
 from flightstack.transport.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.fly_options import DEFAULT_HOME, FlyOptions, check_ports, checked_plan
+from gcs_cli.fly_flags import FlyOptions
+from gcs_cli.fly_options import DEFAULT_HOME, check_ports, checked_plan
 from gcs_cli.paper.trajectory import Trajectory, load_trajectory, sample
 from gcs_cli.pil.run import JSON_NAME, Finished
 from gcs_cli.pil.run import run as run_pil

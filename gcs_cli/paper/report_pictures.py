@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.contract import FloatArray
+from flightstack.extras import INSTALL_MULTIBODY
 from flightstack.poses_file import Poses, write_poses
 from gcs_cli.paper import cases
 from gcs_cli.paper.report_labels import LABELS, PLANTS, anchored
@@ -46,7 +47,7 @@ class Picture(NamedTuple):
 def take(recordings: Mapping[str, Recording]) -> list[Picture]:
     """Draw the flight along the desired trajectory; never raise: what cannot be drawn becomes a sentence."""
     if find_spec("mujoco") is None:
-        return [Picture("No pictures: they need MuJoCo: pip install 'flightstack[multibody]'.", "")]
+        return [Picture(f"No pictures: they need MuJoCo: {INSTALL_MULTIBODY}.", "")]
     plants = (cases.MULTIBODY, cases.RIGID, cases.SMALL_ANGLE)
     keys = (cases.key(cases.BACKSTEPPING, cases.DESIRED, cases.PLAIN, plant) for plant in plants)
     key = next((key for key in keys if key in recordings), None)

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 
 from flightstack.atomic_file import write_text_atomically
+from flightstack.extras import INSTALL_MULTIBODY
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.paper import linear, pil_section, report_pictures
 from gcs_cli.paper.cases import MULTIBODY, all_cases
@@ -29,7 +30,7 @@ from gcs_cli.run_directory import results_directory
 from gcs_cli.transfer_bar import step_bar
 
 JSON_NAME, HTML_NAME = "results.json", "report.html"
-NO_MUJOCO = "the multibody plant needs MuJoCo: pip install 'flightstack[multibody]'"
+NO_MUJOCO = f"the multibody plant needs MuJoCo: {INSTALL_MULTIBODY}"
 NOT_WANTED = "left out on request"
 NOT_REACHED = "not done: the command was ended before"
 

@@ -16,7 +16,7 @@ from flightstack.plan import Plan
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.flight import Flight
 from gcs_cli.fly_display import BarDisplay, Display, draws_bars
-from gcs_cli.fly_options import FlyOptions
+from gcs_cli.fly_flags import FlyOptions
 from gcs_cli.fly_run import fly, write_results
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.report import render_report
@@ -29,11 +29,18 @@ from gcs_cli.run_directory import LOG_NAME, RUNS, fresh_directory
 JSON_NAME, HTML_NAME = "pil.json", "pil.html"
 
 
-class SilentDisplay:
-    """Shows nothing of a flight: where no bar can be drawn, three times the same lines would tell nobody anything."""
+class NoticeDisplay:
+    """Shows nothing of a flight but what should be known: for an output that cannot draw a bar."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
 
     def update(self, flight: Flight) -> None:
         """Show nothing."""
+
+    def note(self, line: str) -> None:
+        """Print it."""
+        self._console.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def close(self) -> None:
         """Nothing is held open."""
@@ -48,20 +55,22 @@ class Finished(NamedTuple):
     """Why a flight did not come to its end; None: all did."""
 
 
-def run(options: FlyOptions, plan: Plan, target: str, out: Path | None, console: Console) -> Finished:
+def run(
+    options: FlyOptions, plan: Plan, target: str, out: Path | None, console: Console, overwrite: bool = False
+) -> Finished:
     """Fly the mission three times and write ``pil.json`` and ``pil.html``; raise CliError, ConfigError.
 
     A flight that fails ends the run; what was flown until then is compared all the same.
     """
     choice = checked_target(target)
     check_there(choice, options.controller)
-    folder = make_pil_directory(options.plan_path.stem, out)
+    folder = make_pil_directory(options.plan_path.stem, out, overwrite)
     flights: dict[str, Flown] = {}
     problem = None
     for stage, loops in ((MIL, PYTHON), (SIL, C), (PIL, target)):
         console.print(f"[bold]{stage}[/]  loops {loops}", highlight=False)
         flown = dataclasses.replace(options, loops=loops)
-        flights[stage], problem = _fly(stage, flown, plan, folder, console)
+        flights[stage], problem = _fly(stage, flown, plan, folder, console, overwrite)
         console.print(f"     {_words(flights[stage])}", markup=False, highlight=False, soft_wrap=True)
         if problem is not None:
             break
@@ -77,13 +86,21 @@ def run(options: FlyOptions, plan: Plan, target: str, out: Path | None, console:
     return Finished(folder, outcome, problem)
 
 
-def make_pil_directory(name: str, out: Path | None) -> Path:
-    """Make and return the directory of a run; raise CliError when it cannot be, or holds another run."""
+def make_pil_directory(name: str, out: Path | None, overwrite: bool = False) -> Path:
+    """Make and return the directory of a run; raise CliError when it cannot be, or holds another run.
+
+    With ``overwrite``, the other run's results are removed.
+    """
     if out is None:
         return fresh_directory(RUNS, f"{name}-pil")
-    if (out / JSON_NAME).exists():
-        raise CliError(f"--out {out}: {JSON_NAME} of another run is there; choose another one", USAGE)
+    if (out / JSON_NAME).exists() and not overwrite:
+        raise CliError(
+            f"--out {out}: {JSON_NAME} of another run is there; choose another one, or give --overwrite",
+            USAGE,
+        )
     try:
+        for file in (JSON_NAME, HTML_NAME):
+            (out / file).unlink(missing_ok=True)
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CliError(f"{out}: the directory cannot be made: {error.strerror}", USAGE) from None
@@ -91,12 +108,12 @@ def make_pil_directory(name: str, out: Path | None) -> Path:
 
 
 def _fly(
-    stage: str, options: FlyOptions, plan: Plan, folder: Path, console: Console
+    stage: str, options: FlyOptions, plan: Plan, folder: Path, console: Console, overwrite: bool
 ) -> tuple[Flown, CliError | None]:
-    display: Display = BarDisplay(console) if draws_bars(console) else SilentDisplay()
+    display: Display = BarDisplay(console) if draws_bars(console) else NoticeDisplay(console)
     place = stage.lower()
     try:
-        flown = fly(options, plan, folder / place, display)
+        flown = fly(options, plan, folder / place, display, overwrite)
     finally:
         display.close()
     summary, outcome = write_results(options, plan, flown)
@@ -143,11 +160,23 @@ def _conditions(options: FlyOptions, target: str) -> dict[str, Any]:
         "wind": options.wind,
         "gusts": options.gust,
         "torque gusts": options.torque_gust,
-        "faults": " ".join(options.faults) or None,
+        "force": options.force,
+        "torque": options.torque,
+        "battery": _battery(options),
+        "faults": " ".join(options.faults or ()) or None,
         "ideal rotors": "yes" if options.ideal_rotors else None,
-        "parameters": None if options.params is None else str(options.params),
+        "parameters": " ".join(map(str, filter(None, (options.params, *(options.param or ()))))) or None,
     }
     return {name: value for name, value in values.items() if value is not None}
+
+
+def _battery(options: FlyOptions) -> str | None:
+    parts = (
+        (options.battery_start, "from {:g} %"),
+        (options.battery_capacity, "{:g} mAh"),
+        (options.battery_drain, "drained {:g} times as fast"),
+    )
+    return ", ".join(words.format(value) for value, words in parts if value is not None) or None
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:

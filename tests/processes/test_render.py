@@ -16,6 +16,7 @@ import imageio_ffmpeg
 import pytest
 from PIL import Image
 
+from flightstack.extras import INSTALL_MULTIBODY
 from flightstack.mavlink.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.params.vehicle import load_vehicle
 from flightstack.poses_file import write_poses
@@ -194,7 +195,7 @@ def test_complaints_name_the_command_that_was_given(
         )
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert capsys.readouterr().err == f"{said}: pip install 'flightstack[multibody]'\n"
+    assert capsys.readouterr().err == f"{said}: {INSTALL_MULTIBODY}\n"
 
 
 def test_without_a_renderer_nothing_is_written(poses: Path, tmp_path: Path) -> None:

@@ -310,5 +310,7 @@ def test_dropping_states_in_lockstep_ends_with_a_sentence() -> None:
 def test_wind_without_effect_is_said() -> None:
     _, _, err = SimBridge("--wind", "5,0", "--timeout", "0.05").end()
     warning, reason = err.splitlines()
-    assert warning.startswith("sim-bridge: the wind has no effect: the vehicle paper_quad has no drag")
+    assert warning.startswith(
+        "sim-bridge: warning: the wind has no effect: the vehicle paper_quad has no drag"
+    )
     assert "waited" in reason

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from flightstack.contract import Vector3
+from flightstack.extras import INSTALL_MULTIBODY
 from flightstack.mavlink.hot_frames import ARMED_FLAG
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.errors import CliError
-from gcs_cli.fly_options import FlyOptions, checked_plan
+from gcs_cli.fly_flags import FlyOptions
+from gcs_cli.fly_options import checked_plan
 from sim_bridge.__main__ import main
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.plant import MultibodyPlant
@@ -125,9 +127,7 @@ def test_without_mujoco_both_commands_say_what_to_install(
     for module in ("sim_bridge.arguments", "gcs_cli.fly_options"):
         monkeypatch.setattr(f"{module}.find_spec", lambda name: None)
     assert main(["--plant", "multibody"]) == 2
-    assert capsys.readouterr().err == (
-        "sim-bridge: the multibody plant needs MuJoCo: pip install 'flightstack[multibody]'\n"
-    )
+    assert capsys.readouterr().err == (f"sim-bridge: the multibody plant needs MuJoCo: {INSTALL_MULTIBODY}\n")
     with pytest.raises(CliError, match="needs MuJoCo: pip install"):
         checked_plan(FlyOptions(SQUARE, plant="multibody"))
 

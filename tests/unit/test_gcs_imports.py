@@ -6,7 +6,14 @@ import subprocess
 import sys
 
 HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich")
-LIGHT = ("flightstack.console", "flightstack.picture_options", "flightstack.port_numbers")
+LIGHT = (
+    "flightstack.command_line",
+    "flightstack.console",
+    "flightstack.options",
+    "flightstack.picture_options",
+    "flightstack.port_numbers",
+    "flightstack.simulation_options",
+)
 """Of the flight stack's modules only those that print, or hold words and numbers for the help."""
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import signal
+import sys
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
-from gcs_cli.processes import culprit, is_explained
+from gcs_cli.processes import Child, Children, culprit, is_explained
 
 
 class Ended(NamedTuple):
@@ -65,3 +67,25 @@ def test_who_ends_in_order_or_blames_the_other_waits_for_it() -> None:
     assert not is_explained((Ended("sim", 0), STACK_RUNS))
     assert not is_explained((Ended("sim", 1, True), STACK_RUNS))
     assert not is_explained((SIM_RUNS, Ended("stack", 1, True)))
+
+
+def test_notices_of_a_child_are_read_once_and_in_whole_lines(tmp_path: Path) -> None:
+    program = "import sys; sys.stdout.write(sys.argv[1])"
+    said = (
+        "sim-bridge: paper_quad, rigid plant\nsim-bridge: warning: the wind has no effect\n"
+        "/lib/numpy.py:12: RuntimeWarning: overflow\nflightstack: compiling kernel 1 of 9: detect\n"
+        "flightstack: shut down by the ground station\nflightstack: warning: half a"
+    )
+    with Children(tmp_path) as children:
+        child = Child("sim-bridge", [sys.executable, "-c", program, said], tmp_path / "sim-bridge.log")
+        children.add(child)
+        assert children.wait(60.0)
+        assert children.notices() == [
+            "sim-bridge: warning: the wind has no effect",
+            "/lib/numpy.py:12: RuntimeWarning: overflow",
+            "flightstack: compiling kernel 1 of 9: detect",
+        ]
+        assert children.notices() == []
+        with (tmp_path / "sim-bridge.log").open("a") as log:
+            log.write(" line\n")
+        assert children.notices() == ["flightstack: warning: half a line"]

@@ -55,7 +55,7 @@ def test_headings_are_those_of_a_compass() -> None:
 
 
 def not_there(*_: object) -> None:
-    raise CliError("no compiler is there: pip install 'flightstack[firmware]'", USAGE)
+    raise CliError("no compiler is there: pip install ziglang unicorn", USAGE)
 
 
 def test_without_its_tools_the_emulated_target_is_left_out_with_the_reason(
@@ -63,7 +63,7 @@ def test_without_its_tools_the_emulated_target_is_left_out_with_the_reason(
 ) -> None:
     monkeypatch.setattr(pil_section, "check_there", not_there)
     found = pil_section.run(tmp_path)
-    assert found["why_left_out"] == "no compiler is there: pip install 'flightstack[firmware]'"
+    assert found["why_left_out"] == "no compiler is there: pip install ziglang unicorn"
     assert found["controllers"] == {}
     assert not list(tmp_path.iterdir())
 

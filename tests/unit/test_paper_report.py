@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from flightstack.extras import INSTALL_MULTIBODY
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.paper import cases
 from gcs_cli.paper.printed import print_results
@@ -316,7 +317,7 @@ def test_pictures_that_cannot_be_had_are_a_sentence(monkeypatch: pytest.MonkeyPa
     assert "No pictures" in picture.caption
     monkeypatch.setattr("gcs_cli.paper.report_pictures.find_spec", lambda name: None)
     (picture,) = take(small_flights().recordings)
-    assert "pip install 'flightstack[multibody]'" in picture.caption
+    assert INSTALL_MULTIBODY in picture.caption
     assert "pip install" in parsed(render(small_results(), {}, [picture])).text
 
 

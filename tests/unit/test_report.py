@@ -20,6 +20,7 @@ from gcs_cli.analysis import read_flight
 from gcs_cli.flight_data import Flight, Text, loop_timing, series
 from gcs_cli.report import render_report, write_report
 from gcs_cli.report_chart import Level, Line, decimated, time_chart
+from gcs_cli.report_conditions import conditions
 from gcs_cli.report_plots import mode_bands, plots
 from gcs_cli.report_svg import nice_ticks, tick_text
 from gcs_cli.report_timing import read_loop_timing
@@ -267,3 +268,12 @@ def test_a_logarithmic_chart_leaves_out_what_is_not_positive() -> None:
 
 def test_a_report_without_a_log_claims_nothing_about_the_rotors() -> None:
     assert "no limits" not in "".join(plots(Flight(), Plan(()), (), None))
+
+
+def test_report_names_force_torque_and_parameters() -> None:
+    summary = {"force_n": [1.0, 0.0, -0.5], "torque_n_m": [0.0, 0.0, 0.1], "param": ["RTL_TYPE=0"]}
+    assert conditions(summary) == [
+        "force 1 N north, 0 N east, −0.5 N down",
+        "torque 0 N m roll, 0 N m pitch, 0.1 N m yaw",
+        "RTL_TYPE=0",
+    ]

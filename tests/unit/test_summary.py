@@ -26,7 +26,7 @@ REQUIRED = {
     "sim_time_s", "wall_time_s", "real_time_factor", "waypoints", "rms_tracking_error_m",
     "max_tracking_error_m", "overruns", "log_sha256", "wind_m_s", "gust_m_s", "torque_gust_n_m",
     "battery_start_percent", "battery_capacity_mah", "battery_drain", "faults", "ideal_rotors",
-    "params",
+    "params", "force_n", "torque_n_m", "param",
 }  # fmt: skip
 
 

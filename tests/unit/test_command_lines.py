@@ -1,0 +1,90 @@
+"""The three commands have one look: plain help with every bracket, ``-h``, ``--version`` and completion."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import typer
+
+import flightstack
+from flightstack.__main__ import app as flightstack_app
+from gcs_cli.__main__ import app as gcs_app
+from sim_bridge.__main__ import app as sim_bridge_app
+
+APPS = {"flightstack": flightstack_app, "gcs": gcs_app, "sim-bridge": sim_bridge_app}
+MODULES = {"flightstack": "flightstack", "gcs": "gcs_cli", "sim-bridge": "sim_bridge"}
+BRACKETS = re.compile(r"\[[^\]]*\]")
+
+
+def pages() -> Iterator[tuple[str, Any, Any]]:
+    """Every command that has a help page: its words, the command, and its context."""
+    for name, app in APPS.items():
+        command = typer.main.get_command(app)
+        waiting = [
+            (name, command, command.context_class(command, info_name=name, **command.context_settings))
+        ]
+        while waiting:
+            words, command, context = waiting.pop()
+            yield words, command, context
+            for part, child in getattr(command, "commands", {}).items():
+                made = child.context_class(child, info_name=part, parent=context, **child.context_settings)
+                waiting.append((f"{words} {part}", child, made))
+
+
+PAGES = {words: (command, context) for words, command, context in pages()}
+
+
+def one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+@pytest.mark.parametrize("words", PAGES)
+def test_help_shows_every_bracket_of_its_source(words: str) -> None:
+    command, context = PAGES[words]
+    shown = one_line(command.get_help(context))
+    for param in command.params:
+        if not getattr(param, "hidden", False):
+            for bracket in BRACKETS.findall(f"{param.help or ''} {param.metavar or ''}"):
+                assert one_line(bracket) in shown, f"{words} --help drops {bracket}"
+    for bracket in BRACKETS.findall(command.help or ""):
+        assert bracket in shown
+
+
+@pytest.mark.parametrize("words", PAGES)
+def test_help_is_plain_text(words: str) -> None:
+    command, context = PAGES[words]
+    assert command.rich_markup_mode is None
+    assert not set(command.get_help(context)) & set("╭│╰")
+    assert list(context.help_option_names) == ["-h", "--help"]
+
+
+def run(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    words = [sys.executable, "-m", MODULES[program], *arguments]
+    return subprocess.run(words, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("program", APPS)
+def test_version_names_the_program(program: str) -> None:
+    result = run(program, "--version")
+    assert (result.returncode, result.stdout) == (0, f"{program} {flightstack.__version__}\n")
+
+
+@pytest.mark.parametrize("program", APPS)
+def test_completion_script_names_the_program(program: str) -> None:
+    result = run(program, "--show-completion", "bash")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.rstrip().endswith(
+        f"complete -o default -F _{program.replace('-', '_')}_completion {program}"
+    )
+
+
+@pytest.mark.parametrize("program", APPS)
+def test_unknown_option_is_refused_in_one_sentence(program: str) -> None:
+    result = run(program, "--no-such-option")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert re.fullmatch(rf"{program}: No such option: --no-such-option.*\n", result.stderr)

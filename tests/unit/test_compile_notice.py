@@ -1,0 +1,116 @@
+"""Compilation is announced kernel by kernel, with how many there are; kernels in the cache are not."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from numba.core import event
+
+from flightstack.compile_notice import CompileNotice
+from flightstack.compiled import compiled
+
+JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+ROOT = Path(__file__).resolve().parents[2]
+LOADED = """
+import sys
+from numba.core.dispatcher import Dispatcher
+{setup}
+found = {{id(value): value for name, module in list(sys.modules.items())
+         if name.partition(".")[0] in ("flightstack", "sim_bridge")
+         for value in [*vars(module).values(), *getattr(module, "_specialised", {{}}).values()]
+         if isinstance(value, Dispatcher)}}
+used = [kernel for kernel in found.values() if kernel.overloads]
+compiled = [kernel for kernel in used if sum(kernel.stats.cache_misses.values())]
+print("compiled" if compiled else " ".join(sorted(kernel.py_func.__name__.partition("__")[0] for kernel in used)))
+"""
+STACK = """
+from flightstack.assembly import build
+from flightstack.config import DEFAULT_HOME, StackConfig
+build(StackConfig("paper_quad", "pid", "tuned", "{loops}", 500.0, 100.0, False, True, DEFAULT_HOME, 1), lambda: None)
+"""
+PLANT = """
+from flightstack.params.vehicle import load_vehicle
+from sim_bridge.disturbance import Disturbance
+from sim_bridge.plant import PlantOptions
+from sim_bridge.simulator import Simulator
+from flightstack.contract import Vector3
+from sim_bridge.battery import BatteryOptions
+still = Vector3(0.0, 0.0, 0.0)
+options = PlantOptions(Disturbance(still, 0.0, still, still, 0.0), 1, battery=BatteryOptions())
+Simulator(load_vehicle("paper_quad"), "{plant}", options)
+"""
+
+
+@compiled
+def part(x: float) -> float:
+    return x + 1.0
+
+
+@compiled
+def whole(x: float) -> float:
+    return 2.0 * part(x)
+
+
+def loaded_kernels(setup: str) -> list[str]:
+    """Names of the kernels that a process with warm caches reads: those that it calls, not what these call."""
+    for _ in range(2):  # the first one may have to compile them
+        run = subprocess.run(
+            [sys.executable, "-c", LOADED.format(setup=setup)],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        if run.stdout.strip() != "compiled":
+            break
+    return run.stdout.splitlines()[-1].split()
+
+
+@JIT
+def test_compile_notice_counts_kernels_not_their_parts() -> None:
+    said: list[str] = []
+    with event.install_listener("numba:compile", CompileNotice(said.append, ("other", "whole"))):
+        assert whole(1.5) == 5.0
+        assert whole(2.5) == 7.0
+    assert said == [
+        "compiling kernels, once; this takes about half a minute on an idle machine",
+        "compiling kernel 2 of 2: whole",
+    ]
+
+
+@JIT
+def test_compile_notice_names_a_kernel_that_is_not_listed() -> None:
+    said: list[str] = []
+
+    @compiled
+    def surplus(x: float) -> float:
+        return math.sqrt(x)
+
+    with event.install_listener("numba:compile", CompileNotice(said.append, ())):
+        surplus(4.0)
+    assert said[-1] == "compiling kernel: surplus"
+
+
+@JIT
+@pytest.mark.parametrize("loops", ["python", "c"])
+def test_kernels_of_the_stack_are_those_it_loads(loops: str) -> None:
+    from flightstack.assembly import kernels_of  # noqa: PLC0415
+    from flightstack.config import DEFAULT_HOME, StackConfig  # noqa: PLC0415
+
+    config = StackConfig("paper_quad", "pid", "tuned", loops, 500.0, 100.0, False, True, DEFAULT_HOME, 1)
+    assert loaded_kernels(STACK.format(loops=loops)) == sorted(kernels_of(config))
+
+
+@JIT
+@pytest.mark.parametrize("plant", ["rigid", "paper", "multibody"])
+def test_kernels_of_a_plant_are_those_it_loads(plant: str) -> None:
+    from sim_bridge.plants import kernels_of  # noqa: PLC0415
+
+    if plant == "multibody":
+        pytest.importorskip("mujoco")
+    assert loaded_kernels(PLANT.format(plant=plant)) == sorted(kernels_of(plant))
