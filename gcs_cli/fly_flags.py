@@ -95,7 +95,8 @@ NOT_PASSED = {
     "wait_for_start": _SET, "exit_on_gcs_loss": _SET, "clock": "lockstep: the flight is the same at any speed",
     "timeout": "--timeout of gcs fly", "sim_timeout": "--timeout of gcs fly", "log": "--out of gcs fly",
     "params": "--params of gcs fly, which begins no file", "outer_hz": "--outer-hz of gcs fly",
-    "home": "--home of gcs fly, or the plan's home",
+    "home": "--home of gcs fly, or the plan's home", "overwrite": "--overwrite of gcs fly",
+    "state": "none: a flight depends on its command line alone",
     "api_port": _LOCAL, "tcp_port": _LOCAL, "listen": _LOCAL, "signing_key": _LOCAL, "allow_unsigned": _LOCAL,
     "check": "gcs fly checks before it starts anything", "version": "gcs --version",
 }  # fmt: skip
