@@ -27,37 +27,51 @@ def dot(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def pseudo_inverse(matrix: FloatArray) -> FloatArray:
-    """Return the pseudo-inverse, shape (n, m), of a matrix of full row rank, shape (m, n): A⁺ = Aᵀ(A·Aᵀ)⁻¹.
+    """Return the pseudo-inverse, shape (n, m), of a matrix A, shape (m, n), by rows of very different sizes too.
 
-    The rows are made orthonormal one after the other (A = L·Q, Gram and Schmidt's method, each row twice), then
-    L·X = I is solved from the first row on: A⁺ = Qᵀ·X. Raise ValueError if the rows depend on each other.
+    A = L·Q: the rows are made orthonormal one after the other by Gram and Schmidt's method, each row twice; one that
+    depends on those before it adds nothing to Q. Then A⁺ = Qᵀ·L⁺.
     """
-    rows: list[list[float]] = matrix.tolist()
-    count = len(rows)
+    lower, orthonormal = _orthonormal_rows(matrix.tolist())
+    if not orthonormal:
+        return np.zeros(matrix.shape[::-1])
+    if len(orthonormal) == len(lower):
+        inverse = _triangular_inverse(lower)
+    else:  # L has more rows than columns, which are independent
+        inverse = pseudo_inverse(np.array(lower).T).T.tolist()
+    columns, places = list(zip(*inverse, strict=True)), list(zip(*orthonormal, strict=True))
+    return np.array([[dot(place, column) for column in columns] for place in places])
+
+
+def _orthonormal_rows(rows: list[list[float]]) -> tuple[list[list[float]], list[list[float]]]:
+    """Return L, shape (m, rank), and Q, shape (rank, n), of rows L·Q."""
     orthonormal: list[list[float]] = []
-    lower = [[0.0] * count for _ in range(count)]
-    for index, row in enumerate(rows):
-        rest = row
+    lower: list[list[float]] = []
+    for row in rows:
+        rest, shares = row, [0.0] * len(orthonormal)
         for _ in range(2):
             for known, unit in enumerate(orthonormal):
                 share = dot(rest, unit)
-                lower[index][known] += share
+                shares[known] += share
                 rest = [value - share * part for value, part in zip(rest, unit, strict=True)]
         length = math.sqrt(dot(rest, rest))
-        if not length > _LEAST_REST * math.sqrt(dot(row, row)):
-            raise ValueError("the rows of the matrix depend on each other")
-        lower[index][index] = length
-        orthonormal.append([value / length for value in rest])
-    inverse = np.zeros((len(rows[0]), count))
+        if length > _LEAST_REST * math.sqrt(dot(row, row)):
+            shares.append(length)
+            orthonormal.append([value / length for value in rest])
+        lower.append(shares)
+    return [shares + [0.0] * (len(orthonormal) - len(shares)) for shares in lower], orthonormal
+
+
+def _triangular_inverse(lower: list[list[float]]) -> list[list[float]]:
+    """Return the inverse of a lower triangular matrix."""
+    count = len(lower)
+    inverse = [[0.0] * count for _ in range(count)]
     for column in range(count):
-        solution = [0.0] * count
-        for index in range(column, count):
-            total = 1.0 if index == column else 0.0
-            for known in range(column, index):
-                total -= lower[index][known] * solution[known]
-            solution[index] = total / lower[index][index]
-        for place in range(len(rows[0])):
-            inverse[place, column] = dot([unit[place] for unit in orthonormal], solution)
+        for row in range(column, count):
+            total = 1.0 if row == column else 0.0
+            for known in range(column, row):
+                total -= lower[row][known] * inverse[known][column]
+            inverse[row][column] = total / lower[row][row]
     return inverse
 
 

@@ -33,11 +33,17 @@ def test_pseudo_inverse_of_any_rows_is_numpys_to_their_condition(columns: int) -
         assert apart.max() < 1e-14 * np.linalg.cond(matrix / scale)
 
 
-def test_pseudo_inverse_refuses_rows_that_depend_on_each_other() -> None:
-    with pytest.raises(ValueError, match="depend on each other"):
-        pseudo_inverse(np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 6.0]]))
-    with pytest.raises(ValueError, match="depend on each other"):
-        pseudo_inverse(np.zeros((1, 3)))
+def test_pseudo_inverse_of_dependent_rows_is_numpys() -> None:
+    random = np.random.default_rng(6)
+    without_drag = load_vehicle("x_quad").effectiveness()
+    without_drag[3] = 0.0
+    matrices = [without_drag, np.zeros((4, 6)), np.array([[0.0, 0.0], [1.0, 2.0], [2.0, 4.0]])]
+    matrices += [random.normal(size=(4, rank)) @ random.normal(size=(rank, 6)) for rank in (1, 2, 3)]
+    for matrix in matrices:
+        expected = np.linalg.pinv(matrix, rcond=1e-12)
+        assert pseudo_inverse(matrix) == pytest.approx(
+            expected, rel=1e-11, abs=1e-13 * np.abs(expected).max()
+        )
 
 
 def test_largest_eigenvalue_is_numpys() -> None:
