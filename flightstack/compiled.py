@@ -16,14 +16,18 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
-from numba.extending import overload
+from numba.extending import overload, register_jitable
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
+from flightstack import portable_math
 from flightstack.kernel_cache import directory, is_own
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _specialised: dict[tuple[Callable[..., Any], str], Callable[..., Any]] = {}
+
+for _function in portable_math.FUNCTIONS:
+    register_jitable(error_model="numpy")(_function)
 
 
 def _compile(function: F, modules: frozenset[str]) -> F:

@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from flightstack.contract import Vector3
+from flightstack.portable_math import sin_cos
 
 EQUATORIAL_RADIUS_M = 6_378_137.0
 ECCENTRICITY_SQUARED = 6.694379990141316e-3
@@ -30,10 +31,10 @@ class LocalFrame:
 
     def __init__(self, origin: GeoPoint) -> None:
         self.origin = origin
-        sin_lat = math.sin(math.radians(origin.latitude_deg))
+        sin_lat, cos_lat = sin_cos(math.radians(origin.latitude_deg))
         w2 = 1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat
         meridian_m = EQUATORIAL_RADIUS_M * (1.0 - ECCENTRICITY_SQUARED) / (w2 * math.sqrt(w2))
-        parallel_m = EQUATORIAL_RADIUS_M / math.sqrt(w2) * math.cos(math.radians(origin.latitude_deg))
+        parallel_m = EQUATORIAL_RADIUS_M / math.sqrt(w2) * cos_lat
         self._north_m_per_deg = math.radians(meridian_m)
         self._east_m_per_deg = math.radians(max(parallel_m, 1e-6))
 

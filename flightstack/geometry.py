@@ -1,6 +1,7 @@
 """Quaternions, Euler angles and vectors in compiled code: the only copy in the project.
 
 Quaternions are Hamilton, scalar first, body FRD to world NED. Euler angles are yaw, pitch, roll (3-2-1).
+Operations and their order are those of ``firmware/core/fs_geometry.h``.
 """
 
 from __future__ import annotations
@@ -9,6 +10,12 @@ import math
 
 from flightstack.compiled import compiled
 from flightstack.contract import Quaternion, Vector3
+from flightstack.portable_math import LARGEST_SQUARE, arc_tangent_series, asin, atan2, sin_cos
+
+LEAST_LENGTH = 1e-30
+"""Stands for zero where a length divides."""
+SMALL_SQUARE = 0.01
+"""Of half the angle [rad²] of a short step: 11 degrees."""
 
 
 @compiled
@@ -69,32 +76,47 @@ def blend(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
 
 @compiled
 def rotation_vector(q: Quaternion) -> Vector3:
-    """Logarithm of a unit quaternion: axis times angle [rad], the angle in [0, π].
+    """Logarithm of a quaternion of any length: axis times angle [rad], the angle in [0, π]; zero of the zero.
 
     On a single axis it is the angle itself, which the paper's Euler errors are too.
     """
-    sign = 1.0 if q.w >= 0.0 else -1.0
-    norm = math.sqrt(q.x * q.x + q.y * q.y + q.z * q.z)
-    # the series' first term where the quotient would lose digits
-    scale = 2.0 * sign if norm < 1e-9 else 2.0 * math.atan2(norm, sign * q.w) / norm * sign
+    square, w_square = q.x * q.x + q.y * q.y + q.z * q.z, q.w * q.w
+    if square < LARGEST_SQUARE * w_square:  # below 45 degrees: 2 atan(norm / w) / norm, without the norm
+        inverse = 1.0 / q.w
+        ratio_square = square * inverse * inverse
+        scale = 2.0 * inverse
+    else:  # the tangent of an eighth of the angle: tan(a/2) = sin a / (cos a + 1), twice
+        half = abs(q.w) + math.sqrt(w_square + square)
+        quarter = half + math.sqrt(half * half + square)
+        inverse = 1.0 / max(quarter, LEAST_LENGTH)
+        ratio_square = square * inverse * inverse
+        scale = 8.0 * inverse if q.w >= 0.0 else -8.0 * inverse
+    scale = scale + scale * arc_tangent_series(ratio_square)
     return Vector3(q.x * scale, q.y * scale, q.z * scale)
 
 
 @compiled
 def rotation_over(rates: Vector3, dt_s: float) -> Quaternion:
     """Rotation that constant body rates make in ``dt_s``; with 1, the exponential of a rotation vector."""
-    norm = math.sqrt(rates.x * rates.x + rates.y * rates.y + rates.z * rates.z)
-    half = 0.5 * norm * dt_s
-    scale = 0.5 * dt_s if half < 1e-9 else math.sin(half) / norm
-    return Quaternion(math.cos(half), rates.x * scale, rates.y * scale, rates.z * scale)
+    rate_square = rates.x * rates.x + rates.y * rates.y + rates.z * rates.z
+    half_dt = 0.5 * dt_s
+    square = rate_square * (half_dt * half_dt)
+    if square <= SMALL_SQUARE:  # Taylor's series of cosine and of sine by angle: no norm needed
+        cosine = (square * (1.0 / 40320.0) - 1.0 / 720.0) * square + 1.0 / 24.0
+        sine = ((square * (1.0 / 362880.0) - 1.0 / 5040.0) * square + 1.0 / 120.0) * square - 1.0 / 6.0
+        w = 1.0 - (0.5 * square - square * (square * cosine))
+        scale = half_dt + half_dt * (square * sine)
+    else:
+        norm = math.sqrt(rate_square)
+        sine, w = sin_cos(norm * half_dt)
+        scale = sine / norm
+    return Quaternion(w, rates.x * scale, rates.y * scale, rates.z * scale)
 
 
 @compiled
 def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
     """Quaternion of yaw, then pitch, then roll (3-2-1)."""
-    cr, sr = math.cos(0.5 * roll_rad), math.sin(0.5 * roll_rad)
-    cp, sp = math.cos(0.5 * pitch_rad), math.sin(0.5 * pitch_rad)
-    cy, sy = math.cos(0.5 * yaw_rad), math.sin(0.5 * yaw_rad)
+    (sr, cr), (sp, cp), (sy, cy) = sin_cos(0.5 * roll_rad), sin_cos(0.5 * pitch_rad), sin_cos(0.5 * yaw_rad)
     return Quaternion(
         cr * cp * cy + sr * sp * sy,
         sr * cp * cy - cr * sp * sy,
@@ -109,10 +131,16 @@ def euler_from_quaternion(q: Quaternion) -> Vector3:
     sin_pitch = 2.0 * (q.w * q.y - q.z * q.x)
     sin_pitch = min(1.0, max(-1.0, sin_pitch))
     return Vector3(
-        math.atan2(2.0 * (q.w * q.x + q.y * q.z), 1.0 - 2.0 * (q.x * q.x + q.y * q.y)),
-        math.asin(sin_pitch),
-        math.atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z)),
+        atan2(2.0 * (q.w * q.x + q.y * q.z), 1.0 - 2.0 * (q.x * q.x + q.y * q.y)),
+        asin(sin_pitch),
+        heading(q),
     )
+
+
+@compiled
+def heading(q: Quaternion) -> float:
+    """Yaw [rad] of a unit quaternion, in (−π, π]."""
+    return atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
 
 
 @compiled

@@ -16,6 +16,7 @@ from flightstack.modes import Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.plan import MissionItem, Rejection
 from flightstack.plan.check import Limits
+from flightstack.portable_math import distance
 from flightstack.snapshot import Recorder, Snapshot
 
 CEILING_MARGIN_M = 1.0
@@ -75,7 +76,7 @@ class PlanKeeper:
         if spoils is not None:
             return spoils
         farthest_m = self._behaviour.fence_max_distance_m
-        away_m = math.hypot(self._state[0] - there.x, self._state[1] - there.y)
+        away_m = distance(self._state[0] - there.x, self._state[1] - there.y)
         if 0.0 < farthest_m < away_m and not self.now.landed and self._behaviour.fence_action > 0.0:
             return f"home would be more than {farthest_m:g} m from the vehicle (GF_MAX_HOR_DIST)"
         return None

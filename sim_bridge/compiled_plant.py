@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from flightstack.compiled import direct
 from flightstack.contract import FloatArray, Quaternion, Vector3
 from flightstack.geometry import quaternion_from_euler, rotate
 from flightstack.params.vehicle import Vehicle
+from flightstack.portable_math import distance
 from sim_bridge.ground import Ground, ground_contact
 from sim_bridge.integrator import advance_kernel, slope_kernel
 from sim_bridge.plant import InitialState, PlantOptions
@@ -49,11 +48,11 @@ class CompiledPlant(RecordPlant):
         m["point_count"] = count
         m["point"][:count] = ground.points
         m["ground_z"] = ground.foot_z_m - ground.rest_depth_m
-        m["reach"] = float(np.linalg.norm(ground.points[:, :3], axis=1).max())
+        m["reach"] = max(distance(*point) for point in ground.points[:, :3].tolist())
         m["stiffness"], m["damping"] = ground.stiffness_n_m, ground.damping_n_s_m
         m["ramp"] = ground.rest_depth_m
-        arms = [math.hypot(*rotor.position_frd_m[:2]) for rotor in self._vehicle.rotors]
-        m["lever"] = sum(arms) / len(arms)
+        arms = [distance(*rotor.position_frd_m[:2]) for rotor in self._vehicle.rotors]
+        m["lever"] = math.fsum(arms) / len(arms)
 
     def set_step(self, step_s: float) -> None:
         """Choose the fixed step of the integration [s]."""

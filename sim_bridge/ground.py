@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from flightstack.contract import MAX_ROTORS, FloatArray
+from flightstack.linear_algebra import dot, largest_eigenvalue
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from sim_bridge.layout import MAX_POINTS
 
@@ -33,26 +35,27 @@ def _points(vehicle: Vehicle) -> FloatArray:
     """
     rotors = vehicle.rotors
     at = np.array([rotor.position_frd_m for rotor in rotors])
-    hover = np.linalg.pinv(vehicle.effectiveness()) @ np.array([vehicle.weight_n, 0.0, 0.0, 0.0])
-    load = hover * np.array([rotor.thrust_coefficient_n_s2 for rotor in rotors])
+    squares = zip(rotors, vehicle.hover_speeds_squared(), strict=True)
+    load = np.array([rotor.thrust_coefficient_n_s2 * squared for rotor, squared in squares])
     points = np.zeros((2 * len(rotors), 4))
     points[:, :2] = np.tile(at[:, :2], (2, 1))
     foot_z = max(vehicle.leg_height_m, float(at[:, 2].max()))
     points[: len(rotors), 2] = foot_z
     points[len(rotors) :, 2] = np.minimum(at[:, 2], foot_z - _ROTOR_CLEARANCE_M)
-    points[:, 3] = np.tile(load / load.sum(), 2)
+    points[:, 3] = np.tile(load / math.fsum(load), 2)
     return points
 
 
 def _fastest_over_bounce(vehicle: Vehicle, points: FloatArray) -> float:
     """Square of the highest eigenfrequency of the vehicle on all its springs over that of the bounce."""
     stiffness = np.zeros((6, 6))
-    for x, y, z, share in points:
-        lever = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-        jacobian = np.hstack([np.eye(3), lever])  # velocity of the point from (v, ω)
-        stiffness += share * jacobian.T @ jacobian
+    for x, y, z, share in points.tolist():
+        # velocity of the point from (v, ω)
+        jacobian = ((1.0, 0.0, 0.0, 0.0, z, -y), (0.0, 1.0, 0.0, -z, 0.0, x), (0.0, 0.0, 1.0, y, -x, 0.0))
+        columns = list(zip(*jacobian, strict=True))
+        stiffness += share * np.array([[dot(a, b) for b in columns] for a in columns])
     scale = 1.0 / np.sqrt(np.array([1.0] * 3 + [i / vehicle.mass_kg for i in vehicle.inertia_kg_m2]))
-    return float(np.linalg.eigvalsh(stiffness * np.outer(scale, scale)).max())
+    return largest_eigenvalue(stiffness * (scale[:, None] * scale))
 
 
 def ground_contact(vehicle: Vehicle, step_s: float, single_point: bool) -> Ground:
@@ -68,8 +71,8 @@ def ground_contact(vehicle: Vehicle, step_s: float, single_point: bool) -> Groun
     frequency = min(_FREQUENCY_RAD_S, _LARGEST_RATE_STEP / (2.0 * DAMPING_RATIO * ratio * step_s))
     return Ground(
         points,
-        vehicle.mass_kg * frequency**2,
+        vehicle.mass_kg * (frequency * frequency),
         2.0 * DAMPING_RATIO * frequency * vehicle.mass_kg,
-        GRAVITY_M_S2 / frequency**2,
+        GRAVITY_M_S2 / (frequency * frequency),
         float(points[0, 2]),
     )

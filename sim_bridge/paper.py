@@ -13,12 +13,12 @@ strong as the load on the feet allows, its heading by friction.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from flightstack.compiled import compiled
 from flightstack.contract import FloatArray, Vector3
 from flightstack.geometry import quaternion_from_euler
+from flightstack.portable_math import sin_cos
 from sim_bridge.contact import FRICTION, contact_force, limited, move_anchor, normal_force
 from sim_bridge.layout import CONTACT, Record
 from sim_bridge.rotors import RotorForces
@@ -48,8 +48,8 @@ def _contact(x: FloatArray, normal_n: float, m: Record) -> _Contact:
     return _Contact(
         force,
         Vector3(
-            limited(-inertia[0] * (k * math.sin(x[6]) + c * x[9]), tilt_limit),
-            limited(-inertia[1] * (k * math.sin(x[7]) + c * x[10]), tilt_limit),
+            limited(-inertia[0] * (k * sin_cos(x[6])[0] + c * x[9]), tilt_limit),
+            limited(-inertia[1] * (k * sin_cos(x[7])[0] + c * x[10]), tilt_limit),
             limited(-inertia[2] * (k * (x[8] - anchor[2]) + c * x[11]), FRICTION * tilt_limit),
         ),
     )
@@ -66,9 +66,7 @@ def derivative(x: FloatArray, rotors: RotorForces, m: Record, out: FloatArray) -
         ground = _contact(x, normal, m)
         fx, fy, fz = fx + ground.force_ned_n.x, fy + ground.force_ned_n.y, fz + ground.force_ned_n.z
         tx, ty, tz = tx + ground.torque_frd_n_m.x, ty + ground.torque_frd_n_m.y, tz + ground.torque_frd_n_m.z
-    sf, cf = math.sin(x[6]), math.cos(x[6])
-    st, ct = math.sin(x[7]), math.cos(x[7])
-    sp, cp = math.sin(x[8]), math.cos(x[8])
+    (sf, cf), (st, ct), (sp, cp) = sin_cos(x[6]), sin_cos(x[7]), sin_cos(x[8])
     u1, mass, inertia = rotors.thrust_n, m["mass"], m["inertia"]
     p, q, r = x[9], x[10], x[11]
     out[0], out[1], out[2] = x[3], x[4], x[5]

@@ -9,6 +9,7 @@ import numpy as np
 
 from flightstack.contract import FloatArray
 from flightstack.params.vehicle import Vehicle
+from flightstack.portable_math import distance, exp
 from sim_bridge.battery import BatteryState, battery_state, set_battery
 from sim_bridge.layout import DRAG, HALF_STEP_DECAY, HIGHEST, LOWEST, MEMORY, OUTPUT, THRUST, RecordArray
 from sim_bridge.plant import PlantOptions
@@ -88,7 +89,7 @@ class RecordPlant(ABC):
         m["step_s"] = step_s
         for index, rotor in enumerate(self._vehicle.rotors):
             m["rotor"][index, HALF_STEP_DECAY] = (
-                math.exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
+                exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
             )
         self._turbulence.set_step(step_s)
 
@@ -119,7 +120,7 @@ class RecordPlant(ABC):
     def airspeed_m_s(self) -> float:
         """Speed relative to the air."""
         m = self._memory[0]
-        return float(np.linalg.norm(m["body"][3:6] - m["wind"] - m["gust"]))
+        return distance(*(m["body"][3:6] - m["wind"] - m["gust"]).tolist())
 
     def about(self) -> str | None:
         """Tell what the user should know of how the plant was made, if anything."""

@@ -211,7 +211,8 @@ def _shaft_power(m: Record, d: Record, when: int) -> float:
     """Mechanical power of the rotors against the air: Σ d·|Ω|³."""
     power = 0.0
     for i in range(m["rotor_count"]):
-        power += abs(m["rotor"][i, DRAG] * d["speed"][when, i] ** 3)
+        speed = d["speed"][when, i]
+        power += abs(m["rotor"][i, DRAG] * (speed * speed * speed))
     return power
 
 

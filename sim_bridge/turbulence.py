@@ -2,6 +2,9 @@
 
 Wind and torque draw from streams of their own: turning one on or off leaves the other as it was. A step takes
 one row of each, whatever the number of steps in a call.
+
+Normal deviates are made here from the integers of PCG64, by Box and Muller's method: NumPy's own come from libm's
+functions, whose last bits depend on the processor, and may change with its version.
 """
 
 from __future__ import annotations
@@ -10,7 +13,9 @@ import math
 
 import numpy as np
 
+from flightstack.compiled import compiled
 from flightstack.contract import FloatArray
+from flightstack.portable_math import exp, log, sin_cos
 from sim_bridge.disturbance import (
     GUST_DOWN_RATIO,
     GUST_TIME_S,
@@ -19,6 +24,23 @@ from sim_bridge.disturbance import (
     Disturbance,
 )
 from sim_bridge.layout import NOISE_ROWS, Record
+
+
+@compiled
+def _box_muller(shares: FloatArray) -> None:
+    """Turn pairs of numbers in [0, 1), shape (n, 2), into pairs of independent normal deviates, in place."""
+    for i in range(len(shares)):
+        radius = math.sqrt(-2.0 * log(1.0 - shares[i, 0]))
+        sine, cosine = sin_cos(2.0 * math.pi * shares[i, 1])
+        shares[i, 0], shares[i, 1] = radius * cosine, radius * sine
+
+
+def normal_deviates(bits: np.random.PCG64, count: int) -> FloatArray:
+    """Return the next ``count`` standard normal deviates, from two integers of 64 bits for each pair."""
+    pairs = (count + 1) // 2
+    shares = (bits.random_raw(2 * pairs) >> np.uint64(11)).astype(np.float64) / 2**53
+    _box_muller(shares.reshape(pairs, 2))
+    return shares[:count]
 
 
 class _Gust:
@@ -31,19 +53,19 @@ class _Gust:
         self._record, self._name = record, name
         self._noise: FloatArray = record[noise]
         self._spread, self._time_s = spread, time_s
-        self._random = np.random.Generator(bits)
+        self._bits = bits
         if self.active:
-            record[name] = spread * self._random.standard_normal(3)
+            record[name] = spread * normal_deviates(bits, 3)
             self.refill()
 
     def refill(self) -> None:
         """Draw new noise."""
         if self.active:
-            self._random.standard_normal(out=self._noise)
+            self._noise[:] = normal_deviates(self._bits, self._noise.size).reshape(self._noise.shape)
 
     def set_step(self, step_s: float) -> None:
         """Set decay and noise of one step so that spread and correlation time do not depend on it."""
-        decay = math.exp(-step_s / self._time_s)
+        decay = exp(-step_s / self._time_s)
         self._record[f"{self._name}_decay"] = decay
         self._record[f"{self._name}_scale"] = self._spread * math.sqrt(1.0 - decay * decay)
 

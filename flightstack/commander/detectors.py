@@ -15,6 +15,7 @@ from flightstack.compiled import compiled
 from flightstack.contract import MAX_ROTORS, FloatArray, LoopRow, LoopStatus
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
+from flightstack.portable_math import acos, asin, atan2, exp
 
 RELEASE_S = 1.0
 NOT_FINITE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT, MOVING = 1, 2, 4, 8, 16
@@ -67,8 +68,8 @@ def rotor_params(vehicle: Vehicle, dt_s: float) -> FloatArray:
     """Return the numbers that ``follow_rotors`` takes: for each rotor the share of its lag that passes in ``dt_s``,
     and at the end that of the mean's time.
     """
-    shares = [1.0 - math.exp(-dt_s / r.lag_s) if r.lag_s > 0.0 else 1.0 for r in vehicle.rotors]
-    return np.array([*shares, 1.0 - math.exp(-dt_s / ROTOR_MEAN_S)], dtype=np.float64)
+    shares = [1.0 - exp(-dt_s / r.lag_s) if r.lag_s > 0.0 else 1.0 for r in vehicle.rotors]
+    return np.array([*shares, 1.0 - exp(-dt_s / ROTOR_MEAN_S)], dtype=np.float64)
 
 
 @compiled
@@ -158,8 +159,8 @@ def detect(
     if max(abs(v.x), abs(v.y), abs(v.z), abs(w.x), abs(w.y), abs(w.z)) > MOVING_ABOVE:
         result |= MOVING
     qw, qx, qy, qz = now.attitude
-    roll = math.atan2(2.0 * (qw * qx + qy * qz), 1.0 - 2.0 * (qx * qx + qy * qy))
-    pitch = math.asin(min(1.0, max(-1.0, 2.0 * (qw * qy - qz * qx))))
+    roll = atan2(2.0 * (qw * qx + qy * qz), 1.0 - 2.0 * (qx * qx + qy * qy))
+    pitch = asin(min(1.0, max(-1.0, 2.0 * (qw * qy - qz * qx))))
     # cosine between the thrust axes: third columns of the two rotation matrices
     rw, rx, ry, rz = (
         row[_REFERENCE_AT],
@@ -172,9 +173,10 @@ def detect(
         + 4.0 * (qy * qz - qw * qx) * (ry * rz - rw * rx)
         + (1.0 - 2.0 * (qx * qx + qy * qy)) * (1.0 - 2.0 * (rx * rx + ry * ry))
     )
-    tilt_error = math.acos(min(1.0, max(-1.0, cosine)))
+    tilt_error = acos(min(1.0, max(-1.0, cosine)))
     p = now.position_ned_m
-    distance = math.sqrt((p.x - setpoint[0]) ** 2 + (p.y - setpoint[1]) ** 2 + (p.z - setpoint[2]) ** 2)
+    dx, dy, dz = p.x - setpoint[0], p.y - setpoint[1], p.z - setpoint[2]
+    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
     errors = (abs(roll), abs(pitch), tilt_error, distance, _rotor_error(row, rotors, params))
     for index in range(TIMERS):
         limit = params[P_LIMIT + index]

@@ -34,7 +34,7 @@ from flightstack.modes import STREAM_MODES, Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
 
-UPRIGHT_COSINE = math.cos(math.radians(30.0))
+UPRIGHT_COSINE = 0.5 * math.sqrt(3.0)  # of 30 degrees
 BATTERY_FAILSAFES = (Failsafe.BATTERY_LOW, Failsafe.BATTERY_CRITICAL, Failsafe.BATTERY_EMERGENCY)
 EVENTS_OF_ACTION: dict[Action, tuple[Event, ...]] = {
     Action.POSITION: (Event.SELECT_POSITION, Event.SELECT_HOLD, Event.SELECT_LAND),

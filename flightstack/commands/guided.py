@@ -20,6 +20,7 @@ from flightstack.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.services.command_server import Command
 from flightstack.modes import Mode
+from flightstack.portable_math import distance
 
 CHANGE_MODE, RELATIVE_YAW = 1, 2
 """Bits of DO_REPOSITION's second parameter."""
@@ -114,7 +115,7 @@ def _out_of_reach(vehicle: VehicleContext, north_m: float, east_m: float, altitu
     home_m = autopilot.places.home.altitude_m
     if 0.0 < limits.max_altitude_m < altitude_m:
         return f"altitude {altitude_m:.6g} m is above {limits.max_altitude_m:g} m"
-    away_m = math.hypot(north_m - x, east_m - y)
+    away_m = distance(north_m - x, east_m - y)
     if 0.0 < limits.max_distance_m < away_m:
         return f"the place is {away_m / 1e3:.1f} km away, farther than MIS_DIST_WPS allows"
     here = (x, y, -z - home_m)

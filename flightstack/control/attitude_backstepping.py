@@ -90,8 +90,8 @@ def read_backstepping_params(vehicle: Vehicle, gains: Table) -> BacksteppingPara
         gains.number("acceleration_feedforward", 0.0, 1.0),
     )
     gains.finish()
-    rotor_inertia = sum(r.inertia_kg_m2 for r in vehicle.rotors) / len(vehicle.rotors)
-    return BacksteppingParams._make((*c, *feedforward, *vehicle.inertia_kg_m2, rotor_inertia))
+    inertias = *vehicle.inertia_kg_m2, vehicle.mean_rotor_inertia_kg_m2
+    return BacksteppingParams._make((*c, *feedforward, *inertias))
 
 
 CONTROLLER = AttitudeController(

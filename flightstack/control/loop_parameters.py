@@ -62,6 +62,14 @@ def _specs(tunables: Sequence[Tunable], values: dict[str, float], group: str) ->
     return [spec_of(tunable, values[tunable.field], group) for tunable in tunables]
 
 
+def tilt_deg(tilt_rad: float) -> float:
+    """Return the shortest number of degrees that ``math.radians`` turns into ``tilt_rad``, to the last bit."""
+    exact = math.degrees(tilt_rad)
+    return next(
+        (short for digits in (9, 12) if math.radians(short := round(exact, digits)) == tilt_rad), exact
+    )
+
+
 class _Slot(NamedTuple):
     """Where a parameter's number stands, and the integral that it multiplies: both live arrays of the kernels."""
 
@@ -93,7 +101,7 @@ class LoopParameters:
         """Return a parameter's value; raise KeyError for an unknown name."""
         slot = self._slots[name]
         number = float(slot.values[slot.at])
-        return math.degrees(number) if name == TILT else number
+        return tilt_deg(number) if name == TILT else number
 
     def set(self, name: str, value: float) -> None:
         """Change a parameter, which the next tick uses; raise KeyError for an unknown name.

@@ -30,7 +30,7 @@ from flightstack.control.attitude_reference import (
 from flightstack.control.controller_loading import compile_error
 from flightstack.control.idle import IdleRow
 from flightstack.control.loop_parameters import LoopParameters, loop_numbers
-from flightstack.control.mixer import Mixer, mix, mixer_for, relative_rotor_speed
+from flightstack.control.mixer import WORK_ROWS, Mixer, mix, mixer_for, relative_rotor_speed
 from flightstack.control.position_pid import (
     PositionMemory,
     PositionParams,
@@ -39,6 +39,7 @@ from flightstack.control.position_pid import (
 from flightstack.geometry import blend, conjugate, quaternion_product, rotation_vector
 from flightstack.params.toml_reader import Table
 from flightstack.params.vehicle import Vehicle
+from flightstack.portable_math import LARGEST_ANGLE_RAD
 
 RecordArray: TypeAlias = np.ndarray[Any, np.dtype[np.void]]
 
@@ -53,6 +54,8 @@ ACHIEVED_AT = LoopRow.WRENCH_ACHIEVED.start
 COMMAND_AT = LoopRow.ROTOR_COMMAND.start
 SPEED_AT = LoopRow.ROTOR_SPEED.start
 STATUS_AT = LoopRow.STATUS
+YAW_AT = 9
+"""Of the setpoint."""
 INPUT_NOT_FINITE = LoopStatus.INPUT_NOT_FINITE
 OUTPUT_NOT_FINITE = LoopStatus.OUTPUT_NOT_FINITE
 
@@ -85,9 +88,10 @@ def outer_kernel(
 ) -> None:
     """Run the position loop: write ``memory`` (3,) and ``target`` (5,), or keep both as they were.
 
+    Both are kept if a number is not finite, or the yaw setpoint beyond ±10⁴ rad, where there is no sine of it.
     ``last`` (48,) is the inner loop's row of the previous tick: it tells whether the mixer followed.
     """
-    if not (all_finite(state) and all_finite(setpoint)):
+    if not (all_finite(state) and all_finite(setpoint) and abs(setpoint[YAW_AT]) <= LARGEST_ANGLE_RAD):
         return
     advanced, aim = position_pid_step(
         PositionMemory(*as_tuple(memory, POSITION_MEMORY_SIZE)),
@@ -129,6 +133,11 @@ def _store_wrenches(row: FloatArray, demanded: Wrench, achieved: Wrench) -> None
 
 
 @compiled
+def _is_finite(v: Vector3) -> bool:
+    return math.isfinite(v.x) and math.isfinite(v.y) and math.isfinite(v.z)
+
+
+@compiled
 def _saturation(row: FloatArray) -> Vector3:
     """Saturation of each axis in the tick that wrote ``row``."""
     return Vector3(
@@ -155,7 +164,7 @@ def inner_layout(rotors: int, controller_memory: int, controller_params: int) ->
             ("reference", "f8", (REFERENCE_MEMORY_SIZE,)),
             ("controller", "f8", (controller_memory,)),
             ("last", "f8", (LoopRow.SIZE,)),
-            ("work", "f8", (2, rotors)),
+            ("work", "f8", (WORK_ROWS, rotors)),
             # what is fixed
             ("dt_s", "f8"),
             ("reference_params", "f8", (REFERENCE_PARAMS_SIZE,)),
@@ -165,6 +174,10 @@ def inner_layout(rotors: int, controller_memory: int, controller_params: int) ->
             ("low", "f8", (rotors,)),
             ("high", "f8", (rotors,)),
             ("spin", "f8", (rotors,)),
+            ("middle", "f8", (rotors,)),
+            ("reach", "f8", (rotors,)),
+            ("is_inverse", "f8"),
+            ("is_even", "f8"),
         ]
     )
 
@@ -190,7 +203,10 @@ def inner_kernel(
         store(row, last)
         row[STATUS_AT] = INPUT_NOT_FINITE
         return
-    mixer = Mixer(m["allocation"], m["effectiveness"], m["low"], m["high"], m["spin"])
+    mixer = Mixer(
+        m["allocation"], m["effectiveness"], m["low"], m["high"], m["spin"],
+        m["middle"], m["reach"], m["is_inverse"], m["is_even"],
+    )  # fmt: skip
     n = mixer.spin.size
     now, aim = vehicle_state(state), attitude_target(target)
     filtered, reference = attitude_reference_step(
@@ -215,7 +231,7 @@ def inner_kernel(
         dt_s,
     )
     # no call with the controller's own types: the callee's cache would name them, and fail when they are gone
-    sound = math.isfinite(torque.x) and math.isfinite(torque.y) and math.isfinite(torque.z)
+    sound = _is_finite(torque)
     for value in advanced:
         sound = sound and math.isfinite(value)
     if not sound:
@@ -224,6 +240,11 @@ def inner_kernel(
         return
     demanded = Wrench(aim.thrust_n, torque)
     achieved = mix(demanded, mixer, row[COMMAND_AT:], m["work"])
+    sound = math.isfinite(achieved.thrust_n) and _is_finite(achieved.torque_frd_n_m)
+    if not (sound and all_finite(row[COMMAND_AT : COMMAND_AT + n])):  # a sum overflowed
+        row[:] = last
+        row[STATUS_AT] = OUTPUT_NOT_FINITE
+        return
     store(m["reference"], filtered)
     for index in range(CONTROLLER_MEMORY_SIZE):
         m["controller"][index] = advanced[index]

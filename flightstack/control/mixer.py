@@ -1,4 +1,7 @@
-"""From a wrench to rotor speeds, for any rotor set, with limits: roll and pitch before thrust before yaw."""
+"""From a wrench to rotor speeds, for any rotor set, with limits: roll and pitch before thrust before yaw.
+
+Operations and their order are those of ``firmware/core/fs_mixer.c``.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,8 @@ from flightstack.contract import FloatArray, Vector3, Wrench
 from flightstack.params.vehicle import Vehicle
 
 UNLIMITED_SPEED_SQUARED = 1e12  # (rad/s)²: stands for "no limit" with ideal rotors, and stays finite
+ROUNDING = 1.0 / 2**53  # largest relative error of one operation
+WORK_ROWS = 3
 
 
 class Mixer(NamedTuple):
@@ -27,21 +32,116 @@ class Mixer(NamedTuple):
     low: FloatArray
     high: FloatArray
     spin: FloatArray
+    # what follows from these, by ``derived``
+    middle: FloatArray
+    """Between ``low`` and ``high``, (n,)."""
+    reach: FloatArray
+    """From there to either, less some rounding, (n,)."""
+    is_inverse: float
+    """1: ``effectiveness`` undoes ``allocation`` but for rounding, and every rotor lifts; else 0."""
+    is_even: float
+    """1: all rotors have the same limits and the same share of the thrust; else 0."""
 
 
 def mixer_for(vehicle: Vehicle) -> Mixer:
     """Compute the mixer of a vehicle from its rotor list."""
-    effectiveness = vehicle.effectiveness()
     limit = UNLIMITED_SPEED_SQUARED
-    low = [-limit if vehicle.ideal_rotors else r.min_speed_rad_s**2 for r in vehicle.rotors]
-    high = [limit if vehicle.ideal_rotors else r.max_speed_rad_s**2 for r in vehicle.rotors]
-    return Mixer(
-        np.ascontiguousarray(np.linalg.pinv(effectiveness)),
-        np.ascontiguousarray(effectiveness),
-        np.array(low),
-        np.array(high),
-        np.array([float(r.spin) for r in vehicle.rotors]),
-    )
+    low = [-limit if vehicle.ideal_rotors else r.min_speed_rad_s * r.min_speed_rad_s for r in vehicle.rotors]
+    high = [limit if vehicle.ideal_rotors else r.max_speed_rad_s * r.max_speed_rad_s for r in vehicle.rotors]
+    spin = np.array([float(r.spin) for r in vehicle.rotors])
+    return derived(vehicle.allocation(), vehicle.effectiveness(), np.array(low), np.array(high), spin)
+
+
+def derived(
+    allocation: FloatArray, effectiveness: FloatArray, low: FloatArray, high: FloatArray, spin: FloatArray
+) -> Mixer:
+    """Return the mixer with these numbers."""
+    middle = 0.5 * low + 0.5 * high
+    reach = (0.5 * high - 0.5 * low) - 8.0 * ROUNDING * (abs(low) + abs(high))
+    is_inverse = float(_is_inverse(allocation.tolist(), effectiveness.tolist()))
+    is_even = float(all(_is_same(column) for column in (allocation[:, 0], low, high)))
+    return Mixer(allocation, effectiveness, low, high, spin, middle, reach, is_inverse, is_even)
+
+
+def _is_inverse(allocation: list[list[float]], effectiveness: list[list[float]]) -> bool:
+    """Tell whether effectiveness times allocation is the identity but for rounding, and every rotor lifts."""
+    if not all(shares[0] > 0.0 for shares in allocation):
+        return False
+    for row, effects in enumerate(effectiveness):
+        for column in range(4):
+            total, magnitude = -1.0 if row == column else 0.0, 0.0
+            for effect, shares in zip(effects, allocation, strict=True):
+                total += effect * shares[column]
+                magnitude += abs(shares[column])
+            if not abs(total) <= 1024.0 * ROUNDING * max(map(abs, effects)) * magnitude:
+                return False
+    return True
+
+
+def _is_same(values: FloatArray) -> bool:
+    """Tell whether all numbers are the same but for rounding."""
+    return bool((abs(values[0] - values) <= 16.0 * ROUNDING * abs(values[0])).all())
+
+
+@compiled
+def _share_out(wrench: Wrench, mixer: Mixer, work: FloatArray) -> tuple[bool, bool]:
+    """Write each rotor's part of roll and pitch, of yaw, and of roll, pitch and thrust, without limits.
+
+    Returns whether no rotor comes near a limit, and whether one is beyond or next to it before there is any yaw.
+    """
+    base, turn, lift = work[0], work[1], work[2]
+    torque, is_free, is_thrust_limited = wrench.torque_frd_n_m, True, False
+    for i in range(mixer.low.size):
+        base[i] = mixer.allocation[i, 1] * torque.x + mixer.allocation[i, 2] * torque.y
+        turn[i] = mixer.allocation[i, 3] * torque.z
+        lift[i] = base[i] + mixer.allocation[i, 0] * wrench.thrust_n
+        off = abs(lift[i] - mixer.middle[i])
+        if not off + abs(turn[i]) <= mixer.reach[i]:
+            is_free = False
+            if not off <= mixer.reach[i]:
+                is_thrust_limited = True
+    return is_free, is_thrust_limited
+
+
+@compiled
+def _limit_even(thrust_n: float, mixer: Mixer, work: FloatArray) -> tuple[float, float]:
+    """Limit roll and pitch, then thrust, for rotors that are alike; return the scale of the first and the thrust.
+
+    The rotor that roll and pitch ask most of and the one that they ask least of decide for all.
+    """
+    base, lift = work[0], work[2]
+    share, low, high = mixer.allocation[0, 0], mixer.low[0], mixer.high[0]
+    upper, lower = base[0], base[0]
+    for i in range(1, mixer.low.size):
+        upper, lower = max(upper, base[i]), min(lower, base[i])
+    scale = 1.0
+    if upper - lower > high - low:
+        scale = (high - low) / (upper - lower)
+        upper *= scale
+        lower *= scale
+    thrust_n = max(min(thrust_n, (high - upper) / share), (low - lower) / share)
+    for i in range(mixer.low.size):
+        lift[i] = min(max(base[i] * scale + share * thrust_n, low), high)  # beyond by no more than rounding
+    return scale, thrust_n
+
+
+@compiled
+def _yaw_scale(mixer: Mixer, work: FloatArray) -> float:
+    """Return the share of yaw, in [0, 1], that the rest leaves room for."""
+    turn, lift = work[1], work[2]
+    scale = 1.0
+    for i in range(mixer.low.size):
+        room = mixer.high[i] - lift[i] if turn[i] > 0.0 else lift[i] - mixer.low[i]
+        size = abs(turn[i])
+        if scale * size > room:
+            scale = room / size
+    return scale
+
+
+@compiled
+def _signed_root(square: float) -> float:
+    root = math.sqrt(abs(square))
+    return root if square >= 0.0 else -root
 
 
 @compiled
@@ -90,13 +190,8 @@ def _fit_thrust(base: FloatArray, thrust_n: float, mixer: Mixer) -> float:
 
 
 @compiled
-def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: FloatArray) -> Wrench:
-    """Write the rotor speeds that come nearest to ``wrench``; return the wrench that they make.
-
-    ``rotor_speed_rad_s`` has room for the rotors; ``work``, shape (2, n), is scratch space. Torque about roll
-    and pitch is served first (they keep the vehicle upright), then thrust, then yaw with what is left. With
-    ideal rotors Ω² may be negative: the speed then carries the sign.
-    """
+def _fit(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: FloatArray) -> Wrench:
+    """Mix where rotors are not alike, or effectiveness does not undo allocation."""
     n = mixer.low.size
     base, yaw = work[0], work[1]
     torque = wrench.torque_frd_n_m
@@ -111,12 +206,43 @@ def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: Float
     total, roll, pitch, heading = 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         squared = base[i] + scale * yaw[i]
-        rotor_speed_rad_s[i] = math.sqrt(squared) if squared >= 0.0 else -math.sqrt(-squared)
+        rotor_speed_rad_s[i] = _signed_root(squared)
         total += mixer.effectiveness[0, i] * squared
         roll += mixer.effectiveness[1, i] * squared
         pitch += mixer.effectiveness[2, i] * squared
         heading += mixer.effectiveness[3, i] * squared
     return Wrench(total, Vector3(roll, pitch, heading))
+
+
+@compiled
+def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: FloatArray) -> Wrench:
+    """Write the rotor speeds that come nearest to ``wrench``; return the wrench that they make.
+
+    ``rotor_speed_rad_s`` has room for the rotors; ``work``, shape (``WORK_ROWS``, n), is scratch space. Torque about
+    roll and pitch is served first (they keep the vehicle upright), then thrust, then yaw with what is left. With
+    ideal rotors Ω² may be negative: the speed then carries the sign.
+
+    Where effectiveness undoes allocation the wrench achieved is known without multiplying it out.
+    """
+    if mixer.is_inverse == 0.0:
+        return _fit(wrench, mixer, rotor_speed_rad_s, work)
+    is_free, is_thrust_limited = _share_out(wrench, mixer, work)
+    tilt_scale, thrust_n, yaw_scale = 1.0, wrench.thrust_n, 1.0
+    if not is_free:
+        if is_thrust_limited:
+            if mixer.is_even == 0.0:
+                return _fit(wrench, mixer, rotor_speed_rad_s, work)
+            tilt_scale, thrust_n = _limit_even(thrust_n, mixer, work)
+        yaw_scale = _yaw_scale(mixer, work)
+    for i in range(mixer.low.size):
+        rotor_speed_rad_s[i] = _signed_root(work[2, i] + yaw_scale * work[1, i])
+    if is_free:
+        return wrench
+    torque = wrench.torque_frd_n_m
+    roll, pitch = torque.x, torque.y
+    if tilt_scale < 1.0:
+        roll, pitch = tilt_scale * roll, tilt_scale * pitch
+    return Wrench(thrust_n, Vector3(roll, pitch, yaw_scale * torque.z))
 
 
 @compiled

@@ -6,11 +6,11 @@ import math
 from typing import NamedTuple
 
 from flightstack.compiled import compiled
-from flightstack.contract import AttitudeTarget, PositionSetpoint, VehicleState
-from flightstack.geometry import quaternion_from_euler
+from flightstack.contract import AttitudeTarget, PositionSetpoint, Quaternion, VehicleState
 from flightstack.params.toml_reader import Table
 from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
+from flightstack.portable_math import sin_cos, tan
 
 
 class PositionMemory(NamedTuple):
@@ -101,7 +101,7 @@ def position_pid_step(
     at_bottom = lift <= least or thrust_saturation < 0.0
     vertical_free = not (at_top and error_z < 0.0) and not (at_bottom and error_z > 0.0)
     lift = min(max(lift, least), most)
-    tilt_force = math.tan(params.max_tilt_rad) * max(lift, 0.5 * params.gravity_m_s2)
+    tilt_force = tan(params.max_tilt_rad) * max(lift, 0.5 * params.gravity_m_s2)
     demand = math.sqrt(north * north + east * east)
     horizontal_free = demand <= tilt_force
     if not horizontal_free:
@@ -118,20 +118,44 @@ def position_pid_step(
 
 
 @compiled
+def _attitude_along(
+    forward: float, right: float, upward: float, half_yaw_sine: float, half_yaw_cosine: float
+) -> Quaternion:
+    """Return yaw, then pitch and roll that turn the thrust along (forward, right, upward), ``upward`` positive.
+
+    With θ = atan2(−forward, upward) and φ = atan2(right, level), level = √(forward² + upward²), tangents of the half
+    angles are −forward / (level + upward) and right / (whole + level), where nothing cancels, and one scale makes
+    sines and cosines of them.
+    """
+    level_square = forward * forward + upward * upward
+    level, whole = math.sqrt(level_square), math.sqrt(right * right + level_square)
+    along, across = level + upward, whole + level
+    scale = 0.5 / (math.sqrt(level * along) * math.sqrt(whole * across))
+    scaled_across, scaled_right = across * scale, right * scale
+    cos_cos, cos_sin = scaled_across * along, -forward * scaled_across  # of half roll, half pitch
+    sin_cos_, sin_sin = scaled_right * along, -forward * scaled_right
+    return Quaternion(
+        cos_cos * half_yaw_cosine + sin_sin * half_yaw_sine,
+        sin_cos_ * half_yaw_cosine - cos_sin * half_yaw_sine,
+        cos_sin * half_yaw_cosine + sin_cos_ * half_yaw_sine,
+        cos_cos * half_yaw_sine - sin_sin * half_yaw_cosine,
+    )
+
+
+@compiled
 def _target_for(
     north: float, east: float, lift: float, yaw_rad: float, state: VehicleState, params: PositionParams
 ) -> AttitudeTarget:
     # below half the weight the direction of a falling vehicle's thrust would swing about: bound it
     upward = max(lift, 0.5 * params.gravity_m_s2)
-    cos_yaw, sin_yaw = math.cos(yaw_rad), math.sin(yaw_rad)
+    half_sine, half_cosine = sin_cos(0.5 * yaw_rad)
+    cos_yaw, sin_yaw = half_cosine * half_cosine - half_sine * half_sine, 2.0 * half_sine * half_cosine
     forward, right = cos_yaw * north + sin_yaw * east, cos_yaw * east - sin_yaw * north
-    pitch = math.atan2(-forward, upward)
-    roll = math.atan2(right, math.sqrt(forward * forward + upward * upward))
     q = state.attitude
     cos_tilt = 1.0 - 2.0 * (q.x * q.x + q.y * q.y)
     thrust = params.mass_kg * lift / max(cos_tilt, 0.5)
     thrust = min(max(thrust, params.min_thrust_n), params.max_thrust_n)
-    return AttitudeTarget(quaternion_from_euler(roll, pitch, yaw_rad), thrust)
+    return AttitudeTarget(_attitude_along(forward, right, upward, half_sine, half_cosine), thrust)
 
 
 def read_position_params(vehicle: Vehicle, gains: Table, max_tilt_rad: float) -> PositionParams:

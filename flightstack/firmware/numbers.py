@@ -15,7 +15,7 @@ from flightstack.contract import MAX_ROTORS
 from flightstack.control import attitude_backstepping, attitude_pid
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.attitude_reference import REFERENCE_TUNABLES, ReferenceParams
-from flightstack.control.loop_parameters import TILT, LoopNumbers, loop_numbers
+from flightstack.control.loop_parameters import TILT, LoopNumbers, loop_numbers, tilt_deg
 from flightstack.control.mixer import mixer_for
 from flightstack.control.position_pid import POSITION_TUNABLES, PositionParams
 from flightstack.params.behaviour import SPECS
@@ -115,7 +115,7 @@ def target_numbers(
     values = _loop_values(loop_numbers(vehicle, controller, gains, max_tilt_rad), controller)
     ix, iy, iz = vehicle.inertia_kg_m2
     values |= {
-        TILT: math.degrees(max_tilt_rad),
+        TILT: tilt_deg(max_tilt_rad),
         "FS_CTRL": float(names.index(controller.name)),
         "FS_ROTORS": float(len(vehicle.rotors)),
         "FS_INNER_HZ": inner_hz,
@@ -125,7 +125,7 @@ def target_numbers(
         "FS_IX": ix,
         "FS_IY": iy,
         "FS_IZ": iz,
-        "FS_JR": sum(r.inertia_kg_m2 for r in vehicle.rotors) / len(vehicle.rotors),
+        "FS_JR": vehicle.mean_rotor_inertia_kg_m2,
         **_mixer_values(vehicle),
     }
     for number in TARGET_NUMBERS:

@@ -26,7 +26,10 @@ def advance_return(aim: FloatArray, state: VehicleState, params: GuidanceParams)
     if aim[A_PHASE] == CLIMBING and abs(p.z - aim[A_Z]) <= params.altitude_acceptance_m:
         aim[A_PHASE] = CRUISING
         aim[A_X], aim[A_Y] = aim[A_HOME_X], aim[A_HOME_Y]
-    elif aim[A_PHASE] == CRUISING and dx * dx + dy * dy <= params.acceptance_radius_m**2:
+    elif (
+        aim[A_PHASE] == CRUISING
+        and dx * dx + dy * dy <= params.acceptance_radius_m * params.acceptance_radius_m
+    ):
         aim[A_PHASE] = DESCENDING
 
 

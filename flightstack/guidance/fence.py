@@ -17,6 +17,7 @@ from flightstack.contract import FloatArray
 from flightstack.fence_layout import A_EAST, A_END, A_GROUP, A_INCLUSION, A_NORTH, A_RADIUS, A_START
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.plan import FenceShape, MissionItem, fence_shape
+from flightstack.portable_math import distance
 
 HYSTERESIS_M = 1.0
 """How far inside a limit the vehicle must be for a breach of it to end, so that it does not flicker."""
@@ -47,7 +48,7 @@ def area_margin(areas: FloatArray, vertices: FloatArray, index: int, north_m: fl
     """Return the distance to the edge of area ``index`` [m]: positive inside, negative outside."""
     radius_m = areas[index, A_RADIUS]
     if radius_m > 0.0:
-        return float(radius_m - math.hypot(north_m - areas[index, A_NORTH], east_m - areas[index, A_EAST]))
+        return float(radius_m - distance(north_m - areas[index, A_NORTH], east_m - areas[index, A_EAST]))
     inside = False
     nearest2 = math.inf
     end = int(areas[index, A_END])
@@ -116,14 +117,14 @@ def fence_step(
     """
     north_m, east_m, down_m = state[0], state[1], state[2]
     if limits[L_DECELERATION] > 0.0:
-        speed = math.hypot(state[3], state[4])
+        speed = distance(state[3], state[4])
         ahead_s = speed / (2.0 * limits[L_DECELERATION])
         north_m, east_m = north_m + state[3] * ahead_s, east_m + state[4] * ahead_s
         down_m = _stops_at(down_m, state[5], limits[L_VERTICAL])
     if not (math.isfinite(north_m) and math.isfinite(east_m) and math.isfinite(down_m)):
         return
     inside_m, outside_m = fence_margins(areas, vertices, groups, north_m, east_m)
-    distance_m = math.hypot(north_m - limits[L_HOME_NORTH], east_m - limits[L_HOME_EAST])
+    distance_m = distance(north_m - limits[L_HOME_NORTH], east_m - limits[L_HOME_EAST])
     memory[F_INCLUSION_M], memory[F_EXCLUSION_M] = inside_m, outside_m
     memory[F_HEIGHT_M], memory[F_DISTANCE_M] = math.inf, math.inf
     if limits[L_MAX_ALTITUDE] > 0.0:

@@ -13,6 +13,7 @@ from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import NOT_GIVEN, STICKS_AT
 from flightstack.guidance.trajectory import KA, Trajectory, TrajectoryLimits, clipped
 from flightstack.params.vehicle import GRAVITY_M_S2
+from flightstack.portable_math import sin_cos, tan
 
 TAKEOFF_STICK = 0.3
 """Shaped throttle, from the centre, beyond which a standing vehicle takes off; PX4's value."""
@@ -38,7 +39,7 @@ def _horizontal_sticks(stream: FloatArray, params: GuidanceParams, expo: float) 
 
 @compiled
 def _to_ned(forward: float, right: float, yaw_rad: float) -> tuple[float, float]:
-    cos_yaw, sin_yaw = math.cos(yaw_rad), math.sin(yaw_rad)
+    sin_yaw, cos_yaw = sin_cos(yaw_rad)
     return cos_yaw * forward - sin_yaw * right, sin_yaw * forward + cos_yaw * right
 
 
@@ -86,7 +87,7 @@ def manual_step(
     else:
         forward, right = _horizontal_sticks(stream, params, 0.0)
         size = math.sqrt(forward * forward + right * right)
-        scale = GRAVITY_M_S2 * math.tan(size * params.manual_tilt_rad) / size if size > 1e-9 else 0.0
+        scale = GRAVITY_M_S2 * tan(size * params.manual_tilt_rad) / size if size > 1e-9 else 0.0
         north, east = _to_ned(forward * scale, right * scale, t.yaw_rad)
         jx, jy = clipped(KA * (north - t.ax), KA * (east - t.ay), 2.0 * limits.jerk_m_s3)
         ax, ay = t.ax + jx * dt_s, t.ay + jy * dt_s

@@ -14,6 +14,7 @@ from flightstack.contract import FloatArray, VehicleState
 from flightstack.geometry import euler_from_quaternion, wrap_pi
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.trajectory import Goal
+from flightstack.portable_math import atan2
 
 # columns of the plan
 COMMAND, PARAM1, PARAM2, PARAM3, PARAM4, NORTH, EAST, DOWN = range(8)
@@ -79,7 +80,7 @@ def _leg_heading(m: FloatArray, x: float, y: float, state: VehicleState, params:
     dx, dy = x - state.position_ned_m.x, y - state.position_ned_m.y
     if dx * dx + dy * dy < 1.0:  # too near for a direction
         return present
-    return math.atan2(dy, dx)
+    return atan2(dy, dx)
 
 
 @compiled

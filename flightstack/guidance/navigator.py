@@ -71,6 +71,7 @@ from flightstack.guidance.setpoints import (
 from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.guidance.trajectory import BRAKING, Trajectory, setpoint_of
 from flightstack.modes import STREAM_MODES, Mode
+from flightstack.portable_math import atan2, distance, sin_cos
 
 ARRIVED_M = 0.5
 """So near to the place it was sent to, a vehicle holds."""
@@ -179,7 +180,8 @@ class Navigator:
         """
         half_yaw = 0.5 * euler_from_quaternion(vehicle_state(state).attitude).z
         thrust_n = min(float(attitude_target[4]), CONTACT_THRUST * self.params.weight_n)
-        return np.array([math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw), thrust_n])
+        sine, cosine = sin_cos(half_yaw)
+        return np.array([cosine, 0.0, 0.0, sine, thrust_n])
 
     @property
     def progress(self) -> MissionProgress:
@@ -256,7 +258,7 @@ class Navigator:
         if mode == Mode.TAKEOFF:
             aim[A_Z] = -takeoff_altitude_m
         elif mode == Mode.HOLD:  # where the reference comes to rest
-            speed = float(np.hypot(t[3], t[4]))
+            speed = distance(t[3], t[4])
             ahead_s = speed / (2.0 * BRAKING * p.acceleration_m_s2)
             aim[A_X], aim[A_Y] = t[0] + t[3] * ahead_s, t[1] + t[4] * ahead_s
             aim[A_Z] = t[2] + t[5] * abs(t[5]) / (2.0 * BRAKING * p.vertical_acceleration_m_s2)
@@ -272,7 +274,7 @@ class Navigator:
         """
         t, aim, p = self._trajectory, self._aim, self.params
         aim[A_PHASE] = CLIMBING
-        if np.hypot(t[0] - aim[A_HOME_X], t[1] - aim[A_HOME_Y]) > p.return_min_distance_m:
+        if distance(t[0] - aim[A_HOME_X], t[1] - aim[A_HOME_Y]) > p.return_min_distance_m:
             aim[A_Z] = min(t[2], aim[A_HOME_Z] - p.return_altitude_m)
         aim[A_Z] = max(aim[A_Z], p.ceiling_down_m)
 
@@ -291,9 +293,9 @@ class Navigator:
         self._repositions = True
         if math.isfinite(north_m) and math.isfinite(east_m):
             aim[A_X], aim[A_Y] = north_m, east_m
-            away_m = math.hypot(north_m - t[0], east_m - t[1])
+            away_m = distance(north_m - t[0], east_m - t[1])
             if math.isnan(yaw_rad) and self.params.yaw_mode < 0.5 and away_m > 1.0:
-                yaw_rad = math.atan2(east_m - t[1], north_m - t[0])
+                yaw_rad = atan2(east_m - t[1], north_m - t[0])
         if math.isfinite(down_m):
             aim[A_Z] = down_m
         if math.isfinite(yaw_rad):
@@ -305,7 +307,7 @@ class Navigator:
     def goes_elsewhere(self) -> bool:
         """Whether HOLD is on its way to a place that ``reposition`` named."""
         t, aim = self._trajectory, self._aim
-        return self._repositions and math.dist(t[:3], (aim[A_X], aim[A_Y], aim[A_Z])) > ARRIVED_M
+        return self._repositions and distance(t[0] - aim[A_X], t[1] - aim[A_Y], t[2] - aim[A_Z]) > ARRIVED_M
 
     def _enter_mission(self) -> None:
         """Begin the current item anew from here, at the speed and with the heading set by those before it.

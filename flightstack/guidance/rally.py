@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.plan import MissionItem
 from flightstack.plan.rally import rally_altitude_m
+from flightstack.portable_math import distance
 
 NEAREST, RALLY_FIRST = 0, 1
 """Values of RTL_TYPE, as PX4's: to the nearest of home and rally points, or of the rally points if there are any.
@@ -48,4 +48,4 @@ def choose(
     """Return the place that a return from ``position_ne_m`` goes to; of equally near ones home, then the first."""
     candidates = list(points) if return_type == RALLY_FIRST and points else [home, *points]
     north_m, east_m = position_ne_m
-    return min(candidates, key=lambda place: math.hypot(place.north_m - north_m, place.east_m - east_m))
+    return min(candidates, key=lambda place: distance(place.north_m - north_m, place.east_m - east_m))

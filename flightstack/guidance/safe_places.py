@@ -19,6 +19,7 @@ from flightstack.plan import (
     check_mission,
     check_rally,
 )
+from flightstack.portable_math import distance
 
 
 def plan_limits(b: Behaviour) -> Limits:
@@ -63,7 +64,7 @@ class SafePlaces:
         if abs(point.latitude_deg) > 90.0 or abs(point.longitude_deg) > 180.0:
             return "home is not a place on earth"
         local = self.frame.to_ned(point)
-        if math.hypot(local.x, local.y) > FARTHEST_HOME_M:
+        if distance(local.x, local.y) > FARTHEST_HOME_M:
             return f"home is more than {FARTHEST_HOME_M / 1e3:g} km from where the vehicle started"
         if abs(local.z) > GREATEST_HOME_STEP_M:
             return f"home is more than {GREATEST_HOME_STEP_M:g} m above or below where the vehicle started"
@@ -75,7 +76,8 @@ class SafePlaces:
     def has_left_home(self, position_ned_m: Vector3) -> bool:
         """Tell whether a place is another than home."""
         home = self.home
-        return math.dist(position_ned_m, (home.north_m, home.east_m, -home.altitude_m)) > HOME_SPREAD_M
+        x, y, z = position_ned_m
+        return distance(x - home.north_m, y - home.east_m, z + home.altitude_m) > HOME_SPREAD_M
 
     def check_mission(
         self, items: Sequence[MissionItem], limits: Limits, home: GeoPoint | None = None

@@ -9,8 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
-from flightstack.contract import FloatArray, LoopRow
-from flightstack.geometry_bulk import heading_from_quaternions
+import numpy as np
+
+from flightstack.compiled import compiled
+from flightstack.contract import FloatArray, LoopRow, Quaternion
+from flightstack.geometry import heading
 
 Derived: TypeAlias = Callable[[FloatArray], FloatArray]
 
@@ -27,6 +30,7 @@ class OuterColumns(NamedTuple):
 
 
 OUTER = OuterColumns()
+ATTITUDE_AT = OUTER.state + 6
 
 
 class Field(NamedTuple):
@@ -49,8 +53,18 @@ class Topic(NamedTuple):
     fields: tuple[Field, ...]
 
 
+@compiled
 def _outer_heading(rows: FloatArray) -> FloatArray:
-    return heading_from_quaternions(rows[:, OUTER.state + 6 : OUTER.state + 10])
+    headings = np.empty(len(rows))
+    for i in range(len(rows)):
+        w, x, y, z = (
+            rows[i, ATTITUDE_AT],
+            rows[i, ATTITUDE_AT + 1],
+            rows[i, ATTITUDE_AT + 2],
+            rows[i, ATTITUDE_AT + 3],
+        )
+        headings[i] = heading(Quaternion(w, x, y, z))
+    return headings
 
 
 def inner_topics(rotors: int) -> tuple[Topic, ...]:

@@ -286,8 +286,8 @@ class SimulatorLink:
 
     def _hil_answer(self, rotor_speed_rad_s: FloatArray, armed: bool) -> bytes:
         count = self._top_speed.size
-        thrust = np.clip(rotor_speed_rad_s[:count] / self._top_speed, 0.0, 1.0) ** 2
-        controls = [value if math.isfinite(value) else 0.0 for value in thrust.tolist()]
+        shares = np.clip(rotor_speed_rad_s[:count] / self._top_speed, 0.0, 1.0).tolist()
+        controls = [share * share if math.isfinite(share) else 0.0 for share in shares]
         controls += [0.0] * (16 - count)
         if not armed:
             controls = [0.0] * 16

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from flightstack.contract import MAX_ROTORS, FloatArray
+from flightstack.linear_algebra import pseudo_inverse
 from flightstack.params.assembly import Part, read_parts
 from flightstack.params.battery import Battery, read_battery
 from flightstack.params.named_file import built_in_names, find_file, hidden_file
@@ -71,7 +72,14 @@ class Vehicle:
     @property
     def max_thrust_n(self) -> float:
         """Thrust of all rotors at their largest speed."""
-        return sum(r.thrust_coefficient_n_s2 * r.max_speed_rad_s**2 for r in self.rotors)
+        return math.fsum(
+            r.thrust_coefficient_n_s2 * r.max_speed_rad_s * r.max_speed_rad_s for r in self.rotors
+        )
+
+    @property
+    def mean_rotor_inertia_kg_m2(self) -> float:
+        """Mean inertia of the rotors about their axes."""
+        return math.fsum(r.inertia_kg_m2 for r in self.rotors) / len(self.rotors)
 
     def effectiveness(self) -> FloatArray:
         """Return the matrix from Ω² [rad²/s²] to (thrust [N], torque FRD [N m]), shape (4, rotors)."""
@@ -82,6 +90,17 @@ class Vehicle:
             # r × F with F = (0, 0, −bΩ²); the body feels the reaction of the rotor's drag
             matrix[:, column] = (b, -y * b, x * b, -rotor.spin * rotor.torque_coefficient_n_m_s2)
         return matrix
+
+    def allocation(self) -> FloatArray:
+        """Return the matrix from (thrust [N], torque FRD [N m]) to Ω² [rad²/s²], shape (rotors, 4).
+
+        The pseudo-inverse of ``effectiveness``: of all Ω² that make a wrench those of the least sum of squares.
+        """
+        return pseudo_inverse(self.effectiveness())
+
+    def hover_speeds_squared(self) -> list[float]:
+        """Return Ω² [rad²/s²] of each rotor in a hover."""
+        return [share * self.weight_n for share in self.allocation()[:, 0].tolist()]
 
     def with_ideal_rotors(self) -> Vehicle:
         """Return the vehicle with rotors that follow at once and have no limits, as the paper assumes.
@@ -195,8 +214,9 @@ def _check_geometry(top: Table, vehicle: Vehicle) -> None:
             "rotor",
             "the rotor geometry is singular: it does not make thrust, roll, pitch and yaw each by itself",
         )
-    hover = np.linalg.pinv(matrix) @ np.array([vehicle.weight_n, 0.0, 0.0, 0.0])
-    for number, (rotor, squared) in enumerate(zip(vehicle.rotors, hover.tolist(), strict=True), start=1):
+    for number, (rotor, squared) in enumerate(
+        zip(vehicle.rotors, vehicle.hover_speeds_squared(), strict=True), 1
+    ):
         needed, low, high = math.sqrt(max(squared, 0.0)), rotor.min_speed_rad_s, rotor.max_speed_rad_s
         if squared <= 0.0 or not low < needed < high:
             needs = f"number {number} would need {needed:.0f} rad/s, its range is {low:.0f} to {high:.0f}"

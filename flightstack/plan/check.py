@@ -26,6 +26,7 @@ from flightstack.plan.vocabulary import (
     Frame,
     MissionResult,
 )
+from flightstack.portable_math import distance
 
 _ALTITUDE_TOLERANCE_M = 0.01  # a 32-bit float of an altitude above sea level is good to half a millimetre
 
@@ -124,11 +125,11 @@ def _distance_rejection(items: Sequence[MissionItem], home: GeoPoint, limits: Li
         if item.position_deg is None:
             continue
         there = frame.to_ned(GeoPoint(*item.position_deg, home.altitude_m))
-        distance_m = math.hypot(there.x - north_m, there.y - east_m)
+        distance_m = distance(there.x - north_m, there.y - east_m)
         if limit_m > 0.0 and distance_m > limit_m:
             reason = f"is {distance_m:.0f} m from {start}, and at most {limit_m:g} m are allowed"
             return item_rejection(seq, item, Fault(MissionResult.INVALID, reason))
-        if 0.0 < limits.max_home_distance_m < (from_home_m := math.hypot(there.x, there.y)):
+        if 0.0 < limits.max_home_distance_m < (from_home_m := distance(there.x, there.y)):
             reason = (
                 f"is {from_home_m:.0f} m from home, and at most {limits.max_home_distance_m:g} m are allowed"
             )

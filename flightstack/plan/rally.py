@@ -11,6 +11,7 @@ from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.item import MissionItem
 from flightstack.plan.rejection import Fault, Rejection, item_rejection, place_fault
 from flightstack.plan.vocabulary import MAX_RALLY_POINTS, RALLY_POINT, MissionResult
+from flightstack.portable_math import distance
 
 
 def check_rally(
@@ -53,8 +54,8 @@ def _altitude_fault(item: MissionItem, home: GeoPoint, limits: Limits) -> Fault 
 def _distance_fault(item: MissionItem, home: GeoPoint, limits: Limits, shape: FenceShape) -> Fault | None:
     assert item.position_deg is not None  # of a rally point whose place was checked
     north_m, east_m = shape.local(*item.position_deg)
-    home_ne_m = shape.local(home.latitude_deg, home.longitude_deg)
-    distance_m, far_m = math.dist((north_m, east_m), home_ne_m), limits.max_home_distance_m
+    home_north_m, home_east_m = shape.local(home.latitude_deg, home.longitude_deg)
+    distance_m, far_m = distance(north_m - home_north_m, east_m - home_east_m), limits.max_home_distance_m
     if 0.0 < far_m < distance_m:
         reason = f"is {distance_m:.0f} m from home, and at most {far_m:g} m are allowed"
         return Fault(MissionResult.INVALID, reason)

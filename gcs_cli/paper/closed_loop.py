@@ -109,9 +109,7 @@ def make_plant(case: Case) -> tuple[Plant, int]:
 
 def hover_speeds(case: Case) -> tuple[float, ...]:
     """Return the rotor speeds [rad/s] that carry Table I's vehicle in hover."""
-    vehicle = load_vehicle(case.vehicle)
-    squared = np.linalg.pinv(vehicle.effectiveness()) @ np.array([vehicle.weight_n, 0.0, 0.0, 0.0])
-    return tuple(np.sqrt(squared).tolist())
+    return tuple(map(math.sqrt, load_vehicle(case.vehicle).hover_speeds_squared()))
 
 
 def fly(case: Case) -> Recording:

@@ -12,8 +12,6 @@ from __future__ import annotations
 import math
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.multibody.xml import add, exact
 
@@ -25,8 +23,7 @@ _HOVER_HEIGHT_M = 2.0
 
 def hover_speeds_rad_s(vehicle: Vehicle) -> list[float]:
     """Return the rotor speeds of a hover, those of the least sum of Ω⁴."""
-    squared = np.linalg.pinv(vehicle.effectiveness()) @ np.array([vehicle.weight_n, 0.0, 0.0, 0.0])
-    return [math.sqrt(max(value, 0.0)) for value in squared.tolist()]
+    return [math.sqrt(max(squared, 0.0)) for squared in vehicle.hover_speeds_squared()]
 
 
 def add_actuators(root: Element, vehicle: Vehicle) -> None:

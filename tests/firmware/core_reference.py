@@ -21,7 +21,7 @@ from flightstack.control.attitude_reference import (
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.control.mixer import Mixer, mix, relative_rotor_speed
+from flightstack.control.mixer import WORK_ROWS, mix, relative_rotor_speed
 from flightstack.control.position_pid import PositionMemory, PositionParams, position_pid_step
 from flightstack.geometry import blend, conjugate, quaternion_product, rotation_vector
 
@@ -101,9 +101,9 @@ def backstepping(inputs, params, torques):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def mixer(wrenches, allocation, effectiveness, low, high, spin, speeds, achieved, relative):  # type: ignore[no-untyped-def]
-    rotors = Mixer(allocation, effectiveness, low, high, spin)
-    work = np.zeros((2, spin.size))
+def mixer(wrenches, rotors, speeds, achieved, relative):  # type: ignore[no-untyped-def]
+    spin = rotors.spin
+    work = np.zeros((WORK_ROWS, spin.size))
     for i in range(wrenches.shape[0]):
         w = wrenches[i]
         made = mix(Wrench(w[0], Vector3(w[1], w[2], w[3])), rotors, speeds[i], work)

@@ -132,7 +132,7 @@ class Loops:
     """Loops in C, driven as ``PythonLoops`` is."""
 
     def __init__(self, core: Core, numbers: Mapping[str, float]) -> None:
-        self.core = core
+        self.core, self.numbers = core, dict(numbers)
         self.memory = np.zeros(core.library.drive_sizes(1), np.uint8)
         core.call("drive_init", self.memory)
         for name, value in numbers.items():
@@ -169,6 +169,12 @@ class Loops:
 def ulps(difference: np.ndarray, scale: np.ndarray | float, dtype: np.dtype[Any]) -> np.ndarray:
     """Return differences in units of the last place of ``scale`` in a floating-point type."""
     return np.abs(difference) / np.spacing(np.abs(np.asarray(scale)).astype(dtype)).astype(np.float64)
+
+
+def same_bits(one: np.ndarray, other: np.ndarray) -> bool:
+    """Tell whether two arrays of float64 are equal to the last bit, signs of zeros too; a NaN equals any NaN."""
+    equal = np.ascontiguousarray(one).view(np.int64) == np.ascontiguousarray(other).view(np.int64)
+    return bool((equal | (np.isnan(one) & np.isnan(other))).all())
 
 
 def run_tool(command: Sequence[str | Path], **options: Any) -> str:

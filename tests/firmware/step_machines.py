@@ -1,4 +1,4 @@
-"""The same steps on host, emulated Cortex-M4F and simulated AVR; each tells the hash of all its reports so far."""
+"""The same steps on host, emulated Cortex-M4F, AVR and aarch64; each tells the hash of all its reports so far."""
 
 from __future__ import annotations
 
@@ -126,6 +126,20 @@ def on_avr(stream: bytes, folder: Path) -> np.ndarray:
     (folder / "steps").write_bytes(stream)
     run([simulator, elf, folder / "steps", folder / "avr"])
     return hashes((folder / "avr").read_bytes())
+
+
+def aarch64() -> list[str]:
+    """Return the command that compiles a program for aarch64, with its libraries in it."""
+    return [tool("aarch64-linux-gnu-gcc", "gcc-aarch64-linux-gnu libc6-dev-arm64-cross"), "-static"]
+
+
+def on_aarch64(stream: bytes, folder: Path, contract: str = "off") -> np.ndarray:
+    """Run the steps on aarch64 in QEMU; ``contract``: the value of -ffp-contract."""
+    elf, flags = folder / "steps_aarch64", [*EXACT, f"-ffp-contract={contract}", *INCLUDES]
+    run([*aarch64(), *flags, *LOOPS, *STEPS, C / "steps_host.c", "-o", elf])
+    (folder / "steps").write_bytes(stream)
+    run([tool("qemu-aarch64", "qemu-user"), elf, folder / "steps", folder / "aarch64"])
+    return hashes((folder / "aarch64").read_bytes())
 
 
 def first_difference(one: np.ndarray, other: np.ndarray) -> str:

@@ -1,9 +1,9 @@
 """Whole missions: the core in C makes of each tick's inputs what Python's loops made of them in flight.
 
-Both keep their own memories from takeoff to landing; only the inputs are shared. With double the largest difference is
-below 1e-12 of the largest value of its quantity in the flight. With float it is bounded in float32's units of the last
-place of that value. An angle has 1e-7 rad of rounding there; the reference filter (60 rad/s) and the stiffness of the
-law turn that into acceleration, and the yaw of a rotor's small drag into speed.
+Both keep their own memories from takeoff to landing; only the inputs are shared. With double every number has the
+same bits. With float the largest difference is bounded in float32's units of the last place of the largest value of
+its quantity in the flight. An angle has 1e-7 rad of rounding there; the reference filter (60 rad/s) and the stiffness
+of the law turn that into acceleration, and the yaw of a rotor's small drag into speed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.firmware.core_support import PARTS, Core, Loops, ulps
+from tests.firmware.core_support import PARTS, Core, Loops, same_bits, ulps
 from tests.parity.recorded_loops import OUTER_DUE, RESET, SET_TARGET, Recording, record
 
 FLIGHTS: dict[str, dict[str, Any]] = {
@@ -31,18 +31,29 @@ FLIGHTS: dict[str, dict[str, Any]] = {
     "the paper's gains and ideal rotors": {
         **{"vehicle": "paper_quad", "controller": "backstepping", "gains": "paper", "ideal_rotors": True},
     },
+    "the paper's gains by PID in gusts": {
+        **{
+            "vehicle": "paper_quad",
+            "controller": "pid",
+            "gains": "paper",
+            "wind": (2.0, 0.0, 0.0),
+            "gust": 0.5,
+        },
+    },
 }
+NEAR_IN_FLOAT = [name for name in FLIGHTS if name != "the paper's gains by PID in gusts"]
+"""In that one yaw is at its limit most of the time, and one tick in 70 is by rounding on another side of it."""
 FLOAT_ULPS = {
     "attitude target": 16,  # measured 5.2
     "target thrust": 32,  # 9.3
-    "reference attitude": 16,  # 4.3
+    "reference attitude": 16,  # 4.9
     "reference rates": 512,  # 162
     "reference acceleration": 4096,  # 991: 0.004 rad/s²
     "thrust": 32,  # 9.3
     "torque": 8192,  # 2029: 6e-5 N m
-    "achieved thrust": 128,  # 48
+    "achieved thrust": 320,  # 161
     "achieved torque": 8192,  # 2029
-    "rotor command": 16384,  # 5728: 0.35 rad/s
+    "rotor command": 16384,  # 4627: 0.28 rad/s
 }
 """Bounds, the largest difference of the four flights beside each."""
 
@@ -64,17 +75,15 @@ def differences(made: np.ndarray, recording: Recording) -> dict[str, tuple[float
 
 
 @pytest.mark.parametrize("name", FLIGHTS)
-def test_a_mission_in_double_is_pythons_to_1e_12(name: str) -> None:
+def test_mission_in_double_has_pythons_bits(name: str) -> None:
     r = flight(name)
     made, status = Loops(Core("double"), r.numbers).run(r.states, r.setpoints, r.targets, r.flags)
     assert np.array_equal(status, r.status)
-    for quantity, (difference, largest) in differences(made, r).items():
-        assert difference <= 1e-12 * largest, (
-            quantity
-        )  # measured 5.9e-13 of a rotor speed, less of all others
+    for quantity, part in PARTS.items():
+        assert same_bits(made[:, part], r.outputs[:, part]), quantity
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
+@pytest.mark.parametrize("name", NEAR_IN_FLOAT)
 def test_a_mission_in_float_stays_near_python(name: str) -> None:
     r = flight(name)
     made, status = Loops(Core("float"), r.numbers).run(r.states, r.setpoints, r.targets, r.flags)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from flightstack.contract import Vector3, Wrench
-from flightstack.control.mixer import mix, mixer_for, relative_rotor_speed
+from flightstack.control.mixer import WORK_ROWS, mix, mixer_for, relative_rotor_speed
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from tests.support.rotor_sets import irregular_vehicles, ring
 
@@ -26,7 +26,7 @@ def run(vehicle: Vehicle, wrench: tuple[float, float, float, float]) -> tuple[np
     """Return rotor speeds and the wrench that the mixer reports."""
     mixer, n = mixer_for(vehicle), len(vehicle.rotors)
     speeds = np.zeros(n)
-    achieved = mix(Wrench(wrench[0], Vector3(*wrench[1:])), mixer, speeds, np.zeros((2, n)))
+    achieved = mix(Wrench(wrench[0], Vector3(*wrench[1:])), mixer, speeds, np.zeros((WORK_ROWS, n)))
     return speeds, np.array([achieved.thrust_n, *achieved.torque_frd_n_m])
 
 
@@ -98,7 +98,7 @@ def best_by_linear_programming(vehicle: Vehicle, wrench: tuple[float, ...]) -> n
     Unknowns are the scale k of roll and pitch, the thrust T, the distance e of T from the demand, and the
     scale s of yaw; Ω² = A (T, k·roll, k·pitch, s·yaw) lies within the limits.
     """
-    allocation = np.linalg.pinv(vehicle.effectiveness())
+    allocation = vehicle.allocation()
     columns = np.stack(
         [
             allocation[:, 1] * wrench[1] + allocation[:, 2] * wrench[2],

@@ -13,8 +13,10 @@ from typing import NamedTuple
 from flightstack.contract import Quaternion, Vector3
 from flightstack.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import AttitudeSetpoint, OffboardSetpoint, PointSetpoint
+from flightstack.linear_algebra import dot
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
+from flightstack.portable_math import sin_cos
 
 FORCE_SET, YAW_IGNORE, YAW_RATE_IGNORE = 1 << 9, 1 << 10, 1 << 11
 POSITION_BIT, VELOCITY_BIT, ACCELERATION_BIT = 0, 3, 6
@@ -67,7 +69,7 @@ def _turned(v: Vector3, yaw_rad: float) -> Vector3:
     if math.isnan(v.x) and math.isnan(v.y):
         return v
     forward, right = (0.0 if math.isnan(part) else part for part in v[:2])
-    cos_yaw, sin_yaw = math.cos(yaw_rad), math.sin(yaw_rad)
+    sin_yaw, cos_yaw = sin_cos(yaw_rad)
     return Vector3(cos_yaw * forward - sin_yaw * right, sin_yaw * forward + cos_yaw * right, v.z)
 
 
@@ -135,7 +137,7 @@ def _attitude(message: Message) -> AttitudeSetpoint | str:
     thrust = min(max(float(message.thrust), 0.0), 1.0)
     if not mask & ATTITUDE_IGNORE:
         q = tuple(float(part) for part in message.q)
-        norm = math.sqrt(sum(part * part for part in q))
+        norm = math.sqrt(dot(q, q))
         if not 0.5 <= norm <= 2.0:  # NaN fails too
             return "the attitude is not a unit quaternion"
         attitude = Quaternion(q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm)

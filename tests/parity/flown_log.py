@@ -1,0 +1,53 @@
+"""Fly missions and print digests of their logs: run as a process under the settings of another processor.
+
+``python -m tests.parity.flown_log PLAN`` prints a line for each library, the digest of what it computes here, which
+shows whether the settings act; then one for each controller, the SHA-256 of its log.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import sys
+from collections.abc import Iterable
+
+import numpy as np
+
+from tests.support.world import World
+
+CONTROLLERS = ("pid", "backstepping")
+
+
+def digest(parts: Iterable[bytes]) -> str:
+    return hashlib.sha256(b"".join(parts)).hexdigest()
+
+
+def library_digests() -> dict[str, str]:
+    """Digests of what libm, LAPACK and NumPy's own loops make of many inputs."""
+    random = np.random.default_rng(5)
+    values = random.uniform(-3.0, 3.0, 20_000)
+    matrices = random.normal(size=(200, 4, 6))
+    functions = (math.sin, math.cos, math.tan, math.exp, math.atan)
+    return {
+        "libm": digest(np.array([f(value) for value in values.tolist()]).tobytes() for f in functions),
+        "lapack": digest(np.linalg.pinv(matrix).tobytes() for matrix in matrices),
+        "numpy": digest(f(values).tobytes() for f in (np.sin, np.cos, np.exp, np.tanh)),
+    }
+
+
+def log_digest(plan: str, controller: str) -> str:
+    """Digest of the log of a mission in wind, with gusts of wind and torque."""
+    world = World(
+        vehicle="x_quad", controller=controller, wind=(3.0, -1.0, 0.0), gust=1.0, torque_gust=0.002, seed=7
+    )
+    world.upload(plan)
+    world.start_mission()
+    world.until_disarmed()
+    return digest([world.log])
+
+
+if __name__ == "__main__":
+    for library, made in library_digests().items():
+        print(library, made)
+    for law in CONTROLLERS:
+        print(law, log_digest(sys.argv[1], law))

@@ -1,0 +1,55 @@
+"""The same log on every processor: flights under settings that make libraries choose the code of an older one.
+
+Each setting is first shown to act, on what its library computes in the same process. Where it does not, the machine has
+one variant only, and the test is skipped. Other architectures: tests/firmware/test_aarch64.py.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.parity.flown_log import CONTROLLERS
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def newer_features() -> str:
+    """Names of the features of this processor that NumPy chooses its loops by."""
+    return ",".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", []))  # type: ignore[index]
+
+
+SETTINGS = {
+    "lapack": {"OPENBLAS_CORETYPE": "Nehalem"},
+    "libm": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-AVX2"},
+    "numpy": {"NPY_DISABLE_CPU_FEATURES": newer_features()},
+}
+
+
+@functools.cache
+def digests(*settings: tuple[str, str]) -> dict[str, str]:
+    """Digests of libraries and logs in a process with these settings."""
+    command = [sys.executable, "-m", "tests.parity.flown_log", "square.plan"]
+    environment = {**os.environ, **dict(settings)}
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
+    return dict(line.split() for line in done.stdout.splitlines())
+
+
+@pytest.mark.parametrize("library", SETTINGS)
+def test_log_does_not_depend_on_the_variant_of(library: str) -> None:
+    here, there = digests(), digests(*SETTINGS[library].items())
+    if here[library] == there[library]:
+        pytest.skip(f"{library} has one variant on this machine")
+    assert [here[law] for law in CONTROLLERS] == [there[law] for law in CONTROLLERS]
+
+
+def test_log_does_not_depend_on_the_processor_that_numba_compiles_for() -> None:
+    """LLVM chooses instructions for the processor; it must neither contract nor reorder. Compiles anew: a minute."""
+    here, there = digests(), digests(("NUMBA_CPU_NAME", "generic"), ("NUMBA_CPU_FEATURES", ""))
+    assert [here[law] for law in CONTROLLERS] == [there[law] for law in CONTROLLERS]
