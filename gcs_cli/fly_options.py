@@ -13,7 +13,7 @@ from flightstack.clock import nearest_outer_hz, rates
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.geodesy import GeoPoint
 from flightstack.params.gains_file import open_gains
-from flightstack.params.vehicle import load_vehicle
+from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
 from flightstack.transport.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
@@ -54,6 +54,7 @@ class FlyOptions:
     faults: tuple[str, ...] = ()
     params: Path | None = None
     loops: str = PYTHON
+    drag: bool = False
 
     @property
     def outer_rate_hz(self) -> float:
@@ -82,7 +83,7 @@ def checked_plan(options: FlyOptions) -> Plan:
     """Check all that can be before anything starts, and return the plan; raise CliError or ConfigError."""
     _check_flags(options)
     plan = load_plan(options.plan_path)
-    load_vehicle(options.vehicle)
+    flown_vehicle(options)
     open_gains(options.gains)
     if options.params is not None and not options.params.is_file():
         raise CliError(f"--params {options.params}: there is no such file", USAGE)
@@ -97,6 +98,19 @@ def checked_plan(options: FlyOptions) -> Plan:
         problem = "the mission begins with a landing or a return, and the vehicle stands on the ground"
         raise CliError(f"{options.plan_path}: {problem}", USAGE)
     return plan
+
+
+def flown_vehicle(options: FlyOptions) -> Vehicle:
+    """Return the vehicle as the simulator flies it; raise ConfigError, or CliError for wind that cannot act."""
+    vehicle = load_vehicle(options.vehicle)
+    if options.drag:
+        vehicle = vehicle.with_drag(options.plant)
+    blows = options.wind is not None and any(float(part) for part in options.wind.split(","))
+    if blows or options.gust:
+        refusal = vehicle.wind_refusal(options.plant)
+        if refusal is not None:
+            raise CliError(f"{'--gust' if options.gust else '--wind'}: {refusal}", USAGE)
+    return vehicle
 
 
 def _check_flags(options: FlyOptions) -> None:
@@ -182,6 +196,8 @@ def simulator_arguments(options: FlyOptions, home: GeoPoint) -> list[str]:
         arguments.append(f"--wind={options.wind}")
     if options.gust is not None:
         arguments.append(f"--gust={options.gust}")
+    if options.drag:
+        arguments.append("--drag")
     if options.torque_gust is not None:
         arguments.append(f"--torque-gust={options.torque_gust}")
     battery = {

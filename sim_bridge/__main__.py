@@ -19,6 +19,7 @@ from sim_bridge.live_view import LiveView
 from sim_bridge.render_command import render, require
 
 if TYPE_CHECKING:
+    from flightstack.params.vehicle import Vehicle
     from sim_bridge.plant import InitialState
     from sim_bridge.server import ServerOptions
 
@@ -42,6 +43,13 @@ def _disturbance(wind: str, gust: float, force: str, torque: str, torque_gust: f
     )
 
 
+def _vehicle(name: str, plant: str, drag: bool) -> Vehicle:
+    from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
+
+    vehicle = load_vehicle(name)
+    return vehicle.with_drag(plant) if drag else vehicle
+
+
 @app.callback(invoke_without_command=True)
 def run(
     context: typer.Context,
@@ -54,6 +62,7 @@ def run(
     seed: options.Seed = 1,
     wind: options.Wind = "0,0",
     gust: options.Gust = 0.0,
+    drag: options.Drag = False,
     force: options.Force = _ZERO,
     torque: options.Torque = _ZERO,
     torque_gust: options.TorqueGust = 0.0,
@@ -73,13 +82,14 @@ def run(
     arguments.plant(plant)
     arguments.in_range("--instance", instance, 0, 250)
     arguments.in_range("--seed", seed, 0, 2**63)
-    from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
+    from sim_bridge.disturbance import check_wind  # noqa: PLC0415
     from sim_bridge.plant import PlantOptions  # noqa: PLC0415
     from sim_bridge.server import ServerOptions  # noqa: PLC0415
 
-    loaded = load_vehicle(vehicle)
+    loaded = _vehicle(vehicle, plant, drag)
     battery = arguments.battery(loaded, battery_start, battery_capacity, battery_drain)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
+    check_wind(loaded, plant, disturbance)
     served = ServerOptions(
         vehicle=loaded,
         plant=plant,
@@ -126,6 +136,7 @@ def open_loop(
     no_lag: options.NoLag = False,
     wind: options.Wind = "0,0",
     gust: options.Gust = 0.0,
+    drag: options.Drag = False,
     force: options.Force = _ZERO,
     torque: options.Torque = _ZERO,
     torque_gust: options.TorqueGust = 0.0,
@@ -141,11 +152,10 @@ def open_loop(
     arguments.in_range("--dt", dt, 1e-6, 1.0)
     arguments.in_range("--seed", seed, 0, 2**63)
     initial = _initial(pos, vel, euler_deg, rates, no_ground)
-    from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
     from sim_bridge.server import complain  # noqa: PLC0415
 
-    loaded = load_vehicle(vehicle)
+    loaded = _vehicle(vehicle, plant, drag)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
     state = run_open_loop(
         OpenLoop(

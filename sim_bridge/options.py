@@ -11,6 +11,9 @@ Vehicle = Annotated[str, typer.Option(help="Built-in vehicle (paper_quad, x_quad
 Plant = Annotated[str, typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")]
 Wind = Annotated[str, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")]
 Gust = Annotated[float, typer.Option(help="Standard deviation of the gusts, m/s.")]
+Drag = Annotated[
+    bool, typer.Option("--drag", help="Fly with the optional drag of the vehicle's file, so that wind acts.")
+]
 Force = Annotated[str, typer.Option(metavar="N,E,D", help="Constant external force, N.")]
 Torque = Annotated[str, typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")]
 TorqueGust = Annotated[

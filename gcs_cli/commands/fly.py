@@ -32,6 +32,10 @@ def fly(
     seed: Annotated[int, typer.Option(help="Seed of the gusts.")] = 1,
     wind: Annotated[str | None, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")] = None,
     gust: Annotated[float | None, typer.Option(help="Standard deviation of the gusts, m/s.")] = None,
+    drag: Annotated[
+        bool,
+        typer.Option("--drag", help="Fly with the optional drag of the vehicle's file, so that wind acts."),
+    ] = False,
     torque_gust: Annotated[
         float | None, typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
     ] = None,
@@ -82,7 +86,7 @@ def fly(
     options = FlyOptions(
         plan, controller, gains, plant, speed, inner_hz, outer_hz, seed, wind, gust, torque_gust, vehicle,
         instance, ideal_rotors, 180.0 if settings.timeout_s is None else settings.timeout_s, limit,
-        battery_start, battery_capacity, battery_drain, tuple(fault or ()), params, loops,
+        battery_start, battery_capacity, battery_drain, tuple(fault or ()), params, loops, drag,
     )  # fmt: skip
     items = checked_plan(options)
     console = FlyConsole(stderr=as_json, highlight=False)

@@ -66,6 +66,10 @@ def fly(
     seed: Annotated[int, typer.Option(help="Seed of the gusts.")] = 1,
     wind: Annotated[str | None, typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")] = None,
     gust: Annotated[float | None, typer.Option(help="Standard deviation of the gusts, m/s.")] = None,
+    drag: Annotated[
+        bool,
+        typer.Option("--drag", help="Fly with the optional drag of the vehicle's file, so that wind acts."),
+    ] = False,
     ideal_rotors: Annotated[
         bool, typer.Option("--ideal-rotors", help="Rotors without limits, lag and spin-up torque.")
     ] = False,
@@ -92,7 +96,7 @@ def fly(
         raise CliError("pil starts a vehicle of its own: leave --connect out, or see --instance", USAGE)
     options = FlyOptions(
         plan, controller, gains, plant, inner_hz=inner_hz, outer_hz=outer_hz, seed=seed, wind=wind, gust=gust,
-        vehicle=vehicle, instance=instance, ideal_rotors=ideal_rotors, params=params, limit_s=limit,
+        drag=drag, vehicle=vehicle, instance=instance, ideal_rotors=ideal_rotors, params=params, limit_s=limit,
         timeout_s=180.0 if settings.timeout_s is None else settings.timeout_s,
     )  # fmt: skip
     checked_target(target)

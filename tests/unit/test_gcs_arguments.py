@@ -27,6 +27,7 @@ from gcs_cli.fly_options import (
     FlyOptions,
     check_ports,
     checked_plan,
+    flown_vehicle,
     simulator_arguments,
     stack_arguments,
 )
@@ -91,6 +92,12 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
         ({"battery_start": 101.0}, "--battery-start 101.0: expected a number"),
         ({"battery_capacity": 0.0}, "--battery-capacity 0.0: expected a number"),
         ({"battery_drain": math.nan}, "--battery-drain nan: expected a number"),
+        ({"wind": "8,0"}, "--wind: wind cannot act: the vehicle paper_quad has no drag; add --drag"),
+        ({"gust": 1.0}, "--gust: wind cannot act: the vehicle paper_quad has no drag; add --drag"),
+        (
+            {"wind": "8,0", "vehicle": "x_quad", "plant": "paper"},
+            "--wind: wind cannot act: the paper's model",
+        ),
         ({"instance": 100}, "--instance 100: expected a number from 0 to 99"),
         ({"limit_s": float("nan")}, "--limit nan"),
         ({"timeout_s": 0.0}, "--timeout 0.0"),
@@ -108,6 +115,8 @@ def test_bad_flags_are_usage_errors(flags: dict[str, object], said: str) -> None
     [
         ({"vehicle": "hexa"}, "hexa: is neither"),
         ({"gains": "loud"}, "loud: is neither"),
+        ({"drag": True, "vehicle": "x_quad"}, "--drag: the file of the vehicle x_quad has no optional_drag"),
+        ({"drag": True, "plant": "paper"}, "--drag: the paper's model has no drag"),
         ({"inner_hz": 1.0}, "--inner-hz"),
         ({"outer_hz": 77.0}, "--outer-hz: 77: does not divide"),
     ],
@@ -250,6 +259,14 @@ def test_a_parameter_file_is_passed_on_and_must_be_there(tmp_path: Path) -> None
     assert f"--params={path}" in stack_arguments(
         FlyOptions(HOP, params=path), GeoPoint(0.0, 0.0, 0.0), tmp_path
     )
+
+
+def test_wind_acts_on_the_papers_vehicle_with_drag() -> None:
+    windy = FlyOptions(HOP, wind="8,0", drag=True)
+    checked_plan(windy)
+    checked_plan(FlyOptions(HOP, wind="0,0", gust=0.0))
+    assert "--drag" in simulator_arguments(windy, GeoPoint(47.1, -8.2, 3.5))
+    assert flown_vehicle(windy).linear_drag_n_s_m == (0.153, 0.153, 0.153)
 
 
 def test_the_simulator_is_told_about_battery_and_faults() -> None:
