@@ -61,7 +61,7 @@ class Flight:
         self.shut_down_accepted = False
         self._session = session
         self._items = plan.items
-        self._uploads = Uploads(session, plan)
+        self._uploads = Uploads(session, plan, restores=False)  # the vehicle began without plans
         self._ends_in_air = ends_in_air(plan.items)
         self._connect_s = connect_s
         self._connect_due_s = now_s + connect_s
