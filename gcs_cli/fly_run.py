@@ -10,18 +10,20 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NamedTuple
 
+from flightstack.params.vehicle import NO_DRAG_PLANT
 from flightstack.plan import Plan
 from gcs_cli.connection import Connection
 from gcs_cli.endpoint import Endpoint
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.flight import Flight
-from gcs_cli.flight_outcome import Outcome
+from gcs_cli.flight_outcome import Code, Outcome
 from gcs_cli.flight_watch import STALL_S
 from gcs_cli.fly_display import Display
 from gcs_cli.fly_options import (
     DEFAULT_HOME,
     FlyOptions,
     check_ports,
+    flown_vehicle,
     simulator_arguments,
     stack_arguments,
 )
@@ -134,12 +136,12 @@ def _run(
             return  # nobody is left who could be shut down
         now_s = connection.now_s
         if interruption.reason:
-            flight.abort(interruption.reason, FAILED, now_s)
+            flight.abort(Outcome(Code.INTERRUPTED, interruption.reason), now_s)
         casualty = _casualty(flight, children)
         if casualty is not None:
             code = casualty.exit_code if casualty.exit_code in (USAGE, NO_ANSWER) else FAILED
             gone = any(child.name == STACK for child in children.ended())
-            flight.abort(casualty.obituary, code, now_s, vehicle_is_gone=gone)
+            flight.abort(Outcome(Code.PROCESS_ENDED, casualty.obituary, code), now_s, vehicle_is_gone=gone)
         flight.step(now_s)
         display.update(flight)
         if not flight.over:
@@ -156,11 +158,16 @@ def _casualty(flight: Flight, children: Children) -> Child | None:
     return children.culprit(_END_PATIENCE_S)
 
 
+def _drag_of(options: FlyOptions) -> tuple[float, float, float]:
+    return (0.0, 0.0, 0.0) if options.plant == NO_DRAG_PLANT else flown_vehicle(options).linear_drag_n_s_m
+
+
 def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:
     """Write summary and report; return the summary, and the outcome with what writing them showed."""
     from flightstack.params.errors import ConfigError  # noqa: PLC0415
     from gcs_cli.analysis import read_flight  # noqa: PLC0415
     from gcs_cli.flight_data import Flight as FlightData  # noqa: PLC0415
+    from gcs_cli.flight_outcome import with_log  # noqa: PLC0415
     from gcs_cli.report import write_report  # noqa: PLC0415
     from gcs_cli.summary import RunInfo, summarise, write_summary  # noqa: PLC0415
 
@@ -170,9 +177,12 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
     except (ConfigError, OSError) as error:
         data = FlightData()
         if outcome.completed:
-            outcome = Outcome(f"the mission was flown, but its log cannot be read: {error}", FAILED)
+            outcome = Outcome(Code.NO_LOG, f"the mission was flown, but its log cannot be read: {error}")
+    else:
+        outcome = with_log(outcome, data, plan.items)
     run = RunInfo(
-        outcome=outcome.reason,
+        outcome=outcome.code.value,
+        outcome_text=outcome.reason,
         plan=str(options.plan_path),
         wall_time_s=flown.wall_time_s,
         vehicle=options.vehicle,
@@ -183,6 +193,7 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
         seed=options.seed,
         wind=options.wind,
         gust=options.gust,
+        drag_n_s_m=_drag_of(options),
         torque_gust=options.torque_gust,
         battery_start=options.battery_start,
         battery_capacity=options.battery_capacity,

@@ -35,7 +35,7 @@ def upload(
     connect: ConnectOption = None,
     timeout: TimeoutOption = None,
 ) -> None:
-    """Replace the vehicle's plans by those of a file, all of them or none.
+    """Replace the vehicle's plans by those of a file.
 
     The mission, and geofence and rally points if the file has any; they go first, because the vehicle checks the
     mission against them. If a part is refused, the vehicle gets back the plans that it held before.

@@ -49,6 +49,8 @@ class Flown(NamedTuple):
     """None: it left no readable log."""
     facts: Mapping[str, Any]
     """What ``pil.json`` says of it besides."""
+    outcome_text: str = ""
+    """The outcome as a sentence."""
 
 
 class Outcome(NamedTuple):
@@ -94,7 +96,12 @@ def closed_loop(
     listed = [difference for pair in differences.values() for difference in pair]
     result = assembled(listed, checks, record, facts)
     result["flights"] = {
-        stage: {"outcome": flown.outcome, **_of_samples(flown.samples), **flown.facts}
+        stage: {
+            "outcome": flown.outcome,
+            "outcome_text": flown.outcome_text,
+            **_of_samples(flown.samples),
+            **flown.facts,
+        }
         for stage, flown in flights.items()
     }
     result["status_differences"] = {
@@ -137,7 +144,9 @@ def _failures(flights: Mapping[str, Flown]) -> float:
 
 
 def _reasons(flights: Mapping[str, Flown]) -> str:
-    reasons = [f"{stage}: {flown.outcome}" for stage, flown in flights.items() if flown.outcome != COMPLETED]
+    reasons = [
+        f"{stage}: {flown.outcome_text}" for stage, flown in flights.items() if flown.outcome != COMPLETED
+    ]
     blank = [
         stage for stage, flown in flights.items() if flown.outcome == COMPLETED and flown.samples is None
     ]

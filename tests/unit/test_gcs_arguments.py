@@ -22,6 +22,7 @@ from gcs_cli.__main__ import main
 from gcs_cli.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
 from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.flight import Phase
+from gcs_cli.flight_outcome import Code, Outcome
 from gcs_cli.fly_display import LineDisplay, make_display, progress
 from gcs_cli.fly_options import (
     FlyOptions,
@@ -360,7 +361,7 @@ def test_what_the_vehicle_says_of_an_early_end_is_not_shown() -> None:
     story = Story(FakeVehicle(refusals={SHUT_DOWN: "Command refused: in the air"})).run(until=Phase.FLY)
     console = Console(file=io.StringIO(), force_terminal=False)
     display = LineDisplay(console)
-    story.flight.abort("interrupted", USAGE, story.now_s)
+    story.flight.abort(Outcome(Code.INTERRUPTED, "interrupted", USAGE), story.now_s)
     display.update(story.flight)
     story.run(most_s=10.0)
     display.update(story.flight)
