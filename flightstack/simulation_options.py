@@ -8,6 +8,7 @@ VEHICLE = typer.Option(help="Built-in vehicle (paper_quad, x_quad) or a TOML fil
 PLANT = typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")
 WIND = typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")
 GUST = typer.Option(help="Standard deviation of the gusts, m/s.")
+DRAG = typer.Option("--drag", help="Fly with the optional drag of the vehicle's file, so that wind acts.")
 FORCE = typer.Option(metavar="N,E,D", help="Constant external force, N.")
 TORQUE = typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")
 TORQUE_GUST = typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")

@@ -42,6 +42,7 @@ _TOPICS = [
     "vehicle_attitude",
     "vehicle_attitude_setpoint",
     "rotor_speeds",
+    "wrench",
     "vehicle_status",
     "vehicle_land_detected",
     "mission_result",
@@ -76,6 +77,7 @@ class _Reader:
         log = self._log
         rotors = self._rotor_count()
         return Flight(
+            start_s=self._start_us * 1e-6,
             duration_s=(log.last_timestamp - self._start_us) * 1e-6,
             info=MappingProxyType(dict(log.msg_info_dict)),
             parameters=MappingProxyType(dict(log.initial_parameters)),
@@ -87,9 +89,13 @@ class _Reader:
             attitude=self._euler("vehicle_attitude", "q"),
             attitude_target=self._euler("vehicle_attitude_setpoint", "q_d"),
             rotor_speed=self._series("rotor_speeds", _elements("speed_rad_s", rotors)),
+            rotor_command=self._series("rotor_speeds", _elements("command_rad_s", rotors)),
+            torque=self._series("wrench", _elements("torque_n_m", 3)),
             statuses=tuple(
-                Status(time_s, int(state), arming == _ARMED)
-                for time_s, state, arming in self._rows("vehicle_status", "nav_state", "arming_state")
+                Status(time_s, int(state), arming == _ARMED, bool(failsafe))
+                for time_s, state, arming, failsafe in self._rows(
+                    "vehicle_status", "nav_state", "arming_state", "failsafe"
+                )
             ),
             landed=tuple(
                 (time_s, bool(landed)) for time_s, landed in self._rows("vehicle_land_detected", "landed")

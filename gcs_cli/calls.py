@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, Protocol, TypeAlias
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.services.addressing import Address
@@ -37,6 +37,13 @@ class Answer(NamedTuple):
     """The plan, of a download."""
     result: int = MissionResult.ACCEPTED
     """The MAV_MISSION_RESULT of a transfer."""
+
+
+class Request(Protocol):
+    """A request under way, or several in a row."""
+
+    def answer(self, now_s: float) -> Answer | None:
+        """Return the answer once it is known."""
 
 
 class Call:
@@ -97,26 +104,27 @@ def command(session: Session, number: int, params: Sequence[float], now_s: float
 
 def upload(session: Session, items: Sequence[MissionItem], kind: MissionType = MissionType.MISSION) -> Call:
     """Begin to upload a mission, geofence or rally points; without items they are cleared."""
-    client = _mission_client(session, kind)
+    client = mission_client(session, kind)
     client.start_upload(items)
     return Call(session, client)
 
 
 def download(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
     """Begin to download the mission, geofence or rally points."""
-    client = _mission_client(session, kind)
+    client = mission_client(session, kind)
     client.start_download()
     return Call(session, client)
 
 
 def clear(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
     """Begin to clear the mission, geofence, rally points or all."""
-    client = _mission_client(session, kind)
+    client = mission_client(session, kind)
     client.start_clear()
     return Call(session, client)
 
 
-def _mission_client(session: Session, kind: MissionType) -> MissionClient:
+def mission_client(session: Session, kind: MissionType) -> MissionClient:
+    """Return a client that transfers one type of plan."""
     return MissionClient(_vehicle(session), Address(SYSTEM_ID, COMPONENT_ID), kind)
 
 

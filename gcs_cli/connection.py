@@ -8,7 +8,7 @@ from collections.abc import Callable
 from flightstack.mavlink.signing import LinkSigning
 from flightstack.plan import MissionResult
 from flightstack.transport.udp import Address, PortBusyError, UdpSocket, resolve
-from gcs_cli.calls import Answer, Call
+from gcs_cli.calls import Answer, Request
 from gcs_cli.endpoint import VEHICLE_CONNECTION, Endpoint
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError, PortInUseError
 from gcs_cli.session import Session
@@ -107,7 +107,7 @@ class Connection:
             "`flightstack`, or name its link with --connect"
         )
 
-    def complete(self, call: Call, name: str, *, may_lack: bool = False) -> Answer:
+    def complete(self, call: Request, name: str | Callable[[], str], *, may_lack: bool = False) -> Answer:
         """Run a request to its end; raise CliError when the vehicle refuses ``name`` or does not answer.
 
         With ``may_lack``, a vehicle that knows no such type of plan has an empty one.
@@ -115,14 +115,14 @@ class Connection:
         session = self.session
         while (answer := call.answer(self.now_s)) is None:
             if session.view.powered_off or session.view.lost(self.now_s):
-                raise CliError(
-                    f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}"
-                )
+                how = "shut down" if session.view.powered_off else "was lost"
+                raise CliError(f"{name() if callable(name) else name}: the vehicle {how}")
             self.step(self.now_s + _LONGEST_WAIT_S)
         if may_lack and answer.result == MissionResult.UNSUPPORTED:
             return Answer(True)
         if not answer.accepted:
-            refused = f"{name}: {answer.reason}" if answer.silent else f"{name} refused: {answer.reason}"
+            what = name() if callable(name) else name
+            refused = f"{what}: {answer.reason}" if answer.silent else f"{what} refused: {answer.reason}"
             raise CliError(refused, NO_ANSWER if answer.silent else FAILED)
         return answer
 

@@ -13,7 +13,7 @@ from flightstack.plan import Plan
 from gcs_cli import calls
 from gcs_cli.calls import Answer, Call
 from gcs_cli.errors import FAILED, NO_ANSWER
-from gcs_cli.flight_outcome import Outcome, ends_in_air, judged
+from gcs_cli.flight_outcome import Code, Outcome, ends_in_air, judged
 from gcs_cli.flight_watch import STALL_S, Watch, no_state, no_vehicle
 from gcs_cli.plan_parts import Uploads
 from gcs_cli.session import Session
@@ -61,7 +61,7 @@ class Flight:
         self.shut_down_accepted = False
         self._session = session
         self._items = plan.items
-        self._uploads = Uploads(session, plan)
+        self._uploads = Uploads(session, plan, restores=False)  # the vehicle began without plans
         self._ends_in_air = ends_in_air(plan.items)
         self._connect_s = connect_s
         self._connect_due_s = now_s + connect_s
@@ -103,10 +103,10 @@ class Flight:
         """Items sent and in all, while the plan is uploaded."""
         return self._uploads.progress
 
-    def abort(self, reason: str, exit_code: int, now_s: float, vehicle_is_gone: bool = False) -> None:
+    def abort(self, outcome: Outcome, now_s: float, vehicle_is_gone: bool = False) -> None:
         """End the flight for a reason from outside; a vehicle that is not gone is asked to shut down."""
         if self.outcome is None:
-            self._end(Outcome(reason, exit_code), now_s, vehicle_is_gone)
+            self._end(outcome, now_s, vehicle_is_gone)
 
     def step(self, now_s: float) -> None:
         """Go on as far as possible."""
@@ -120,11 +120,12 @@ class Flight:
     def _watch_vehicle(self, now_s: float) -> None:
         at = "" if self.view.time_s is None else f" at t = {self.view.time_s:.1f} s"
         if self.view.powered_off:
-            self._end(Outcome(f"the flight stack shut down{at} while {self.phase.value}", FAILED), now_s)
+            reason = f"the flight stack shut down{at} while {self.phase.value}"
+            self._end(Outcome(Code.PROCESS_ENDED, reason), now_s)
             return
         lost = self._watch.lost(self.view.silent_s(now_s), self.view.time_s, self.phase.value)
         if lost is not None:
-            self._end(Outcome(lost, FAILED), now_s)
+            self._end(Outcome(Code.VEHICLE_LOST, lost), now_s)
 
     # -- phases
 
@@ -132,7 +133,7 @@ class Flight:
         if self.view.identity is not None:
             self.phase = Phase.UPLOAD
         elif now_s >= self._connect_due_s:
-            self._end(Outcome(no_vehicle(self._connect_s), NO_ANSWER), now_s)
+            self._end(Outcome(Code.NO_VEHICLE, no_vehicle(self._connect_s), NO_ANSWER), now_s)
 
     def _upload(self, now_s: float) -> None:
         if self._accepted(
@@ -147,7 +148,7 @@ class Flight:
             self._order(calls.ARM, now_s)
             self.phase = Phase.ARM
         elif now_s >= self._connect_due_s:
-            self._end(Outcome(no_state(self._connect_s), NO_ANSWER), now_s)
+            self._end(Outcome(Code.NO_VEHICLE, no_state(self._connect_s), NO_ANSWER), now_s)
         elif self._ask_again_s is not None:
             if now_s >= self._ask_again_s:
                 self._ask_again_s = None
@@ -179,9 +180,9 @@ class Flight:
             self.phase = Phase.CONFIRM
         elif (self.flown_s or 0.0) > self._limit_s:
             late = f"the flight took longer than --limit {self._limit_s:g} s of simulated time"
-            self._end(Outcome(late, NO_ANSWER), now_s)
+            self._end(Outcome(Code.TIMEOUT, late, NO_ANSWER), now_s)
         elif held_up is not None:
-            self._end(Outcome(held_up, FAILED), now_s)
+            self._end(Outcome(Code.STALLED, held_up), now_s)
         elif self._ends_in_air and view.mission.complete and view.mode == "HOLD" and not self.returned_by_us:
             self.returned_by_us = True
             self._order(calls.RETURN, now_s)
@@ -219,7 +220,8 @@ class Flight:
         if answer.accepted:
             return True
         reason = answer.reason if answer.silent else refusal + answer.reason
-        self._end(Outcome(reason, NO_ANSWER if answer.silent else FAILED), now_s)
+        code, exit_code = (Code.VEHICLE_LOST, NO_ANSWER) if answer.silent else (Code.REFUSED, FAILED)
+        self._end(Outcome(code, reason, exit_code), now_s)
         return False
 
     def _end(self, outcome: Outcome, now_s: float, vehicle_is_gone: bool = False) -> None:

@@ -14,8 +14,10 @@ from flightstack.geodesy import GeoPoint, LocalFrame
 
 FlagArray: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
 
-_STILL_M_S = 0.1  # slower than any descent: a vehicle that is about to be found landed stands already
-_SAME_HEIGHT_M = 0.05
+_TOUCH_M = 0.05
+"""A vehicle no higher than this above where it comes to rest touches the ground: leant by 10° it stands on one leg."""
+_BOUNCE_M = 0.3
+"""A vehicle that rises less than this after it has touched the ground has not taken off again."""
 _REAL_TIME = 1  # clock of a loop timing
 
 
@@ -32,6 +34,7 @@ class Status(NamedTuple):
     time_s: float
     nav_state: int
     armed: bool
+    failsafe: bool = False
 
 
 class MissionProgress(NamedTuple):
@@ -89,6 +92,8 @@ def series(time_s: FloatArray, values: FloatArray) -> Series:
 class Flight:
     """One flight. Positions NED [m] from the origin, velocities NED [m/s], angles roll, pitch, yaw [rad]."""
 
+    start_s: float = 0.0
+    """Simulated time at the start of the log, from which all other times count."""
     duration_s: float = 0.0
     info: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -101,6 +106,9 @@ class Flight:
     attitude: Series = field(default_factory=lambda: empty_series(3))
     attitude_target: Series = field(default_factory=lambda: empty_series(3))
     rotor_speed: Series = field(default_factory=lambda: empty_series(0))
+    rotor_command: Series = field(default_factory=lambda: empty_series(0))
+    torque: Series = field(default_factory=lambda: empty_series(3))
+    """Torque that the controller asks for, body FRD [N m]."""
     statuses: tuple[Status, ...] = ()
     landed: tuple[tuple[float, bool], ...] = ()
     mission: tuple[MissionProgress, ...] = ()
@@ -122,41 +130,49 @@ class Flight:
         local = LocalFrame(self.origin).to_ned(self.home)
         return local.x, local.y
 
-    def flying(self, time_s: FloatArray) -> FlagArray:
-        """Tell for each time whether the vehicle was armed and off the ground.
+    @property
+    def disarmed_in_air(self) -> bool:
+        """Whether the flight ended with the vehicle off the ground and disarmed."""
+        return bool(self.landed and self.statuses) and not (self.landed[-1][1] or self.statuses[-1].armed)
 
-        A landing counts from the touchdown, not from its detection: in between the setpoint sinks into the
-        ground, and that is no error of tracking.
+    def flying(self, time_s: FloatArray) -> FlagArray:
+        """Tell for each time whether the vehicle was armed and in flight: from the takeoff to the touchdown.
+
+        Takeoff and landing are those of the land detector. It finds a landing some time after the touchdown, while the
+        setpoint sinks into the ground, so that the flight ends when the vehicle came down.
         """
         armed = _step(((status.time_s, status.armed) for status in self.statuses), time_s)
-        if not self.landed:
-            return armed
-        on_ground = [(self._touchdown_s(at_s) if landed else at_s, landed) for at_s, landed in self.landed]
-        return armed & ~_step(on_ground, time_s)
+        return armed & ~_step(self._grounded(), time_s)
 
     def standing(self, time_s: FloatArray) -> FlagArray:
-        """Tell for each time whether the vehicle stood after a landing: from its touchdown until it took off again.
+        """Tell for each time whether the vehicle stood after a landing: its setpoint is in the ground then."""
+        return _step(self._grounded()[1:], time_s)
 
-        Its setpoint is in the ground then, so that it stays there, and is nowhere that it shall fly to. Wind may push
-        it about meanwhile: it counts from when it was as low as at the end.
+    def _grounded(self) -> list[tuple[float, bool]]:
+        """Return when the vehicle came to the ground and left it, as ``landed``."""
+        left_s = (0.0, *(at_s for at_s, _ in self.landed))
+        return [
+            (self._touchdown_s(before_s, at_s) if landed else at_s, landed)
+            for before_s, (at_s, landed) in zip(left_s, self.landed, strict=False)
+        ]
+
+    def _touchdown_s(self, left_s: float, landed_s: float) -> float:
+        """Return when the vehicle, found to be landed at ``landed_s``, came down; it was in the air at ``left_s``.
+
+        It is the first time at the height of its rest after the last that was higher than a bounce.
         """
-        again = ((self._settled_s(at_s) if landed else at_s, landed) for at_s, landed in self.landed[1:])
-        return _step(again, time_s)
-
-    def _touchdown_s(self, landed_s: float) -> float:
-        """Return since when the vehicle, found to be landed at ``landed_s``, had been standing still."""
-        time_s, velocity = self.velocity
-        return _since(time_s, np.linalg.norm(velocity, axis=1) <= _STILL_M_S, landed_s)
-
-    def _settled_s(self, landed_s: float) -> float:
-        """Return since when the vehicle, found to be landed at ``landed_s``, had stood still or been as low as then."""
         time_s, down = self.position.time_s, self.position.values[:, 2]
-        before = int(np.searchsorted(time_s, landed_s, side="right"))
-        low = np.abs(down - down[before - 1]) <= _SAME_HEIGHT_M if before else np.zeros(0, dtype=bool)
-        return min(self._touchdown_s(landed_s), _since(time_s, low, landed_s))
+        first, end = np.searchsorted(time_s, (left_s, landed_s), side="right")
+        if first >= end:
+            return landed_s
+        height = down[end - 1] - down[first:end]
+        above = np.flatnonzero(height > _BOUNCE_M)
+        begin = above[-1] + 1 if len(above) else 0
+        touching = np.flatnonzero(height[begin:] <= _TOUCH_M)
+        return float(time_s[first + begin + touching[0]]) if len(touching) else landed_s
 
     def tracking_error(self) -> Series:
-        """Distance [m] between position and setpoint while flying, shape (n, 1); a vehicle that stands does not fly."""
+        """Distance [m] between position and setpoint while flying, shape (n, 1)."""
         time_s, position = self.position
         if not len(time_s) or not len(self.position_setpoint.time_s):
             return empty_series(1)
@@ -164,8 +180,7 @@ class Flight:
         if not np.array_equal(time_s, self.position_setpoint.time_s):
             setpoint = _interpolated(self.position_setpoint, time_s)
         error = np.linalg.norm(position - setpoint, axis=1)
-        flies = self.flying(time_s) & ~self.standing(time_s)
-        kept = flies & np.isfinite(error)  # a setpoint may leave an axis free: NaN
+        kept = self.flying(time_s) & np.isfinite(error)  # a setpoint may leave an axis free: NaN
         return series(time_s[kept], error[kept][:, None])
 
 
@@ -175,15 +190,6 @@ def _step(changes: Iterable[tuple[float, bool]], time_s: FloatArray) -> FlagArra
     times = np.array([time for time, _ in listed])
     values = np.array([False, *(value for _, value in listed)])
     return values[np.searchsorted(times, time_s, side="right")]
-
-
-def _since(time_s: FloatArray, flags: FlagArray, end_s: float) -> float:
-    """Return since when a flag given by samples had been True without a break at ``end_s``; ``end_s`` if it was not."""
-    before = int(np.searchsorted(time_s, end_s, side="right"))
-    others = np.flatnonzero(~flags[:before])
-    if not len(others) or others[-1] + 1 == before:
-        return end_s
-    return float(time_s[others[-1] + 1])
 
 
 def _interpolated(series: Series, time_s: FloatArray) -> FloatArray:

@@ -37,6 +37,7 @@ class FlyOptions:
     seed: Annotated[int, world.SEED] = 1
     wind: Annotated[str | None, world.WIND] = None
     gust: Annotated[float | None, world.GUST] = None
+    drag: Annotated[bool, world.DRAG] = False
     torque_gust: Annotated[float | None, world.TORQUE_GUST] = None
     vehicle: Annotated[str, world.VEHICLE] = "paper_quad"
     instance: int = 0
@@ -83,8 +84,8 @@ class FlyOptions:
 
 
 TO_SIMULATOR = (
-    "vehicle", "plant", "speed", "instance", "seed", "wind", "gust", "force", "torque", "torque_gust", "physics_hz",
-    "battery_start", "battery_capacity", "battery_drain", "faults", "ideal_rotors", "view",
+    "vehicle", "plant", "speed", "instance", "seed", "wind", "gust", "drag", "force", "torque", "torque_gust",
+    "physics_hz", "battery_start", "battery_capacity", "battery_drain", "faults", "ideal_rotors", "view",
 )  # fmt: skip
 TO_STACK = ("vehicle", "controller", "gains", "loops", "inner_hz", "instance", "param", "ideal_rotors")
 

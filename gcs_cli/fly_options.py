@@ -15,7 +15,7 @@ from flightstack.extras import INSTALL_MULTIBODY
 from flightstack.firmware.choice import parse_loops
 from flightstack.geodesy import GeoPoint
 from flightstack.params.gains_file import hidden_gains, open_gains
-from flightstack.params.vehicle import hidden_vehicle, load_vehicle
+from flightstack.params.vehicle import Vehicle, hidden_vehicle, load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
 from flightstack.port_numbers import INSTANCES, vehicle_api_port, vehicle_ground_port
 from flightstack.transport.udp import PortBusyError, UdpSocket
@@ -36,7 +36,7 @@ def checked_plan(options: FlyOptions) -> Plan:
     """Check all that can be before anything starts, and return the plan; raise CliError or ConfigError."""
     _check_flags(options)
     plan = load_plan(options.plan_path)
-    load_vehicle(options.vehicle)
+    flown_vehicle(options)
     open_gains(options.gains)
     for sentence in (hidden_vehicle(options.vehicle), hidden_gains(options.gains)):
         if sentence is not None:
@@ -59,6 +59,19 @@ def checked_plan(options: FlyOptions) -> Plan:
 def home_of(options: FlyOptions, plan: Plan) -> GeoPoint:
     """Return where the vehicle stands: as given, else the plan's home; raise ConfigError."""
     return plan.home or DEFAULT_HOME if options.home is None else parse_home(options.home)
+
+
+def flown_vehicle(options: FlyOptions) -> Vehicle:
+    """Return the vehicle as the simulator flies it; raise ConfigError, or CliError for wind that cannot act."""
+    vehicle = load_vehicle(options.vehicle)
+    if options.drag:
+        vehicle = vehicle.with_drag(options.plant)
+    blows = options.wind is not None and any(float(part) for part in options.wind.split(","))
+    if blows or options.gust:
+        refusal = vehicle.wind_refusal(options.plant)
+        if refusal is not None:
+            raise CliError(f"{'--gust' if options.gust else '--wind'}: {refusal}", USAGE)
+    return vehicle
 
 
 def _check_flags(options: FlyOptions) -> None:

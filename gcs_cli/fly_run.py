@@ -11,17 +11,18 @@ from types import FrameType
 from typing import Any, NamedTuple
 
 from flightstack.console import complain
+from flightstack.params.vehicle import NO_DRAG_PLANT
 from flightstack.plan import Plan
 from flightstack.port_numbers import vehicle_ground_port
 from gcs_cli.connection import Connection
 from gcs_cli.endpoint import LOOPBACK, Endpoint
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.flight import Flight
-from gcs_cli.flight_outcome import Outcome
+from gcs_cli.flight_outcome import Code, Outcome
 from gcs_cli.flight_watch import STALL_S
 from gcs_cli.fly_display import Display
 from gcs_cli.fly_flags import FlyOptions
-from gcs_cli.fly_options import check_ports, home_of, simulator_arguments, stack_arguments
+from gcs_cli.fly_options import check_ports, flown_vehicle, home_of, simulator_arguments, stack_arguments
 from gcs_cli.processes import Child, Children
 from gcs_cli.run_directory import (
     LOG_NAME,
@@ -132,12 +133,12 @@ def _run(
             return  # nobody is left who could be shut down
         now_s = connection.now_s
         if interruption.reason:
-            flight.abort(interruption.reason, FAILED, now_s)
+            flight.abort(Outcome(Code.INTERRUPTED, interruption.reason), now_s)
         casualty = _casualty(flight, children)
         if casualty is not None:
             code = casualty.exit_code if casualty.exit_code in (USAGE, NO_ANSWER) else FAILED
             gone = any(child.name == STACK for child in children.ended())
-            flight.abort(casualty.obituary, code, now_s, vehicle_is_gone=gone)
+            flight.abort(Outcome(Code.PROCESS_ENDED, casualty.obituary, code), now_s, vehicle_is_gone=gone)
         _show_notices(children, display)
         flight.step(now_s)
         display.update(flight)
@@ -160,11 +161,16 @@ def _casualty(flight: Flight, children: Children) -> Child | None:
     return children.culprit(_END_PATIENCE_S)
 
 
+def _drag_of(options: FlyOptions) -> tuple[float, float, float]:
+    return (0.0, 0.0, 0.0) if options.plant == NO_DRAG_PLANT else flown_vehicle(options).linear_drag_n_s_m
+
+
 def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:
     """Write summary and report; return the summary, and the outcome with what writing them showed."""
     from flightstack.params.errors import ConfigError  # noqa: PLC0415
     from gcs_cli.analysis import read_flight  # noqa: PLC0415
     from gcs_cli.flight_data import Flight as FlightData  # noqa: PLC0415
+    from gcs_cli.flight_outcome import with_log  # noqa: PLC0415
     from gcs_cli.report import write_report  # noqa: PLC0415
     from gcs_cli.summary import RunInfo, summarise, write_summary  # noqa: PLC0415
 
@@ -174,9 +180,12 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
     except (ConfigError, OSError) as error:
         data = FlightData()
         if outcome.completed:
-            outcome = Outcome(f"the mission was flown, but its log cannot be read: {error}", FAILED)
+            outcome = Outcome(Code.NO_LOG, f"the mission was flown, but its log cannot be read: {error}")
+    else:
+        outcome = with_log(outcome, data, plan.items)
     run = RunInfo(
-        outcome=outcome.reason,
+        outcome=outcome.code.value,
+        outcome_text=outcome.reason,
         plan=str(options.plan_path),
         wall_time_s=flown.wall_time_s,
         vehicle=options.vehicle,
@@ -187,6 +196,7 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
         seed=options.seed,
         wind=options.wind,
         gust=options.gust,
+        drag_n_s_m=_drag_of(options),
         torque_gust=options.torque_gust,
         force=options.force,
         torque=options.torque,

@@ -13,6 +13,7 @@ from gcs_cli.flight_data import Flight, LoopTiming
 from gcs_cli.report_conditions import conditions, flown
 from gcs_cli.report_plots import plots, section
 from gcs_cli.report_timing import read_loop_timing
+from gcs_cli.summary import max_overshoot_m
 
 _STYLE_SHEET = Path(__file__).with_name("report.css")
 _COMPLETED = "completed"
@@ -54,13 +55,11 @@ def render_report(flight: Flight, plan: Plan, summary: dict[str, Any], timings: 
 
 def _header(title: str, summary: dict[str, Any]) -> str:
     good = "good" if summary["outcome"] == _COMPLETED else "bad"
-    about = "".join(
-        f'<div class="about">{escape(" · ".join(line))}</div>'
-        for line in (flown(summary), conditions(summary))
-    )
+    lines = ([summary["outcome_text"]], flown(summary), conditions(summary))
+    about = "".join(f'<div class="about">{escape(" · ".join(line))}</div>' for line in lines if any(line))
     return (
         f"<header><h1>{escape(title)}</h1>"
-        f'<span class="outcome {good}">{escape(summary["outcome"])}</span>{about}</header>'
+        f'<span class="outcome {good}">{escape(summary["outcome"].replace("_", " "))}</span>{about}</header>'
     )
 
 
@@ -68,12 +67,14 @@ def _tiles(summary: dict[str, Any]) -> str:
     rows = summary["waypoints"]
     reached = f"{sum(row['reached'] for row in rows)} of {len(rows)}"
     tiles = (
-        ("simulated time", _show(summary["sim_time_s"], ".1f", " s")),
-        ("times real time", _show(summary["real_time_factor"], ".3g", "×")),
         ("items reached", reached),
-        ("rms tracking error", _show(summary["rms_tracking_error_m"], ".3f", " m")),
-        ("largest error", _show(summary["max_tracking_error_m"], ".3f", " m")),
-        ("overruns", _show(summary["overruns"])),
+        ("time in flight", _show(summary["flight_time_s"], ".1f", " s")),
+        ("tracking error, rms", _show(summary["rms_tracking_error_m"], ".3f", " m")),
+        ("tracking error, largest", _show(summary["max_tracking_error_m"], ".3f", " m")),
+        ("overshoot, largest", _show(max_overshoot_m(summary), ".3f", " m")),
+        ("attitude error, rms", _show(summary["rms_attitude_error_deg"], ".2f", "°")),
+        ("attitude error, largest", _show(summary["max_attitude_error_deg"], ".1f", "°")),
+        ("times real time", _show(summary["real_time_factor"], ".3g", "×")),
     )
     cells = "".join(f'<div class="tile"><b>{value}</b><span>{name}</span></div>' for name, value in tiles)
     return f'<div class="tiles">{cells}</div>'
@@ -87,12 +88,13 @@ def _waypoints(plan: Plan, summary: dict[str, Any]) -> str:
             yield (
                 f'<tr><td class="n">{row["seq"]}</td><td>{escape(name)}</td>{reached}'
                 f'<td class="n">{_show(row["time_s"], ".2f", " s")}</td>'
-                f'<td class="n">{_show(row["miss_distance_m"], ".3f", " m")}</td></tr>'
+                f'<td class="n">{_show(row["miss_distance_m"], ".3f", " m")}</td>'
+                f'<td class="n">{_show(row["overshoot_m"], ".3f", " m")}</td></tr>'
             )
 
     head = (
         '<tr><th class="n">item</th><th>command</th><th>reached</th><th class="n">at</th>'
-        '<th class="n">closest approach</th></tr>'
+        '<th class="n">closest approach</th><th class="n">overshoot</th></tr>'
     )
     return section("Plan", f"<table>{head}{''.join(rows())}</table>")
 
@@ -122,6 +124,9 @@ def _facts(flight: Flight, summary: dict[str, Any]) -> str:
         ("seed", _show(summary["seed"])),
         ("inner loop", _show(summary["inner_hz"], "g", " Hz")),
         ("outer loop", _show(summary["outer_hz"], "g", " Hz")),
+        ("rms torque asked for, x, y, z", _effort(summary)),
+        ("rms change of rotor commands", _show(summary["rms_rotor_command_rate_rad_s2"], ".0f", " rad/s²")),
+        ("simulated time", _show(summary["sim_time_s"], ".2f", " s")),
         ("wall time", _show(summary["wall_time_s"], ".2f", " s")),
         ("flight stack", _show(flight.info.get("ver_sw"))),
         ("home", _home(flight)),
@@ -129,6 +134,11 @@ def _facts(flight: Flight, summary: dict[str, Any]) -> str:
     cells = "".join(f"<div><dt>{name}</dt><dd>{value}</dd></div>" for name, value in facts)
     digest = f'<div class="wide"><dt>log sha-256</dt><dd>{_show(summary["log_sha256"])}</dd></div>'
     return section("Flight", f'<dl class="facts">{cells}{digest}</dl>')
+
+
+def _effort(summary: dict[str, Any]) -> str:
+    torque = summary["rms_torque_n_m"]
+    return _UNKNOWN if torque is None else f"{', '.join(f'{value:.4f}' for value in torque)} N m"
 
 
 def _home(flight: Flight) -> str:

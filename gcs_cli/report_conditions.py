@@ -29,13 +29,14 @@ def conditions(summary: Mapping[str, Any]) -> list[str]:
     parts = [
         _vector("wind", summary.get("wind_m_s"), "m/s", ("north", "east", "down")),
         _amount("gusts", summary.get("gust_m_s"), " m/s"),
+        _drag(summary),
         _amount("gusty torque", summary.get("torque_gust_n_m"), " N m"),
         _vector("force", summary.get("force_n"), "N", ("north", "east", "down")),
         _vector("torque", summary.get("torque_n_m"), "N m", ("roll", "pitch", "yaw")),
         _amount("battery from", summary.get("battery_start_percent"), " %"),
         _amount("battery of", summary.get("battery_capacity_mah"), " mAh"),
         _amount("battery drained", summary.get("battery_drain"), " times as fast"),
-        *(f"fault {fault}" for fault in summary.get("faults") or ()),
+        *_faults(summary),
     ]
     if summary.get("ideal_rotors"):
         parts.append("rotors without lag and limits")
@@ -43,6 +44,21 @@ def conditions(summary: Mapping[str, Any]) -> list[str]:
     parts += summary.get("param") or ()
     told = [part for part in parts if part] or ["no wind, no faults"]
     return [*told, *([f"seed {summary['seed']}"] if summary.get("seed") is not None else [])]
+
+
+def _drag(summary: Mapping[str, Any]) -> str:
+    """Return the drag through which the wind acted; nothing of a flight in calm air."""
+    blows = any(summary.get("wind_m_s") or ()) or summary.get("gust_m_s")
+    drag = summary.get("drag_n_s_m")
+    return f"drag {', '.join(f'{value:g}' for value in drag)} N s/m" if blows and drag else ""
+
+
+def _faults(summary: Mapping[str, Any]) -> list[str]:
+    late = summary.get("faults_not_begun") or ()
+    return [
+        f"fault {fault}" + (" (did not act: the flight ended before)" if fault in late else "")
+        for fault in summary.get("faults") or ()
+    ]
 
 
 def _named(name: str, value: object) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,16 @@ import numpy as np
 from flightstack.atomic_file import write_text_atomically
 from flightstack.contract import FloatArray
 from flightstack.geodesy import LocalFrame
-from flightstack.plan import NAV_COMMANDS, MissionItem, Plan
+from flightstack.plan import NAV_COMMANDS, Command, MissionItem, Plan
 from gcs_cli.flight_data import Flight
+from gcs_cli.flight_figures import (
+    attitude_error,
+    overshoots_m,
+    rms,
+    rms_command_rate_rad_s2,
+    rms_torque_n_m,
+)
+from gcs_cli.flight_outcome import GROUND_ENDS
 
 _DIGITS = 6
 
@@ -24,13 +33,14 @@ _DIGITS = 6
 class RunInfo:
     """What the log of the flight does not know: how it was started and how it ended.
 
-    ``outcome`` is "completed" or the reason why not. ``wall_time_s`` runs from the start of the mission to
-    the end of the flight. What is None is taken from the log where it is there.
+    ``outcome`` is a code of ``flight_outcome``. ``wall_time_s`` runs from the start of the mission to the end of the
+    flight. What is None is taken from the log where it is there.
     """
 
     outcome: str
     plan: str
     wall_time_s: float | None = None
+    outcome_text: str = ""
     vehicle: str | None = None
     controller: str | None = None
     gains: str | None = None
@@ -39,6 +49,7 @@ class RunInfo:
     seed: int | None = None
     wind: str | None = None
     gust: float | None = None
+    drag_n_s_m: tuple[float, float, float] | None = None
     torque_gust: float | None = None
     force: str | None = None
     torque: str | None = None
@@ -58,10 +69,8 @@ class RunInfo:
 def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
     """Return the content of ``summary.json``: only what JSON can hold; null for what is not known.
 
-    For a run that left no readable log, pass ``Flight()``. Tracking errors are distances [m] between position
-    and setpoint while flying; the root mean square is over samples, which are evenly spaced in time.
+    docs/summary.md describes every key. For a run that left no readable log, pass ``Flight()``.
     """
-    error_m = flight.tracking_error().values[:, 0]
     factor = flight.duration_s / run.wall_time_s if run.wall_time_s else None
     settings = {
         key: value if (value := getattr(run, key)) is not None else flight.info.get(key)
@@ -69,25 +78,49 @@ def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
     }
     return {
         "outcome": run.outcome,
+        "outcome_text": run.outcome_text,
         "plan": run.plan,
         **{key: _finite(value) for key, value in settings.items()},
-        **_conditions(run),
+        **_conditions(run, flight),
         "sim_time_s": _rounded(flight.duration_s),
+        "flight_time_s": _flight_time_s(flight),
         "wall_time_s": _rounded(run.wall_time_s),
         "real_time_factor": _rounded(factor),
         "waypoints": waypoint_rows(flight, plan),
-        "rms_tracking_error_m": _rounded(math.sqrt(np.mean(error_m**2))) if len(error_m) else None,
-        "max_tracking_error_m": _rounded(float(error_m.max())) if len(error_m) else None,
+        **_control(flight),
         "overruns": run.overruns if run.overruns is not None else flight.overruns,
         "log_sha256": file_sha256(run.log_path) if run.log_path and run.log_path.exists() else None,
     }
 
 
-def _conditions(run: RunInfo) -> dict[str, Any]:
+def _control(flight: Flight) -> dict[str, Any]:
+    """How well the setpoints were followed in flight, and what that took."""
+    error_m, angle_rad = flight.tracking_error().values[:, 0], attitude_error(flight).values[:, 0]
+    angle_deg, torque = np.degrees(angle_rad), rms_torque_n_m(flight)
+    return {
+        "rms_tracking_error_m": _rounded(rms(error_m)),
+        "max_tracking_error_m": _rounded(float(error_m.max())) if len(error_m) else None,
+        "rms_attitude_error_deg": _rounded(rms(angle_deg)),
+        "max_attitude_error_deg": _rounded(float(angle_deg.max())) if len(angle_deg) else None,
+        "rms_torque_n_m": None if torque is None else [_rounded(value) for value in torque],
+        "rms_rotor_command_rate_rad_s2": _rounded(rms_command_rate_rad_s2(flight)),
+    }
+
+
+def _flight_time_s(flight: Flight) -> float | None:
+    """Time in the air, from takeoff to touchdown; None without a log of positions."""
+    time_s = flight.position.time_s
+    if len(time_s) < 2:
+        return None
+    return _rounded(float(np.diff(time_s)[flight.flying(time_s)[:-1]].sum()))
+
+
+def _conditions(run: RunInfo, flight: Flight) -> dict[str, Any]:
     """What the simulator was asked to do to the vehicle, in the units of the flags; null where nothing was."""
     return {
         "wind_m_s": _numbers(run.wind),
         "gust_m_s": run.gust,
+        "drag_n_s_m": None if run.drag_n_s_m is None else list(run.drag_n_s_m),
         "torque_gust_n_m": run.torque_gust,
         "force_n": _numbers(run.force),
         "torque_n_m": _numbers(run.torque),
@@ -95,6 +128,7 @@ def _conditions(run: RunInfo) -> dict[str, Any]:
         "battery_capacity_mah": run.battery_capacity,
         "battery_drain": run.battery_drain,
         "faults": list(run.faults),
+        "faults_not_begun": [fault for fault in run.faults if _begin_s(fault) >= _end_s(flight)],
         "ideal_rotors": run.ideal_rotors,
         "params": run.params,
         "param": list(run.param),
@@ -103,6 +137,17 @@ def _conditions(run: RunInfo) -> dict[str, Any]:
 
 def _numbers(text: str | None) -> list[float] | None:
     return None if text is None else [float(part) for part in text.split(",")]
+
+
+def _begin_s(fault: str) -> float:
+    """Return the simulated time at which a fault begins, from its text: ``rotor:2:off@12.5-20``."""
+    begin, _, _ = fault.partition("@")[2].partition("-")
+    return float(begin) if begin else 0.0
+
+
+def _end_s(flight: Flight) -> float:
+    """Return the simulated time at the end of the log; infinite without one."""
+    return flight.start_s + flight.duration_s if flight.statuses else math.inf
 
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:
@@ -133,20 +178,40 @@ def waypoint_rows(flight: Flight, plan: Plan) -> list[dict[str, Any]]:
 
     ``time_s`` is when the item was first reached, since the start of the log. ``miss_distance_m`` is the
     smallest distance between the flown path and the item's position while it was the current one.
+    ``overshoot_m``: see ``overshoots_m``; null where it has no meaning, as for a landing.
     """
     reached: dict[int, float] = {}
     for progress in flight.mission:
         reached.setdefault(progress.reached, progress.time_s)
+    places = {
+        seq: place for seq, item in enumerate(plan.items) if (place := _place(item, flight)) is not None
+    }
+    overshoots = overshoots_m(flight, places)
     return [
         {
             "seq": seq,
             "reached": seq in reached,
             "time_s": _rounded(reached.get(seq)),
             "miss_distance_m": _miss_distance_m(flight, seq, item),
+            "overshoot_m": None if item.command in GROUND_ENDS else _rounded(overshoots.get(seq)),
         }
         for seq, item in enumerate(plan.items)
         if item.command in NAV_COMMANDS
     ]
+
+
+def max_overshoot_m(summary: Mapping[str, Any]) -> float | None:
+    """Return the largest overshoot of all items; None if none has one."""
+    return max(
+        (row["overshoot_m"] for row in summary["waypoints"] if row["overshoot_m"] is not None), default=None
+    )
+
+
+def _place(item: MissionItem, flight: Flight) -> FloatArray | None:
+    """Position of an item that is flown to; that of a return is home, at the ground."""
+    if item.command == Command.NAV_RETURN_TO_LAUNCH and flight.home_ne_m() is not None:
+        return np.array([*(flight.home_ne_m() or ()), 0.0])
+    return item_ned_m(item, flight) if item.command in NAV_COMMANDS else None
 
 
 def _miss_distance_m(flight: Flight, seq: int, item: MissionItem) -> float | None:
@@ -159,7 +224,8 @@ def _miss_distance_m(flight: Flight, seq: int, item: MissionItem) -> float | Non
     for progress, end_s in zip(flight.mission, ends, strict=False):
         if progress.current == seq:
             # the sample at the end belongs to both: the item was reached by then
-            inside = (time_s >= progress.time_s) & (time_s <= end_s) & flight.flying(time_s)
+            began = flight.flying(time_s) | flight.standing(time_s)
+            inside = (time_s >= progress.time_s) & (time_s <= end_s) & began
             smallest = min(smallest, _distance_to_path_m(position[inside], target))
     return _rounded(smallest)
 

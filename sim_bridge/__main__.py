@@ -21,6 +21,7 @@ from sim_bridge.output import complain, load_named_vehicle, print_result
 from sim_bridge.render_command import render, require
 
 if TYPE_CHECKING:
+    from flightstack.params.vehicle import Vehicle
     from sim_bridge.plant import InitialState
     from sim_bridge.server import ServerOptions
 
@@ -41,6 +42,11 @@ def _disturbance(wind: str, gust: float, force: str, torque: str, torque_gust: f
     )
 
 
+def _vehicle(name: str, plant: str, drag: bool) -> Vehicle:
+    vehicle = load_named_vehicle(name)
+    return vehicle.with_drag(plant) if drag else vehicle
+
+
 @app.callback(invoke_without_command=True)
 def run(
     context: typer.Context,
@@ -53,6 +59,7 @@ def run(
     seed: options.Seed = 1,
     wind: options.Wind = "0,0",
     gust: options.Gust = 0.0,
+    drag: options.Drag = False,
     force: options.Force = _ZERO,
     torque: options.Torque = _ZERO,
     torque_gust: options.TorqueGust = 0.0,
@@ -73,12 +80,14 @@ def run(
     arguments.plant(plant)
     arguments.in_range("--instance", instance, 0, 250)
     arguments.in_range("--seed", seed, 0, 2**63)
+    from sim_bridge.disturbance import check_wind  # noqa: PLC0415
     from sim_bridge.plant import PlantOptions  # noqa: PLC0415
     from sim_bridge.server import ServerOptions  # noqa: PLC0415
 
-    loaded = load_named_vehicle(vehicle)
+    loaded = _vehicle(vehicle, plant, drag)
     battery = arguments.battery(loaded, battery_start, battery_capacity, battery_drain)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
+    check_wind(loaded, plant, disturbance)
     served = ServerOptions(
         vehicle=loaded,
         plant=plant,
@@ -125,6 +134,7 @@ def open_loop(
     no_lag: options.NoLag = False,
     wind: options.Wind = "0,0",
     gust: options.Gust = 0.0,
+    drag: options.Drag = False,
     force: options.Force = _ZERO,
     torque: options.Torque = _ZERO,
     torque_gust: options.TorqueGust = 0.0,
@@ -144,7 +154,7 @@ def open_loop(
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
     from sim_bridge.plants import kernels_of  # noqa: PLC0415
 
-    loaded = load_named_vehicle(vehicle)
+    loaded = _vehicle(vehicle, plant, drag)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
     announce_compilation("sim-bridge", kernels_of(plant))
     state = run_open_loop(

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from flightstack.contract import Vector3
 from flightstack.params.vehicle import Vehicle
+from sim_bridge.errors import UsageProblemError
 
 GUST_TIME_S = 1.5
 """Correlation time of the gusts."""
@@ -46,12 +47,10 @@ class Disturbance(NamedTuple):
 NO_DISTURBANCE = Disturbance()
 
 
-def wind_warning(vehicle: Vehicle, plant: str, disturbance: Disturbance) -> str | None:
-    """Return a sentence when wind is asked for and cannot act, else None."""
+def check_wind(vehicle: Vehicle, plant: str, disturbance: Disturbance) -> None:
+    """Raise UsageProblemError for wind or gusts that cannot act, because the plant or the vehicle has no drag."""
     if disturbance.wind_ned_m_s == _STILL and disturbance.gust_m_s == 0.0:
-        return None
-    if plant == "paper":
-        return "the wind has no effect: the paper's model has no drag; use --plant rigid or --force"
-    if not any(vehicle.linear_drag_n_s_m):
-        return f"the wind has no effect: the vehicle {vehicle.name} has no drag; use --force for a push"
-    return None
+        return
+    refusal = vehicle.wind_refusal(plant)
+    if refusal is not None:
+        raise UsageProblemError(f"{'--wind' if disturbance.gust_m_s == 0.0 else '--gust'}: {refusal}")

@@ -12,7 +12,7 @@ from flightstack.contract import MAX_ROTORS, FloatArray, Quaternion
 from flightstack.geometry import euler_from_quaternion
 from flightstack.mavlink.hot_frames import ARMED_FLAG
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.disturbance import Disturbance, wind_warning
+from sim_bridge.disturbance import Disturbance
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.layout import CONTACT, DIVERGED
 from sim_bridge.plant import InitialState, Plant, PlantOptions
@@ -106,9 +106,9 @@ def run_open_loop(run: OpenLoop, warn: Callable[[str], None] = lambda _: None) -
         plant.set_rotor_speeds(run.rotor_speed_rad_s)
     count, step_s, rest_s = split_time(run.seconds, run.dt_s)
     plant.show()
-    for warning in (wind_warning(vehicle, run.plant, run.disturbance), start_warning(plant, run.ground)):
-        if warning:
-            warn(f"warning: {warning}")
+    warning = start_warning(plant, run.ground)
+    if warning:
+        warn(f"warning: {warning}")
     for steps, length_s in ((count, step_s), (1 if rest_s > 0.0 else 0, rest_s)):
         if steps:
             _fly(plant, command, steps, length_s, run.ground)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.compiled_plant import CompiledPlant
+from sim_bridge.disturbance import check_wind
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant import Plant, PlantOptions
 from sim_bridge.plant_names import MULTIBODY, NO_MUJOCO
@@ -19,8 +20,10 @@ def kernels_of(plant: str) -> tuple[str, ...]:
 def make_plant(vehicle: Vehicle, name: str, options: PlantOptions) -> Plant:
     """Return the plant of this name, one of ``plant_names``.
 
-    Raises UsageProblemError where MuJoCo is not installed, ConfigError for a mesh that is not a solid.
+    Raises UsageProblemError where MuJoCo is not installed or wind cannot act, ConfigError for a mesh that is not
+    a solid.
     """
+    check_wind(vehicle, name, options.disturbance)
     if name != MULTIBODY:
         return CompiledPlant(vehicle, name, options)
     try:

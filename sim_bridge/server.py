@@ -21,7 +21,6 @@ from sim_bridge.connection import (
     StopSignal,
     listen,
 )
-from sim_bridge.disturbance import wind_warning
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.faults import Fault
 from sim_bridge.live_view import LiveView
@@ -92,9 +91,6 @@ def _introduce(options: ServerOptions, port: int) -> None:
         f"{options.vehicle.name}, {options.plant} plant, {options.host}:{port}, speed {speed}, "
         f"seed {options.plant_options.seed}"
     )
-    warning = wind_warning(options.vehicle, options.plant, options.plant_options.disturbance)
-    if warning:
-        complain(f"warning: {warning}")
 
 
 def _await_client(listener: socket.socket, stop: StopSignal, timeout_s: float | None) -> socket.socket:

@@ -18,6 +18,7 @@ class Session:
         self.link = link
         self.exchanges = 0
         self.wall_s = 0.0
+        self._speed = speed
         self.pacer = None if math.isinf(speed) else Pacer(speed, stop.is_set)
         # at a given speed there is time to sleep, and the scheduler finds the processor that wakes up first
         self._roamer = Roamer() if self.pacer is None else None
@@ -89,6 +90,8 @@ class Session:
             f"{self.exchanges} exchanges, {self.link.stale} stale and {self.link.bad} bad messages, "
             f"{self.link.simulator.plant.bad_commands} bad commands"
         ]
+        if math.isinf(self._speed) and self.link.free_running:
+            lines.append("the flight stack kept real time, so that --speed max did not act: flown at speed 1")
         if self.pacer is not None and self.pacer.lateness.count:
             late = self.pacer.lateness
             lines.append(

@@ -12,6 +12,7 @@ from flightstack.contract import MAX_ROTORS, FloatArray
 from flightstack.linear_algebra import pseudo_inverse
 from flightstack.params.assembly import Part, read_parts
 from flightstack.params.battery import Battery, read_battery
+from flightstack.params.errors import ConfigError
 from flightstack.params.named_file import built_in_names, find_file, hidden_file
 from flightstack.params.toml_reader import Table, read_toml
 
@@ -28,6 +29,10 @@ GENERIC_MULTIROTOR = 43
 def system_type(rotors: int) -> int:
     """Return the MAV_TYPE that a vehicle with so many rotors announces."""
     return SYSTEM_TYPES.get(rotors, GENERIC_MULTIROTOR)
+
+
+NO_DRAG_PLANT = "paper"
+"""The plant whose model has no drag, whatever the vehicle's."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +62,8 @@ class Vehicle:
     linear_drag_n_s_m: tuple[float, float, float]
     leg_height_m: float
     rotors: tuple[Rotor, ...]
+    optional_drag_n_s_m: tuple[float, float, float] | None = None
+    """The drag that ``with_drag`` flies, of a vehicle whose model has none."""
     ideal_rotors: bool = False
     battery: Battery | None = None
     parts: tuple[Part, ...] = ()
@@ -101,6 +108,25 @@ class Vehicle:
     def hover_speeds_squared(self) -> list[float]:
         """Return Ω² [rad²/s²] of each rotor in a hover."""
         return [share * self.weight_n for share in self.allocation()[:, 0].tolist()]
+
+    def with_drag(self, plant: str) -> Vehicle:
+        """Return the vehicle with the optional drag of its file; raise ConfigError where it cannot act."""
+        if plant == NO_DRAG_PLANT:
+            raise ConfigError("--drag", "", "the paper's model has no drag; use --plant rigid or multibody")
+        if self.optional_drag_n_s_m is None:
+            needs = f"the file of the vehicle {self.name} has no optional_drag_n_s_m"
+            flies = "; its linear_drag_n_s_m acts without --drag" if any(self.linear_drag_n_s_m) else ""
+            raise ConfigError("--drag", "", needs + flies)
+        return replace(self, linear_drag_n_s_m=self.optional_drag_n_s_m)
+
+    def wind_refusal(self, plant: str) -> str | None:
+        """Return why wind cannot act on the vehicle in the plant of this name, and what to do; None if it can."""
+        if plant == NO_DRAG_PLANT:
+            return "wind cannot act: the paper's model has no drag; use --plant rigid or multibody"
+        if any(self.linear_drag_n_s_m):
+            return None
+        remedy = "add --drag" if self.optional_drag_n_s_m is not None else "set linear_drag_n_s_m in its file"
+        return f"wind cannot act: the vehicle {self.name} has no drag; {remedy}"
 
     def with_ideal_rotors(self) -> Vehicle:
         """Return the vehicle with rotors that follow at once and have no limits, as the paper assumes.
@@ -147,6 +173,7 @@ def _vehicle(top: Table) -> Vehicle:
         linear_drag_n_s_m=body.numbers("linear_drag_n_s_m", 3, 0.0, 1e3, (0.0, 0.0, 0.0)),  # type: ignore[arg-type]
         leg_height_m=body.number("leg_height_m", 0.0, 10.0, 0.1),
         rotors=_rotors(top, rotor_type, mass_kg),
+        optional_drag_n_s_m=_optional_drag(body),
         battery=read_battery(top),
         parts=read_parts(top),
         default_parts=top.flag("default_parts", True),
@@ -155,6 +182,15 @@ def _vehicle(top: Table) -> Vehicle:
         table.finish()
     _check_geometry(top, vehicle)
     return vehicle
+
+
+def _optional_drag(body: Table) -> tuple[float, float, float] | None:
+    if not body.has("optional_drag_n_s_m"):
+        return None
+    x, y, z = body.numbers("optional_drag_n_s_m", 3, 0.0, 1e3)
+    if not any((x, y, z)):
+        raise body.error("optional_drag_n_s_m", "is zero: leave it out")
+    return x, y, z
 
 
 def _rotors(top: Table, rotor_type: Table, mass_kg: float) -> tuple[Rotor, ...]:

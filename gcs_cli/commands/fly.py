@@ -72,23 +72,33 @@ def _open(report: Path) -> None:
 
 def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> None:
     """Print the figures of a flight on a few lines."""
-    rows = summary["waypoints"]
-    misses = [row["miss_distance_m"] for row in rows if row["reached"] and row["miss_distance_m"] is not None]
-    reached = f"{sum(row['reached'] for row in rows)} of {len(rows)} items reached"
-    if misses:
-        reached += f", largest miss {max(misses):.3f} m"
+    from gcs_cli.report_conditions import conditions  # noqa: PLC0415
+
     files = " ".join(sorted(path.name for path in folder.iterdir() if path.suffix != ".log"))
     lines = (
-        ("outcome", str(summary["outcome"])),
+        ("outcome", f"{summary['outcome']}: {summary['outcome_text']}"),
+        ("flown in", ", ".join(conditions(summary))),
         ("time", _time(summary)),
-        ("mission", reached),
+        ("mission", _mission(summary)),
         ("tracking", _tracking(summary)),
-        ("overruns", _shown(summary["overruns"])),
+        ("effort", _effort(summary)),
         ("files", f"{folder}/  {files}"),
     )
     for name, value in lines:
         console.print(f"[bright_black]{name:<9}[/]", end="")
         console.print(value, markup=False, soft_wrap=True)
+
+
+def _mission(summary: dict[str, Any]) -> str:
+    from gcs_cli.summary import max_overshoot_m  # noqa: PLC0415
+
+    rows = summary["waypoints"]
+    misses = [row["miss_distance_m"] for row in rows if row["reached"] and row["miss_distance_m"] is not None]
+    words = f"{sum(row['reached'] for row in rows)} of {len(rows)} items reached"
+    if misses:
+        words += f", largest miss {max(misses):.3f} m"
+    overshoot_m = max_overshoot_m(summary)
+    return words if overshoot_m is None else f"{words}, largest overshoot {overshoot_m:.3f} m"
 
 
 def _time(summary: dict[str, Any]) -> str:
@@ -102,7 +112,16 @@ def _time(summary: dict[str, Any]) -> str:
 
 def _tracking(summary: dict[str, Any]) -> str:
     rms, largest = summary["rms_tracking_error_m"], summary["max_tracking_error_m"]
-    return f"rms error {_shown(rms, '.3f')} m, largest {_shown(largest, '.3f')} m"
+    words = f"rms error {_shown(rms, '.3f')} m, largest {_shown(largest, '.3f')} m"
+    rms, largest = summary["rms_attitude_error_deg"], summary["max_attitude_error_deg"]
+    return f"{words}; attitude rms {_shown(rms, '.2f')}°, largest {_shown(largest, '.1f')}°"
+
+
+def _effort(summary: dict[str, Any]) -> str:
+    torque = summary["rms_torque_n_m"]
+    about = "—" if torque is None else " ".join(f"{value:.4f}" for value in torque)
+    rate = _shown(summary["rms_rotor_command_rate_rad_s2"], ".0f")
+    return f"rms torque {about} N m, rms change of rotor commands {rate} rad/s²"
 
 
 def _shown(value: float | None, spec: str = "") -> str:

@@ -37,23 +37,17 @@ def upload(
 ) -> None:
     """Replace the vehicle's plans by those of a file.
 
-    Mission, geofence and rally points; what the file does not hold stays as it is on the vehicle.
+    The mission, and geofence and rally points if the file has any; they go first, because the vehicle checks the
+    mission against them. If a part is refused, the vehicle gets back the plans that it held before.
     """
     from flightstack.plan import load_plan  # noqa: PLC0415
-    from gcs_cli import calls  # noqa: PLC0415
-    from gcs_cli.plan_parts import plan_parts  # noqa: PLC0415
+    from gcs_cli.plan_parts import Uploads, parts_to_send  # noqa: PLC0415
 
     plan = load_plan(file)
-    parts = [part for part in plan_parts(plan) if part.items or part.kind == 0]
-    done: list[str] = []
     with meet_vehicle(context, connect, timeout, instance) as connection:
-        for part in parts:
-            name = f"upload of the {part.name} of {file}" if len(parts) > 1 else f"upload of {file}"
-            if done:
-                name = f"{' and '.join(done)} uploaded, but {name}"
-            connection.complete(calls.upload(connection.session, part.items, part.kind), name)
-            done.append(part.name)
-    for part in parts:
+        uploads = Uploads(connection.session, plan, restores=True)
+        connection.complete(uploads, lambda: f"upload of the {uploads.name} of {file}")
+    for part in parts_to_send(plan):
         typer.echo(f"{part.name} of {len(part.items)} items uploaded")
 
 

@@ -82,8 +82,19 @@ NUDGE = Condition("nudge", "a push of 10⁻¹² N", {"force_ned_n": Vector3(1e-1
 _PAIR = [contender for contender in CONTENDERS if contender.name in (PID, BACKSTEPPING)]
 
 
+_PARTS = (
+    frozenset(contender.name for contender in CONTENDERS),
+    frozenset((*PATHS, *STEPS)),
+    frozenset(condition.name for condition in (*CONDITIONS, NUDGE)),
+    frozenset((SMALL_ANGLE, RIGID, MULTIBODY)),
+)
+
+
 def key(contender: str, trajectory: str, condition: str = PLAIN, plant: str = SMALL_ANGLE) -> str:
-    """Return the name of a case in results.json."""
+    """Return the name of a case in results.json; raise ValueError for a part that no case has."""
+    for part, known in zip((contender, trajectory, condition, plant), _PARTS, strict=True):
+        if part not in known:
+            raise ValueError(f"{part!r} is none of {', '.join(sorted(known))}")
     return f"{contender}/{trajectory}/{condition}/{plant}"
 
 

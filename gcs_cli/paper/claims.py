@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from gcs_cli.paper.cases import (
@@ -26,8 +26,8 @@ from gcs_cli.paper.claims_stability import (
     survives,
     yaw_saturated_percent,
 )
-from gcs_cli.paper.comparisons import Cases, shared_overshoots, xy_figures
-from gcs_cli.paper.verdicts import NAMES, Question, flights, less_or_more, where_of, who_ended
+from gcs_cli.paper.comparisons import Cases, shared_overshoots, steady_m
+from gcs_cli.paper.verdicts import NAMES, NotFlownError, Question, flights, less_or_more, where_of, who_ended
 
 SIMILAR_PERCENT = 10.0
 """Errors that differ by less are called similar."""
@@ -43,22 +43,24 @@ _ALL = (*_READINGS, BACKSTEPPING)
 def claims(cases: Cases, linear: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the paper's claims and ours, each with verdict, threshold and a sentence with the figures.
 
-    ``cases`` and ``linear`` are those of results.json. A claim whose flights or analysis are not there is left out.
+    ``cases`` and ``linear`` are those of results.json. A claim whose flights or analysis were not asked for in this run
+    is left out; any other figure that is missing raises KeyError.
     """
-    judges: tuple[Callable[[str], dict[str, Any]], ...] = (
-        lambda plant: _similar(cases, plant),
-        lambda plant: _lower_overshoot(cases, plant),
-        lambda plant: _limits_matter(cases, plant),
-        lambda plant: _method_or_gains(cases, plant),
-        lambda plant: _torque(cases, plant),
-        lambda plant: stays_stable(linear, plant),
-        lambda plant: survives(cases, plant),
-        lambda plant: spin_up(cases, plant),
+    both = (SMALL_ANGLE, RIGID)
+    judges: tuple[tuple[Callable[[str], dict[str, Any]], Sequence[str]], ...] = (
+        (lambda plant: _similar(cases, plant), both),
+        (lambda plant: _lower_overshoot(cases, plant), both),
+        (lambda plant: _limits_matter(cases, plant), both),
+        (lambda plant: _method_or_gains(cases, plant), both),
+        (lambda plant: _torque(cases, plant), both),
+        (lambda plant: stays_stable(linear, plant), both),
+        (lambda plant: survives(cases, plant), both),
+        (lambda _: spin_up(cases), (RIGID,)),
     )
     found = []
-    for judge in judges:
-        for plant in (SMALL_ANGLE, RIGID):
-            with contextlib.suppress(KeyError):  # of what was not flown or analysed
+    for judge, plants in judges:
+        for plant in plants:
+            with contextlib.suppress(NotFlownError):
                 found.append({"plant": plant, **judge(plant)})
     return found
 
@@ -190,7 +192,7 @@ def _torque(cases: Cases, plant: str) -> dict[str, Any]:
     found = flights(cases, pair, SMOOTH, "torque", plant)
     if (why := who_ended(pair, found)) is not None:
         return question.nothing_to_compare(why, where_of(plant))
-    pid, back = ((xy_figures(case) or {})["steady_m"] or 0.0 for case in found)
+    pid, back = (steady_m(case) for case in found)
     words = (
         f"Under the constant torque the vehicle comes to rest {1e3 * pid:.1f} mm beside its place with the PID and "
         f"{1e3 * back:.1f} mm with backstepping {where_of(plant)}."

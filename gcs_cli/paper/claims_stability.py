@@ -23,7 +23,7 @@ from gcs_cli.paper.cases import (
 )
 from gcs_cli.paper.comparisons import Cases
 from gcs_cli.paper.types import Case
-from gcs_cli.paper.verdicts import Question, how_ended, where_of
+from gcs_cli.paper.verdicts import NotFlownError, Question, flight, how_ended, where_of
 
 RARELY_PERCENT = 1.0
 """Rotors that are at their limits in less of the time are not driven there."""
@@ -57,7 +57,9 @@ class Nearness(NamedTuple):
 
 
 def stays_stable(linear: Mapping[str, Any], plant: str) -> dict[str, Any]:
-    """Judge by margins and lowest rates of the attitude loops as they fly; raise KeyError without the analysis."""
+    """Judge by margins and lowest rates of the attitude loops as they fly; raise NotFlownError without the analysis."""
+    if not linear:
+        raise NotFlownError("linear analysis")
     question = Question(
         "stable",
         "backstepping does so without coming nearer to instability",
@@ -77,14 +79,8 @@ def stays_stable(linear: Mapping[str, Any], plant: str) -> dict[str, Any]:
 
 
 def _nearness(linear: Mapping[str, Any], controller: str, axis: str, plant: str) -> Nearness:
-    of: Mapping[str, Any] = next(
-        (
-            one
-            for one in linear.get("loops", ())
-            if (one["controller"], one["gains"]) == (controller, "paper")
-        ),
-        {"axes": {}},
-    )
+    loops = {(one["controller"], one["gains"]): one for one in linear["loops"]}
+    of: Mapping[str, Any] = loops[controller, "paper"]
     wanted = _SPIN_UP if plant == RIGID and axis == "yaw" else _FLOWN
     sampled = {one["actuators"]: one for one in of["axes"][axis]["sampled"]}[wanted]
     margins, lowest_hz = sampled["margins"][str(_RATE_HZ)], sampled["lowest_stable_hz"]
@@ -129,7 +125,7 @@ def survives(cases: Cases, plant: str) -> dict[str, Any]:
                 where.append(condition.name)
                 told[who].append(f"{condition.label} ({how_ended(case)})")
     if not flown:
-        raise KeyError(plant)
+        raise NotFlownError(f"{HARD} on {plant}")
     words = (
         f"On the hard profile {where_of(plant)} the PID does not come to its end with: {_listed(told[PID])}. "
         f"Backstepping does not with: {_listed(told[BACKSTEPPING])}. The PID with its rate fed ahead does not with: "
@@ -149,10 +145,8 @@ def yaw_saturated_percent(case: Mapping[str, Any]) -> float:
     return share
 
 
-def spin_up(cases: Cases, plant: str) -> dict[str, Any]:
+def spin_up(cases: Cases) -> dict[str, Any]:
     """Judge the one torque that the rigid body has and the paper leaves out; no plant without it can tell."""
-    if plant != RIGID:
-        raise KeyError(plant)
     question = Question(
         "spin_up",
         "the torque that spins the rotors up may be left out",
@@ -160,14 +154,14 @@ def spin_up(cases: Cases, plant: str) -> dict[str, Any]:
         f"the PID's yaw loop saturates in at most {RARELY_PERCENT:g} % of the ticks with it",
     )
     without, there, other = (
-        cases[key(who, DESIRED, PLAIN, which)]
+        flight(cases, key(who, DESIRED, PLAIN, which))
         for who, which in ((PID, SMALL_ANGLE), (PID, RIGID), (BACKSTEPPING, RIGID))
     )
     shares = [yaw_saturated_percent(case) for case in (without, there, other)]
     drop_m = there["metrics"]["z"]["max_error"]
     words = (
         f"Along the desired trajectory the PID's yaw loop is at the rotors' limits in {shares[1]:.0f} % of the time "
-        f"{where_of(plant)}, which has this torque, and in {shares[0]:.0f} % without it; the height is off by up to "
+        f"{where_of(RIGID)}, which has this torque, and in {shares[0]:.0f} % without it; the height is off by up to "
         f"{100 * drop_m:.0f} cm with it. Backstepping's is there in {shares[2]:.0f} %."
     )
     return question.answer(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -42,7 +43,7 @@ def xy_figures(case: Mapping[str, Any]) -> dict[str, float | None] | None:
     """Return what the comparison takes from one case; None where it crashed or lost control."""
     if case["ended"] is not None:
         return None
-    path, x, y = case["path"], case["metrics"]["x"], case["metrics"]["y"]
+    path = case["path"]
     overshoots = list(overshoots_of(case).values())
     return {
         "rms_m": path["rms_error_m"],
@@ -52,8 +53,14 @@ def xy_figures(case: Mapping[str, Any]) -> dict[str, float | None] | None:
         "beyond_m": path["beyond_m"],
         "overshoot_percent": max(overshoots, default=None),
         "overshoot_median_percent": float(np.median(overshoots)) if overshoots else None,
-        "steady_m": (x["steady_state_error"] ** 2 + y["steady_state_error"] ** 2) ** 0.5,
+        "steady_m": steady_m(case),
     }
+
+
+def steady_m(case: Mapping[str, Any]) -> float:
+    """Return the steady-state error in XY [m]."""
+    x, y = (float(case["metrics"][axis]["steady_state_error"]) for axis in ("x", "y"))
+    return math.hypot(x, y)
 
 
 def overshoots_of(case: Mapping[str, Any]) -> dict[tuple[str, float], float]:

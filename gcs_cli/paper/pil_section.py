@@ -22,6 +22,7 @@ from flightstack.geodesy import LocalFrame
 from flightstack.plan import Command, Frame, MissionItem, Plan, save_plan
 from flightstack.transport.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.flight_outcome import Code
 from gcs_cli.fly_flags import FlyOptions
 from gcs_cli.fly_options import DEFAULT_HOME, check_ports, checked_plan
 from gcs_cli.paper.trajectory import Trajectory, load_trajectory, sample
@@ -44,8 +45,6 @@ WHY_SO = (
 )
 TRAJECTORY = "desired"
 _FIRST_INSTANCE = 90
-_INTERRUPTED = "interrupted"
-"""How the outcome of a flight begins that the user ended."""
 _LEAST_LEG_M = 0.3
 _LEAST_HEIGHT_M = 1.0
 _PARTS = ("verdict", "checks", "differences", "compared", "profile", "target", "stack")
@@ -174,7 +173,7 @@ def _fly(
         console = Console(file=io.StringIO())
         finished = run_pil(options, checked_plan(options), target, Path(workshop) / "flights", console)
         outcomes = [flight["outcome"] for flight in finished.outcome.result["flights"].values()]
-        if any(outcome.startswith(_INTERRUPTED) for outcome in outcomes):
+        if Code.INTERRUPTED in outcomes:
             raise KeyboardInterrupt  # a flight takes Ctrl-C as a wish to land; here it ends the command
         if (kept / JSON_NAME).exists():
             shutil.rmtree(kept)

@@ -93,7 +93,7 @@ def _sections(
 ) -> Iterator[str]:
     left_out, found = results["left_out"], results["cases"]
     yield summary_section(results)
-    yield claims_section(results["comparisons"].get("claims", ()))
+    yield claims_section(results["comparisons"]["claims"])
     yield pictures_section(pictures)
     yield tables_section(results["vehicle"], results["gains"])
     yield corrections_section(results["corrections"])
@@ -129,7 +129,7 @@ def _metrics(found: Mapping[str, Any], recordings: Recordings) -> str:
 
 
 def _conditions(results: Mapping[str, Any]) -> str:
-    conditions = dict(results.get("conditions", {}))
+    conditions = dict(results["conditions"])
     if any(f"/{cases.NUDGE.name}/" in key for key in results["cases"]):
         conditions[cases.NUDGE.name] = cases.NUDGE.label
     rows = "".join(
@@ -137,7 +137,7 @@ def _conditions(results: Mapping[str, Any]) -> str:
     )
     trajectories = "".join(
         f"<tr><th>{escape(name)}</th><td>{escape(of['description'])}; {of['duration_s']:g} s</td></tr>"
-        for name, of in results.get("trajectories", {}).items()
+        for name, of in results["trajectories"].items()
     )
     words = (
         "<p>Made by <code>gcs paper</code>. Loops and plants are those of the flight stack and its simulator, joined "

@@ -15,7 +15,7 @@ _PAPERS = "paper"
 def paper_claims(results: Results) -> dict[str, list[Mapping[str, Any]]]:
     """Return what the paper claims or implies (not our questions) by its name, each with its verdict on every plant."""
     named: dict[str, list[Mapping[str, Any]]] = {}
-    for claim in results["comparisons"].get("claims", ()):
+    for claim in results["comparisons"]["claims"]:
         if _PAPERS in claim["source"]:
             named.setdefault(claim["name"], []).append(claim)
     return named

@@ -112,10 +112,10 @@ def outer_table(loops: Loops) -> str:
             of = sampled(whole, FLOWN)
             if of is None:
                 continue
-            slowest, step = whole["slowest"], whole["step"] or {}
+            slowest, step = whole["slowest"], whole["step"]
             mode = cell(fixed(slowest["natural_rad_s"], 2)) + cell(fixed(slowest["damping"], 2))
-            over = cell(_with(fixed(step.get("overshoot_percent"), 1), "%"))
-            settling = cell(_with(fixed(step.get("settling_s"), 2), "s"))
+            over = cell(_with(fixed(step["overshoot_percent"] if step else None, 1), "%"))
+            settling = cell(_with(fixed(step["settling_s"] if step else None, 2), "s"))
             margins = _margin_cell(of["margins"].get(FLOWN_RATES))
             lowest = cell(_with(fixed(of["lowest_stable_outer_hz"], 2), "Hz"))
             rows.append(

@@ -101,7 +101,7 @@ def _of_endings(results: Results) -> Iterator[str]:
 
 def _by_contender(results: Results, keys: list[str]) -> dict[str, list[str]]:
     """Sort keys of cases by contender, each with the labels of its conditions."""
-    labels = results.get("conditions", {})
+    labels = results["conditions"]
     found: dict[str, list[str]] = {}
     for key in keys:
         name, _, condition, _ = key.split("/") if key.count("/") == 3 else (key, "", key, "")
@@ -149,7 +149,7 @@ def _of_linear(results: Results) -> Iterator[str]:
     yield escape(f"{words}, for inner and outer loops.")
     rates = {
         loop["controller"]: of["lowest_stable_hz"]
-        for loop in results["linear"].get("loops", ())
+        for loop in (results["linear"]["loops"] if results["linear"] else ())
         if loop["gains"] == "paper" and (of := sampled(loop["axes"]["roll"], FLOWN)) is not None
     }
     if len(rates) == 2 and None not in rates.values():

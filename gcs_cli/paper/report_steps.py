@@ -82,8 +82,8 @@ _GAINS = ("paper", "tuned")
 
 def _linear_overshoot(results: Mapping[str, Any]) -> float | None:
     """Overshoot [%] of Table II's yaw loop by the linear analysis, in continuous time."""
-    for loop in results["linear"].get("loops", ()):
-        if (loop["controller"], loop["gains"]) == ("pid", "paper") and loop["axes"]["yaw"].get("step"):
+    for loop in results["linear"]["loops"] if results["linear"] else ():
+        if (loop["controller"], loop["gains"]) == ("pid", "paper") and loop["axes"]["yaw"]["step"]:
             value: float = loop["axes"]["yaw"]["step"]["overshoot_percent"]
             return value
     return None

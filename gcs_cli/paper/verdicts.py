@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from gcs_cli.paper.cases import BACKSTEPPING, PID, POLES, RATE_FED_PID, SMALL_ANGLE, key
+from gcs_cli.paper.cases import BACKSTEPPING, PID, POLES, RATE_FED_PID, SMALL_ANGLE, all_cases, key
 from gcs_cli.paper.comparisons import Cases
 
 NAMES = {
@@ -14,6 +14,13 @@ NAMES = {
     BACKSTEPPING: "backstepping",
     POLES: "the linear PD with backstepping's poles",
 }
+
+
+_PLANNED = frozenset(case.key for case in all_cases(multibody=True))
+
+
+class NotFlownError(Exception):
+    """A verdict needs a flight or an analysis that was not asked for in this run."""
 
 
 class Question(NamedTuple):
@@ -49,8 +56,15 @@ def sentence(words: str) -> str:
 def flights(
     cases: Cases, names: Sequence[str], trajectory: str, condition: str, plant: str
 ) -> list[Mapping[str, Any]]:
-    """Return the flights of these contenders; raise KeyError if one was not flown."""
-    return [cases[key(name, trajectory, condition, plant)] for name in names]
+    """Return the flights of these contenders; raise NotFlownError, or KeyError for what is no experiment at all."""
+    return [flight(cases, key(name, trajectory, condition, plant)) for name in names]
+
+
+def flight(cases: Cases, name: str) -> Mapping[str, Any]:
+    """Return one flight; raise NotFlownError, or KeyError for what is no experiment at all."""
+    if name not in cases and name in _PLANNED:
+        raise NotFlownError(name)
+    return cases[name]
 
 
 def who_ended(names: Sequence[str], found: Sequence[Mapping[str, Any]]) -> str | None:

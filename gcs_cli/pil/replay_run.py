@@ -75,6 +75,7 @@ def _setup(flight: FlightSamples, log: Path, vehicle: str | None) -> LoopsSetup:
     info = flight.info
     try:
         name, inner_hz, outer_hz = str(info["controller"]), float(info["inner_hz"]), float(info["outer_hz"])
+        tilt_deg = flight.parameters[_TILT]
     except KeyError as error:
         raise ConfigError(log, "", f"cannot be replayed: it does not say its {error.args[0]}") from error
     controller = next((known for known in CONTROLLERS if known.name == name), None)
@@ -84,7 +85,7 @@ def _setup(flight: FlightSamples, log: Path, vehicle: str | None) -> LoopsSetup:
         _vehicle(flight, log, vehicle),
         controller,
         open_gains(DEFAULT_GAINS),  # each of which is a parameter, and the log's values take their places
-        math.radians(flight.parameters.get(_TILT, 45.0)),
+        math.radians(tilt_deg),
         inner_hz,
         outer_hz,
         max(1, round(inner_hz / outer_hz)),
@@ -99,8 +100,9 @@ def _vehicle(flight: FlightSamples, log: Path, name: str | None) -> Vehicle:
         if name is not None:
             raise
         raise CliError(f"{log}: was flown by {flown}: give its file with --vehicle", USAGE) from None
-    mass_kg, rotors = flight.info.get("mass_kg", vehicle.mass_kg), flight.info.get("rotor_count")
-    if abs(mass_kg - vehicle.mass_kg) > _MASS_TOLERANCE * vehicle.mass_kg or rotors != len(vehicle.rotors):
+    mass_kg, rotors = flight.info.get("mass_kg", math.nan), flight.info.get("rotor_count")
+    is_same_mass = abs(mass_kg - vehicle.mass_kg) <= _MASS_TOLERANCE * vehicle.mass_kg
+    if not is_same_mass or rotors != len(vehicle.rotors):
         raise CliError(f"{log}: was flown by another {flown}: give its file with --vehicle", USAGE)
     return vehicle if "rotor_max_speed_rad_s" in flight.info else vehicle.with_ideal_rotors()
 

@@ -186,7 +186,7 @@ def _flights(result: Mapping[str, Any]) -> Iterator[str]:
     )
     rows = "".join(
         f"<tr><td>{escape(stage)}</td><td>{shown(flight['loops'])}</td>"
-        f'<td class="{"good" if flight["outcome"] == "completed" else "bad"}">{shown(flight["outcome"])}</td>'
+        f'<td class="{"good" if flight["outcome"] == "completed" else "bad"}">{shown(_ending(flight))}</td>'
         f'<td class="n">{shown(flight["sim_time_s"], ".2f", " s")}</td>'
         f'<td class="n">{shown(flight["wall_time_s"], ".2f", " s")}</td>'
         f'<td class="n">{shown(flight["ticks"])}</td>'
@@ -194,3 +194,8 @@ def _flights(result: Mapping[str, Any]) -> Iterator[str]:
         for stage, flight in flights.items()
     )
     yield section("Flights", f"<table>{head}{rows}</table>")
+
+
+def _ending(flight: Mapping[str, Any]) -> str:
+    """Return the outcome of a flight, with its reason if it was not completed."""
+    return str(flight["outcome"] if flight["outcome"] == "completed" else flight["outcome_text"])

@@ -49,6 +49,8 @@ class Flown(NamedTuple):
     """None: it left no readable log."""
     facts: Mapping[str, Any]
     """What ``pil.json`` says of it besides."""
+    outcome_text: str = ""
+    """The outcome as a sentence."""
 
 
 class Outcome(NamedTuple):
@@ -94,7 +96,12 @@ def closed_loop(
     listed = [difference for pair in differences.values() for difference in pair]
     result = assembled(listed, checks, record, facts)
     result["flights"] = {
-        stage: {"outcome": flown.outcome, **_of_samples(flown.samples), **flown.facts}
+        stage: {
+            "outcome": flown.outcome,
+            "outcome_text": flown.outcome_text,
+            **_of_samples(flown.samples),
+            **flown.facts,
+        }
         for stage, flown in flights.items()
     }
     result["status_differences"] = {
@@ -137,7 +144,9 @@ def _failures(flights: Mapping[str, Flown]) -> float:
 
 
 def _reasons(flights: Mapping[str, Flown]) -> str:
-    reasons = [f"{stage}: {flown.outcome}" for stage, flown in flights.items() if flown.outcome != COMPLETED]
+    reasons = [
+        f"{stage}: {flown.outcome_text}" for stage, flown in flights.items() if flown.outcome != COMPLETED
+    ]
     blank = [
         stage for stage, flown in flights.items() if flown.outcome == COMPLETED and flown.samples is None
     ]
@@ -176,15 +185,17 @@ def target_checks(record: TargetRecord | None, ticks: int) -> Iterator[Check]:
     Safe states and overruns stand in the reports of the steps, and in the target's own counters, which also know of
     what happened between steps. Where the two differ, the larger one counts.
     """
-    name, counted = "steps flown without the target", {} if record is None else record.counted
+    name = "steps flown without the target"
     if record is None:
         yield Check(name, 0.0, float(max(1, ticks)), "", "no record of the target is there")
         return
     yield Check(name, 0.0, float(max(0, ticks - record.steps)), "", record.ending or "")
     told = "" if record.status else "FS_PIL_STATUS was asked for in vain after the last step"
     yield Check("counters that the target did not tell", 0.0, float(not record.status), "", told)
-    safe_states = max(record.bad_inputs, counted.get("safe_states", 0))
-    overruns = max(record.overruns, counted.get("loop_overruns", 0))
+    safe_states, overruns = record.bad_inputs, record.overruns
+    if record.status:
+        safe_states = max(safe_states, record.counted["safe_states"])
+        overruns = max(overruns, record.counted["loop_overruns"])
     yield Check("safe states of the target", 0.0, float(safe_states), "")
     yield Check("steps that overran their period", 0.0, float(overruns), "")
 
@@ -219,7 +230,7 @@ _ABOUT_UNIT = {
 
 
 def _stack(record: TargetRecord | None) -> dict[str, Any] | None:
-    if record is None or not record.status.get("stack_size"):
+    if record is None or not record.status or not record.status["stack_size"]:
         return None
     return {"size": record.status["stack_size"], "high_water": record.status["stack_high_water"]}
 
@@ -254,7 +265,7 @@ def target_tiles(record: TargetRecord | None) -> list[dict[str, str]]:
     whole = next((profile for profile in profiles_of(record) if profile.stage == "whole"), None)
     if whole is not None:
         tiles.append({"name": f"most {record.unit} of a step", "value": f"{whole.largest:.0f}"})
-    return [*tiles, {"name": "frames sent again", "value": f"{record.link.get('resent', 0)}"}]
+    return [*tiles, {"name": "frames sent again", "value": f"{record.link['resent']}"}]
 
 
 def largest_difference(differences: Sequence[Difference]) -> str:

@@ -125,13 +125,13 @@ def _fly(
     problem = None
     if not outcome.completed:
         problem = CliError(f"{stage}: {outcome.reason} (see {folder / place})", outcome.exit_code)
-    return Flown(outcome.reason, samples, {"directory": place, **facts}), problem
+    return Flown(outcome.code.value, samples, {"directory": place, **facts}, outcome.reason), problem
 
 
 def _words(flown: Flown) -> str:
     simulated_s, wall_s = flown.facts["sim_time_s"], flown.facts["wall_time_s"]
     if flown.outcome != COMPLETED or wall_s is None:
-        return flown.outcome
+        return f"{flown.outcome}: {flown.outcome_text}"
     return f"{flown.outcome}: {simulated_s:.1f} s simulated in {wall_s:.1f} s"
 
 
@@ -159,6 +159,7 @@ def _conditions(options: FlyOptions, target: str) -> dict[str, Any]:
         "seed": options.seed,
         "wind": options.wind,
         "gusts": options.gust,
+        "optional drag": "yes" if options.drag else None,
         "torque gusts": options.torque_gust,
         "force": options.force,
         "torque": options.torque,

@@ -98,7 +98,7 @@ class Recorder:
 
 def flown_steps(plan: str = "hop.plan", **world: Any) -> list[bytes]:
     """Fly a mission in wind with gusts and return the steps of its loops."""
-    flight = World(wind=(4.0, 2.0, 0.0), gust=2.0, **world)
+    flight = World(wind=(4.0, 2.0, 0.0), gust=2.0, drag=True, **world)
     recorder = Recorder(flight.stack.autopilot._backend)
     flight.stack.autopilot._backend = recorder
     flight.upload(plan)

@@ -9,7 +9,7 @@ from tests.support.world import World
 
 def flight(loops: str) -> np.ndarray:
     """Fly in gusts and return the plant's state of every tenth tick, shape (n, 13)."""
-    world = World(loops=loops, wind=(4.0, 2.0, 0.0), gust=2.0)
+    world = World(loops=loops, wind=(4.0, 2.0, 0.0), gust=2.0, drag=True)
     world.upload("hop.plan")
     world.start_mission()
     states = []

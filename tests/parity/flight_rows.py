@@ -14,7 +14,8 @@ from tests.support.world import World, item
 
 def flight_rows(vehicle: str, controller: str, ticks: int) -> np.ndarray:
     """Row of the inner loop, setpoint, attitude target and state after each tick, shape (ticks, 77)."""
-    world = World(vehicle=vehicle, controller=controller, wind=(1.0, -2.0, 0.0), gust=0.5)
+    drag = vehicle == "paper_quad"
+    world = World(vehicle=vehicle, controller=controller, wind=(1.0, -2.0, 0.0), gust=0.5, drag=drag)
     world.upload([item(115, p1=30.0), item(22, z=1.0), item(16, north=3.0, east=-2.0, z=1.5), item(20)])
     world.start_mission()
     now = world.stack.autopilot.now

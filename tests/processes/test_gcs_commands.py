@@ -11,6 +11,7 @@ import select
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,9 @@ from gcs_cli import calls
 from gcs_cli.__main__ import main
 from gcs_cli.connection import Connection
 from tests.support.fake_vehicle import ARM, FakeVehicle, serve
+from tests.support.fences import circle
 from tests.support.gcs import Ended, gcs
+from tests.support.vehicle_processes import vehicle
 
 LONG_S = 30  # a bound for a machine that is busy; nothing is expected to take a second
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -101,10 +104,11 @@ def test_a_plan_goes_up_and_comes_down_with_its_geofence_and_rally_points(tmp_pa
     vehicle, copy = FakeVehicle(), tmp_path / "copy.plan"
     result = told(vehicle, "mission", "upload", MISSIONS / "fenced_square.plan")
     assert result.stdout.splitlines() == [
-        "mission of 6 items uploaded",
         "geofence of 5 items uploaded",
         "list of rally points of 1 items uploaded",
+        "mission of 6 items uploaded",
     ]
+    assert vehicle.uploaded == [1, 2, 0]
     assert [len(vehicle.plans[kind]) for kind in (0, 1, 2)] == [6, 5, 1]
     assert told(vehicle, "mission", "download", copy).returncode == 0
     before, after = load_plan(MISSIONS / "fenced_square.plan"), load_plan(copy)
@@ -115,12 +119,54 @@ def test_a_plan_goes_up_and_comes_down_with_its_geofence_and_rally_points(tmp_pa
     assert not any(vehicle.plans.values())
 
 
-def test_a_refused_geofence_is_told_from_the_mission_that_went_before() -> None:
-    vehicle = FakeVehicle(refused_type=1)
-    result = told(vehicle, "mission", "upload", MISSIONS / "fenced_square.plan")
-    assert result.returncode == 1
-    assert "mission uploaded, but upload of the geofence of" in result.stderr
-    assert [len(vehicle.plans[kind]) for kind in (0, 1, 2)] == [6, 0, 0]
+def test_a_plan_replaces_another_whole_or_not_at_all(tmp_path: Path) -> None:
+    """On a real vehicle: each fence refuses the other's mission, and a plan that is refused leaves the one before."""
+    from flightstack.plan import load_plan, save_plan  # noqa: PLC0415
+
+    fenced, home = load_plan(MISSIONS / "fenced_square.plan"), load_plan(MISSIONS / "hop.plan")
+    small = replace(home, fence=(circle((0.0, 0.0), 3.0),))
+    refused = replace(fenced, fence=small.fence, rally=())
+    for name, plan in (("small", small), ("refused", refused)):
+        save_plan(tmp_path / f"{name}.plan", plan)
+    with vehicle(tmp_path) as stack:
+        for plan in (
+            MISSIONS / "fenced_square.plan",
+            tmp_path / "small.plan",
+            MISSIONS / "fenced_square.plan",
+        ):
+            assert gcs("--connect", stack.link, "mission", "upload", plan).returncode == 0
+        result = gcs("--connect", stack.link, "mission", "upload", tmp_path / "refused.plan")
+        assert result.returncode == 1
+        assert "refused.plan refused: item " in result.stderr
+        assert "geofence; the vehicle holds its former plans" in result.stderr
+        assert gcs("--connect", stack.link, "mission", "download", tmp_path / "held.plan").returncode == 0
+    held = load_plan(tmp_path / "held.plan")
+    assert (held.items, held.fence, held.rally) == (fenced.items, fenced.fence, fenced.rally)
+
+
+def contents(vehicle: FakeVehicle) -> dict[int, list[tuple[float, ...]]]:
+    return {
+        kind: [(item.command, item.param1, item.x, item.y, item.z) for item in plan]
+        for kind, plan in vehicle.plans.items()
+    }
+
+
+@pytest.mark.parametrize(("refused", "name"), [(0, "mission"), (1, "geofence"), (2, "list of rally points")])
+def test_a_refused_part_leaves_the_plans_of_before(tmp_path: Path, refused: int, name: str) -> None:
+    from flightstack.plan import load_plan, save_plan  # noqa: PLC0415
+
+    plan, changed = load_plan(MISSIONS / "fenced_square.plan"), tmp_path / "changed.plan"
+    save_plan(changed, replace(plan, items=plan.items[:4], fence=plan.fence[:4], rally=plan.rally * 2))
+    vehicle = FakeVehicle()
+    assert told(vehicle, "mission", "upload", MISSIONS / "fenced_square.plan").returncode == 0
+    assert told(vehicle, "mission", "clear", "--type", "rally").returncode == 0
+    before = contents(vehicle)
+    vehicle.refused_type = refused
+    result = told(vehicle, "mission", "upload", changed)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert f"gcs: upload of the {name} of {changed} refused: " in result.stderr
+    assert result.stderr.endswith("; the vehicle holds its former plans\n")
+    assert contents(vehicle) == before
 
 
 def test_a_vehicle_without_geofence_is_downloaded_from() -> None:

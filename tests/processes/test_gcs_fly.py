@@ -220,7 +220,8 @@ def test_a_child_that_ends_is_named_and_ends_the_flight(
     assert process.returncode == 1
     assert errors.startswith(f"gcs: {said}")
     assert errors.count("\n") == 1
-    assert said in str(summary_of(out)["outcome"])
+    assert summary_of(out)["outcome"] == "process_ended"
+    assert said in str(summary_of(out)["outcome_text"])
     assert (out / "report.html").exists()
 
 
@@ -232,7 +233,7 @@ def test_an_interrupted_flight_is_ended_in_order(tmp_path: Path, number: signal.
         _, errors = process.communicate(timeout=LONG_S)
     assert process.returncode == 1
     assert errors.startswith("gcs: interrupted")
-    assert str(summary_of(out)["outcome"]).startswith("interrupted")
+    assert summary_of(out)["outcome"] == "interrupted"
     assert (out / "flight.ulg").stat().st_size
     assert (out / "report.html").exists()
 
@@ -262,7 +263,8 @@ def test_no_vehicle_in_time(tmp_path: Path) -> None:
     result = run(tmp_path / "run", "--timeout", "0.1")
     assert result.returncode == 3
     assert "within 0.1 s" in result.stderr
-    assert "within 0.1 s" in str(summary_of(tmp_path / "run")["outcome"])
+    assert summary_of(tmp_path / "run")["outcome"] == "no_vehicle"
+    assert "within 0.1 s" in str(summary_of(tmp_path / "run")["outcome_text"])
     assert "within 0.1 s" in (tmp_path / "run" / "report.html").read_text()  # also without a log
 
 

@@ -307,10 +307,23 @@ def test_dropping_states_in_lockstep_ends_with_a_sentence() -> None:
     assert err.count("\n") == 1
 
 
-def test_wind_without_effect_is_said() -> None:
-    _, _, err = SimBridge("--wind", "5,0", "--timeout", "0.05").end()
-    warning, reason = err.splitlines()
-    assert warning.startswith(
-        "sim-bridge: warning: the wind has no effect: the vehicle paper_quad has no drag"
-    )
-    assert "waited" in reason
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--wind", "5,0"], "--wind: wind cannot act: the vehicle paper_quad has no drag; add --drag"),
+        (["--gust", "1", "--vehicle", "x_quad", "--plant", "paper"], "--gust: wind cannot act: the paper's model"),
+        (["--drag", "--vehicle", "x_quad"], "--drag: the file of the vehicle x_quad has no optional_drag_n_s_m"),
+        (["--drag", "--plant", "paper"], "--drag: the paper's model has no drag"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("command", [[], ["open-loop", "--rotors", "1,1,1,1", "--seconds", "1"]])
+def test_wind_that_cannot_act_is_a_usage_error(
+    capsys: pytest.CaptureFixture[str], command: list[str], given: list[str], said: str
+) -> None:
+    from sim_bridge.__main__ import main  # noqa: PLC0415
+
+    assert main([*command, *given]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"sim-bridge: {said}")
+    assert err.count("\n") == 1

@@ -300,7 +300,7 @@ def test_a_whole_flight_by_sticks() -> None:
 
 
 def test_position_mode_holds_its_place_in_wind() -> None:
-    world = World(wind=(4.0, 2.0, 0.0))
+    world = World(wind=(4.0, 2.0, 0.0), drag=True)
     world.arm()
     world.takeoff(5.0)
     world.until(lambda: world.mode is Mode.HOLD)

@@ -52,7 +52,9 @@ def test_a_speed_that_the_mission_has_set_stays() -> None:
 @pytest.mark.parametrize(("controller", "gain"), [("pid", "PID_ROLL_P"), ("backstepping", "BS_ROLL_C1")])
 def test_a_gain_acts_on_the_next_tick(controller: str, gain: str) -> None:
     """Two flights that are equal up to the change: the next row's torque is the new gain's."""
-    changed, same = (cruising(controller=controller, wind=(0.0, 3.0, 0.0), gust=1.0) for _ in range(2))
+    changed, same = (
+        cruising(controller=controller, wind=(0.0, 3.0, 0.0), gust=1.0, drag=True) for _ in range(2)
+    )
     assert changed.stack.autopilot.now.row.tolist() == same.stack.autopilot.now.row.tolist()
     params = changed.stack.params
     params.set(gain, 2.0 * params.value(gain))

@@ -51,6 +51,7 @@ def linear_part() -> dict[str, Any]:
         "natural_rad_s": 10.0,
         "damping": 0.8,
         "poles": [[-8.0, -6.0], [-8.0, 6.0]],
+        "step": {"overshoot_percent": 1.5, "peak_s": 0.3, "rise_s": 0.1, "settling_s": 0.4},
         "largest_lag_s": 0.0219,
         "sampled": [
             {"actuators": "motor lag", "margins": rates, "lowest_stable_hz": 123.4},

@@ -70,6 +70,7 @@ class World:
         plant: str = "rigid",
         wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
         gust: float = 0.0,
+        drag: bool = False,
         force: tuple[float, float, float] = (0.0, 0.0, 0.0),
         torque: tuple[float, float, float] = (0.0, 0.0, 0.0),
         torque_gust: float = 0.0,
@@ -82,17 +83,16 @@ class World:
         self.config = StackConfig(params=tuple(params), **config)  # type: ignore[arg-type]
         self.stack: Stack = build(self.config, self._open_log, flight_logs)
         disturbance = Disturbance(wind, gust, force, torque, torque_gust)
-        self.simulator = Simulator(
-            self.stack.vehicle, plant, PlantOptions(disturbance=disturbance, seed=seed)
-        )
+        vehicle = self.stack.vehicle.with_drag(plant) if drag else self.stack.vehicle
+        self.simulator = Simulator(vehicle, plant, PlantOptions(disturbance=disturbance, seed=seed))
         self.simulator.set_interval_us(self.stack.rates.interval_us)
         self._actuators = ActuatorsFrame()
         self._simulator_codec = Link(1, SIMULATOR_COMPONENT)
         self._held_s = 0.0
         self._link = Link(*GCS)
-        vehicle = Address(self.config.system_id, 1)
-        self._missions = MissionClient(vehicle, GCS)
-        self._commands = CommandClient(vehicle, GCS)
+        autopilot = Address(self.config.system_id, 1)
+        self._missions = MissionClient(autopilot, GCS)
+        self._commands = CommandClient(autopilot, GCS)
         self._heartbeat_due_s = -math.inf
         self.received: dict[str, Message] = {}
         self.counts: dict[str, int] = {}

@@ -24,11 +24,13 @@ from gcs_cli.__main__ import main
 from gcs_cli.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
 from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.flight import Phase
+from gcs_cli.flight_outcome import Code, Outcome
 from gcs_cli.fly_display import LineDisplay, make_display, progress
 from gcs_cli.fly_flags import NOT_PASSED, TO_SIMULATOR, TO_STACK, FlyOptions, flag_of
 from gcs_cli.fly_options import (
     check_ports,
     checked_plan,
+    flown_vehicle,
     home_of,
     simulator_arguments,
     stack_arguments,
@@ -95,6 +97,12 @@ def test_bad_connection_strings_are_usage_errors(text: str) -> None:
         ({"battery_start": 101.0}, "--battery-start 101.0: expected a number"),
         ({"battery_capacity": 0.0}, "--battery-capacity 0.0: expected a number"),
         ({"battery_drain": math.nan}, "--battery-drain nan: expected a number"),
+        ({"wind": "8,0"}, "--wind: wind cannot act: the vehicle paper_quad has no drag; add --drag"),
+        ({"gust": 1.0}, "--gust: wind cannot act: the vehicle paper_quad has no drag; add --drag"),
+        (
+            {"wind": "8,0", "vehicle": "x_quad", "plant": "paper"},
+            "--wind: wind cannot act: the paper's model",
+        ),
         ({"instance": 250}, "--instance 250: expected a number from 0 to 249"),
         ({"limit_s": float("nan")}, "--limit nan"),
         ({"timeout_s": 0.0}, "--timeout 0.0"),
@@ -112,6 +120,8 @@ def test_bad_flags_are_usage_errors(flags: dict[str, object], said: str) -> None
     [
         ({"vehicle": "hexa"}, "hexa: is neither"),
         ({"gains": "loud"}, "loud: is neither"),
+        ({"drag": True, "vehicle": "x_quad"}, "--drag: the file of the vehicle x_quad has no optional_drag"),
+        ({"drag": True, "plant": "paper"}, "--drag: the paper's model has no drag"),
         ({"inner_hz": 1.0}, "--inner-hz"),
         ({"outer_hz": 77.0}, "--outer-hz: 77: does not divide"),
     ],
@@ -254,6 +264,14 @@ def test_a_parameter_file_is_passed_on_and_must_be_there(tmp_path: Path) -> None
     )
 
 
+def test_wind_acts_on_the_papers_vehicle_with_drag() -> None:
+    windy = FlyOptions(HOP, wind="8,0", drag=True)
+    checked_plan(windy)
+    checked_plan(FlyOptions(HOP, wind="0,0", gust=0.0))
+    assert "--drag" in simulator_arguments(windy, GeoPoint(47.1, -8.2, 3.5))
+    assert flown_vehicle(windy).linear_drag_n_s_m == (0.153, 0.153, 0.153)
+
+
 def test_the_simulator_is_told_about_battery_and_faults() -> None:
     faults = ("rotor:2:off@12.5", "battery:level=0.1@20")
     options = FlyOptions(HOP, battery_start=40.0, battery_drain=3.5, faults=faults)
@@ -379,7 +397,7 @@ def test_what_the_vehicle_says_of_an_early_end_is_not_shown() -> None:
     story = Story(FakeVehicle(refusals={SHUT_DOWN: "Command refused: in the air"})).run(until=Phase.FLY)
     console = Console(file=io.StringIO(), force_terminal=False)
     display = LineDisplay(console)
-    story.flight.abort("interrupted", USAGE, story.now_s)
+    story.flight.abort(Outcome(Code.INTERRUPTED, "interrupted", USAGE), story.now_s)
     display.update(story.flight)
     story.run(most_s=10.0)
     display.update(story.flight)

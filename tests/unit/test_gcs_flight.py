@@ -9,6 +9,7 @@ import pytest
 from flightstack.plan import RALLY_POINT, Command, FenceCommand, Frame, MissionItem, MissionType, Plan
 from gcs_cli.errors import DONE, FAILED, NO_ANSWER
 from gcs_cli.flight import Flight, Phase
+from gcs_cli.flight_outcome import Code, Outcome
 from gcs_cli.flight_watch import STALL_S
 from gcs_cli.fly_display import phase_words
 from gcs_cli.session import Session
@@ -61,6 +62,11 @@ class Story:
         return self.flight.outcome.reason
 
     @property
+    def outcome(self) -> Code:
+        assert self.flight.outcome is not None
+        return self.flight.outcome.code
+
+    @property
     def code(self) -> int:
         assert self.flight.outcome is not None
         return self.flight.outcome.exit_code
@@ -72,7 +78,7 @@ class Story:
 
 def test_a_mission_is_flown_to_its_end() -> None:
     story = Story(FakeVehicle()).run()
-    assert (story.reason, story.code) == ("completed", DONE)
+    assert (story.outcome, story.code) == (Code.COMPLETED, DONE)
     assert [item.command for item in story.vehicle.items] == [22, 16, 21]
     assert story.orders == [ARM, START, SHUT_DOWN]
     assert story.flight.shut_down_accepted
@@ -86,7 +92,7 @@ def test_geofence_and_rally_points_go_before_the_mission_that_is_checked_against
     story = Story(FakeVehicle(), fence=(CIRCLE,), rally=(RALLY, RALLY)).run(until=Phase.UPLOAD)
     assert story.flight.upload_progress == (0, 6)
     story.run()
-    assert story.reason == "completed"
+    assert story.outcome is Code.COMPLETED
     plans = story.vehicle.plans
     assert [item.command for item in plans[MissionType.FENCE]] == [CIRCLE.command]
     assert [item.command for item in plans[MissionType.RALLY]] == [RALLY_POINT] * 2
@@ -117,6 +123,7 @@ def test_no_vehicle() -> None:
     )
     assert "see flightstack.log" in story.reason
     assert story.code == NO_ANSWER
+    assert story.outcome is Code.NO_VEHICLE
     assert not story.orders
 
 
@@ -145,6 +152,7 @@ def test_refused_mission_without_a_word_tells_the_result() -> None:
 def test_refused_command_tells_the_vehicles_reason(command: int, text: str) -> None:
     story = Story(FakeVehicle(refusals={command: "Command refused: the battery is low"})).run()
     assert (story.reason, story.code) == (text + "the battery is low", FAILED)
+    assert story.outcome is Code.REFUSED
     assert story.orders[-1] == SHUT_DOWN
 
 
@@ -183,24 +191,26 @@ def test_a_vehicle_that_never_gets_ready() -> None:
 )
 def test_no_single_message_is_needed_to_see_the_end(mute: set[str]) -> None:
     story = Story(FakeVehicle(mute=mute)).run()
-    assert story.reason == "completed"
+    assert story.outcome is Code.COMPLETED
 
 
 def test_landing_at_the_last_item_counts_when_only_the_item_is_known() -> None:
     vehicle = FakeVehicle(stop_at_item=2, mute={"MISSION_ITEM_REACHED"})
-    assert Story(vehicle).run().reason == "completed"
+    assert Story(vehicle).run().outcome is Code.COMPLETED
 
 
 def test_disarming_on_the_way_is_a_failure_with_the_vehicles_last_warning() -> None:
     story = Story(FakeVehicle(stop_at_item=1)).run()
     assert story.reason == "the vehicle disarmed at item 1 of 3, before the mission was done: Rotor 3 is gone"
     assert story.code == FAILED
+    assert story.outcome is Code.INCOMPLETE
 
 
 def test_a_lost_vehicle_is_noticed_within_six_seconds() -> None:
     story = Story(FakeVehicle(stop_at_item=1, at_stop="silence")).run(most_s=10.0)
     assert "the vehicle was lost at t = " in story.reason
     assert story.code == FAILED
+    assert story.outcome is Code.VEHICLE_LOST
     assert story.flight.view.silent_s(story.now_s) == pytest.approx(5.0, abs=2.1 * STEP_S)
     assert not story.flight.shut_down_accepted
 
@@ -209,6 +219,7 @@ def test_a_vehicle_that_shuts_down_in_flight() -> None:
     story = Story(FakeVehicle(stop_at_item=1, at_stop="power off")).run()
     assert "the flight stack shut down" in story.reason
     assert story.code == FAILED
+    assert story.outcome is Code.PROCESS_ENDED
 
 
 def test_simulated_time_that_stands_still_ends_the_flight() -> None:
@@ -218,6 +229,7 @@ def test_simulated_time_that_stands_still_ends_the_flight() -> None:
     began_s = story.now_s
     story.run(most_s=STALL_S + 5.0)
     assert story.code == FAILED
+    assert story.outcome is Code.STALLED
     assert story.reason == (
         "simulated time stood still for 10 s at t = 2.0 s: sim-bridge does not answer: see sim-bridge.log"
     )
@@ -255,6 +267,7 @@ def test_the_limit_counts_simulated_time() -> None:
     story = Story(FakeVehicle(stop_at_item=1, at_stop="hover"), limit_s=120.0).run()
     assert story.reason == "the flight took longer than --limit 120 s of simulated time"
     assert story.code == NO_ANSWER
+    assert story.outcome is Code.TIMEOUT
     assert story.now_s - 100.0 < 10.0  # wall time: 5 s of simulated time pass in each step of 0.05 s
 
 
@@ -262,7 +275,7 @@ def test_a_plan_that_ends_in_the_air_is_brought_home() -> None:
     story = Story(FakeVehicle(ends_in_air=True), items=(TAKEOFF, WAYPOINT)).run()
     assert story.orders == [ARM, START, RETURN, SHUT_DOWN]
     assert story.flight.returned_by_us
-    assert story.reason == "completed"
+    assert story.outcome is Code.COMPLETED
 
 
 def test_a_refused_return_ends_the_flight() -> None:
@@ -274,18 +287,19 @@ def test_a_refused_return_ends_the_flight() -> None:
 @pytest.mark.parametrize("phase", [Phase.UPLOAD, Phase.ARM, Phase.FLY])
 def test_an_interruption_shuts_the_vehicle_down(phase: Phase) -> None:
     story = Story(FakeVehicle(stop_at_item=1, at_stop="hover")).run(until=phase)
-    story.flight.abort("interrupted", FAILED, story.now_s)
+    story.flight.abort(Outcome(Code.INTERRUPTED, "interrupted"), story.now_s)
     story.run(most_s=4.0)
     assert (story.reason, story.orders[-1]) == ("interrupted", SHUT_DOWN)
 
 
 def test_a_vehicle_that_is_gone_is_not_waited_for() -> None:
     story = Story(FakeVehicle()).run(until=Phase.FLY)
-    story.flight.abort("flightstack ended with code 1", FAILED, story.now_s, vehicle_is_gone=True)
+    gone = Outcome(Code.PROCESS_ENDED, "flightstack ended with code 1")
+    story.flight.abort(gone, story.now_s, vehicle_is_gone=True)
     assert story.flight.over
 
 
 def test_a_vehicle_that_ignores_the_shut_down_does_not_hold_us() -> None:
     story = Story(FakeVehicle(deaf_to={SHUT_DOWN})).run(most_s=30.0)
-    assert story.reason == "completed"
+    assert story.outcome is Code.COMPLETED
     assert not story.flight.shut_down_accepted

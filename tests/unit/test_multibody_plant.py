@@ -75,7 +75,8 @@ class Conditions:
 
     def __init__(self, vehicle: str, seed: int) -> None:
         random = np.random.default_rng(seed)
-        self.vehicle = load_vehicle(vehicle)
+        loaded = load_vehicle(vehicle)
+        self.vehicle = loaded.with_drag("rigid") if vehicle == "paper_quad" else loaded
         place, velocity, euler, rates = random.normal(size=(4, 3)) * [[5.0], [3.0], [0.3], [2.0]]
         self.initial = InitialState(Vector3(*place), Vector3(*velocity), Vector3(*euler), Vector3(*rates))
         speed = hover(self.vehicle)

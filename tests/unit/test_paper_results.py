@@ -16,7 +16,8 @@ from rich.console import Console
 from flightstack.params.gains_file import BUILT_IN
 from gcs_cli.__main__ import main
 from gcs_cli.errors import CliError
-from gcs_cli.paper import comparisons, linear, pil_section, plants, run
+from gcs_cli.paper import claims as claims_module
+from gcs_cli.paper import claims_stability, comparisons, linear, pil_section, plants, run
 from gcs_cli.paper.cases import (
     BACKSTEPPING,
     CONDITIONS,
@@ -43,6 +44,7 @@ from gcs_cli.paper.results import results_of, text_of
 from gcs_cli.paper.run import HTML_NAME, JSON_NAME, PaperOptions
 from gcs_cli.paper.tables import table_1, table_2, table_3
 from gcs_cli.paper.trajectory import trajectory_names
+from gcs_cli.paper.verdicts import NotFlownError, flight
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 FEW = [
@@ -289,6 +291,44 @@ def test_a_yaw_loop_that_saturates_is_told() -> None:
     (claim,) = claims(flights, {})
     assert not claim["holds"]
     assert "80 % of the time on the rigid-body plant" in claim["words"]
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "value"),
+    [
+        (claims_module, "SMOOTH", "smoth"),
+        (claims_module, "IDEAL", "idel"),
+        (claims_module, "PID", "pdi"),
+        (claims_stability, "DESIRED", "smooth_"),
+        (claims_stability, "_FLOWN", "motor lagg"),
+    ],
+)
+def test_a_verdict_is_never_dropped_by_a_typo(
+    monkeypatch: pytest.MonkeyPatch, module: Any, name: str, value: str
+) -> None:
+    cases = {case.key: case_entry(20.0) for case in all_cases(multibody=False)}
+    assert len(claims(cases, linear_with())) == 2 * 7 + 1
+    monkeypatch.setattr(module, name, value)
+    with pytest.raises((KeyError, ValueError)):
+        claims(cases, linear_with())
+
+
+@pytest.mark.parametrize("path", [("path", "rms_error_m"), ("effort", "saturated_percent"), ("metrics", "x")])
+def test_a_figure_that_a_flight_lacks_is_an_error(path: tuple[str, str]) -> None:
+    cases = {case.key: case_entry(20.0) for case in all_cases(multibody=False)}
+    for case in cases.values():
+        del case[path[0]][path[1]]
+    with pytest.raises(KeyError, match=path[1]):
+        claims(cases, linear_with())
+
+
+def test_a_condition_that_a_plant_does_not_fly_is_no_missing_flight() -> None:
+    with pytest.raises(KeyError):
+        flight({}, key(PID, "smooth", "drive", SMALL_ANGLE))
+    with pytest.raises(NotFlownError):
+        flight({}, key(PID, "smooth", "drive", RIGID))
+    with pytest.raises(ValueError, match="'driv' is none of"):
+        key(PID, "smooth", "driv")
 
 
 def test_a_table_without_flights_is_empty() -> None:

@@ -67,7 +67,12 @@ def three(
     }
     facts = {"directory": "x", "sim_time_s": 1.0, "wall_time_s": 0.5, "log_sha256": "0"}
     flown = {
-        stage: Flown(outcomes.get(stage, COMPLETED), samples, {**facts, "directory": stage.lower()})
+        stage: Flown(
+            "process_ended" if stage in outcomes else COMPLETED,
+            samples,
+            {**facts, "directory": stage.lower()},
+            outcomes.get(stage, ""),
+        )
         for stage, samples in flights.items()
     }
     return closed_loop(flown, record() if of is None else of, same_bits, FACTS)

@@ -24,8 +24,8 @@ from flightstack.mavlink.hot_frames import (
 )
 from flightstack.params.vehicle import load_vehicle
 from sim_bridge.compiled_plant import CompiledPlant
-from sim_bridge.disturbance import Disturbance, wind_warning
-from sim_bridge.errors import PlantDivergedError
+from sim_bridge.disturbance import Disturbance
+from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.plant import InitialState, PlantOptions
 from sim_bridge.simulator import Simulator
 
@@ -185,19 +185,47 @@ def test_intervals_out_of_range_are_refused(interval_us: int) -> None:
         Simulator(PAPER).set_interval_us(interval_us)
 
 
-def test_wind_on_a_vehicle_without_drag_is_reported() -> None:
-    wind = Disturbance(Vector3(5.0, 0.0, 0.0))
-    assert "no drag" in (wind_warning(PAPER, "rigid", wind) or "")
-    assert "paper's model" in (wind_warning(X_QUAD, "paper", Disturbance(gust_m_s=1.0)) or "")
-    assert wind_warning(X_QUAD, "rigid", wind) is None
-    assert wind_warning(PAPER, "rigid", Disturbance()) is None
+@pytest.mark.parametrize("air", [Disturbance(Vector3(5.0, 0.0, 0.0)), Disturbance(gust_m_s=1.0)])
+def test_wind_that_cannot_act_is_refused(air: Disturbance) -> None:
+    options = PlantOptions(air)
+    with pytest.raises(UsageProblemError, match="paper_quad has no drag; add --drag"):
+        Simulator(PAPER, options=options)
+    with pytest.raises(UsageProblemError, match="the paper's model has no drag"):
+        Simulator(X_QUAD, "paper", options)
+    Simulator(X_QUAD, options=options)
+    Simulator(PAPER.with_drag("rigid"), options=options)
+    Simulator(PAPER, "paper")
+
+
+@pytest.mark.parametrize(
+    "air",
+    [
+        Disturbance(Vector3(5.0, 0.0, 0.0)), Disturbance(gust_m_s=1.0), Disturbance(torque_gust_n_m=0.01),
+        Disturbance(force_ned_n=Vector3(0.1, 0.0, 0.0)), Disturbance(torque_frd_n_m=Vector3(0.01, 0.0, 0.0)),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("ideal", [False, True])
+@pytest.mark.parametrize("plant", ["rigid", "paper"])
+def test_each_disturbance_acts_on_each_plant_that_takes_it(plant: str, ideal: bool, air: Disturbance) -> None:
+    if plant == "paper" and (any(air.wind_ned_m_s) or air.gust_m_s):
+        pytest.skip("refused: test_wind_that_cannot_act_is_refused")
+    vehicle = X_QUAD.with_ideal_rotors() if ideal else X_QUAD
+    start = InitialState(position_ned_m=Vector3(0.0, 0.0, -10.0))
+    calm, moved = (
+        Simulator(vehicle, plant, PlantOptions(disturbance, initial=start))
+        for disturbance in (Disturbance(), air)
+    )
+    for simulator in (calm, moved):
+        for _ in range(50):
+            simulator.apply(command(650.0, 650.0, 650.0, 650.0))
+    assert calm.frame.state.tolist() != moved.frame.state.tolist()
 
 
 def short_flights() -> str:
-    """Digits of the states after 60 ms in all gusts, from the ground, on both plants."""
+    """Digits of the states after 60 ms in all gusts that act, from the ground, on both plants."""
     digits = []
-    for plant, vehicle in (("rigid", X_QUAD), ("paper", PAPER)):
-        simulator = Simulator(vehicle, plant, BOTH_GUSTS)
+    for plant, vehicle, gusts in (("rigid", X_QUAD, BOTH_GUSTS), ("paper", PAPER, TWISTED)):
+        simulator = Simulator(vehicle, plant, gusts)
         for _ in range(30):
             simulator.apply(command(400.0, 410.0, 420.0, 390.0))
         digits += [value.hex() for value in simulator.frame.state.tolist()]

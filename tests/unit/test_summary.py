@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,10 @@ from flightstack.modes import NAVIGATION_STATE, Mode
 from flightstack.params.errors import ConfigError
 from flightstack.plan import Command, Frame, MissionItem, Plan
 from gcs_cli.analysis import read_flight
+from gcs_cli.errors import FAILED
 from gcs_cli.flight_data import Flight, MissionProgress, Series, Status, series
+from gcs_cli.flight_figures import attitude_error, rms_command_rate_rad_s2, rms_torque_n_m
+from gcs_cli.flight_outcome import COMPLETED, Code, Outcome, with_log
 from gcs_cli.summary import RunInfo, item_ned_m, summarise, waypoint_rows, write_summary
 from tests.support.square_plan import item_at, square_plan
 from tests.support.synthetic_flight import CORNERS_NED_M, HOME, INFO, PARAMETERS, synthetic_flight_bytes
@@ -26,7 +30,8 @@ REQUIRED = {
     "sim_time_s", "wall_time_s", "real_time_factor", "waypoints", "rms_tracking_error_m",
     "max_tracking_error_m", "overruns", "log_sha256", "wind_m_s", "gust_m_s", "torque_gust_n_m",
     "battery_start_percent", "battery_capacity_mah", "battery_drain", "faults", "ideal_rotors",
-    "params", "force_n", "torque_n_m", "param",
+    "params", "force_n", "torque_n_m", "param", "outcome_text", "drag_n_s_m", "faults_not_begun", "flight_time_s",
+    "rms_attitude_error_deg", "max_attitude_error_deg", "rms_torque_n_m", "rms_rotor_command_rate_rad_s2",
 }  # fmt: skip
 
 
@@ -85,7 +90,7 @@ def test_the_summary_of_a_whole_flight(log_path: Path) -> None:
     flight = read_flight(log_path)
     run = RunInfo("completed", "missions/square.plan", 1.5, plant="rigid", seed=3, log_path=log_path)
     summary = summarise(flight, square_plan(), run)
-    assert set(summary) >= REQUIRED
+    assert set(summary) == REQUIRED
     assert summary["real_time_factor"] == pytest.approx(35.99 / 1.5, abs=1e-6)
     assert (summary["vehicle"], summary["plant"], summary["seed"]) == ("paper_quad", "rigid", 3)
     assert summary["log_sha256"] == hashlib.sha256(log_path.read_bytes()).hexdigest()
@@ -151,6 +156,30 @@ def test_a_vehicle_that_wind_pushes_about_on_the_ground_has_landed() -> None:
     )
     assert flight.tracking_error().time_s.tolist() == [1.0]
     assert flight.standing(flight.position.time_s).tolist() == [False, False, True, True, True, True]
+
+
+def test_bounces_of_a_landing_in_wind_are_not_tracked() -> None:
+    """The setpoint sinks from the first touch at 2 s on; the vehicle bounces 0.2 m high until it is found landed."""
+    time_s = [0, 1, 2, 3, 4, 5]
+    flight = Flight(
+        position=samples(time_s, [[0, 0, z] for z in (-3, -1, -0.01, -0.2, 0, 0)]),
+        position_setpoint=samples(time_s, [[0, 0, z] for z in (-3, -1, 0.5, 1, 2, 2)]),
+        statuses=armed_from(0.0),
+        landed=((0.0, False), (5.0, True)),
+    )
+    assert flight.tracking_error().time_s.tolist() == [0.0, 1.0]
+    assert flight.standing(flight.position.time_s).tolist() == [False, False, True, True, True, True]
+
+
+def test_a_second_takeoff_is_flight_again() -> None:
+    time_s = [0, 1, 2, 3, 4, 5, 6]
+    flight = Flight(
+        position=samples(time_s, [[0, 0, z] for z in (0, -1, 0, 0, -1, -1, 0)]),
+        statuses=armed_from(0.0),
+        landed=((0.0, True), (0.5, False), (2.5, True), (3.5, False), (6.0, True)),
+    )
+    flying = flight.flying(flight.position.time_s)
+    assert flying.tolist() == [False, True, False, False, True, True, False]
 
 
 def test_a_landing_without_a_stand_before_it_counts_from_its_detection() -> None:
@@ -225,8 +254,8 @@ def test_items_without_position_and_items_never_flown_have_no_distance() -> None
         home=HOME, position=samples([0], [[0, 0, 0]]), mission=(MissionProgress(0.0, 0, -1, 3, False),)
     )
     assert waypoint_rows(flight, Plan(tuple(items))) == [
-        {"seq": 0, "reached": False, "time_s": None, "miss_distance_m": None},
-        {"seq": 2, "reached": False, "time_s": None, "miss_distance_m": None},
+        {"seq": 0, "reached": False, "time_s": None, "miss_distance_m": None, "overshoot_m": None},
+        {"seq": 2, "reached": False, "time_s": None, "miss_distance_m": None, "overshoot_m": None},
     ]
 
 
@@ -244,13 +273,145 @@ def test_altitudes_above_sea_level_and_above_home() -> None:
     assert item_ned_m(relative, Flight()) is None
 
 
+# ---------------------------------------------------------------- overshoot, attitude, effort
+
+
+def over(
+    path: list[list[float]], items: list[tuple[float, float, float]], begins: list[float]
+) -> list[float | None]:
+    """Overshoots of waypoints that become current at the times ``begins``; the path has one sample a second."""
+    plan = Plan(tuple(item_at(Command.NAV_WAYPOINT, place) for place in items))
+    mission = [MissionProgress(at, seq, seq - 1, len(items), False) for seq, at in enumerate(begins)]
+    flight = Flight(
+        home=HOME,
+        position=samples(list(range(len(path))), path),
+        mission=tuple(mission),
+        statuses=armed_from(0.0),
+    )
+    return [row["overshoot_m"] for row in waypoint_rows(flight, plan)]
+
+
+def test_overshoot_is_the_way_beyond_a_waypoint_along_its_leg() -> None:
+    path = [[0, 0, -3], [8, 0, -3], [10.6, 1, -3], [10.2, 4, -3], [9, 9, -3], [10, 10.25, -3], [10, 10, -3]]
+    corners = [(10.0, 0.0, -3.0), (10.0, 10.0, -3.0)]
+    assert over(path, corners, [0.0, 1.5]) == [pytest.approx(0.6, abs=0.01), pytest.approx(0.25, abs=0.01)]
+
+
+def test_a_corner_that_is_cut_is_not_overshot() -> None:
+    path = [[0, 0, -3], [8, 0, -3], [9.5, 1, -3], [9.8, 4, -3], [10, 10, -3]]
+    assert over(path, [(10.0, 0.0, -3.0), (10.0, 10.0, -3.0)], [0.0, 1.5])[0] == pytest.approx(0.0, abs=0.01)
+
+
+def test_overshoot_ends_when_the_vehicle_turns_round_or_reaches_the_next_item() -> None:
+    climbs_later = [[0, 0, 0], [0, 0, -2.6], [5, 0, -2.9], [9.6, 0, -3], [10, 5, -5], [10, 10, -5]]
+    items = [(0.0, 0.0, -3.0), (10.0, 0.0, -3.0), (10.0, 10.0, -5.0)]
+    assert over(climbs_later, items, [0.0, 1.0, 3.0])[0] == pytest.approx(0.0, abs=0.01)
+    returns = [[0, 0, -3], [10.3, 0, -3], [10.1, 3, -3], [30, 5, -3]]
+    assert over(returns, [(10.0, 0.0, -3.0), (10.0, 50.0, -3.0)], [0.0, 1.0])[0] == pytest.approx(
+        0.3, abs=0.01
+    )
+
+
+def test_a_waypoint_on_a_straight_path_has_no_overshoot() -> None:
+    path = [[0, 0, -3], [10, 0, -3], [20.5, 0, -3], [20, 0, -3]]
+    found = over(path, [(10.0, 0.0, -3.0), (20.0, 0.0, -3.0)], [0.0, 1.0])
+    assert found == [None, pytest.approx(0.5, abs=0.01)]
+
+
+def test_attitude_error_is_the_angle_between_attitude_and_setpoint() -> None:
+    time_s = [0, 1, 2, 3]
+    flight = Flight(
+        attitude=samples(time_s, [[0, 0, 3.1], [0.1, 0, 0], [0, 0, 0], [1, 0, 0]]),
+        attitude_target=samples(time_s, [[0, 0, -3.1], [0, 0, 0], [0, -0.2, 0], [0, 0, 0]]),
+        statuses=armed_from(0.0, 3.0),
+    )
+    # across ±180° of yaw, in roll, in pitch; disarmed from 3 s on
+    assert attitude_error(flight).values[:, 0] == pytest.approx([2 * math.pi - 6.2, 0.1, 0.2], abs=1e-12)
+
+
+def test_control_effort_by_hand() -> None:
+    time_s = [0.0, 0.5, 1.0, 1.5]
+    flight = Flight(
+        torque=samples(time_s, [[9, 9, 9], [1, 0, 0], [-1, 2, 0], [9, 9, 9]]),
+        rotor_command=samples(time_s, [[0, 0], [100, 100], [103, 96], [0, 0]]),
+        statuses=armed_from(0.5, 1.5),
+    )
+    assert rms_torque_n_m(flight) == pytest.approx([1.0, math.sqrt(2.0), 0.0])
+    assert rms_command_rate_rad_s2(flight) == pytest.approx(math.sqrt((6.0**2 + 8.0**2) / 2))
+
+
+# ---------------------------------------------------------------- outcome
+
+
+def flown_with(*statuses: Status, landed: bool = True, mission: tuple[MissionProgress, ...] = ()) -> Flight:
+    end = Status(9.0, NAVIGATION_STATE[Mode.HOLD], False)
+    return Flight(
+        statuses=(*statuses, end), landed=((0.0, True), (1.0, False), (8.0, landed)), mission=mission
+    )
+
+
+ARMED = Status(0.0, NAVIGATION_STATE[Mode.MISSION], True)
+TERMINATION = Status(5.0, NAVIGATION_STATE[Mode.TERMINATION], False)
+EARLY = Outcome(Code.INCOMPLETE, "the vehicle disarmed at item 2 of 6, before the mission was done")
+
+
+def test_the_log_tells_why_a_mission_ended_early() -> None:
+    items = square_plan().items
+    assert with_log(EARLY, flown_with(ARMED), items) == EARLY
+    assert with_log(EARLY, flown_with(ARMED, ARMED._replace(failsafe=True)), items).code is Code.FAILSAFE
+    assert with_log(EARLY, flown_with(ARMED, TERMINATION), items).code is Code.LOST_CONTROL
+    assert with_log(EARLY, flown_with(ARMED, landed=False), items).code is Code.LOST_CONTROL
+    crashed = with_log(COMPLETED, flown_with(ARMED, landed=False), items)
+    assert (crashed.code, crashed.exit_code) == (Code.LOST_CONTROL, FAILED)
+    refused = Outcome(Code.REFUSED, "the vehicle refused to arm: no")
+    assert with_log(refused, flown_with(ARMED, TERMINATION), items) == refused
+
+
+def test_a_completed_mission_names_the_items_that_were_not_reached() -> None:
+    items = [item_at(Command.NAV_WAYPOINT, (float(north), 0.0, -3.0)) for north in range(4)]
+    jump = MissionItem(Command.DO_JUMP, Frame.MISSION, 3.0, 1.0)
+    steps = ((0, -1), (1, 0), (3, 1), (3, 3))
+    mission = tuple(MissionProgress(float(at), *step, 4, False) for at, step in enumerate(steps))
+    flight = flown_with(ARMED, mission=mission)
+    assert with_log(COMPLETED, flight, items).reason == "the mission was flown to its end; item 2 not reached"
+    jumps = [*items[:2], jump, *items[2:]]
+    steps = ((0, -1), (1, 0), (4, 1), (4, 4))
+    mission = tuple(MissionProgress(float(at), *step, 5, False) for at, step in enumerate(steps))
+    jumped = with_log(COMPLETED, flown_with(ARMED, mission=mission), jumps)
+    assert jumped == COMPLETED._replace(reason="the mission was flown to its end; item 3 skipped by DO_JUMP")
+
+
+def test_a_fault_that_begins_after_the_flight_is_named() -> None:
+    flight = Flight(2.0, 10.0, statuses=armed_from(0.0))
+    faults = ("rotor:2:off", "rotor:2:off@11.9", "state:freeze@12-13", "battery:level=0.1@500")
+    summary = summarise(flight, square_plan(), RunInfo("completed", "x.plan", faults=faults))
+    assert summary["faults_not_begun"] == ["state:freeze@12-13", "battery:level=0.1@500"]
+    assert (
+        summarise(Flight(), square_plan(), RunInfo("no_vehicle", "x", faults=faults))["faults_not_begun"]
+        == []
+    )
+
+
+def test_every_key_of_the_summary_is_documented(log_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "summary.md").read_text()
+    told = set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE))
+    summary = summarise(read_flight(log_path), square_plan(), RunInfo("completed", "x.plan"))
+    assert told == {*summary, *summary["waypoints"][0], *Code, "directory"}
+
+
 def test_a_run_without_a_log_still_has_a_summary(tmp_path: Path) -> None:
-    run = RunInfo("sim-bridge ended early", "p.plan", log_path=tmp_path / "flight.ulg", inner_hz=math.nan)
+    run = RunInfo(
+        "process_ended",
+        "p.plan",
+        outcome_text="sim-bridge ended early",
+        log_path=tmp_path / "flight.ulg",
+        inner_hz=math.nan,
+    )
     summary = summarise(Flight(), square_plan(), run)
-    assert set(summary) >= REQUIRED
+    assert set(summary) == REQUIRED
     write_summary(tmp_path / "summary.json", summary)
     got = json.loads((tmp_path / "summary.json").read_text())
-    assert got["outcome"] == "sim-bridge ended early"
+    assert (got["outcome"], got["outcome_text"]) == ("process_ended", "sim-bridge ended early")
     assert got["rms_tracking_error_m"] is got["log_sha256"] is got["inner_hz"] is None
     assert len(got["waypoints"]) == 6
     assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]

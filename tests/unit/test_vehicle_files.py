@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,15 @@ def test_the_papers_vehicle_is_table_i() -> None:
     b, d, arm = 2.93e-5, 7.2e-7, 0.2
     expected = [[b] * 4, [0, -arm * b, 0, arm * b], [arm * b, 0, -arm * b, 0], [-d, d, -d, d]]
     assert np.allclose(v.effectiveness(), expected, rtol=1e-15, atol=0.0)
+
+
+def test_the_optional_drag_acts_only_when_asked_for() -> None:
+    v = load_vehicle("paper_quad")
+    assert v.linear_drag_n_s_m == (0.0, 0.0, 0.0)
+    assert v.with_drag("rigid") == replace(v, linear_drag_n_s_m=(0.153, 0.153, 0.153))
+    for vehicle, plant in ((v, "paper"), (load_vehicle("x_quad"), "rigid")):
+        with pytest.raises(ConfigError, match="--drag: "):
+            vehicle.with_drag(plant)
 
 
 def test_ideal_rotors_have_no_lag_and_no_limits() -> None:

@@ -1,0 +1,184 @@
+"""A plan of several parts goes to a vehicle whole or not at all: one ground station, lossless and lossy links."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pytest
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.services.mission_server import MissionServer
+from flightstack.mavlink.services.mission_store import Check
+from flightstack.plan import (
+    MissionItem,
+    MissionType,
+    Plan,
+    check_fence,
+    check_mission,
+    check_rally,
+    fence_shape,
+)
+from flightstack.transport.memory import LOSSLESS, Conditions, LossyLink
+from gcs_cli.calls import Answer
+from gcs_cli.plan_parts import Uploads
+from gcs_cli.session import Session
+from tests.protocol.mission_harness import LOSSY, VEHICLE, mission
+from tests.support.fences import HOME, circle, polygon, rally_point, square
+
+MISSION, FENCE, RALLY = MissionType.MISSION, MissionType.FENCE, MissionType.RALLY
+ALL = (MISSION, FENCE, RALLY)
+PEER = ("vehicle", 1)
+WIDE, ELSEWHERE = tuple(polygon(square(100.0))), (circle((0.0, 0.0), 50.0),)
+NARROW = (circle((0.0, 0.0), 5.0),)
+FAR = (*mission(2)[:1], mission(1001)[1000])  # its last item is 111 m north
+
+
+class World:
+    """A vehicle that checks mission and rally points against the geofence it holds, and a ground station."""
+
+    def __init__(
+        self, conditions: Conditions = LOSSLESS, seed: int = 0, stored: Sequence[MissionType] = ALL
+    ) -> None:
+        checks: dict[MissionType, Check] = {
+            MISSION: lambda items: check_mission(items, HOME, fence=self.shape),
+            FENCE: lambda items: check_fence(items, HOME),
+            RALLY: lambda items: check_rally(items, HOME, fence=self.shape),
+        }
+        self.now_s, self.heartbeat_s = 100.0, -math.inf
+        self.server = MissionServer(VEHICLE, {kind: checks[kind] for kind in stored})
+        self.session = Session(PEER)
+        self.wire = LossyLink(conditions, seed)
+        self.codec = Link(*VEHICLE)
+        self.deaf_after: int | None = None
+        """The vehicle hears no more than so many messages of the mission protocol."""
+        self.heard: list[Message] = []
+
+    @property
+    def shape(self) -> object:
+        return fence_shape(self.server.items(FENCE), HOME)
+
+    @property
+    def plans(self) -> dict[MissionType, tuple[MissionItem, ...]]:
+        return {kind: self.server.items(kind) for kind in ALL}
+
+    def step(self) -> None:
+        now_s = self.now_s
+        for data in self.wire.two.receive(now_s):
+            for message in self.codec.decode(data):
+                if message.get_type().startswith("MISSION_") and len(self.heard) != self.deaf_after:
+                    self.heard.append(message)
+                    self.server.receive(message, "peer", now_s)
+        messages = [message for _, message in self.server.poll(now_s)]
+        if now_s >= self.heartbeat_s:
+            self.heartbeat_s = now_s + 1.0
+            messages.append(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+        for message in messages:
+            self.wire.two.send(self.codec.encode(message), now_s)
+        for data in self.wire.one.receive(now_s):
+            self.session.receive(data, PEER, now_s)
+        for frame in self.session.poll(now_s):
+            self.wire.one.send(frame, now_s)
+        deadlines = (
+            self.server.next_deadline(), self.session.next_deadline(), self.wire.next_arrival(), self.heartbeat_s
+        )  # fmt: skip
+        self.now_s = max(now_s, min(due for due in deadlines if due is not None)) + 1e-4
+
+    def hold(self, plan: Plan) -> None:
+        for kind, items in zip(ALL, (plan.items, plan.fence, plan.rally), strict=True):
+            self.server.restore(kind, items)
+
+    def upload(self, plan: Plan, *, restores: bool = True) -> Answer:
+        while self.session.view.identity is None:
+            self.step()
+        uploads = Uploads(self.session, plan, restores=restores)
+        end_s = self.now_s + 300.0
+        while (answer := uploads.answer(self.now_s)) is None:
+            assert self.now_s < end_s, "the upload does not end"
+            self.step()
+        return answer
+
+
+LINKS = pytest.mark.parametrize(
+    ("conditions", "seed"), [(LOSSLESS, 0), *((LOSSY, seed) for seed in range(8))]
+)
+OLD = Plan(mission(3), fence=WIDE, rally=(rally_point((20.0, 0.0)),))
+
+
+@LINKS
+def test_a_plan_is_judged_by_its_own_geofence(conditions: Conditions, seed: int) -> None:
+    """The former geofence would refuse the new mission, and the new one refuses the former mission."""
+    world = World(conditions, seed)
+    assert world.upload(Plan(mission(2), fence=NARROW)).accepted
+    far = Plan(FAR, fence=tuple(polygon(square(200.0))))
+    assert world.upload(far).accepted
+    assert (world.plans[MISSION], world.plans[FENCE]) == (far.items, far.fence)
+    assert world.upload(OLD).accepted
+    assert world.plans == {MISSION: OLD.items, FENCE: OLD.fence, RALLY: OLD.rally}
+
+
+@LINKS
+@pytest.mark.parametrize(
+    "plan",
+    [
+        Plan(FAR, fence=NARROW),
+        Plan(mission(2), fence=ELSEWHERE, rally=(rally_point((80.0, 0.0)),)),
+        Plan(mission(2), fence=(circle((200.0, 0.0), 50.0),)),  # leaves out home
+    ],
+    ids=["mission", "rally", "fence"],
+)
+def test_a_refused_plan_changes_nothing(conditions: Conditions, seed: int, plan: Plan) -> None:
+    world = World(conditions, seed)
+    world.hold(OLD)
+    before = world.plans
+    answer = world.upload(plan)
+    assert not answer.accepted
+    assert answer.reason.endswith("; the vehicle holds its former plans")
+    assert world.plans == before
+
+
+def test_a_refused_plan_is_removed_from_a_vehicle_that_held_none() -> None:
+    world = World()
+    assert not world.upload(Plan(FAR, fence=NARROW)).accepted
+    assert world.plans == {MISSION: (), FENCE: (), RALLY: ()}
+
+
+@pytest.mark.parametrize("stored", [(MISSION,), (MISSION, RALLY)])
+def test_a_vehicle_that_knows_no_geofence_keeps_its_mission(stored: Sequence[MissionType]) -> None:
+    world = World(stored=stored)
+    assert world.upload(Plan(mission(3))).accepted
+    answer = world.upload(Plan(mission(2, mark=1), fence=WIDE))
+    assert not answer.accepted
+    assert world.plans[MISSION] == mission(3)
+    assert world.upload(Plan(mission(2, mark=1))).accepted
+
+
+def test_a_vehicle_that_falls_silent_is_told_with_what_it_may_hold() -> None:
+    plan = Plan(mission(2, mark=1), fence=ELSEWHERE)
+    hearing, world = World(), World()
+    for each in (hearing, world):
+        each.hold(OLD)
+    assert hearing.upload(plan).accepted
+    kinds = [(message.get_type(), message.mission_type) for message in hearing.heard]
+    world.deaf_after = kinds.index(("MISSION_COUNT", MISSION))
+    answer = world.upload(plan)
+    assert answer.silent
+    assert "; the former geofence could not be restored: " in answer.reason
+
+
+def test_a_part_alone_is_sent_without_a_download() -> None:
+    world = World()
+    assert world.upload(Plan(mission(3))).accepted
+    assert {message.get_type() for message in world.heard} == {"MISSION_COUNT", "MISSION_ITEM_INT"}
+
+
+def test_a_vehicle_of_gcs_fly_is_not_asked_for_plans() -> None:
+    world = World()
+    assert world.upload(OLD, restores=False).accepted
+    assert [message.mission_type for message in world.heard if message.get_type() == "MISSION_COUNT"] == [
+        1,
+        2,
+        0,
+    ]
+    assert "MISSION_REQUEST_LIST" not in {message.get_type() for message in world.heard}
