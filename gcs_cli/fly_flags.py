@@ -37,7 +37,6 @@ class FlyOptions:
     seed: Annotated[int, world.SEED] = 1
     wind: Annotated[str | None, world.WIND] = None
     gust: Annotated[float | None, world.GUST] = None
-    drag: Annotated[bool, world.DRAG] = False
     torque_gust: Annotated[float | None, world.TORQUE_GUST] = None
     vehicle: Annotated[str, world.VEHICLE] = "paper_quad"
     instance: int = 0
@@ -59,6 +58,7 @@ class FlyOptions:
     ] = None
     param: stack.Assignments = None
     view: Annotated[bool, world.VIEW] = False
+    drag: Annotated[bool, world.DRAG] = False
 
     @property
     def outer_rate_hz(self) -> float:
