@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import aclosing, asynccontextmanager, suppress
 
 import pytest
-from mavsdk.plugins.manual_control import ManualControlError
+from mavsdk.plugins.action import ActionError
 from mavsdk.plugins.offboard import (
     Attitude,
     AttitudeRate,
@@ -157,7 +157,14 @@ async def test_sticks_fly_in_position_and_altitude_mode(drone: Drone) -> None:
 
 
 @story()
-async def test_sticks_that_were_never_moved_fly_nothing(drone: Drone) -> None:
-    with pytest.raises(ManualControlError) as refused:
-        await drone.manual_control.start_altitude_control()
-    assert refused.value.result.name in ("INPUT_NOT_SET", "COMMAND_DENIED")
+async def test_sticks_that_were_moved_once_arm_nothing(drone: Drone) -> None:
+    """A disarmed vehicle takes any mode, as PX4 does; it arms only while the sticks come."""
+    await drone.manual_control.set_manual_control_input(0.0, 0.0, 0.5, 0.0)
+    await drone.manual_control.start_altitude_control()
+    await drone.until_mode("ALTCTL")
+    await drone.until("not armable", drone.telemetry.subscribe_health(), lambda health: not health.is_armable)
+    with pytest.raises(ActionError) as refused:
+        await drone.action.arm()
+    assert refused.value.result.name == "COMMAND_DENIED"
+    await drone.action.hold()
+    await drone.until_mode("HOLD")

@@ -28,6 +28,9 @@ from tests.interop.stack import RealVehicle
 PREARM_CHECK = 0x1000_0000
 COMPONENT_INFORMATION = "395"
 
+MANUAL = 1 << 16
+"""A mode of PX4 that this vehicle does not have."""
+
 
 @pytest.fixture(scope="module")
 def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
@@ -201,6 +204,15 @@ def test_modes_did_not_change(station: Station) -> None:
 def test_a_mode_that_cannot_be_is_seen_in_the_heartbeat(station: Station, commands: Commands) -> None:
     """FirmwarePlugin.cc, _setFlightModeAndValidate: three times 1.3 s without the mode mean that it failed."""
     before = station.custom_mode
-    assert not Actions(station, commands).start_mission(), "there is no mission"
+    assert not Actions(station, commands).set_flight_mode(MANUAL)
     assert (station.custom_mode, station.armed) == (before, False)
     assert any(text.startswith("Mode change: ") for text in station.texts)
+
+
+def test_a_mission_that_is_not_there_does_not_arm(station: Station, commands: Commands) -> None:
+    """The mode is taken while disarmed, as with PX4; arming is what fails, with its reason."""
+    actions = Actions(station, commands)
+    assert not actions.start_mission()
+    assert (station.custom_mode, station.armed) == (MISSION, False)
+    assert any("no mission is loaded" in text for text in station.texts)
+    assert actions.set_flight_mode(HOLD)
