@@ -93,7 +93,7 @@ class Session:
         link = self._links.setdefault(peer, Link(SYSTEM_ID, COMPONENT_ID, signing=self._signing))
         bad_before = link.bad
         for message in link.decode(data):
-            if heard or self._is_vehicle(message, peer, now_s):
+            if link.is_authentic(message) and (heard or self._is_vehicle(message, peer, now_s)):
                 self._take(message, now_s)
         self.bad += link.bad - bad_before
 

@@ -39,7 +39,7 @@ def _shown(view: VehicleView) -> VehicleView:
     partial = view.partial_text
     if partial is None:
         return view
-    text = clean(partial.octets.decode("utf-8", "replace"))
+    text = clean(partial.octets.decode("utf-8", "replace")).rstrip()  # PX4 ends some texts with a tab
     entry = StatusText(view.text_count, partial.severity, text, partial.received_s, partial.vehicle_time_s)
     texts = (*view.texts, entry)[-TEXTS_KEPT:]
     return view._replace(texts=texts, text_count=view.text_count + 1, partial_text=None)

@@ -10,12 +10,12 @@ REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 def clean(text: str) -> str:
     """Return ``text`` on one line, with nothing in it that a terminal obeys or that hides other characters.
 
-    White space of any kind is a space, and none stands at an end. Other characters that are not printable (control
-    characters of C0 and C1, escape, marks of text direction, lone surrogates) are replaced by U+FFFD.
+    White space of any kind is a space. Other characters that are not printable (control characters of C0 and C1,
+    escape, marks of text direction, lone surrogates) are replaced by U+FFFD.
     """
-    if not text.isprintable():
-        text = "".join(c if c.isprintable() else " " if c.isspace() else REPLACEMENT for c in text)
-    return text.strip()
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else " " if c.isspace() else REPLACEMENT for c in text)
 
 
 def clean_fields(message: mavlink.MAVLink_message) -> None:

@@ -93,12 +93,13 @@ class World:
         autopilot = Address(self.config.system_id, 1)
         self._missions = MissionClient(autopilot, GCS)
         self._commands = CommandClient(autopilot, GCS)
-        self._heartbeat_due_s = -math.inf
+        self._heartbeat_due_s, self._heartbeat_kind = -math.inf, -1
         self.received: dict[str, Message] = {}
         self.counts: dict[str, int] = {}
         self.texts: list[str] = []
         self.reached: list[int] = []
         self.sends_heartbeats = True
+        """As a ground station; else as a companion, whose heartbeats keep no data link alive."""
         self.loses_states = False
         """Ticks go on without states, as they do in real time when a simulator hangs."""
         self._missed_us = 0
@@ -205,9 +206,10 @@ class World:
         """Carry what both sides have to say, once."""
         now_s = self._link_now_s()
         ground = self.stack.ground
-        if self.sends_heartbeats and now_s >= self._heartbeat_due_s:
-            self._heartbeat_due_s = now_s + 1.0
-            self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        kind = mavlink.MAV_TYPE_GCS if self.sends_heartbeats else mavlink.MAV_TYPE_ONBOARD_CONTROLLER
+        if now_s >= self._heartbeat_due_s or kind != self._heartbeat_kind:
+            self._heartbeat_due_s, self._heartbeat_kind = now_s + 1.0, kind
+            self.send(mavlink.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3))
         if self.streams and now_s >= self._stream_due_s:
             self._stream_due_s = now_s + STREAM_STEP_S
             for make in self.streams.values():

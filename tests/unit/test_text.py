@@ -33,8 +33,8 @@ OBEYED = {"Cc", "Cf", "Cs", "Zl", "Zp"}
 @pytest.mark.parametrize(
     ("text", "shown"),
     [
-        ("Takeoff detected\t", "Takeoff detected"),
-        ("two\nlines\r\n", "two lines"),
+        ("Takeoff detected\t", "Takeoff detected "),
+        ("two\nlines\r\n", "two lines  "),
         ("\x1b[31mred\x9b0m", "�[31mred�0m"),
         ("\u202etxt.exe", "�txt.exe"),
         ("5 °C, αβγ 日本", "5 °C, αβγ 日本"),
