@@ -32,10 +32,11 @@ from flightstack.params.store import ParamStore
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.timing_report import TimingReport
 
-_LOOP_KERNELS = ("inner_kernel", "outer_kernel")
 _KERNELS = (
-    "store_outer_row", "follow_rotors", "detect", "mission_start", "stream_kernel", "goal_kernel", "fence_step",
+    "inner_kernel", "store_outer_row", "follow_rotors", "detect", "mission_start", "stream_kernel", "goal_kernel",
+    "outer_kernel", "fence_step",
 )  # fmt: skip
+_LOOP_KERNELS = ("inner_kernel", "outer_kernel")
 
 
 class Stack(NamedTuple):
@@ -62,8 +63,9 @@ def vehicle_of(config: StackConfig) -> Vehicle:
 
 
 def kernels_of(config: StackConfig) -> tuple[str, ...]:
-    """Names of the kernels that ``build`` compiles, or reads from the cache."""
-    return (*(_LOOP_KERNELS if config.loops == PYTHON else ()), *_KERNELS)
+    """Names of the kernels that ``build`` compiles, or reads from the cache, in this order."""
+    needs_loops = config.loops == PYTHON
+    return tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
 
 
 def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> Stack:
