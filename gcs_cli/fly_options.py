@@ -12,11 +12,14 @@ from pathlib import Path
 from flightstack.clock import nearest_outer_hz, rates
 from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.geodesy import GeoPoint
+from flightstack.params.behaviour import SPECS, Behaviour
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
 from flightstack.transport.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.flight_limit import LONGEST_S, flight_limit_s
+from gcs_cli.param_file import load_parameters
 from gcs_cli.plan_parts import plan_problem
 from gcs_cli.run_directory import LOG_NAME
 
@@ -47,7 +50,7 @@ class FlyOptions:
     instance: int = 0
     ideal_rotors: bool = False
     timeout_s: float = 60.0
-    limit_s: float = 3600.0
+    limit_s: float | None = None
     battery_start: float | None = None
     battery_capacity: float | None = None
     battery_drain: float | None = None
@@ -99,6 +102,21 @@ def checked_plan(options: FlyOptions) -> Plan:
     return plan
 
 
+def longest_flight_s(options: FlyOptions, plan: Plan) -> float:
+    """Return the simulated time after which the flight is given up: as asked for, else as the plan needs.
+
+    Raise ConfigError for a parameter file that is not one.
+    """
+    if options.limit_s is not None:
+        return options.limit_s
+    behaviour = Behaviour()
+    if options.params is not None:
+        for name, value in load_parameters(options.params).items():
+            if name in SPECS:
+                behaviour = behaviour.updated(name, value)
+    return flight_limit_s(plan.items, plan.home or DEFAULT_HOME, behaviour)
+
+
 def _check_flags(options: FlyOptions) -> None:
     known = sorted(point.name for point in entry_points(group=CONTROLLERS))
     if options.controller not in known:
@@ -124,7 +142,7 @@ def _check_flags(options: FlyOptions) -> None:
     _number("--seed", options.seed, 0, 2**31 - 1)
     _number("--instance", options.instance, 0, MOST_INSTANCES - 1)
     _number("--timeout", options.timeout_s, 0.1, 86_400.0)
-    _number("--limit", options.limit_s, 1.0, 1e6)
+    _number("--limit", _or(options.limit_s, LONGEST_S), 1.0, LONGEST_S)
     _number("--battery-start", _or(options.battery_start, 100.0), 0.0, 100.0)
     _number("--battery-capacity", _or(options.battery_capacity, 1.0), 1.0, 1e6)
     _number("--battery-drain", _or(options.battery_drain, 1.0), 0.0, 1e4)

@@ -22,6 +22,7 @@ from gcs_cli.fly_options import (
     DEFAULT_HOME,
     FlyOptions,
     check_ports,
+    longest_flight_s,
     simulator_arguments,
     stack_arguments,
 )
@@ -86,7 +87,7 @@ def fly(options: FlyOptions, plan: Plan, out: Path | None, display: Display) -> 
             plan,
             connection.now_s,
             options.timeout_s,
-            options.limit_s,
+            longest_flight_s(options, plan),
             STALL_S / min(1.0, options.speed_factor),
         )
         with _recording(connection, folder), Children(folder) as children:

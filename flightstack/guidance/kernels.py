@@ -27,7 +27,7 @@ GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
 LAND_MEMORY_SIZE = 4
 THRUST_AT = 4  # of the attitude target's array form
 LEAD_M, LEAD_LIFT = 0.5, 0.8
-"""How far below the vehicle the reference sinks, and farther only until the loops let the thrust fall so low [share]."""
+"""How far below the vehicle the reference sinks, and farther only until the loops reduce the lift to this share."""
 BELOW_M = 0.05
 """How far below the vehicle a reference at rest asks for a descent."""
 

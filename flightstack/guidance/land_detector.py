@@ -2,13 +2,13 @@
 
 The stages are those of PX4's MulticopterLandDetector:
 
-* *Contact*: guidance asks for a descent, the thrust carries less than the weight, and yet the vehicle does not sink. It is
-  then levelled without thrust, so that a vehicle that touches nothing falls, and leaves the stage at once.
-* *Rest* (PX4's "maybe landed"): contact has lasted. The loops stop; nothing leans against the ground or winds itself up.
+* *Contact*: guidance asks for a descent, the thrust carries less than the weight, and yet the vehicle does not sink. It
+  is then levelled without thrust, so that a vehicle that touches nothing falls, and leaves the stage at once.
+* *Rest* (PX4's "maybe landed"): contact has lasted. The loops stop, so that nothing works against the ground.
 * *Landed*: since contact the vehicle has neither had thrust nor fallen for a while.
 
-Unlike PX4's, the detector looks at no horizontal speed and no rates: wind that is stronger than friction makes a vehicle
-slide and rattle along the ground whatever the rotors do, and their thrust would only help it.
+Unlike PX4's, the detector looks at no horizontal speed and no rates: wind that is stronger than friction makes a
+vehicle slide and rattle along the ground whatever the rotors do, and their thrust would only help it.
 """
 
 from __future__ import annotations

@@ -182,8 +182,8 @@ class Navigator:
     def levelling_target(self, attitude_target: FloatArray) -> FloatArray:
         """Return the next attitude target without thrust, shape (5,), of a vehicle that touches the ground.
 
-        From the last one, ``attitude_target``, it levels within about ``LEVEL_S``. The outer loop would lean against wind
-        that friction withstands, and wind itself up.
+        From the last one, ``attitude_target``, it levels within about ``LEVEL_S``. The outer loop would lean against
+        wind that friction withstands, and wind itself up.
         """
         last = Quaternion(*attitude_target[:4].tolist())
         half_yaw = 0.5 * euler_from_quaternion(last).z

@@ -67,7 +67,12 @@ def fly(
     open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
     as_json: JsonOption = False,
     timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 180]")] = None,
-    limit: Annotated[float, typer.Option(help="Longest flight, s of simulated time.")] = 3600.0,
+    limit: Annotated[
+        float | None,
+        typer.Option(
+            help="Longest flight, s of simulated time.  [default: 60 s more than three times the plan's]"
+        ),
+    ] = None,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""
     from gcs_cli.fly_display import FlyConsole, make_display  # noqa: PLC0415

@@ -76,7 +76,12 @@ def fly(
     open_report: OpenOption = False,
     as_json: JsonOption = False,
     timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 180]")] = None,
-    limit: Annotated[float, typer.Option(help="Longest flight, s of simulated time.")] = 3600.0,
+    limit: Annotated[
+        float | None,
+        typer.Option(
+            help="Longest flight, s of simulated time.  [default: 60 s more than three times the plan's]"
+        ),
+    ] = None,
 ) -> None:
     """Fly a mission with each of the loops, and compare.
 

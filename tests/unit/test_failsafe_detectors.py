@@ -63,7 +63,14 @@ class Bench:
             for _ in range(5):
                 follow_rotors(self.row, self.rotors, self.rotor_params)
             found = detect(
-                self.state, self.setpoint, self.row, self.rotors, self.memory, self.params, self.on_ground, DT_S
+                self.state,
+                self.setpoint,
+                self.row,
+                self.rotors,
+                self.memory,
+                self.params,
+                self.on_ground,
+                DT_S,
             )
         return found
 

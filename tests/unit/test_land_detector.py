@@ -79,7 +79,9 @@ def test_a_missing_sign_begins_contact_anew() -> None:
     assert watch(DT_S, moving(down=0.5), memory=almost).missing_m_s == 0.0
 
 
-def fly(lift_of: Callable[[float], float], updraft: float = 0.0, vz: float = 0.0, seconds: float = 5.0) -> float:
+def fly(
+    lift_of: Callable[[float], float], updraft: float = 0.0, vz: float = 0.0, seconds: float = 5.0
+) -> float:
     """Return the most that was missed in the air, with the vertical acceleration that the lift leads to."""
     memory, most, time_s = FLYING, 0.0, 0.0
     while time_s < seconds:
