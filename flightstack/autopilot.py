@@ -60,6 +60,7 @@ class Autopilot(FlightRequests):
         self._rotor_speed = rotor_speed_rad_s
         self._tick = 0
         self._target_is_given = False  # by guidance, in place of the outer loop's
+        self._rests = False  # on the ground, though not found to be landed yet
         self._takeoff_altitude_m = behaviour.takeoff_altitude_m
         self.has_state = False  # set once a state has arrived
         idle_row = np.zeros(LoopRow.SIZE)
@@ -89,7 +90,7 @@ class Autopilot(FlightRequests):
             self._supervise(time_us)
             self._guide()
         row, flags = self._recorder.inner_row(time_us), 0
-        if not self._flying:
+        if self._rests or not self._flying:
             self._backend.idle(self._state, self._rotor_speed, now.status.armed, row)
             supervisor.follow_rotors(row)
         elif supervisor.states.holds_rotors:
@@ -112,18 +113,26 @@ class Autopilot(FlightRequests):
         return commands
 
     def _guide(self) -> None:
-        """Let guidance say where to fly; it rests while the state is not to be flown by."""
+        """Let guidance say where to fly, or that the vehicle rests; no step while the state is not to be flown by."""
         now, flying = self.now, self._flying
+        rested, self._rests = self._rests, False
         armed, mode = now.status
         waits = armed and mode is _MISSION  # on the ground
         if self.supervisor.states.holds_rotors or not (flying or waits):
             return
         navigator, target = self._navigator, None
+        touched = navigator.touches_ground
         navigator.step(mode, self._state, now.attitude_target)
-        if flying and navigator.flies_attitude(mode):
+        flies_attitude = navigator.flies_attitude(mode)
+        touches = flying and navigator.touches_ground and not flies_attitude
+        self._rests = touches and navigator.rests
+        if rested or self._rests or (touches and not touched):  # what the loops remember is of the ground
+            self._backend.reset(self._state)
+            self._loops_begin = True
+        if flying and flies_attitude:
             target = navigator.attitude_target
-        elif flying and navigator.touches_ground:
-            target = navigator.level_target(self._state, now.attitude_target)
+        elif touches and not self._rests:
+            target = navigator.levelling_target(now.attitude_target)
         if target is not None:
             self._backend.set_attitude_target(target)
         self._target_is_given = target is not None
@@ -134,7 +143,8 @@ class Autopilot(FlightRequests):
         """Turn what failsafes, guidance and the land detector found into events; once per outer tick."""
         now, supervisor, navigator = self.now, self.supervisor, self._navigator
         status = now.status
-        supervisor.position_is_controlled = self._flying and not navigator.flies_attitude(status.mode)
+        supervisor.position_is_controlled = self._flying and not (self._target_is_given or self._rests)
+        supervisor.on_ground = now.landed or navigator.touches_ground
         conditions = supervisor.look(time_us, status, now.landed, now.setpoint, now.row)
         if conditions is not None:
             self._meet_failsafes(time_us, conditions)

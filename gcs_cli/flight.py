@@ -13,7 +13,7 @@ from flightstack.plan import Plan
 from gcs_cli import calls
 from gcs_cli.calls import Answer, Call
 from gcs_cli.errors import FAILED, NO_ANSWER
-from gcs_cli.flight_outcome import Code, Outcome, ends_in_air, judged
+from gcs_cli.flight_outcome import Code, Outcome, ends_in_air, judged, too_late
 from gcs_cli.flight_watch import STALL_S, Watch, no_state, no_vehicle
 from gcs_cli.plan_parts import Uploads
 from gcs_cli.session import Session
@@ -179,8 +179,7 @@ class Flight:
             self._call = None
             self.phase = Phase.CONFIRM
         elif (self.flown_s or 0.0) > self._limit_s:
-            late = f"the flight took longer than --limit {self._limit_s:g} s of simulated time"
-            self._end(Outcome(Code.TIMEOUT, late, NO_ANSWER), now_s)
+            self._end(too_late(view, self._items, self._limit_s), now_s)
         elif held_up is not None:
             self._end(Outcome(Code.STALLED, held_up), now_s)
         elif self._ends_in_air and view.mission.complete and view.mode == "HOLD" and not self.returned_by_us:

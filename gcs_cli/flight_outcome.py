@@ -79,10 +79,27 @@ def judged(view: VehicleView, items: Sequence[MissionItem]) -> Outcome:
     )
     if mission.complete or reached_end or landed_at_end:
         return COMPLETED
+    return Outcome(
+        Code.INCOMPLETE,
+        f"the vehicle disarmed{_item(view, items)}, before the mission was done{_warnings(view)}",
+    )
+
+
+def too_late(view: VehicleView, items: Sequence[MissionItem], limit_s: float) -> Outcome:
+    """Return the outcome of a flight that was ended after ``limit_s`` of simulated time."""
+    late = f"the mission was not done after {limit_s:g} s of simulated time (--limit)"
+    return Outcome(Code.TIMEOUT, f"{late}{_item(view, items)}{_warnings(view)}")
+
+
+def _item(view: VehicleView, items: Sequence[MissionItem]) -> str:
+    current = view.mission.current
+    return "" if current is None else f" at item {current} of {len(items)}"
+
+
+def _warnings(view: VehicleView) -> str:
+    """Return the newest warnings of the vehicle, to stand at the end of a sentence."""
     warnings = [entry.text for entry in view.texts if entry.severity <= _WARNING]
-    said = f": {'; '.join(warnings[-_MOST_WARNINGS:])}" if warnings else ""
-    at = "" if mission.current is None else f" at item {mission.current} of {len(items)}"
-    return Outcome(Code.INCOMPLETE, f"the vehicle disarmed{at}, before the mission was done{said}")
+    return f": {'; '.join(warnings[-_MOST_WARNINGS:])}" if warnings else ""
 
 
 def with_log(outcome: Outcome, flight: Flight, items: Sequence[MissionItem]) -> Outcome:

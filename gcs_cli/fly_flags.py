@@ -42,7 +42,13 @@ class FlyOptions:
     instance: int = 0
     ideal_rotors: Annotated[bool, world.IDEAL_ROTORS] = False
     timeout_s: float = 180.0
-    limit_s: Annotated[float, typer.Option("--limit", help="Longest flight, s of simulated time.")] = 3600.0
+    limit_s: Annotated[
+        float | None,
+        typer.Option(
+            "--limit",
+            help="Longest flight, s of simulated time.  [default: 60 s more than three times the plan's]",
+        ),
+    ] = None
     battery_start: Annotated[float | None, world.BATTERY_START] = None
     battery_capacity: Annotated[float | None, world.BATTERY_CAPACITY] = None
     battery_drain: Annotated[float | None, world.BATTERY_DRAIN] = None

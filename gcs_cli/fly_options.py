@@ -14,14 +14,18 @@ from flightstack.console import complain
 from flightstack.extras import INSTALL_MULTIBODY
 from flightstack.firmware.choice import parse_loops
 from flightstack.geodesy import GeoPoint
+from flightstack.params.behaviour import SPECS, Behaviour
 from flightstack.params.gains_file import hidden_gains, open_gains
+from flightstack.params.store import read_assignment
 from flightstack.params.vehicle import Vehicle, hidden_vehicle, load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
 from flightstack.port_numbers import INSTANCES, vehicle_api_port, vehicle_ground_port
 from flightstack.transport.udp import PortBusyError, UdpSocket
 from gcs_cli.endpoint import LOOPBACK
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.flight_limit import LONGEST_S, flight_limit_s
 from gcs_cli.fly_flags import TO_SIMULATOR, TO_STACK, FlyOptions, passed
+from gcs_cli.param_file import load_parameters
 from gcs_cli.plan_parts import plan_problem
 from gcs_cli.run_directory import LOG_NAME
 
@@ -74,6 +78,21 @@ def flown_vehicle(options: FlyOptions) -> Vehicle:
     return vehicle
 
 
+def longest_flight_s(options: FlyOptions, plan: Plan) -> float:
+    """Return the simulated time after which the flight is given up: as asked for, else as the plan needs.
+
+    Raise ConfigError for a parameter file that is not one, and for an assignment without a number.
+    """
+    if options.limit_s is not None:
+        return options.limit_s
+    values = {} if options.params is None else load_parameters(options.params)
+    values.update(map(read_assignment, options.param or ()))
+    behaviour = Behaviour()
+    for name in SPECS.keys() & values.keys():
+        behaviour = behaviour.updated(name, values[name])
+    return flight_limit_s(plan.items, home_of(options, plan), behaviour)
+
+
 def _check_flags(options: FlyOptions) -> None:
     known = sorted(point.name for point in entry_points(group=CONTROLLERS))
     if options.controller not in known:
@@ -99,7 +118,7 @@ def _check_flags(options: FlyOptions) -> None:
     _number("--seed", options.seed, 0, 2**31 - 1)
     _number("--instance", options.instance, 0, INSTANCES - 1)
     _number("--timeout", options.timeout_s, 0.1, 86_400.0)
-    _number("--limit", options.limit_s, 1.0, 1e6)
+    _number("--limit", _or(options.limit_s, LONGEST_S), 1.0, LONGEST_S)
     _number("--battery-start", _or(options.battery_start, 100.0), 0.0, 100.0)
     _number("--battery-capacity", _or(options.battery_capacity, 1.0), 1.0, 1e6)
     _number("--battery-drain", _or(options.battery_drain, 1.0), 0.0, 1e4)

@@ -22,7 +22,14 @@ from gcs_cli.flight_outcome import Code, Outcome
 from gcs_cli.flight_watch import STALL_S
 from gcs_cli.fly_display import Display
 from gcs_cli.fly_flags import FlyOptions
-from gcs_cli.fly_options import check_ports, flown_vehicle, home_of, simulator_arguments, stack_arguments
+from gcs_cli.fly_options import (
+    check_ports,
+    flown_vehicle,
+    home_of,
+    longest_flight_s,
+    simulator_arguments,
+    stack_arguments,
+)
 from gcs_cli.processes import Child, Children
 from gcs_cli.run_directory import (
     LOG_NAME,
@@ -90,7 +97,7 @@ def fly(
             plan,
             connection.now_s,
             options.timeout_s,
-            options.limit_s,
+            longest_flight_s(options, plan),
             STALL_S / min(1.0, options.speed_factor),
         )
         with _recording(connection, folder), Children(folder) as children:

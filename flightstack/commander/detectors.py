@@ -141,6 +141,7 @@ def detect(
     rotors: FloatArray,
     memory: FloatArray,
     params: FloatArray,
+    on_ground: bool,
     dt_s: float,
 ) -> int:
     """Advance all detectors by one outer tick; return the bits of what is wrong, and ``MOVING``.
@@ -148,6 +149,7 @@ def detect(
     ``state`` (13,), ``setpoint`` (11,) and ``row`` (48,), the newest row of the inner loop, as in ``contract``;
     ``rotors`` (25,) is the memory of ``follow_rotors``; ``memory`` (10,) is updated; ``params`` come from
     ``detector_params``. A state that is not finite leaves the other detectors, and what they found, as they are.
+    ``on_ground``: the feet hold the vehicle, and its attitude need not follow the reference; it must still be upright.
     """
     status = int(row[_STATUS_AT])
     for value in state:
@@ -173,7 +175,7 @@ def detect(
         + 4.0 * (qy * qz - qw * qx) * (ry * rz - rw * rx)
         + (1.0 - 2.0 * (qx * qx + qy * qy)) * (1.0 - 2.0 * (rx * rx + ry * ry))
     )
-    tilt_error = acos(min(1.0, max(-1.0, cosine)))
+    tilt_error = 0.0 if on_ground else acos(min(1.0, max(-1.0, cosine)))
     p = now.position_ned_m
     dx, dy, dz = p.x - setpoint[0], p.y - setpoint[1], p.z - setpoint[2]
     distance = math.sqrt(dx * dx + dy * dy + dz * dz)

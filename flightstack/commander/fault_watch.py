@@ -51,7 +51,7 @@ class FaultWatch:
         row = np.zeros(LoopRow.SIZE)
         self._follow = direct(follow_rotors, row, self._rotors, self._rotor_params)
         self._detect = direct(
-            detect, state, self._nowhere, row, self._rotors, self._detector, self._params, self._dt_s
+            detect, state, self._nowhere, row, self._rotors, self._detector, self._params, False, self._dt_s
         )
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
@@ -68,17 +68,19 @@ class FaultWatch:
         """Take the newest row of the inner loop, shape (48,), once per inner tick."""
         self._follow(row, self._rotors, self._rotor_params)
 
-    def look(self, setpoint: FloatArray, row: FloatArray, position_is_controlled: bool) -> int:
+    def look(
+        self, setpoint: FloatArray, row: FloatArray, position_is_controlled: bool, on_ground: bool
+    ) -> int:
         """Advance by one outer tick; return the bits found.
 
-        ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop. Nobody can be far from a
-        place that nobody flies to: on the ground, or while a stream gives attitudes.
+        ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop. Position errors count only
+        while the position is controlled: not on the ground, nor while a stream gives attitudes.
         """
         if not position_is_controlled:
             self._nowhere[:3] = self._state[:3]
             setpoint = self._nowhere
         self.found = self._detect(
-            self._state, setpoint, row, self._rotors, self._detector, self._params, self._dt_s
+            self._state, setpoint, row, self._rotors, self._detector, self._params, on_ground, self._dt_s
         )
         return self.found
 

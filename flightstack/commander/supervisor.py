@@ -68,6 +68,8 @@ class Supervisor:
         self.states = StateWatch(source)
         self.position_is_controlled = False
         """Whether the setpoint's place is flown to: not on the ground, nor while a stream gives attitudes."""
+        self.on_ground = True
+        """Whether the vehicle stands, or touches the ground without being found landed yet."""
         self.battery_level = 0
         self._reading: BatteryReading | None = None
         self._source = source
@@ -168,7 +170,7 @@ class Supervisor:
             self._memory = IDLE
             return None
         if not states.holds_rotors:
-            faults.look(setpoint, row, self.position_is_controlled)
+            faults.look(setpoint, row, self.position_is_controlled, self.on_ground)
         breached = self.fence.step(self._state) != 0
         entries = self._memory.entries
         if (

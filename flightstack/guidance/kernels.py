@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from flightstack.arrays import store_position_setpoint, vehicle_state
 from flightstack.compiled import as_tuple, compiled, store
 from flightstack.contract import FloatArray, VehicleState
 from flightstack.guidance.aim import A_START_X, A_START_Y, RETURN, advance_return, aim_goal
-from flightstack.guidance.land_detector import LandMemory, land_detector_step
+from flightstack.guidance.land_detector import STILL_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
 from flightstack.guidance.mission import into_ground, mission_goal, mission_step
 from flightstack.guidance.offboard import attitude_step, point_step
@@ -22,8 +24,12 @@ MISSION, OFFBOARD, POSITION = int(Mode.MISSION), int(Mode.OFFBOARD), int(Mode.PO
 TRAJECTORY_SIZE = 11
 T_YAW = 9
 GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
-LAND_MEMORY_SIZE = 3
+LAND_MEMORY_SIZE = 4
 THRUST_AT = 4  # of the attitude target's array form
+LEAD_M, LEAD_LIFT = 0.5, 0.8
+"""How far below the vehicle the reference sinks, and farther only until the loops reduce the lift to this share."""
+BELOW_M = 0.05
+"""How far below the vehicle a reference at rest asks for a descent."""
 
 
 @compiled
@@ -32,14 +38,31 @@ def _limits(params: GuidanceParams) -> TrajectoryLimits:
 
 
 @compiled
+def _waiting(last: Trajectory, reference: Trajectory, down_m: float, lift: float) -> Trajectory:
+    """Return the reference, which waits for a vehicle at ``down_m`` that does not sink although its lift is low."""
+    t = reference
+    if t.z <= max(last.z, down_m + LEAD_M) or lift >= LEAD_LIFT:
+        return t
+    z = max(last.z, down_m + LEAD_M)
+    return Trajectory(t.x, t.y, z, t.vx, t.vy, t.vz, t.ax, t.ay, t.az, t.yaw_rad, t.yaw_rate_rad_s)
+
+
+@compiled
+def _descent(reference: Trajectory, down_m: float) -> float:
+    """Return the sink rate asked of a vehicle at ``down_m``, at least a slow one while the reference lies below it."""
+    if reference.z > down_m + BELOW_M and reference.vz > -BELOW_M:
+        return max(reference.vz, 2.0 * STILL_M_S)
+    return reference.vz
+
+
+@compiled
 def _finish(
     reference: Trajectory,
-    descending: bool,
     state: VehicleState,
     trajectory: FloatArray,
     land: FloatArray,
-    thrust_n: float,
-    params: GuidanceParams,
+    lift: float,
+    descent_m_s: float,
     dt_s: float,
     setpoint: FloatArray,
 ) -> None:
@@ -47,7 +70,7 @@ def _finish(
     store(trajectory, reference)
     store_position_setpoint(setpoint, setpoint_of(reference))
     memory = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE))
-    store(land, land_detector_step(memory, state, thrust_n, params.weight_n, descending, dt_s))
+    store(land, land_detector_step(memory, state, lift, descent_m_s, dt_s))
 
 
 @compiled
@@ -83,9 +106,10 @@ def goal_kernel(
         goal = aim_goal(mode, aim, params)
     goal = into_ground(goal, state.position_ned_m.z, params)
     last = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE))
-    reference = trajectory_step(last, goal, _limits(params), dt_s)
-    thrust_n = attitude_target[THRUST_AT]
-    _finish(reference, reference.vz > 0.1, state, trajectory, land, thrust_n, params, dt_s, setpoint)
+    down_m = state.position_ned_m.z
+    lift = lift_share(state, attitude_target[THRUST_AT], params.weight_n)
+    reference = _waiting(last, trajectory_step(last, goal, _limits(params), dt_s), down_m, lift)
+    _finish(reference, state, trajectory, land, lift, _descent(reference, down_m), dt_s, setpoint)
 
 
 @compiled
@@ -111,14 +135,16 @@ def stream_kernel(
     state = vehicle_state(state_array)
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     last, limits = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE)), _limits(params)
-    thrust_n = attitude_target[THRUST_AT]
-    if mode != OFFBOARD:
-        reference = manual_step(last, stream, state, mode == POSITION, params, limits, dt_s)
-        descending = reference.vz > 0.1
-    elif stream[S_KIND] >= ATTITUDE:
+    down_m = state.position_ned_m.z
+    lift = lift_share(state, attitude_target[THRUST_AT], params.weight_n)
+    if mode == OFFBOARD and stream[S_KIND] >= ATTITUDE:
         reference = attitude_step(stream, attitude_target, state, params, limits, dt_s, target)
-        descending = True  # little thrust, and yet no motion: on the ground
+        descent_m_s = math.inf
     else:
-        reference = point_step(last, stream, state, params, limits, dt_s)
-        descending = reference.vz > 0.1
-    _finish(reference, descending, state, trajectory, land, thrust_n, params, dt_s, setpoint)
+        if mode == OFFBOARD:
+            reference = point_step(last, stream, state, params, limits, dt_s)
+        else:
+            reference = manual_step(last, stream, state, mode == POSITION, params, limits, dt_s)
+        reference = _waiting(last, reference, down_m, lift)
+        descent_m_s = _descent(reference, down_m)
+    _finish(reference, state, trajectory, land, lift, descent_m_s, dt_s, setpoint)

@@ -9,8 +9,8 @@ import numpy as np
 
 from flightstack.arrays import store_position_setpoint, vehicle_state
 from flightstack.compiled import direct
-from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
-from flightstack.geometry import euler_from_quaternion
+from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray, Quaternion
+from flightstack.geometry import blend, euler_from_quaternion
 from flightstack.guidance.aim import (
     A_HOME_X,
     A_HOME_Y,
@@ -27,7 +27,7 @@ from flightstack.guidance.aim import (
     CLIMBING,
 )
 from flightstack.guidance.kernels import T_YAW, TRAJECTORY_SIZE, goal_kernel, stream_kernel
-from flightstack.guidance.land_detector import CLIMB_M, CONTACT_S, CONTACT_THRUST, LandMemory
+from flightstack.guidance.land_detector import CLIMB_M, CONTACT_M_S, REST_M_S, LandMemory
 from flightstack.guidance.manual import TAKEOFF_STICK, shaped
 from flightstack.guidance.mission import (
     COMMAND,
@@ -73,6 +73,8 @@ from flightstack.guidance.trajectory import BRAKING, Trajectory, setpoint_of
 from flightstack.modes import STREAM_MODES, Mode
 from flightstack.portable_math import atan2, distance, sin_cos
 
+LEVEL_S = 0.1
+"""Time constant with which a vehicle that touches the ground is levelled: a step would make it hop."""
 ARRIVED_M = 0.5
 """So near to the place it was sent to, a vehicle holds."""
 # looking up a member of an enumeration takes seven times as long as looking up a name or a key
@@ -106,7 +108,7 @@ class Navigator:
         self._reported = 0
         self._repositions = False
         self._aim = np.zeros(AIM_SIZE)
-        self._land = np.array(LandMemory(1.0, 0.0, 0.0))
+        self._land = np.array(LandMemory(1.0, 0.0, 0.0, 0.0))
         self._land_now = self._land.data  # a number of an array takes four times as long to read
         self._stream = empty_stream()
         self.attitude_target = np.eye(1, ATTITUDE_TARGET_SIZE)[0]
@@ -171,17 +173,23 @@ class Navigator:
     @property
     def touches_ground(self) -> bool:
         """Whether something other than the rotors holds the vehicle up: landed, or about to count as landed."""
-        return self._land_now[1] >= CONTACT_S
+        return self._land_now[1] >= CONTACT_M_S
 
-    def level_target(self, state: FloatArray, attitude_target: FloatArray) -> FloatArray:
-        """Return a level attitude with little thrust, shape (5,), for a vehicle that touches the ground.
+    @property
+    def rests(self) -> bool:
+        """Whether the vehicle has touched the ground for so long that it needs no control."""
+        return self._land_now[1] >= REST_M_S
 
-        There the outer loop would lean against wind that the ground now withstands, and wind itself up.
+    def levelling_target(self, attitude_target: FloatArray) -> FloatArray:
+        """Return the next attitude target without thrust, shape (5,), of a vehicle that touches the ground.
+
+        From the last one, ``attitude_target``, it levels within about ``LEVEL_S``. The outer loop would lean against
+        wind that friction withstands, and wind itself up.
         """
-        half_yaw = 0.5 * euler_from_quaternion(vehicle_state(state).attitude).z
-        thrust_n = min(float(attitude_target[4]), CONTACT_THRUST * self.params.weight_n)
-        sine, cosine = sin_cos(half_yaw)
-        return np.array([cosine, 0.0, 0.0, sine, thrust_n])
+        last = Quaternion(*attitude_target[:4].tolist())
+        sine, cosine = sin_cos(0.5 * euler_from_quaternion(last).z)
+        level = Quaternion(cosine, 0.0, 0.0, sine)
+        return np.array([*blend(last, level, self._dt_s / LEVEL_S), 0.0])
 
     @property
     def progress(self) -> MissionProgress:
@@ -240,7 +248,7 @@ class Navigator:
         self._trajectory[:] = 0.0
         self._trajectory[:3] = state[:3]
         self._trajectory[T_YAW] = euler_from_quaternion(vehicle_state(state).attitude).z
-        self._land[:] = (1.0, 0.0, state[2])
+        self._land[:] = (1.0, 0.0, 0.0, state[2])
         store_position_setpoint(self.setpoint, setpoint_of(Trajectory(*self._trajectory.tolist())))
 
     def take_up(self, state: FloatArray) -> None:

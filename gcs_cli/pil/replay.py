@@ -143,7 +143,7 @@ def _outer_flags(flight: FlightSamples) -> tuple[FlagArray, bool]:
     setpoint = flight.topics["vehicle_attitude_setpoint"]
     if "loop_flags" not in setpoint:
         return np.full(len(setpoint["timestamp"]), LoopFlags.SET_TARGET, np.int64), False
-    return setpoint["loop_flags"].astype(np.int64) & (LoopFlags.OUTER_DUE | LoopFlags.SET_TARGET), True
+    return setpoint["loop_flags"].astype(np.int64), True
 
 
 def _begins(flight: FlightSamples, steps_us: TimeArray) -> np.ndarray[Any, np.dtype[np.bool_]]:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from flightstack.guidance.land_detector import LandMemory
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.modes import Mode
@@ -65,12 +66,13 @@ class PerfectVehicle:
         """Put the vehicle into the air, at rest, no longer landed."""
         self.state[:3] = north, east, down
         self.navigator.rest_at(self.state)
-        self.navigator._land[:] = 0.0, 0.0, down
+        self.navigator._land[:] = LandMemory(0.0, 0.0, 0.0, down)
 
     def tick(self) -> None:
         setpoint = self.navigator.setpoint
         on_ground = self.state[2] >= 0.0 and setpoint[2] >= 0.0
-        thrust = 0.3 * WEIGHT_N if on_ground else WEIGHT_N
+        pushes = 0.0 if self.navigator.touches_ground else 0.3 * WEIGHT_N
+        thrust = pushes if on_ground else WEIGHT_N
         self.navigator.step(self.mode, self.state, np.array([1.0, 0.0, 0.0, 0.0, thrust]))
         before = self.yaw
         self.state[:6] = setpoint[:6]

@@ -48,6 +48,7 @@ class Bench:
         self.memory = np.zeros(DETECTOR_MEMORY_SIZE)
         self.state = np.array([0.0] * 6 + [1.0] + [0.0] * 6)
         self.setpoint = np.zeros(11)
+        self.on_ground = False
         self.row = np.zeros(LoopRow.SIZE)
         self.row[LoopRow.REFERENCE_ATTITUDE] = 1.0, 0.0, 0.0, 0.0
         self.row[LoopRow.ROTOR_COMMAND] = self.row[LoopRow.ROTOR_SPEED] = 300.0
@@ -61,7 +62,16 @@ class Bench:
         for _ in range(round(seconds / DT_S)):
             for _ in range(5):
                 follow_rotors(self.row, self.rotors, self.rotor_params)
-            found = detect(self.state, self.setpoint, self.row, self.rotors, self.memory, self.params, DT_S)
+            found = detect(
+                self.state,
+                self.setpoint,
+                self.row,
+                self.rotors,
+                self.memory,
+                self.params,
+                self.on_ground,
+                DT_S,
+            )
         return found
 
 
@@ -121,6 +131,19 @@ def test_tilt_error_is_the_angle_between_the_thrust_axes(
     assert bool(bench.run(0.05) & BEYOND_ATTITUDE) is (angle > math.radians(30.0))
 
 
+def test_on_the_ground_the_reference_may_differ_but_the_vehicle_must_stand_upright() -> None:
+    bench = Bench()
+    bench.row[LoopRow.REFERENCE_ATTITUDE] = math.cos(0.5), math.sin(0.5), 0.0, 0.0  # 57°
+    bench.on_ground = True
+    assert not bench.run(10.0) & BEYOND_ATTITUDE
+    bench.on_ground = False
+    assert bench.run(0.5) & BEYOND_ATTITUDE
+    fallen = Bench()
+    fallen.on_ground = True
+    fallen.attitude(90.0)
+    assert fallen.run(0.3) & BEYOND_ATTITUDE
+
+
 def test_position_error_has_a_limit_a_time_and_a_release() -> None:
     bench = Bench()
     bench.state[:3] = 6.0, 8.1, 0.0
@@ -164,7 +187,7 @@ def test_rotors_that_are_shaken_are_no_fault(period: int) -> None:
         follow_rotors(bench.row, bench.rotors, bench.rotor_params)
         if tick % 5 == 0:
             found = detect(
-                bench.state, bench.setpoint, bench.row, bench.rotors, bench.memory, bench.params, DT_S
+                bench.state, bench.setpoint, bench.row, bench.rotors, bench.memory, bench.params, False, DT_S
             )
             assert not found & ROTOR_FAULT
         speed += (command - speed) * (1.0 - math.exp(-INNER_S / lag_s))

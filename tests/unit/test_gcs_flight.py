@@ -265,9 +265,10 @@ def test_a_vehicle_that_is_silent_in_the_first_step_for_too_long_is_lost() -> No
 
 def test_the_limit_counts_simulated_time() -> None:
     story = Story(FakeVehicle(stop_at_item=1, at_stop="hover"), limit_s=120.0).run()
-    assert story.reason == "the flight took longer than --limit 120 s of simulated time"
-    assert story.code == NO_ANSWER
+    assert story.reason == "the mission was not done after 120 s of simulated time (--limit) at item 1 of 3"
+    assert story.code == FAILED
     assert story.outcome is Code.TIMEOUT
+    assert story.orders[-1] == SHUT_DOWN
     assert story.now_s - 100.0 < 10.0  # wall time: 5 s of simulated time pass in each step of 0.05 s
 
 

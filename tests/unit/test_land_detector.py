@@ -1,83 +1,174 @@
-"""The land detector: every sign that must agree, how long, and what ends it."""
+"""The land detector: contact, landing, what ends them, and what is neither."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Callable
 
 import pytest
 
 from flightstack.contract import Quaternion, Vector3, VehicleState
-from flightstack.guidance.land_detector import CLIMB_M, CONTACT_S, SETTLE_S, LandMemory, land_detector_step
+from flightstack.guidance.land_detector import (
+    CLIMB_M,
+    CONTACT_M_S,
+    LANDED_S,
+    REST_M_S,
+    SETTLING_M_S,
+    STANDING_M_S,
+    STILL_M_S,
+    LandMemory,
+    land_detector_step,
+    lift_share,
+)
+from flightstack.params.vehicle import GRAVITY_M_S2
 
-WEIGHT_N, DT = 10.0, 0.01
-FLYING = LandMemory(0.0, 0.0, 0.0)
+DT_S, DESCENT_M_S = 0.01, 0.7
+FLYING = LandMemory(0.0, 0.0, 0.0, 0.0)
+TOUCHING = LandMemory(0.0, CONTACT_M_S, 0.0, 0.0)
 LEVEL = Quaternion(1.0, 0.0, 0.0, 0.0)
 
 
-def moving(down: float = 0.0, north: float = 0.0, east: float = 0.0, z: float = -0.02) -> VehicleState:
-    return VehicleState(Vector3(0.0, 0.0, z), Vector3(north, east, down), LEVEL, Vector3(0.0, 0.0, 0.0))
+def moving(down: float = 0.0, north: float = 0.0, roll_rate: float = 0.0, z: float = -0.02) -> VehicleState:
+    return VehicleState(Vector3(0.0, 0.0, z), Vector3(north, 0.0, down), LEVEL, Vector3(roll_rate, 0.0, 0.0))
 
 
 def watch(
-    seconds: float, state: VehicleState, thrust: float = 3.0, descending: bool = True, memory=FLYING
+    seconds: float,
+    state: VehicleState,
+    lift: float = 0.4,
+    descent_m_s: float = DESCENT_M_S,
+    memory: LandMemory = FLYING,
 ) -> LandMemory:
-    for _ in range(round(seconds / DT)):
-        memory = land_detector_step(memory, state, thrust, WEIGHT_N, descending, DT)
+    for _ in range(round(seconds / DT_S)):
+        memory = land_detector_step(memory, state, lift, descent_m_s, DT_S)
     return memory
 
 
-def test_it_needs_all_signs_for_the_settling_time() -> None:
-    assert watch(SETTLE_S - 2 * DT, moving()).landed == 0.0
-    landed = watch(SETTLE_S + 2 * DT, moving())
+def touches(memory: LandMemory) -> bool:
+    return memory.missing_m_s >= CONTACT_M_S
+
+
+@pytest.mark.parametrize("lift", [0.0, 0.5, 0.85])
+def test_contact_takes_the_time_of_the_missing_fall(lift: float) -> None:
+    needed_s = CONTACT_M_S / ((1.0 - lift) * GRAVITY_M_S2)
+    assert not touches(watch(needed_s - 2 * DT_S, moving(), lift))
+    assert touches(watch(needed_s + 2 * DT_S, moving(), lift))
+
+
+@pytest.mark.parametrize(
+    ("state", "lift", "descent_m_s"),
+    [
+        (moving(down=0.3), 0.4, DESCENT_M_S),
+        (moving(down=-0.3), 0.4, DESCENT_M_S),
+        (moving(down=0.06), 0.4, 0.1),
+        (moving(), 0.95, DESCENT_M_S),
+        (moving(), 0.0, 0.0),
+        (moving(), 0.0, -1.0),
+    ],
+    ids=["sinking", "rising", "slow landing", "carried by its rotors", "holding", "climbing"],
+)
+def test_one_missing_sign_is_enough_for_no_contact(
+    state: VehicleState, lift: float, descent_m_s: float
+) -> None:
+    assert watch(10.0, state, lift, descent_m_s) == (0.0, 0.0, 0.0, -0.02)
+
+
+def test_a_missing_sign_begins_contact_anew() -> None:
+    almost = watch(0.15, moving(), memory=FLYING)
+    assert 0.5 < almost.missing_m_s < CONTACT_M_S
+    assert watch(DT_S, moving(down=0.5), memory=almost).missing_m_s == 0.0
+
+
+def fly(
+    lift_of: Callable[[float], float], updraft: float = 0.0, vz: float = 0.0, seconds: float = 5.0
+) -> float:
+    """Return the most that was missed in the air, with the vertical acceleration that the lift leads to."""
+    memory, most, time_s = FLYING, 0.0, 0.0
+    while time_s < seconds:
+        lift = lift_of(time_s)
+        vz += (1.0 - lift - updraft) * GRAVITY_M_S2 * DT_S
+        memory = land_detector_step(memory, moving(down=vz), lift, math.inf, DT_S)
+        most = max(most, memory.missing_m_s)
+        time_s += DT_S
+    return most
+
+
+@pytest.mark.parametrize("lift", [0.0, 0.3, 0.6, 0.89])
+def test_a_fall_through_the_apex_of_a_throw_is_no_contact(lift: float) -> None:
+    assert fly(lambda _: lift, vz=-2.0) <= 2.0 * STILL_M_S + GRAVITY_M_S2 * DT_S
+
+
+@pytest.mark.parametrize("period_s", [0.1, 0.5, 2.0])
+def test_a_throttle_that_swings_in_the_air_is_no_contact(period_s: float) -> None:
+    assert fly(lambda t: 1.0 + 0.8 * math.sin(2.0 * math.pi * t / period_s)) < CONTACT_M_S
+
+
+def test_hovering_in_an_updraft_is_no_landing() -> None:
+    """Even where the air carries most of the weight: contact at most, and without thrust the vehicle falls."""
+    assert watch(60.0, moving(), lift=0.95, descent_m_s=math.inf) == (0.0, 0.0, 0.0, -0.02)
+    for updraft in (0.1, 0.4, 0.8):
+        hovering = watch(60.0, moving(), lift=1.0 - updraft, descent_m_s=math.inf)
+        assert hovering.landed == 0.0
+        memory, vz = hovering, 0.0
+        for _ in range(200):  # guidance takes the thrust away
+            vz += (1.0 - updraft) * GRAVITY_M_S2 * DT_S
+            memory = land_detector_step(memory, moving(down=vz), 0.0, DESCENT_M_S, DT_S)
+            assert memory.landed == 0.0
+        assert not touches(memory)
+
+
+def test_landed_means_standing_without_thrust_for_a_while() -> None:
+    assert watch(LANDED_S - 2 * DT_S, moving(), 0.0, memory=TOUCHING).landed == 0.0
+    landed = watch(LANDED_S + DT_S, moving(), 0.0, memory=TOUCHING)
     assert landed.landed == 1.0
     assert landed.ground_z_m == -0.02
 
 
 @pytest.mark.parametrize(
-    ("state", "thrust", "descending"),
-    [
-        (moving(down=0.55), 3.0, True),
-        (moving(down=-0.55), 3.0, True),
-        (moving(north=0.3, east=0.3), 3.0, True),
-        (moving(), 7.6, True),
-        (moving(), 3.0, False),
-    ],
-    ids=["sinking", "rising", "sliding", "carried by its rotors", "not told to descend"],
+    ("state", "lift"),
+    [(moving(), 0.2), (moving(down=STANDING_M_S + 0.01), 0.0)],
+    ids=["under thrust", "settling"],
 )
-def test_one_missing_sign_is_enough_to_be_flying(
-    state: VehicleState, thrust: float, descending: bool
-) -> None:
-    assert watch(10.0, state, thrust, descending) == (0.0, 0.0, -0.02)
-    # and an instant of it begins the time anew
-    almost = watch(SETTLE_S - 2 * DT, moving())
-    interrupted = land_detector_step(almost, state, thrust, WEIGHT_N, descending, DT)
-    assert watch(SETTLE_S - 2 * DT, moving(), memory=interrupted).landed == 0.0
+def test_a_vehicle_that_does_not_stand_stays_in_contact(state: VehicleState, lift: float) -> None:
+    memory = watch(10.0, state, lift, memory=TOUCHING)
+    assert memory.landed == memory.stood_s == 0.0
+    assert memory.missing_m_s > REST_M_S
 
 
-@pytest.mark.parametrize("down", [0.25, -0.25])
-def test_a_foot_on_the_ground_may_turn_the_vehicle_but_a_slow_sink_begins_nothing(down: float) -> None:
-    """A tilted vehicle levels about the foot that touches; before contact the same speed is flight."""
-    assert watch(10.0, moving(down=down)) == (0.0, 0.0, -0.02)
-    touching = watch(CONTACT_S + DT, moving())
-    assert watch(SETTLE_S, moving(down=down), memory=touching).landed == 1.0
+def test_wind_that_pushes_a_vehicle_along_the_ground_does_not_prevent_landing() -> None:
+    assert watch(1.0, moving(north=6.0, roll_rate=2.0), 0.0).landed == 1.0
 
 
-def test_a_slow_descent_in_the_air_is_no_landing() -> None:
-    """Sinking slowly and evenly takes the whole weight in thrust."""
-    assert watch(20.0, moving(down=0.1), thrust=WEIGHT_N).landed == 0.0
+def test_rest_begins_a_third_of_a_second_after_contact() -> None:
+    assert watch(0.25, moving(), 0.0, memory=TOUCHING).missing_m_s < REST_M_S
+    assert watch(0.35, moving(), 0.0, memory=TOUCHING).missing_m_s >= REST_M_S
 
 
-def test_it_ends_with_a_rise_and_with_nothing_else() -> None:
-    landed = watch(1.0, moving())
-    assert watch(5.0, moving(down=3.0, north=2.0), thrust=20.0, descending=False, memory=landed) == landed
-    higher = moving(z=-0.02 - CLIMB_M + 0.001)
-    assert watch(1.0, higher, thrust=12.0, descending=False, memory=landed).landed == 1.0
-    flying = watch(DT, moving(z=-0.02 - CLIMB_M - 0.001), thrust=12.0, descending=False, memory=landed)
-    assert flying.landed == 0.0
+@pytest.mark.parametrize("down", [SETTLING_M_S + 0.01, -SETTLING_M_S - 0.01])
+def test_a_fall_or_a_jump_ends_contact(down: float) -> None:
+    assert not touches(watch(DT_S, moving(down=down), 0.0, memory=TOUCHING))
+
+
+def test_a_demand_to_climb_ends_contact_at_once() -> None:
+    assert not touches(watch(DT_S, moving(), 0.0, descent_m_s=-0.5, memory=TOUCHING))
+    assert not touches(watch(DT_S, moving(), 1.05, memory=TOUCHING))
+
+
+def test_a_landing_ends_with_a_rise_and_with_nothing_else() -> None:
+    landed = watch(1.0, moving(), 0.0)
+    assert watch(5.0, moving(down=3.0, north=2.0), 2.0, -1.0, landed) == landed
+    assert watch(1.0, moving(z=-0.02 - CLIMB_M + 0.001), 1.2, -1.0, landed).landed == 1.0
+    assert watch(DT_S, moving(z=-0.02 - CLIMB_M - 0.001), 1.2, -1.0, landed).landed == 0.0
 
 
 def test_ground_is_wherever_it_landed() -> None:
     """A hill of 30 m: the next takeoff is measured from there."""
-    hill = moving(z=-30.0)
-    landed = watch(1.0, hill)
-    assert landed == (1.0, landed.settled_s, -30.0)
+    landed = watch(1.0, moving(z=-30.0), 0.0)
+    assert (landed.landed, landed.ground_z_m) == (1.0, -30.0)
     assert watch(1.0, moving(z=-30.1), memory=landed).landed == 1.0
-    assert watch(1.0, moving(z=-30.2), thrust=12.0, descending=False, memory=landed).landed == 0.0
+    assert watch(1.0, moving(z=-30.2), 1.2, -1.0, landed).landed == 0.0
+
+
+def test_lift_is_the_vertical_part_of_the_thrust() -> None:
+    tilted = Quaternion(math.cos(math.pi / 6), math.sin(math.pi / 6), 0.0, 0.0)  # by 60°
+    assert lift_share(moving()._replace(attitude=tilted), 10.0, 10.0) == pytest.approx(0.5)
