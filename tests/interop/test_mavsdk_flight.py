@@ -80,10 +80,15 @@ async def test_hold_stops_on_the_way(drone: Drone) -> None:
 
 @story(speeds=(1,))
 async def test_what_cannot_be_done_is_refused(drone: Drone) -> None:
-    drone.step("return while on the ground")
+    drone.step("land while on the ground")
     with pytest.raises(ActionError) as grounded:
-        await drone.action.return_to_launch()
+        await drone.action.land()
     assert grounded.value.result.name == "COMMAND_DENIED"
+    drone.step("select a return while disarmed: a mode like any other, as with PX4")
+    await drone.action.return_to_launch()
+    await drone.until_mode("RETURN_TO_LAUNCH")
+    await drone.action.hold()
+    await drone.until_mode("HOLD")
     await drone.take_off()
     drone.step("disarm in the air")
     with pytest.raises(ActionError) as flying:
