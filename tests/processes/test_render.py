@@ -210,7 +210,7 @@ def test_without_a_renderer_nothing_is_written(poses: Path, tmp_path: Path) -> N
 def test_an_interrupted_film_leaves_the_old_one(poses: Path, tmp_path: Path) -> None:
     film = tmp_path / "f.mp4"
     film.write_bytes(b"the old one")
-    arguments = [poses, *SMALL, "--video", film, "--fps", "240", "--speed", "0.01"]
+    arguments = [poses, *SMALL, "--video", film, "--overwrite", "--fps", "240", "--speed", "0.01"]
     process = Process("sim_bridge", "render", *map(str, arguments))
     begun = threading.Event()
     while not begun.wait(0.02):  # the film under way has a name of its own
