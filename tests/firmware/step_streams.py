@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -96,9 +97,12 @@ class Recorder:
         self._loops.step(state, setpoint, speed, outer_due, row)
 
 
-def flown_steps(plan: str = "hop.plan", **world: Any) -> list[bytes]:
-    """Fly a mission in wind with gusts and return the steps of its loops."""
-    flight = World(wind=(4.0, 2.0, 0.0), gust=2.0, drag=True, **world)
+GUSTY: dict[str, Any] = {"wind": (4.0, 2.0, 0.0), "gust": 2.0, "drag": True}
+
+
+def flown_steps(plan: str = "hop.plan", air: Mapping[str, Any] = GUSTY) -> list[bytes]:
+    """Fly a mission and return the steps of its loops."""
+    flight = World(**air)
     recorder = Recorder(flight.stack.autopilot._backend)
     flight.stack.autopilot._backend = recorder
     flight.upload(plan)
