@@ -76,9 +76,9 @@ def test_the_log_tells_when_the_loops_begin_and_when_guidance_gives_the_target(t
     (data,) = (d for d in ULog(str(log)).data_list if d.name == "vehicle_attitude_setpoint")
     flags = data.data["loop_flags"]
     assert set(flags) >= {0, LoopFlags.OUTER_DUE, LoopFlags.SET_TARGET}
-    begins = np.flatnonzero(flags & LoopFlags.RESET)
-    assert len(begins) == 1
-    assert flags[: begins[0]].tolist() == [0] * begins[0]
+    takeoff, touchdown = np.flatnonzero(flags & LoopFlags.RESET)
+    assert flags[:takeoff].tolist() == [0] * takeoff
+    assert flags[touchdown] == LoopFlags.RESET | LoopFlags.SET_TARGET
     given = np.flatnonzero(flags == LoopFlags.SET_TARGET)
     assert np.count_nonzero(np.diff(given) == 1) + 1 >= 40
 
