@@ -30,6 +30,8 @@ class ArmingFacts(NamedTuple):
     battery_remaining: float
     throttle: float = 0.0
     """Throttle stick, −1 to 1; 0 at the centre, and without sticks."""
+    step_refusal: str = ""
+    """Why the steps between the simulator's states cannot be flown, a sentence; empty: they can."""
 
 
 def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]:
@@ -47,6 +49,7 @@ def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]
     checks = (
         (facts.state_is_valid, Need.STATE.value),
         (facts.state_is_fresh or not facts.state_is_valid, "the state is frozen or missing"),
+        (not facts.step_refusal, facts.step_refusal),
         (facts.upright or not facts.state_is_valid, Need.UPRIGHT.value),
         (facts.battery_level == 0, f"the battery is low: {facts.battery_remaining:.0%} left"),
         (ordered, "BAT_EMERGEN_THR, BAT_CRIT_THR and BAT_LOW_THR do not rise in this order"),
