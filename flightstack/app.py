@@ -13,11 +13,13 @@ from flightstack.clock import DeadlineScheduler, ask_for_punctual_sleeps
 from flightstack.config import StackConfig
 from flightstack.firmware.errors import TargetError
 from flightstack.ground_end import GroundEnd
+from flightstack.lockstep import Lockstep
 from flightstack.modes import Mode
 from flightstack.process_config import (
     EXIT_LOST,
     EXIT_OK,
     EXIT_TIMEOUT,
+    EXIT_USAGE,
     Ended,
     ProcessConfig,
     RebootRequestedError,
@@ -183,6 +185,7 @@ class App:
     def _run_lockstep(self, simulator: TcpClient) -> None:
         """Answer each state with actuators; the simulator owns time."""
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
+        lockstep = Lockstep(link, autopilot, self.stack.rates.interval_us)
         receive, clock_ns = simulator.receive, time.monotonic_ns
         self._follower = Follower(simulator.socket)
         divisor, tick = self.stack.rates.divisor, 0
@@ -190,7 +193,7 @@ class App:
         while True:
             if fresh:
                 began_ns = clock_ns()
-                commands = autopilot.tick(link.time_us)
+                commands = lockstep.tick(began_ns)
                 simulator.send(link.answer(commands, autopilot.now.status.armed))
                 timing.tick(began_ns, clock_ns())
                 tick += 1
@@ -240,6 +243,9 @@ class App:
             self._next_log_us = time_us + 1_000_000
             fields = self.stack.report.log_fields(time_us // self.stack.rates.interval_us)
             self.stack.recorder.timing(time_us, **fields)
+            if not self._lockstep:
+                self.stack.simulator.steps.compare(self.stack.simulator.time_us, time_us)
+        self._pass_notices()
         now_ns = time.monotonic_ns()
         if now_ns < self._next_ground_ns:
             return
@@ -249,6 +255,15 @@ class App:
         self._next_ground_ns = now_ns + (GROUND_POLL_NS if heard else GROUND_IDLE_NS)
         self._pass_requests(simulator)
         self._check_stop()
+
+    def _pass_notices(self) -> None:
+        """Tell the operator what is wrong with the simulator's steps; do not begin a mission that cannot be flown."""
+        link, now = self.stack.simulator, self.stack.autopilot.now
+        for severity, text in link.steps.take_notices():
+            self.stack.autopilot.say(severity, text)
+            complain(text[0].lower() + text[1:])
+            if self._process.wait_for_start and now.landed and (refusal := link.step_refusal):
+                raise Ended(EXIT_USAGE, refusal)
 
     def _pass_requests(self, simulator: TcpClient) -> None:
         if requests := self.stack.simulator.take_requests():

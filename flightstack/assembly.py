@@ -99,7 +99,7 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
     params, loaded = load_parameters(config, backend)
     behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
     recorder = FlightRecorder(open_log, info, params.values, config.home)
-    simulator = SimulatorLink(vehicle, config.home, config.lockstep, system_id)
+    simulator = SimulatorLink(vehicle, config.home, config.lockstep, system_id, pace.interval_us)
     autopilot = Autopilot(
         vehicle,
         backend,

@@ -35,7 +35,7 @@ class TimingReport:
         """Return FS_LOOP_TIMING."""
         t, r, e, late = self._timing, self._rates, self._execution, self._lateness
         return FsLoopTiming(
-            self._time_us, t.ticks & 0xFFFFFFFF, t.overruns, t.missed, r.inner_hz, r.outer_hz, self._factor,
+            self._time_us, t.ticks, t.overruns, t.missed, r.inner_hz, r.outer_hz, self._factor,
             *e, *late, 0 if self._lockstep else 1,
         )  # fmt: skip
 

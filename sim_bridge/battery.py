@@ -15,6 +15,7 @@ import math
 from typing import NamedTuple
 
 from flightstack.compiled import compiled
+from flightstack.field_numbers import int16, int32, whole
 from flightstack.mavlink.battery_frame import EXTRA_PLACES, PLACES, UNUSED_CELL, BatteryReport
 from flightstack.params.battery import Battery
 from sim_bridge.layout import Record
@@ -106,14 +107,14 @@ def battery_state(m: Record) -> BatteryState:
 
 def battery_report(state: BatteryState, cells: int) -> BatteryReport:
     """BATTERY_STATUS of a pack whose cells are equal."""
-    in_cell = min(round(state.voltage_v / cells * 1e3), UNUSED_CELL - 1)
+    in_cell = whole(state.voltage_v / cells * 1e3, 0, UNUSED_CELL - 1)
     first, more = min(cells, PLACES), max(cells - PLACES, 0)
     unused = [UNUSED_CELL] * (PLACES - first) + [in_cell] * more + [0] * (EXTRA_PLACES - more)
     return BatteryReport(
         0,
         (*[in_cell] * first, *unused),
-        min(round(state.current_a * 100.0), 0x7FFF),
-        min(round(state.consumed_mah), 0x7FFFFFFF),
-        min(round(state.energy_j / 100.0), 0x7FFFFFFF),
-        round(state.remaining * 100.0),
+        int16(state.current_a * 100.0),
+        int32(state.consumed_mah),
+        int32(state.energy_j / 100.0),
+        whole(state.remaining * 100.0, 0, 100),
     )

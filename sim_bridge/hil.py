@@ -12,6 +12,7 @@ import math
 from typing import Any
 
 from flightstack.contract import Quaternion, Vector3
+from flightstack.field_numbers import int16, int32, whole
 from flightstack.geodesy import LocalFrame
 from flightstack.geometry import conjugate, rotate
 from flightstack.mavlink.dialect import mavlink
@@ -25,19 +26,6 @@ HIL_LOCKSTEP_FLAG = 1  # HIL_ACTUATOR_CONTROLS_FLAGS_LOCKSTEP
 _HIL_ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 
-def _integer(value: float, low: int, high: int) -> int:
-    """Round and clip to an integer field of the wire."""
-    return round(min(max(value, low), high))
-
-
-def _int16(value: float) -> int:
-    return _integer(value, -32768, 32767)
-
-
-def _int32(value: float) -> int:
-    return _integer(value, -(2**31), 2**31 - 1)
-
-
 def hil_state(simulator: Simulator, frame: LocalFrame) -> Message:
     """HIL_STATE_QUATERNION of the present state, positions relative to the origin of ``frame``."""
     shown = simulator.shown.state.tolist()
@@ -47,18 +35,18 @@ def hil_state(simulator: Simulator, frame: LocalFrame) -> Message:
     geo = frame.to_geo(Vector3(*x[0:3]))
     a = simulator.plant.acceleration_ned_m_s2()
     force = rotate(conjugate(attitude), Vector3(a.x, a.y, a.z - GRAVITY_M_S2))
-    airspeed = _integer(simulator.plant.airspeed_m_s() * 100.0, 0, 65535)
+    airspeed = whole(simulator.plant.airspeed_m_s() * 100.0, 0, 65535)
     return mavlink.MAVLink_hil_state_quaternion_message(
         simulator.time_us,
         shown[6:10],
         *shown[10:13],
-        _int32(geo.latitude_deg * 1e7),
-        _int32(geo.longitude_deg * 1e7),
-        _int32(geo.altitude_m * 1e3),
-        *(_int16(v * 100.0) for v in velocity),
+        int32(geo.latitude_deg * 1e7),
+        int32(geo.longitude_deg * 1e7),
+        int32(geo.altitude_m * 1e3),
+        *(int16(v * 100.0) for v in velocity),
         airspeed,
         airspeed,
-        *(_int16(f / STANDARD_GRAVITY_M_S2 * 1000.0) for f in force),
+        *(int16(f / STANDARD_GRAVITY_M_S2 * 1000.0) for f in force),
     )
 
 

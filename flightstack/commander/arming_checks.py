@@ -32,6 +32,8 @@ class ArmingFacts(NamedTuple):
     """Throttle stick, −1 to 1; 0 at the centre, and without sticks."""
     mode_fault: str = ""
     """Why the mode does not take a standing vehicle into the air; empty: it may."""
+    step_refusal: str = ""
+    """Why the steps between the simulator's states cannot be flown, a sentence; empty: they can."""
 
 
 def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]:
@@ -50,6 +52,7 @@ def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]
         (facts.state_is_valid, Need.STATE.value),
         (facts.state_is_fresh or not facts.state_is_valid, "the state is frozen or missing"),
         (not facts.mode_fault, facts.mode_fault),
+        (not facts.step_refusal, facts.step_refusal),
         (facts.upright or not facts.state_is_valid, Need.UPRIGHT.value),
         (facts.battery_level == 0, f"the battery is low: {facts.battery_remaining:.0%} left"),
         (ordered, "BAT_EMERGEN_THR, BAT_CRIT_THR and BAT_LOW_THR do not rise in this order"),

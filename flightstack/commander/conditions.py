@@ -57,6 +57,11 @@ class StateSource(Protocol):
         """The newest word about the battery."""
         ...
 
+    @property
+    def step_refusal(self) -> str:
+        """Why the steps between states cannot be flown; empty if they can."""
+        ...
+
     def freshness(self, now_us: int) -> Freshness:
         """Tell how old the state is at vehicle time ``now_us``."""
         ...

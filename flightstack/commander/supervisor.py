@@ -114,6 +114,7 @@ class Supervisor:
             fence_breach=breach,
             battery_level=self.battery_level,
             battery_remaining=self._source.battery.remaining,
+            step_refusal=self._source.step_refusal,
         )
 
     # ------------------------------------------------------------------ what is told

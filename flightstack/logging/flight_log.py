@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from flightstack.contract import FloatArray, LoopRow
+from flightstack.field_numbers import fitted
 from flightstack.geodesy import GeoPoint
 from flightstack.logging import ulog
 from flightstack.logging.event_topics import EVENT_TOPICS
@@ -71,8 +72,8 @@ class _EventTopic:
     def __init__(self, topic: Topic, message_id: int, known: Mapping[str, float]) -> None:
         """``known`` fields have these values in every message that does not give another."""
         self._header = ulog.DATA_HEADER.pack(content_size(topic), ulog.DATA_TYPE, message_id)
-        codes = "".join(ulog.STRUCT_CODES[field.type] for field in topic.fields)
-        self._pack = struct.Struct("<Q" + codes).pack
+        self._codes = "Q" + "".join(ulog.STRUCT_CODES[field.type] for field in topic.fields)
+        self._pack = struct.Struct("<" + self._codes).pack
         self._defaults: dict[str, float] = {
             field.name: field.default if field.type in ("float", "double") else int(field.default)
             for field in topic.fields
@@ -80,10 +81,16 @@ class _EventTopic:
         self._defaults |= known
 
     def encode(self, time_us: int, fields: Mapping[str, float]) -> bytes:
+        """Return the message. Unsigned fields (times, counters) wrap, signed ones saturate."""
         values = {**self._defaults, **fields}
         if len(values) != len(self._defaults):
             raise TypeError(f"not a field of the topic: {sorted(set(fields) - set(self._defaults))}")
-        return self._header + self._pack(time_us, *values.values())
+        numbers = (time_us, *values.values())
+        try:
+            return self._header + self._pack(*numbers)
+        except (struct.error, OverflowError):
+            fits = [fitted(n, code, code.isupper()) for n, code in zip(numbers, self._codes, strict=True)]
+            return self._header + self._pack(*fits)
 
 
 class FlightLog:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable
 
+from flightstack.field_numbers import fitted, int32
+
 MAGIC = b"ULog\x01\x12\x35"
 VERSION = 1
 
@@ -87,8 +89,8 @@ def information(key: str, value: str | int | float) -> bytes:
 def parameter(name: str, value: float) -> bytes:
     """Return a parameter: an int as int32_t, a float as float, the two types that ULog allows."""
     if isinstance(value, int):
-        return _keyed("P", f"int32_t {name}", struct.pack("<i", value))
-    return _keyed("P", f"float {name}", struct.pack("<f", value))
+        return _keyed("P", f"int32_t {name}", struct.pack("<i", int32(value)))
+    return _keyed("P", f"float {name}", struct.pack("<f", fitted(value, "f", wraps=False)))
 
 
 def subscription(message_id: int, name: str) -> bytes:

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 from fastcrc import crc16
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.fitting import PACKING_ERRORS, fit
 from flightstack.mavlink.frames import MAGIC_V1, MAGIC_V2, Frame, FrameReader
 from flightstack.mavlink.signing import LinkSigning
 from flightstack.mavlink.text import clean_fields
@@ -47,8 +48,15 @@ class Link:
         self.bad = 0
 
     def encode(self, message: Message) -> bytes:
-        """Return the frame of ``message`` with this link's next sequence number."""
-        frame: bytes = message.pack(self._codec)
+        """Return the frame of ``message`` with this link's next sequence number.
+
+        Values that their fields cannot hold are brought into range in ``message`` (``fitting.fit``).
+        """
+        try:
+            frame: bytes = message.pack(self._codec)
+        except PACKING_ERRORS:
+            fit(message)
+            frame = message.pack(self._codec)
         self._codec.seq = (self._codec.seq + 1) % 256
         self.sent += 1
         return self._outgoing(bytes(frame), message)

@@ -23,15 +23,13 @@ from flightstack.mavlink.hot_frames import (
     PlantStateFrame,
 )
 from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.state_steps import StateSteps
 from flightstack.params.vehicle import Vehicle, system_type
 
 HIL_ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED | mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 HIL_DISARMED = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 HIL_LOCKSTEP = 1
 
-
-LATEST_START_US = 1 << 53
-"""Largest time of a first state that is believed: three centuries."""
 
 LONGEST_STEP_US = 2_000_000
 """Largest step between two states' times that the vehicle's clock follows: twice that of the slowest loops."""
@@ -67,12 +65,15 @@ class SimulatorLink:
 
     ``state`` (13,) and ``rotor_speed_rad_s`` (8,) are the same arrays for the link's whole life.
 
-    ``time_us`` is the vehicle's clock. It follows the steps between the states' times. A step back, or one longer
-    than ``LONGEST_STEP_US`` (a simulator that started anew, or nonsense), is counted in ``odd_times``; the state
-    is taken, and the clock stands still for that step.
+    ``time_us`` is the simulated time since the vehicle booted: the first state, whatever its time, is at 0, and
+    the steps between the states' times are followed. A step back, or one longer than ``LONGEST_STEP_US`` (a
+    simulator that started anew, or nonsense), is counted in ``odd_times``; the state is taken, and the clock
+    stands still for that step. ``steps`` watches those that are not the loops' own, ``interval_us``.
     """
 
-    def __init__(self, vehicle: Vehicle, home: GeoPoint, lockstep: bool, system_id: int = 1) -> None:
+    def __init__(
+        self, vehicle: Vehicle, home: GeoPoint, lockstep: bool, system_id: int = 1, interval_us: int = 2000
+    ) -> None:
         self._link = Link(system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._plant = PlantStateFrame()
         self._actuators = ActuatorsFrame(system_id)
@@ -87,10 +88,13 @@ class SimulatorLink:
         self.rotor_speed_rad_s = self._plant.rotor_speed_rad_s
         self.time_us = 0
         self.odd_times = 0
+        self.steps = StateSteps(interval_us)
+        self._interval_us = interval_us
         self.battery = NO_BATTERY
         self._finder = FrameFinder()
         self._state_us = 0  # the newest state's own time
-        self._arrived = False  # a state, since ``freshness`` was last asked for
+        self.has_arrived = False
+        """Whether a state of a new time has come since ``freshness`` was last asked for."""
         self._arrived_us = 0
         self._changed_us = 0
         self._seen = b""
@@ -104,8 +108,7 @@ class SimulatorLink:
         """Go on where another link of the same connection was, after a reboot."""
         self.state[:] = other.state
         self.rotor_speed_rad_s[:] = other.rotor_speed_rad_s
-        self.time_us, self._state_us, self._arrived_us = other.time_us, other._state_us, other.time_us
-        self._changed_us = other.time_us
+        self._state_us = other._state_us  # its clock begins anew
         self.battery, self.has_state, self._speaks_hil = other.battery, other.has_state, other._speaks_hil
 
     def hello(self, interval_us: int) -> bytes:
@@ -198,22 +201,31 @@ class SimulatorLink:
     def _take_time(self, state_us: int) -> None:
         step_us = state_us - self._state_us
         self._state_us = state_us
-        self._arrived = True
-        if 0 <= step_us <= LONGEST_STEP_US:
+        if step_us == self._interval_us and self.has_state:  # the usual
             self.time_us += step_us
-        elif self.has_state:
+            self.has_arrived = True
+        elif not self.has_state:  # the vehicle boots
+            self.has_state = self.has_arrived = True
+        elif 0 < step_us <= LONGEST_STEP_US:
+            self.time_us += step_us
+            self.has_arrived = True
+            self.steps.differs(step_us, self.time_us)
+        elif step_us:
             self.odd_times += 1
-        else:  # the first one says when the flight begins
-            self.time_us = state_us if state_us < LATEST_START_US else 0
-        self.has_state = True
+            self.steps.jumps(step_us, self.time_us)
+
+    @property
+    def step_refusal(self) -> str:
+        """Why the vehicle must not arm with the simulator's steps; empty if it may."""
+        return self.steps.refusal(self.time_us)
 
     def freshness(self, now_us: int) -> Freshness:
         """Tell how old the newest state is at ``now_us``, the time of this tick; to be asked for in regular ticks.
 
         In lockstep a state can be frozen but never old.
         """
-        if self._arrived:
-            self._arrived = False
+        if self.has_arrived:
+            self.has_arrived = False
             self._arrived_us = now_us
             content = self.state.tobytes()
             if content != self._seen:

@@ -23,6 +23,7 @@ from flightstack.config import DEFAULT_HOME, StackConfig
 from flightstack.contract import Vector3
 from flightstack.geodesy import LocalFrame
 from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.lockstep import Lockstep
 from flightstack.logging.flight_log import FlightLog
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.hot_frames import ActuatorsFrame
@@ -86,7 +87,10 @@ class World:
         vehicle = self.stack.vehicle.with_drag(plant) if drag else self.stack.vehicle
         self.simulator = Simulator(vehicle, plant, PlantOptions(disturbance=disturbance, seed=seed))
         self.simulator.set_interval_us(self.stack.rates.interval_us)
-        self._actuators = ActuatorsFrame()
+        self._lockstep = Lockstep(self.stack.simulator, self.stack.autopilot, self.stack.rates.interval_us)
+        self.machine_ns = 0
+        """Time of the machine that flies, for a simulator whose clock stands still."""
+        self.actuators = ActuatorsFrame()
         self._simulator_codec = Link(1, SIMULATOR_COMPONENT)
         self._held_s = 0.0
         self._link = Link(*GCS)
@@ -108,7 +112,7 @@ class World:
         self._stream_due_s = -math.inf
         self._next_log_us = 0
         self._ticks = 0
-        self.stack.simulator.receive(memoryview(self.simulator.outgoing()))
+        self.stack.simulator.receive(memoryview(self.states()))
         self.stack.autopilot.has_state = True
         self.stack.ground.add_peer(PEER, permanent=True)
 
@@ -158,8 +162,13 @@ class World:
     def tick(self) -> None:
         """One exchange: state to the stack, actuators back, all as bytes."""
         stack = self.stack
-        commands = stack.autopilot.tick(stack.simulator.time_us + self._missed_us)
-        assert self._actuators.open(stack.simulator.answer(commands, self.armed))
+        if self._missed_us:
+            commands = stack.autopilot.tick(stack.simulator.time_us + self._missed_us)
+        else:
+            commands = self._lockstep.tick(self.machine_ns)
+        for severity, text in stack.simulator.steps.take_notices():
+            stack.autopilot.say(severity, text)
+        self.take_answer(stack.simulator.answer(commands, self.armed))
         self._ticks += 1
         if self._ticks % stack.rates.divisor == 0:
             time_us = stack.autopilot.now.time_us
@@ -167,11 +176,19 @@ class World:
                 self._next_log_us = time_us + 1_000_000
                 stack.recorder.timing(time_us, **stack.report.log_fields(time_us // stack.rates.interval_us))
             self.exchange_with_ground()
-        self.simulator.apply(self._actuators)
+        self.simulator.apply(self.actuators)
         if self.loses_states:
             self._missed_us += stack.rates.interval_us
         else:
-            assert stack.simulator.receive(memoryview(self.simulator.outgoing()))
+            assert stack.simulator.receive(memoryview(self.states()))
+
+    def states(self) -> bytes | memoryview:
+        """The bytes that the simulator sends for one step."""
+        return self.simulator.outgoing()
+
+    def take_answer(self, answer: bytes | memoryview) -> None:
+        """Take the stack's actuators."""
+        assert self.actuators.open(answer)
 
     def _pass_requests(self) -> None:
         """Carry what the vehicle asks of the simulator, and the answers."""

@@ -26,6 +26,13 @@ def link(lockstep: bool = True, vehicle=PAPER) -> SimulatorLink:
     return SimulatorLink(vehicle, HOME, lockstep, system_id=3)
 
 
+def booted() -> SimulatorLink:
+    """A link whose clock runs since a state of time 0."""
+    stack = link()
+    assert receive(stack, plant_state(0, [0.0] * 6 + STATE[6:]))
+    return stack
+
+
 def plant_state(time_us: int, state=STATE, speed: float = 200.0) -> bytes:
     frame = PlantStateFrame(1, 51)
     frame.state[:] = state
@@ -83,7 +90,7 @@ def test_flags_say_armed_and_lockstep(lockstep: bool, armed: bool, flags: int) -
 
 
 def test_the_newest_of_several_states_counts() -> None:
-    stack = link()
+    stack = booted()
     assert receive(stack, plant_state(2000) + plant_state(4000, [0.0] * 6 + STATE[6:]))
     assert stack.time_us == 4000
     assert stack.state[0] == 0.0
@@ -94,7 +101,7 @@ STREAM = heartbeat() + plant_state(2000) + heartbeat() + plant_state(4000)
 
 @pytest.mark.parametrize("cut", range(1, len(STREAM)))
 def test_the_stream_may_be_cut_anywhere(cut: int) -> None:
-    stack = link()
+    stack = booted()
     first, second = receive(stack, STREAM[:cut]), receive(stack, STREAM[cut:])
     assert second or (first and cut == len(STREAM))
     assert stack.time_us == 4000
@@ -105,7 +112,7 @@ def test_the_stream_may_be_cut_anywhere(cut: int) -> None:
 
 
 def test_byte_by_byte() -> None:
-    stack = link()
+    stack = booted()
     fresh = [receive(stack, STREAM[index : index + 1]) for index in range(len(STREAM))]
     assert sum(fresh) == 2
     assert stack.time_us == 4000
@@ -114,7 +121,7 @@ def test_byte_by_byte() -> None:
 @pytest.mark.parametrize("junk", [b"\x00" * 7, b"hello", bytes(range(200)), b"\xfe\x00", b"\xff" * 300])
 def test_junk_between_frames_costs_no_state(junk: bytes) -> None:
     """In lockstep a lost state would be the last: the simulator waits for its answer."""
-    stack = link()
+    stack = booted()
     for time_us in range(2000, 22_000, 2000):
         receive(stack, junk)
         assert receive(stack, plant_state(time_us))
@@ -141,7 +148,7 @@ def test_a_state_that_takes_the_general_way_is_taken_too() -> None:
     codec._codec.signing.secret_key = b"k" * 32
     codec._codec.signing.sign_outgoing = True
     message = FsPlantState(8000, STATE[:3], STATE[3:6], STATE[6:10], STATE[10:], [150.0] * 8, 4, 1)
-    stack = link()
+    stack = booted()
     assert receive(stack, codec.encode(message))
     assert (stack.time_us, stack.state.tolist()) == (8000, STATE)
     assert stack.rotor_speed_rad_s.tolist() == [150.0] * 8
@@ -177,7 +184,7 @@ def test_a_simulator_that_refuses_our_message_is_asked_for_the_standard_one() ->
 
 
 def test_hil_state_becomes_the_state() -> None:
-    stack = link()
+    stack = booted()
     assert receive(stack, hil_state())
     place = LocalFrame(HOME).to_geo(Vector3(*stack.state[:3]))
     assert place == pytest.approx((47.398, 8.546, 495.0), abs=1e-9)
@@ -249,7 +256,7 @@ def battery(**changes) -> bytes:
 
 
 def test_a_battery_is_taken_with_the_time_of_its_state() -> None:
-    stack = link()
+    stack = booted()
     assert not stack.battery.valid
     assert receive(stack, plant_state(2000))
     assert receive(stack, battery() + plant_state(4000))
@@ -265,7 +272,7 @@ def test_a_battery_and_state_are_the_same_whichever_way_they_come() -> None:
     ways = [[data], [b"\x55\x66" + data], [data[:20], data[20:]], [data + battery()]]
     seen = []
     for way in ways:
-        stack = link()
+        stack = booted()
         receive(stack, plant_state(2000))
         assert [receive(stack, piece) for piece in way][-1]
         seen.append((stack.battery, stack.state.tolist(), stack.time_us, stack.odd_times))
@@ -317,25 +324,97 @@ def test_the_clock_neither_goes_back_nor_jumps(odd: int) -> None:
     receive(stack, plant_state(1_000_000))
     receive(stack, plant_state(1_002_000))
     receive(stack, plant_state(odd, [5.0, *STATE[1:]]))
-    assert (stack.time_us, stack.odd_times, stack.state[0]) == (1_002_000, 1, 5.0)
+    assert (stack.time_us, stack.odd_times, stack.state[0]) == (2_000, 1, 5.0)
     assert answer.open(stack.answer(np.zeros(8), True))
     assert answer.time_us == odd
     receive(stack, plant_state((odd + 4000) % 2**64))
-    expected = 1_002_000 if odd == 2**64 - 1 else 1_006_000
+    expected = 2_000 if odd == 2**64 - 1 else 6_000
     assert stack.time_us == expected
     receive(stack, plant_state((odd + 6000) % 2**64))
     assert stack.time_us == expected + 2000
 
 
-def test_the_first_time_begins_the_clock_if_it_is_believable() -> None:
+@pytest.mark.parametrize("first_us", [0, 5_000_000_000, 1_790_000_000_000_000, 2**64 - 5000])
+def test_the_clock_counts_from_the_first_state(first_us: int) -> None:
     stack = link()
-    receive(stack, plant_state(5_000_000_000))
-    assert (stack.time_us, stack.odd_times) == (5_000_000_000, 0)
-    other = link()
-    receive(other, plant_state(2**64 - 1))
-    receive(other, plant_state(2000))
-    receive(other, plant_state(4000))
-    assert other.time_us == 2000
+    for after_us in (0, 2000, 4000):
+        receive(stack, plant_state(first_us + after_us))
+        assert (stack.time_us, stack.odd_times) == (after_us, 0)
+
+
+def test_a_first_time_that_was_nonsense_costs_one_step() -> None:
+    stack = link()
+    receive(stack, plant_state(2**64 - 1))
+    receive(stack, plant_state(2000))
+    receive(stack, plant_state(4000))
+    assert (stack.time_us, stack.odd_times) == (2000, 1)
+
+
+def test_a_state_that_comes_again_is_no_new_one() -> None:
+    stack = booted()
+    receive(stack, plant_state(10_000))
+    assert stack.freshness(10_000) == (0, 0)
+    assert receive(stack, plant_state(10_000, [9.0, *STATE[1:]]))  # it wants an answer
+    assert (stack.time_us, stack.odd_times) == (10_000, 0)
+    assert stack.freshness(20_000).age_us == 10_000
+
+
+def texts(stack: SimulatorLink) -> list[str]:
+    return [notice.text for notice in stack.steps.take_notices()]
+
+
+@pytest.mark.parametrize("step_us", [500, 4000, 4167, 10_000])
+def test_another_step_is_told_once(step_us: int) -> None:
+    stack = booted()
+    for number in range(1, 100):
+        receive(stack, plant_state(number * step_us))
+    assert texts(stack) == [
+        f"Simulator sends a state every {step_us / 1000:.4g} ms; the loops run every 2 ms on the newest one"
+    ]
+    assert not stack.step_refusal
+
+
+def test_steps_that_jitter_about_the_loops_own_are_not_told() -> None:
+    stack = booted()
+    for number in range(1, 200):
+        receive(stack, plant_state(number * 2000 + (number % 3 - 1) * 20))
+    assert texts(stack) == []
+
+
+def test_a_step_too_long_to_fly_is_refused_until_it_ends() -> None:
+    stack, time_us = booted(), 0
+    for _ in range(10):
+        time_us += 16_000
+        receive(stack, plant_state(time_us))
+    assert stack.step_refusal == (
+        "the simulator sends a state every 16 ms, the loops need one every 10 ms, or --inner-hz 62.5"
+    )
+    assert texts(stack) == [f"Not to be flown: {stack.step_refusal}"]
+    for _ in range(20):
+        time_us += 2_000
+        receive(stack, plant_state(time_us))
+    assert not stack.step_refusal
+
+
+def test_steps_that_cannot_be_followed_are_told_now_and_then() -> None:
+    stack = booted()
+    for time_us in (2000, 12_002_000, 2000, 4000):
+        receive(stack, plant_state(time_us))
+    assert texts(stack) == ["Simulator time jumped ahead by 12 s"]
+    for number in range(6000):
+        receive(stack, plant_state(6000 + 2000 * number))
+    receive(stack, plant_state(2000))
+    assert texts(stack) == ["Simulator time went back by 12 s"]
+
+
+def test_a_simulator_out_of_step_with_the_machine_is_told_once() -> None:
+    stack = booted()
+    for second in range(30):
+        stack.steps.compare(1_000_000 * second, 1_000_000 * second)
+    assert texts(stack) == []
+    for second in range(30):
+        stack.steps.compare(29_000_000 + 500_000 * second, 1_000_000 * (29 + second))
+    assert texts(stack) == ["Simulator runs at 0.50 times real time"]
 
 
 def test_a_failure_is_asked_for_by_the_standard_command() -> None:
@@ -345,7 +424,7 @@ def test_a_failure_is_asked_for_by_the_standard_command() -> None:
 
 @pytest.mark.parametrize("junk", [b"\xfd\xff\x00", b"\xfe\xff", b"\xfd\xff\x00" * 90, b"\xfd" * 500])
 def test_junk_in_the_same_piece_costs_no_state(junk: bytes) -> None:
-    stack = link()
+    stack = booted()
     for time_us in range(2000, 22_000, 2000):
         data = junk + plant_state(time_us)
         cut = len(junk) + 40

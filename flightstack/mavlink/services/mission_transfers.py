@@ -17,7 +17,10 @@ class Upload(Operation):
     """Announces the items, then serves them as the vehicle asks, in any order and as often as it asks."""
 
     def __init__(self, vehicle: Address, mission_type: int, items: Sequence[MissionItem]) -> None:
-        count = mavlink.MAVLink_mission_count_message(*vehicle, len(items), mission_type)
+        announced = min(
+            len(items), 0xFFFF
+        )  # of more than the field holds, so many: a vehicle refuses them all
+        count = mavlink.MAVLink_mission_count_message(*vehicle, announced, mission_type)
         super().__init__(vehicle, mission_type, count)
         self._items = tuple(items)
         self._count_message = count

@@ -1,4 +1,4 @@
-"""Numbers of the vehicle as MAVLink's fields hold them: rounded, bounded, and nothing that cannot be packed."""
+"""Numbers of the vehicle as fields of single precision hold them, and its clock as the 32-bit fields do."""
 
 from __future__ import annotations
 
@@ -10,21 +10,6 @@ from flightstack.mavlink.telemetry.facts import VehicleFacts
 NAN = math.nan
 _SINGLE_LIMIT = 1e18
 """Beyond this a number counts as infinite: single-precision fields, and their products, must hold it."""
-
-
-def whole(value: float, low: int, high: int) -> int:
-    """Round into an integer field; what is not finite becomes 0."""
-    return max(low, min(high, round(value))) if math.isfinite(value) else 0
-
-
-def int16(value: float) -> int:
-    """Round into a 16-bit field."""
-    return whole(value, -32768, 32767)
-
-
-def int32(value: float) -> int:
-    """Round into a 32-bit field."""
-    return whole(value, -(2**31), 2**31 - 1)
 
 
 def floats(array: FloatArray) -> list[float]:
@@ -40,9 +25,14 @@ def singles(values: list[float]) -> list[float]:
     return values
 
 
+def wrapped(time: int) -> int:
+    """Return a time as a 32-bit field holds it: it wraps."""
+    return time & 0xFFFFFFFF
+
+
 def boot_ms(f: VehicleFacts) -> int:
-    """Time since boot in the 32-bit field that wraps."""
-    return (f.time_us // 1000) & 0xFFFFFFFF
+    """Return the time since boot as the field ``time_boot_ms``, which wraps after 49.7 days."""
+    return wrapped(f.time_us // 1000)
 
 
 def euler(q: list[float]) -> tuple[float, float, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from flightstack.contract import LoopRow, Vector3
+from flightstack.field_numbers import int16, int32, whole
 from flightstack.mavlink.dialect import EscStatus, mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.telemetry.facts import VehicleFacts
@@ -14,10 +15,8 @@ from flightstack.mavlink.telemetry.fields import (
     euler,
     floats,
     heading_deg,
-    int16,
-    int32,
     singles,
-    whole,
+    wrapped,
 )
 
 RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
@@ -141,7 +140,7 @@ def servo_output(f: VehicleFacts) -> Message:
     """SERVO_OUTPUT_RAW: rotor speed commands as pulses, 1000 µs for none to 2000 µs for the largest."""
     pulses = [1000 + round(1000.0 * share) for share in _command_shares(f)]
     pulses += [0] * (8 - len(pulses))
-    return mavlink.MAVLink_servo_output_raw_message(f.time_us & 0xFFFFFFFF, 0, *pulses)
+    return mavlink.MAVLink_servo_output_raw_message(wrapped(f.time_us), 0, *pulses)
 
 
 def actuator_output(f: VehicleFacts) -> Message:

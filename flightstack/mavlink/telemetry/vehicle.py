@@ -6,10 +6,11 @@ import math
 
 from flightstack import __version__
 from flightstack.contract import Vector3
+from flightstack.field_numbers import int16, int32, whole
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.telemetry.facts import VehicleFacts
-from flightstack.mavlink.telemetry.fields import NAN, boot_ms, int16, int32, whole
+from flightstack.mavlink.telemetry.fields import NAN, boot_ms
 from flightstack.modes import CUSTOM_MODE, Mode
 from flightstack.params.vehicle import system_type
 
@@ -168,8 +169,7 @@ def flight_information(f: VehicleFacts) -> Message:
 def fence_status(f: VehicleFacts) -> Message:
     """FENCE_STATUS: whether the fence is broken now; the number of breaches, and kind and time of the latest."""
     number, latest_us, kind = f.fence_breaches
-    began_ms = latest_us // 1000 & 0xFFFFFFFF
-    return mavlink.MAVLink_fence_status_message(int(f.fence_breached), min(number, 0xFFFF), kind, began_ms)
+    return mavlink.MAVLink_fence_status_message(int(f.fence_breached), number, kind, latest_us // 1000)
 
 
 CAPABILITIES = (

@@ -1,0 +1,114 @@
+"""What the times of states say about the simulator: how long its steps are, and whether they can be flown. Pure."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flightstack.mavlink.dialect import mavlink
+
+LONGEST_FLYABLE_US = 10_000
+"""Longest step that loops of a shorter one fly by: both built-in vehicles fly the square at 16 ms, not at 20 ms."""
+GAP_US = 50_000
+"""A single step of so much is a gap: the loops rest in it, as without states."""
+WINDOW = 10
+"""So many steps make a mean."""
+CHANGE = 0.05
+"""Share by which a mean must differ from the one that was told last."""
+PACE_SPAN_US = 5_000_000
+PACE_TOLERANCE = 0.2
+"""In real time, the share by which the simulator's speed may differ from the machine's, over so long."""
+
+
+class Notice(NamedTuple):
+    """What the operator should know, with its MAV_SEVERITY."""
+
+    severity: int
+    text: str
+
+
+class StateSteps:
+    """Watches the steps between states. Steps of ``interval_us``, the loops' own, are not shown to it."""
+
+    def __init__(self, interval_us: int) -> None:
+        self._interval_us = interval_us
+        self._sum_us = self._count = 0
+        self._mean_us = self._told_us = float(interval_us)
+        self._latest_us = 0
+        self._quiet_until_us = 0
+        self._pace_from: tuple[int, int] | None = None
+        self._pace_is_off = False
+        self._notices: list[Notice] = []
+
+    def take_notices(self) -> list[Notice]:
+        """Return what the operator should know, once."""
+        if not self._notices:
+            return self._notices
+        notices, self._notices = self._notices, []
+        return notices
+
+    def refusal(self, time_us: int) -> str:
+        """Return why the newest steps, at ``time_us``, cannot be flown; empty if they can."""
+        is_over = time_us - self._latest_us > 2.0 * self._mean_us
+        if is_over or self._mean_us <= max(LONGEST_FLYABLE_US, self._interval_us):
+            return ""
+        return (
+            f"the simulator sends a state every {_ms(self._mean_us)}, the loops need one every "
+            f"{_ms(LONGEST_FLYABLE_US)}, or --inner-hz {1e6 / self._mean_us:.4g}"
+        )
+
+    def differs(self, step_us: int, time_us: int) -> None:
+        """Take a step that led to ``time_us`` and is not the loops' own."""
+        self._latest_us = time_us
+        self._sum_us += step_us
+        self._count += 1
+        if self._count == WINDOW:
+            self._mean_us = self._sum_us / WINDOW
+            self._sum_us = self._count = 0
+            if abs(self._mean_us - self._told_us) > CHANGE * self._told_us:
+                self._told_us = self._mean_us
+                self._tell_mean(time_us)
+        elif step_us >= GAP_US:
+            self.jumps(step_us, time_us)
+
+    def _tell_mean(self, time_us: int) -> None:
+        refusal = self.refusal(time_us)
+        text = (
+            f"Simulator sends a state every {_ms(self._mean_us)}; "
+            f"the loops run every {_ms(self._interval_us)} on the newest one"
+        )
+        if refusal:
+            self.tell(mavlink.MAV_SEVERITY_ERROR, "Not to be flown: " + refusal)
+        else:
+            self.tell(mavlink.MAV_SEVERITY_NOTICE, text)
+
+    def jumps(self, step_us: int, time_us: int) -> None:
+        """Take a step that the vehicle's clock, at ``time_us``, follows as a gap, or not at all."""
+        if time_us < self._quiet_until_us:
+            return
+        self._quiet_until_us = time_us + 10_000_000
+        way = "went back by" if step_us < 0 else "jumped ahead by"
+        self.tell(mavlink.MAV_SEVERITY_WARNING, f"Simulator time {way} {abs(step_us) * 1e-6:.4g} s")
+
+    def compare(self, time_us: int, machine_us: int) -> None:
+        """In real time: compare the simulator's clock with the machine's; call from time to time."""
+        if self._pace_from is None:
+            self._pace_from = time_us, machine_us
+            return
+        passed_us = machine_us - self._pace_from[1]
+        if passed_us < PACE_SPAN_US:
+            return
+        pace = (time_us - self._pace_from[0]) / passed_us
+        self._pace_from = time_us, machine_us
+        is_off = abs(pace - 1.0) > PACE_TOLERANCE
+        if is_off and not self._pace_is_off:
+            says = f"runs at {pace:.2f} times real time" if pace > 0.0 else "clock stands still"
+            self.tell(mavlink.MAV_SEVERITY_WARNING, f"Simulator {says}")
+        self._pace_is_off = is_off
+
+    def tell(self, severity: int, text: str) -> None:
+        """Add a notice for the operator."""
+        self._notices.append(Notice(severity, text))
+
+
+def _ms(duration_us: float) -> str:
+    return f"{duration_us * 1e-3:.4g} ms"
