@@ -79,7 +79,7 @@ def flying(start: Start, tmp_path: Path) -> dict[str, Process]:
         "simulator": start("sim_bridge", "--instance", str(instance), "--speed", "2"),
         "stack": start(
             "flightstack", "--instance", str(instance), "--gcs-port", str(port), "--log", str(tmp_path / "flight.ulg"),
-            "--params", "none", "--exit-on-gcs-loss", "3",
+            "--params", "none", "--exit-on-gcs-loss", "30",  # a ground station may take seconds to start
         ),
     }  # fmt: skip
     processes["stack"].wait_for("flightstack: paper_quad")
