@@ -12,7 +12,7 @@ INSTALL := $(BIN)/python -m pip install -q --no-compile --disable-pip-version-ch
 WORKERS ?= 3
 .DEFAULT_GOAL := help
 
-.PHONY: help setup fly test check lint types imports generated generate bench fuzz fuzz-firmware firmware-check mutation clean
+.PHONY: help setup fly test stress check lint types imports generated generate bench fuzz fuzz-firmware firmware-check mutation clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -40,6 +40,9 @@ fly: $(FLY_READY) ## Fly missions/square.plan: simulator, flight stack and groun
 
 test: $(READY) ## Run every test
 	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --durations 15
+
+stress: $(READY) ## Run every test beside a program that keeps each core busy
+	@$(BIN)/python tools/beside_load.py $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
 
 check: lint types imports generated test ## Everything that CI checks
 
