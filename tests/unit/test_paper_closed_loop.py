@@ -189,8 +189,12 @@ def test_the_linear_pd_has_the_poles_of_backstepping() -> None:
 # ---------------------------------------------------------------- what the comparison of the controllers finds
 
 
-def flown(contender: str, trajectory: str, condition: str = "plain", plant: str = "paper") -> Recording:
-    return fly(make_case(BY_NAME[contender], trajectory, CONDITION[condition], plant))
+def flown(
+    contender: str, trajectory: str, condition: str = "plain", plant: str = "paper", push_n: float = 0.0
+) -> Recording:
+    """Fly a case. ``push_n`` moves an unstable loop from its rest, which takes rounding a time that is chance."""
+    case = make_case(BY_NAME[contender], trajectory, CONDITION[condition], plant)
+    return fly(case._replace(force_ned_n=Vector3(push_n, -push_n, 0.0)) if push_n else case)
 
 
 def worst_overshoot(recording: Recording) -> float:
@@ -215,7 +219,8 @@ def test_a_linear_pd_with_its_poles_flies_as_backstepping_does(plant: str) -> No
 @pytest.mark.parametrize("plant", PLANTS)
 def test_backstepping_overshoots_less_than_a_pd_without_the_rate_alone(plant: str) -> None:
     """What Table III has and Table II has not is the rate of the reference: with it the PD overshoots no more."""
-    found = [entry_of(flown(name, "hard", plant=plant)) for name in (PID, RATE_FED_PID, BACKSTEPPING)]
+    names = PID, RATE_FED_PID, BACKSTEPPING
+    found = [entry_of(flown(name, "hard", plant=plant, push_n=1e-12)) for name in names]
     over = shared_overshoots(found)
     assert over is not None
     without, fed, backstepping = over.median_percent
@@ -234,10 +239,10 @@ def test_a_reference_model_takes_the_overshoot_from_everybody() -> None:
 
 def test_without_limits_the_spin_up_torque_ends_the_papers_pid() -> None:
     """Its yaw loop is unstable there, and nothing but the rotors' limits bounds what it asks for."""
-    flight = flown(PID, "hard", "no_limits", "rigid")
+    flight = flown(PID, "hard", "no_limits", "rigid", push_n=1e-12)
     assert flight.ended_how == "lost"
     assert flight.ended_s is not None
-    assert flight.ended_s < 1.0
+    assert flight.ended_s < 1.0  # measured 0.54 to 0.56 with pushes of 1e-12 N
 
 
 def test_smooth_paths_are_flown_alike_on_the_papers_model() -> None:
