@@ -198,6 +198,21 @@ def test_client_on_its_own_clock_gets_states_at_the_rate() -> None:
     assert "lateness mean" in out
 
 
+def test_speed_max_that_did_not_act_is_reported() -> None:
+    bridge = SimBridge("--speed", "max")
+    with Client(bridge.port) as client:
+        client.request()
+        states = (message for message in client.messages() if message.get_type() == "FS_PLANT_STATE")
+        next(states)
+        client.answer(0, flags=ARMED_FLAG)  # without the flag of lockstep
+        for _ in range(5):
+            next(states)
+        client.heartbeat(mavlink.MAV_STATE_POWEROFF)
+    code, out, _ = bridge.end()
+    assert code == 0
+    assert "--speed max did not act: flown at speed 1" in out
+
+
 def test_same_commands_give_the_same_bytes_at_any_speed() -> None:
     received = []
     for speed in ("max", "10", "100"):
