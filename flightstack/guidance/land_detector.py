@@ -3,7 +3,7 @@
 The stages are those of PX4's MulticopterLandDetector:
 
 * *Contact*: guidance asks for a descent, the thrust carries less than the weight, and yet the vehicle does not sink. It
-  is then levelled without thrust, so that a vehicle that touches nothing falls, and leaves the stage at once.
+  is then levelled with hardly any thrust, so that a vehicle that touches nothing falls, and leaves the stage at once.
 * *Rest* (PX4's "maybe landed"): contact has lasted. The loops stop, so that nothing works against the ground.
 * *Landed*: since contact the vehicle has neither had thrust nor fallen for a while.
 
@@ -22,12 +22,16 @@ from flightstack.params.vehicle import GRAVITY_M_S2
 CONTACT_M_S = 1.0
 """Sink rate that the missing thrust should have led to, and has not: contact. In the air it is 0.5 m/s at most, the
 width of ``STILL_M_S``; the rest is for what an updraft carries."""
+BOUNCE_SHARE = 0.5
+"""How fast that sum falls again while the vehicle is not still, in g: a bounce on its feet does not clear it."""
 REST_M_S = 4.0
 """The same from which on the vehicle rests without any control: 0.3 s after contact, in which it has levelled."""
 LANDED_S = 0.4
 """How long the signs of standing must agree after contact."""
 CONTACT_LIFT = 0.9
 """Vertical thrust, as share of the weight, below which something else must carry a vehicle that does not sink."""
+LEVELLING_LIFT = 0.08
+"""Thrust, as share of the weight, of a vehicle that is levelled: friction holds it, and yaw is controlled."""
 LANDED_LIFT = 0.15
 """Vertical thrust, as share of the weight, of a vehicle that stands."""
 STILL_M_S = 0.25
@@ -77,8 +81,9 @@ def land_detector_step(
         return LandMemory(0.0, 0.0, 0.0, z)
     missing_m_s = memory.missing_m_s + (1.0 - lift) * GRAVITY_M_S2 * dt_s
     if memory.missing_m_s < CONTACT_M_S:
-        still = abs(vz) < min(STILL_M_S, 0.5 * descent_m_s)
-        return LandMemory(0.0, missing_m_s if still else 0.0, 0.0, z)
+        if abs(vz) >= min(STILL_M_S, 0.5 * descent_m_s):
+            missing_m_s = max(0.0, memory.missing_m_s - BOUNCE_SHARE * GRAVITY_M_S2 * dt_s)
+        return LandMemory(0.0, missing_m_s, 0.0, z)
     if abs(vz) >= SETTLING_M_S:
         return LandMemory(0.0, 0.0, 0.0, z)
     stands = lift < LANDED_LIFT and abs(vz) < STANDING_M_S

@@ -27,7 +27,7 @@ from flightstack.guidance.aim import (
     CLIMBING,
 )
 from flightstack.guidance.kernels import T_YAW, TRAJECTORY_SIZE, goal_kernel, stream_kernel
-from flightstack.guidance.land_detector import CLIMB_M, CONTACT_M_S, REST_M_S, LandMemory
+from flightstack.guidance.land_detector import CLIMB_M, CONTACT_M_S, LEVELLING_LIFT, REST_M_S, LandMemory
 from flightstack.guidance.manual import TAKEOFF_STICK, shaped
 from flightstack.guidance.mission import (
     COMMAND,
@@ -181,7 +181,7 @@ class Navigator:
         return self._land_now[1] >= REST_M_S
 
     def levelling_target(self, attitude_target: FloatArray) -> FloatArray:
-        """Return the next attitude target without thrust, shape (5,), of a vehicle that touches the ground.
+        """Return the next attitude target, with little thrust, shape (5,), of a vehicle that touches the ground.
 
         From the last one, ``attitude_target``, it levels within about ``LEVEL_S``. The outer loop would lean against
         wind that friction withstands, and wind itself up.
@@ -189,7 +189,8 @@ class Navigator:
         last = Quaternion(*attitude_target[:4].tolist())
         sine, cosine = sin_cos(0.5 * euler_from_quaternion(last).z)
         level = Quaternion(cosine, 0.0, 0.0, sine)
-        return np.array([*blend(last, level, self._dt_s / LEVEL_S), 0.0])
+        thrust_n = LEVELLING_LIFT * self.params.weight_n
+        return np.array([*blend(last, level, self._dt_s / LEVEL_S), thrust_n])
 
     @property
     def progress(self) -> MissionProgress:

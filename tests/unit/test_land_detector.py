@@ -73,10 +73,12 @@ def test_one_missing_sign_is_enough_for_no_contact(
     assert watch(10.0, state, lift, descent_m_s) == (0.0, 0.0, 0.0, -0.02)
 
 
-def test_a_missing_sign_begins_contact_anew() -> None:
-    almost = watch(0.15, moving(), memory=FLYING)
+def test_thrust_or_a_fall_clears_the_signs_of_contact_and_a_bounce_does_not() -> None:
+    almost = watch(0.15, moving())
     assert 0.5 < almost.missing_m_s < CONTACT_M_S
-    assert watch(DT_S, moving(down=0.5), memory=almost).missing_m_s == 0.0
+    assert watch(DT_S, moving(), lift=0.95, memory=almost).missing_m_s == 0.0
+    assert watch(0.04, moving(down=-0.4), memory=almost).missing_m_s > 0.5 * almost.missing_m_s
+    assert watch(0.3, moving(down=0.5), memory=almost).missing_m_s == 0.0
 
 
 def fly(
