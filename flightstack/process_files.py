@@ -31,16 +31,22 @@ class ProcessFiles:
         self._signing: Signing | None = None
 
     def build(self, config: StackConfig) -> Stack:
-        """Build a stack and join it to the files; raise ConfigError."""
+        """Build a stack, which ``adopt`` puts in place of the present one; raise ConfigError, TargetError."""
+        if self._saver is not None:
+            self._saver.flush()  # the new stack reads the file
         log = self._process.log
         stack = build(config, self._open_log, NO_LOGS if log is None else LogLibrary(log.parent))
-        self._stack = stack
         stack.ground.vehicle.open_log_tail = self._open_tail
-        self._signing = self._open_signing(stack)
+        self._use_signing(stack)
+        return stack
+
+    def adopt(self, stack: Stack, config: StackConfig) -> None:
+        """Join ``stack``, built for ``config``, to the files."""
+        self.close_parameters()
+        self._stack = stack
         if config.params_file is not None:
             system_id = int(stack.params.value(SYSTEM_ID))
             self._saver = ParamSaver(stack.params, stack.loaded_params, Path(config.params_file), system_id)
-        return stack
 
     def take_problem(self) -> str | None:
         """Return the sentence why parameters were not saved, once for each time."""
@@ -84,15 +90,18 @@ class ProcessFiles:
 
     # ------------------------------------------------------------------ signing
 
-    def _open_signing(self, stack: Stack) -> Signing | None:
-        """Sign the ground links if there is to be a key; raise ConfigError."""
+    def _use_signing(self, stack: Stack) -> None:
+        """Sign the ground links if there is to be a key; raise ConfigError.
+
+        All stacks of the process share one ``Signing``: a frame heard before a reboot is a replay after it.
+        """
         path = self._process.signing_key
         if path is None:
-            return None
-        if not path.exists():
-            create_key(path)
-            print(f"flightstack: a new signing key is in {path}", flush=True)
-        role = f"vehicle-{self._process.ports.instance}"
-        signing = open_signing(path, role, self._process.allow_unsigned)
-        stack.ground.use_signing(signing, lambda key: replace_key(path, key))
-        return signing
+            return
+        if self._signing is None:
+            if not path.exists():
+                create_key(path)
+                print(f"flightstack: a new signing key is in {path}", flush=True)
+            role = f"vehicle-{self._process.ports.instance}"
+            self._signing = open_signing(path, role, self._process.allow_unsigned)
+        stack.ground.use_signing(self._signing, lambda key: replace_key(path, key))

@@ -50,6 +50,11 @@ class ParamSaver:
         error, self._error = self._error, None
         return None if error is None else f"parameters are not saved: {self._path}: {error.strerror or error}"
 
+    def flush(self) -> None:
+        """Save what has changed before returning; later changes are saved too."""
+        self.close()
+        self._closing = False
+
     def close(self) -> None:
         """Save what has changed, and end; a second call does nothing."""
         self._closing = True
