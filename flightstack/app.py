@@ -7,14 +7,18 @@ import math
 import select
 import signal
 import time
+from dataclasses import replace
 from types import FrameType
 
+from flightstack.assembly import Stack
 from flightstack.clock import DeadlineScheduler, ask_for_punctual_sleeps
 from flightstack.config import StackConfig
+from flightstack.firmware.choice import PYTHON, SERIAL, parse_loops
 from flightstack.firmware.errors import TargetError
 from flightstack.ground_end import GroundEnd
 from flightstack.lockstep import Lockstep
 from flightstack.modes import Mode
+from flightstack.params.errors import ConfigError
 from flightstack.process_config import (
     EXIT_LOST,
     EXIT_OK,
@@ -50,6 +54,9 @@ class App:
         self._config = config
         self._files = ProcessFiles(process)
         self.stack = self._files.build(config)
+        self._files.adopt(self.stack, config)
+        self.stack.ground.vehicle.prepare_reboot = self._prepare_reboot
+        self._next: tuple[Stack, StackConfig] | None = None
         self._ground = GroundEnd(process.ports, self.stack.ground)
         self._lockstep = config.lockstep
         self._stop_signal = 0
@@ -78,6 +85,9 @@ class App:
             self.stack.recorder.take_back_row()
             complain(error)
             code = EXIT_TIMEOUT
+        except ConfigError as error:  # at a reboot
+            complain(error)
+            code = EXIT_USAGE
         except LinkClosedError:
             code = self._simulator_gone()
         finally:
@@ -113,18 +123,38 @@ class App:
                 if not holds_time:  # the last state was answered: the next one comes by itself
                     waits = True
 
+    def _prepare_reboot(self) -> str | None:
+        """Build the stack that a reboot begins with; return why it cannot be: then the present one goes on."""
+        config = config_after(self.stack, self._config)
+        is_exclusive = parse_loops(config.loops).kind == SERIAL  # a line is opened once: the rest must do
+        try:
+            stack = self._files.build(replace(config, loops=PYTHON) if is_exclusive else config)
+        except (ConfigError, TargetError) as error:
+            complain(f"not rebooted: {error}")
+            return f"not rebooted: {error}"
+        if (problem := self._files.unsaved_parameters()) is not None:
+            stack.loops.close()
+            return f"not rebooted: {problem}"
+        self._next = None if is_exclusive else (stack, config)
+        return None
+
     def _reboot(self) -> None:
+        """Put the stack that was prepared in place of the present one."""
         old = self.stack
         old.recorder.close()
         self._files.attend()
         self._ground.leave(time.monotonic())  # with the command's answer
-        self._files.close_parameters()
-        self._files.close_signing()
         self._files.close_loops()
-        self.stack = self._files.build(config_after(old, self._config))
-        self._ground.join(self.stack.ground)
-        carry_over(old, self.stack)
-        self.stack.autopilot.say(NOTICE, "Rebooted")
+        config = config_after(old, self._config)
+        new, config = self._next or (self._files.build(config), config)
+        self._next = None
+        self._files.adopt(new, config)
+        self.stack = new
+        new.ground.vehicle.prepare_reboot = self._prepare_reboot
+        self._ground.join(new.ground)
+        self._next_log_us = 0
+        carry_over(old, new)
+        new.autopilot.say(NOTICE, "Rebooted")
         complain("rebooted")
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
@@ -145,6 +175,8 @@ class App:
         """End the log and, if all is in order, say goodbye: who hears nothing counts us as lost."""
         self.stack.recorder.close()
         self._files.close_loops()
+        if self._next is not None:
+            self._next[0].loops.close()
         self._files.close_parameters()
         self._files.attend()
         self._files.close_plans()

@@ -85,6 +85,21 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
         pace.divisor,
     )
     backend = make_loops(config.loops, setup, config.lockstep)
+    try:
+        return _join(config, vehicle, pace, backend, open_log, logs)
+    except BaseException:
+        backend.close()  # a target may be a process, or hold a line
+        raise
+
+
+def _join(
+    config: StackConfig,
+    vehicle: Vehicle,
+    pace: Rates,
+    backend: ControlBackend,
+    open_log: OpenLog,
+    logs: LogStore,
+) -> Stack:
     info: dict[str, str | int | float] = {
         "sys_name": "flightstack",
         "ver_sw": __version__,

@@ -17,7 +17,7 @@ class FileSaver:
         self._write = write
         self._failure = failure
         self._error: OSError | None = None
-        self._has_failed = False
+        self._told = False
         self._changed = threading.Event()
         self._closing = False
         self._thread: threading.Thread | None = None
@@ -42,16 +42,27 @@ class FileSaver:
         try:
             self._write()
         except OSError as error:
-            if not self._has_failed:
-                self._error = error
-            self._has_failed = True
+            self._error = error
         else:
-            self._has_failed = False
+            self._error, self._told = None, False
+
+    def problem(self) -> str | None:
+        """Return the sentence why the newest state is not in the file, or None if it is."""
+        error = self._error
+        return None if error is None else f"{self._failure}: {error.strerror or error}"
 
     def take_error(self) -> str | None:
-        """Return the sentence why the file was not written, or None: one for each row of failures."""
-        error, self._error = self._error, None
-        return None if error is None else f"{self._failure}: {error.strerror or error}"
+        """Return ``problem``, once for each row of failures."""
+        problem = self.problem()
+        if problem is None or self._told:
+            return None
+        self._told = True
+        return problem
+
+    def flush(self) -> None:
+        """Write what has changed before returning; later changes are written too."""
+        self.close()
+        self._closing = False
 
     def close(self) -> None:
         """Write what has changed, and end; a second call does nothing."""

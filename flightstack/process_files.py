@@ -35,20 +35,30 @@ class ProcessFiles:
         self._signing: Signing | None = None
 
     def build(self, config: StackConfig) -> Stack:
-        """Build a stack and join it to the files; raise ConfigError."""
+        """Build a stack, which ``adopt`` puts in place of the present one; raise ConfigError, TargetError."""
+        if self._params is not None:
+            self._params.flush()  # the new stack reads the file
         log = self._process.log
-        library = None if log is None else LogLibrary(log.parent, self._own_log)
-        stack = build(config, self._open_log, library or NO_LOGS)
-        is_first, self._stack = self._stack is None, stack
-        if library is not None:
-            library.logs()  # every log is examined now, and not in flight
+        stack = build(
+            config, self._open_log, NO_LOGS if log is None else LogLibrary(log.parent, self._own_log)
+        )
         stack.ground.vehicle.open_log_tail = self._open_tail
-        self._signing = self._open_signing(stack)
+        self._use_signing(stack)
+        return stack
+
+    def adopt(self, stack: Stack, config: StackConfig) -> None:
+        """Join ``stack``, built for ``config``, to the files."""
+        self.close_parameters()
+        is_first, self._stack = self._stack is None, stack
         if config.params_file is not None:
             self._params = _param_saver(stack, Path(config.params_file))
+        stack.ground.vehicle.logs.logs()  # every log is examined now, and not in flight
         if self._plans is not None and is_first:
             self._tell(self._plans.restore(stack))
-        return stack
+
+    def unsaved_parameters(self) -> str | None:
+        """Return the sentence why the newest parameters are not in their file, or None if they are."""
+        return None if self._params is None else self._params.problem()
 
     def attend(self) -> None:
         """Save plans that have changed; tell ground stations and user once of a file that cannot be written."""
@@ -118,18 +128,21 @@ class ProcessFiles:
 
     # ------------------------------------------------------------------ signing
 
-    def _open_signing(self, stack: Stack) -> Signing | None:
-        """Sign the ground links if there is to be a key; raise ConfigError."""
+    def _use_signing(self, stack: Stack) -> None:
+        """Sign the ground links if there is to be a key; raise ConfigError.
+
+        All stacks of the process share one ``Signing``: a frame heard before a reboot is a replay after it.
+        """
         path = self._process.signing_key
         if path is None:
-            return None
-        if not path.exists():
-            create_key(path)
-            say(f"flightstack: a new signing key is in {path}")
-        role = f"vehicle-{self._process.ports.instance}"
-        signing = open_signing(path, role, self._process.allow_unsigned)
-        stack.ground.use_signing(signing, lambda key: replace_key(path, key))
-        return signing
+            return
+        if self._signing is None:
+            if not path.exists():
+                create_key(path)
+                say(f"flightstack: a new signing key is in {path}")
+            role = f"vehicle-{self._process.ports.instance}"
+            self._signing = open_signing(path, role, self._process.allow_unsigned)
+        stack.ground.use_signing(self._signing, lambda key: replace_key(path, key))
 
 
 def _param_saver(stack: Stack, path: Path) -> FileSaver:

@@ -17,7 +17,12 @@ def config_after(stack: Stack, config: StackConfig) -> StackConfig:
 
 
 def carry_over(old: Stack, new: Stack) -> None:
-    """Give the new stack what is not the process's to forget: peers, plans, home, and the newest state."""
+    """Give the new stack what a reboot must not lose: peers, plans, home, and the newest state.
+
+    What begins anew: the vehicle's clock, modes and failsafes, sequence numbers, transfers of files and missions,
+    counters, timing. What the process keeps for all stacks: signing with the time stamps of its streams, the number
+    of the next log, the parameter file.
+    """
     for address, permanent in old.ground.addresses():
         new.ground.add_peer(address, permanent)
     new.autopilot.set_home(old.autopilot.home, old.autopilot.places.home_is_chosen)
@@ -25,4 +30,3 @@ def carry_over(old: Stack, new: Stack) -> None:
     new.ground.last_heard_s = old.ground.last_heard_s
     new.simulator.resume(old.simulator)
     new.autopilot.has_state = old.autopilot.has_state
-    new.autopilot.now.time_us = old.autopilot.now.time_us

@@ -69,6 +69,8 @@ class VehicleContext:
     """Whether the vehicle calls itself a generic autopilot (FS_AUTOPILOT), as it was when it started."""
     shutdown_requested: bool = False
     reboot_requested: bool = False
+    prepare_reboot: Callable[[], str | None] = field(default=lambda: None)
+    """Makes ready what a reboot begins with; returns why there can be none, or None."""
     logs: LogStore = NO_LOGS
     open_log_tail: Callable[[], LogTail | None] = field(default=lambda: None)
     """Opens the log that is being written, to stream it; None while there is none."""

@@ -6,6 +6,7 @@ from flightstack.commander.transitions import Need
 from flightstack.commands.context import (
     ACCEPTED,
     DENIED,
+    FAILED,
     RELATIVE_FRAMES,
     UNSUPPORTED,
     Answer,
@@ -33,6 +34,10 @@ def reboot_or_shut_down(vehicle: VehicleContext, command: Command) -> Answer:
     now = vehicle.autopilot.now
     if now.status.armed and not now.landed:
         return Answer(DENIED, "the vehicle is in the air")
+    if wanted == REBOOT and not vehicle.reboot_requested:
+        problem = vehicle.prepare_reboot()
+        if problem is not None:
+            return Answer(FAILED, problem)
     vehicle.shutdown_requested = wanted == SHUT_DOWN
     vehicle.reboot_requested = wanted == REBOOT
     return Answer(ACCEPTED)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
+from pyulog import ULog
 
 from tests.support.gcs import gcs
 from tests.support.vehicle_processes import vehicle
@@ -58,3 +60,53 @@ def test_a_reboot_while_no_simulator_is_there_is_a_reboot_too(tmp_path: Path) ->
         assert there.stack.returncode == 0
         assert errors.count("flightstack: rebooted") == 2
         assert "Traceback" not in errors
+
+
+def test_a_bad_parameter_file_refuses_the_reboot_and_the_vehicle_goes_on(tmp_path: Path) -> None:
+    file = tmp_path / "vehicle.params"
+    with vehicle(tmp_path, "--log", "none", "--params", file) as there:
+
+        def run(*words: object) -> tuple[int, str]:
+            ended = gcs("--connect", there.link, "--timeout", 60, *words)
+            return ended.returncode, ended.stdout + ended.stderr
+
+        assert run("param", "get", "MIS_TAKEOFF_ALT")[0] == 0
+        good = file.read_text()
+        file.write_text(f"{there.instance + 1}\t1\tMIS_TAKEOFF_ALT\tnonsense\t9\n")
+        code, said = run("reboot")
+        assert code == 1, said
+        assert "not rebooted" in said
+        assert "vehicle.params" in said
+        assert run("arm")[0] == 0
+        assert run("disarm", "--force")[0] == 0
+        file.write_text(good)
+        assert run("reboot")[0] == 0
+        assert run("param", "get", "MIS_TAKEOFF_ALT")[0] == 0
+        there.stack.terminate()
+        _, errors = there.stack.communicate(timeout=60)
+        assert there.stack.returncode == 0
+        assert errors.count("flightstack: rebooted") == 1
+        assert errors.count("flightstack: not rebooted: ") == 1
+
+
+@pytest.mark.parametrize("clock", ["lockstep", "realtime"])
+def test_the_log_after_a_reboot_has_the_loops_timing(tmp_path: Path, clock: str) -> None:
+    options = ("--log", "flight.ulg", "--params", "none", "--clock", clock, "--param", "COM_DISARM_PRFLT=3")
+    with vehicle(tmp_path, *options, speed=3) as there:
+
+        def run(*words: object) -> str:
+            ended = gcs("--connect", there.link, "--timeout", 60, *words)
+            assert ended.returncode == 0, ended.stderr
+            return ended.stdout
+
+        for flight in range(2):
+            if flight:
+                run("reboot")
+            run("arm")
+            while json.loads(run("status", "--json"))["armed"]:
+                pass  # it disarms by itself
+    for name in ("flight.ulg", "flight-2.ulg"):
+        log = ULog(str(tmp_path / name))
+        seconds = (log.last_timestamp - log.start_timestamp) // 1_000_000
+        assert seconds == 3
+        assert len(log.get_dataset("loop_timing").data["timestamp"]) in (seconds, seconds + 1)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from threading import Thread
 
 import pytest
 
 from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
 from tests.support.free_instance import free_instance
+from tests.support.gcs import gcs
 from tests.support.process import BOUND_S, Process
+
+MISSIONS = Path(__file__).parents[2] / "missions"
 
 
 class StandingVehicle:
@@ -60,6 +64,7 @@ def start() -> Iterator[Callable[..., Process]]:
             "--log", "none", "--params", "none", *options,
         )  # fmt: skip
         ends.extend((process.kill, simulator.close))
+        process.link = f"udpout:127.0.0.1:{18570 + instance}"
         return process
 
     yield begin
@@ -76,6 +81,15 @@ def test_a_step_that_differs_is_told_on_the_terminal(start) -> None:
 def test_a_step_too_long_is_told_on_the_terminal(start) -> None:
     stack = start(lambda number: 20_000 * number)
     stack.wait_for("not to be flown: the simulator sends a state every 20 ms")
+
+
+def test_a_step_too_long_ends_a_stack_that_was_to_start_a_mission(start) -> None:
+    stack = start(lambda number: 20_000 * number, "--wait-for-start")
+    stack.wait_for("flightstack: paper_quad")
+    for words in (["mission", "upload", str(MISSIONS / "square.plan")], ["arm"], ["mission", "start"]):
+        assert gcs("--connect", stack.link, "--timeout", 60, *words).returncode == 0
+    assert stack.end() == 2
+    assert "flightstack: the simulator sends a state every 20 ms" in stack.output
 
 
 @pytest.mark.parametrize("clock", ["lockstep", "realtime"])

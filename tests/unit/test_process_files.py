@@ -1,0 +1,101 @@
+"""The files of one process over a reboot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from flightstack.config import StackConfig
+from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.hot_frames import PlantStateFrame
+from flightstack.mavlink.link import Link
+from flightstack.mavlink.signing import LinkSigning, Signing
+from flightstack.params.errors import ConfigError
+from flightstack.process_config import ProcessConfig
+from flightstack.process_files import ProcessFiles
+from flightstack.reboot import carry_over
+from flightstack.signing_file import load_key
+from flightstack.transport.vehicle_ports import PortsConfig
+
+PEER = PeerAddress(GROUND, "127.0.0.1", 5000)
+REBOOT = mavlink.MAVLink_command_long_message(1, 1, 246, 0, 1, 0, 0, 0, 0, 0, 0)
+
+
+def process_files(folder: Path) -> ProcessFiles:
+    ports = PortsConfig(0, (), ("127.0.0.1", 1), "127.0.0.1", 0)
+    key = folder / "key"
+    return ProcessFiles(ProcessConfig("127.0.0.1", 1, 1.0, ports, None, False, None, key))
+
+
+def test_a_recorded_signed_reboot_is_a_replay_after_the_reboot(tmp_path: Path) -> None:
+    files, config = process_files(tmp_path), StackConfig()
+    old = files.build(config)
+    files.adopt(old, config)
+    now_s = 1.79e9
+    station = Link(255, 190, signing=LinkSigning(Signing(load_key(tmp_path / "key"), lambda: now_s), 0))
+    files._signing._clock = lambda: now_s
+    recorded = station.encode(REBOOT)
+    old.ground.receive(PEER, recorded, 0.0)
+    assert old.ground.vehicle.reboot_requested
+    new = files.build(config)
+    files.adopt(new, config)
+    carry_over(old, new)
+    new.ground.receive(PEER, recorded, 1.0)
+    assert not new.ground.vehicle.reboot_requested
+    new.ground.receive(PEER, station.encode(REBOOT), 1.0)
+    assert new.ground.vehicle.reboot_requested
+
+
+def test_vehicle_time_begins_anew_at_a_reboot(tmp_path: Path) -> None:
+    files, config = process_files(tmp_path), StackConfig()
+    old, new, frame = files.build(config), files.build(config), PlantStateFrame(1, 51)
+    for time_us in (1_000_000, 1_002_000, 1_004_000):
+        old.simulator.receive(memoryview(bytes(frame.seal(time_us, 0))))
+    old.autopilot.tick(old.simulator.time_us)
+    carry_over(old, new)
+    assert (new.simulator.time_us, new.autopilot.now.time_us) == (0, 0)
+    new.simulator.receive(memoryview(bytes(frame.seal(1_006_000, 0))))
+    assert (new.simulator.time_us, new.simulator.odd_times) == (2000, 0)
+    assert new.simulator.freshness(2000) == (0, 0)
+
+
+def test_a_parameter_changed_just_before_a_reboot_is_kept(tmp_path: Path) -> None:
+    files, config = process_files(tmp_path), StackConfig(params_file=str(tmp_path / "vehicle.params"))
+    old = files.build(config)
+    files.adopt(old, config)
+    old.params.set("MIS_TAKEOFF_ALT", 4.5)
+    new = files.build(config)
+    assert new.params.value("MIS_TAKEOFF_ALT") == 4.5
+    old.params.set("MIS_TAKEOFF_ALT", 5.5)  # a reboot that comes to nothing leaves the saver at work
+    files.close_parameters()
+    assert "5.5" in (tmp_path / "vehicle.params").read_text()
+
+
+def test_a_stack_that_cannot_be_built_leaves_the_present_one_joined(tmp_path: Path) -> None:
+    file = tmp_path / "vehicle.params"
+    files, config = process_files(tmp_path), StackConfig(params_file=str(file))
+    stack = files.build(config)
+    files.adopt(stack, config)
+    file.write_text("1\t1\tMIS_TAKEOFF_ALT\tnonsense\t9\n")
+    with pytest.raises(ConfigError):
+        files.build(config)
+    stack.params.set("MIS_TAKEOFF_ALT", 5.5)
+    files.close_parameters()
+    assert "5.5" in file.read_text()
+
+
+def test_a_reboot_that_cannot_be_prepared_is_refused_with_the_reason(tmp_path: Path) -> None:
+    files, config = process_files(tmp_path), StackConfig()
+    files._process = ProcessConfig("127.0.0.1", 1, 1.0, files._process.ports, None, False, None)
+    stack = files.build(config)
+    stack.ground.vehicle.prepare_reboot = lambda: "the parameter file cannot be read"
+    station = Link(255, 190)
+    stack.ground.receive(PEER, station.encode(REBOOT), 0.0)
+    answers = [m for _, data in stack.ground.poll(0.0) for m in station.decode(data)]
+    (ack,) = (m for m in answers if m.get_type() == "COMMAND_ACK")
+    assert ack.result == mavlink.MAV_RESULT_FAILED
+    texts = "".join(m.text for m in answers if m.get_type() == "STATUSTEXT")
+    assert "the parameter file cannot be read" in texts
+    assert not stack.ground.vehicle.reboot_requested
