@@ -48,6 +48,7 @@ class GroundHub:
         self._peers: dict[PeerAddress, Peer] = {}
         self._setup = signing_setup(self._own, vehicle.autopilot)
         self._congested: Set[PeerAddress] = frozenset()
+        self._polled_s = -math.inf
         services = make_services(self._own, vehicle, facts, self._peer_at, self._has_room)
         self._services = [*services, self._setup]
         self._by_type: dict[str, list[Service]] = {}
@@ -77,8 +78,10 @@ class GroundHub:
     def add_peer(self, address: PeerAddress, permanent: bool = False) -> Peer:
         """Begin to talk to ``address``; a permanent one gets heartbeats before it was ever heard."""
         rates = API_RATES_HZ if address.channel == API else GROUND_RATES_HZ
-        link = Link(*self._own, keeps_unknown=True, signing=link_signing(self._signing, address))
-        peer = Peer(link, Streams(rates), permanent, address.channel == TCP)
+        signing = link_signing(self._signing, address)
+        link = Link(*self._own, keeps_unknown=True, signing=signing)
+        signed = signing is not None and signing.requires_signature
+        peer = Peer(link, Streams(rates), permanent, address.channel == TCP, signed)
         self._peers[address] = peer
         return peer
 
@@ -117,7 +120,9 @@ class GroundHub:
         return self._peers[address]
 
     def _has_room(self, address: Hashable) -> bool:
-        return address not in self._congested
+        """Return False for a peer that is not to get file data now: it reads too slowly, or has fallen silent."""
+        peer = self._peers.get(address) if isinstance(address, PeerAddress) else None
+        return peer is None or (address not in self._congested and peer.is_served(self._polled_s))
 
     def _forget_silent(self, now_s: float) -> None:
         if now_s < self._forget_due_s:
@@ -174,12 +179,14 @@ class GroundHub:
     def poll(
         self, now_s: float, congested: Set[PeerAddress] = frozenset()
     ) -> Iterator[tuple[PeerAddress, bytes]]:
-        """Yield (address, bytes) of all that is to be sent now; file data waits for peers that are ``congested``.
+        """Yield (address, bytes) of all that is to be sent now.
+
+        Telemetry and file data wait for peers that are ``congested``, answers and texts do not.
 
         Who has little time may take a part of it, and the rest later, before the next call; ``receive`` may be
         called in between.
         """
-        self._congested = congested
+        self._congested, self._polled_s = congested, now_s
         changed = self._note_changes()
         for service in self._services:
             self._collect(service.poll(now_s))
@@ -187,7 +194,8 @@ class GroundHub:
         self._made.clear()
         for address, peer in list(self._peers.items()):
             if self._peers.get(address) is peer:  # it may have gone while its turn had not come
-                frames = [peer.link.encode_shared(message) for message in self._due(peer, changed, now_s)]
+                due = self._due(peer, changed, now_s, streams=address not in congested)
+                frames = [peer.link.encode_shared(message) for message in due]
                 for frame in frames:
                     yield address, frame
         yield from self._forwarded(now_s)
@@ -215,15 +223,19 @@ class GroundHub:
             elif isinstance(address, PeerAddress) and address in self._peers:
                 self._peers[address].outbox.append(message)
 
-    def _due(self, peer: Peer, changed: bool, now_s: float) -> Iterator[Message]:
-        """Yield what ``peer`` is to get now: only heartbeats if it is silent, as the address of UDP may be forged."""
+    def _due(self, peer: Peer, changed: bool, now_s: float, streams: bool) -> Iterator[Message]:
+        """Yield what ``peer`` is to get now; texts wait for one that has fallen silent, and may speak again."""
         if (peer.heard or peer.permanent) and (changed or now_s >= peer.heartbeat_due_s):
             peer.heartbeat_due_s = now_s + HEARTBEAT_S
             yield from self._make(mavlink.MAVLINK_MSG_ID_HEARTBEAT, self._facts)
-        if peer.is_served(now_s):
-            yield from peer.outbox
-            yield from peer.streams.due(self._facts, now_s, self._make)
+        if not peer.is_served(now_s):
+            texts = [message for message in peer.outbox if message.get_type() == "STATUSTEXT"]
+            peer.outbox[:] = texts[-KEPT_TEXTS:]
+            return
+        yield from peer.outbox
         peer.outbox.clear()
+        if streams:
+            yield from peer.streams.due(self._facts, now_s, self._make)
 
     def _note_changes(self) -> bool:
         """Announce reached items and another home; tell whether mode or arming changed."""

@@ -29,7 +29,9 @@ class Peer:
     streams: Streams
     permanent: bool
     connected: bool = False
-    """Whether it has a TCP connection: its address cannot be forged, and it is there until the connection ends."""
+    """Whether it has a TCP connection: it is there until the connection ends."""
+    is_signed: bool = False
+    """Whether only signed frames are taken from it."""
     heard_s: float = -math.inf
     heartbeat_due_s: float = -math.inf
     outbox: list[Message] = field(default_factory=list)
@@ -44,5 +46,10 @@ class Peer:
         return now_s - self.heard_s > SILENT_AFTER_S
 
     def is_served(self, now_s: float) -> bool:
-        """Return True if it gets more than heartbeats: it is not silent, or connected and heard once."""
-        return self.heard and (self.connected or not self.is_silent(now_s))
+        """Return True if it gets more than heartbeats.
+
+        The address of a datagram may be forged: a sender that falls silent gets no more. A connection, an address that
+        the user configured and a signature are no such sender's.
+        """
+        known = self.connected or self.permanent or self.is_signed
+        return self.heard and (known or not self.is_silent(now_s))

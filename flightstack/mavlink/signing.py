@@ -192,9 +192,14 @@ class LinkSigning(NamedTuple):
         """Return True if a received frame, not accepted yet, proves that its sender may use the link."""
         return self.signing.authenticates(frame, self.trusted)
 
+    @property
+    def requires_signature(self) -> bool:
+        """Whether only signed frames are taken."""
+        return not (self.trusted or self.signing.allow_unsigned) and self.signing.is_on
+
     def is_authentic(self, frame: bytes) -> bool:
         """Return True if a frame that was accepted had the signature that this link requires, if any."""
-        return is_signed(frame) or self.trusted or self.signing.allow_unsigned or not self.signing.is_on
+        return is_signed(frame) or not self.requires_signature
 
 
 def without_signature(frame: bytes, crc_extra: int) -> bytes:

@@ -184,6 +184,16 @@ def test_a_burst_waits_for_a_congested_peer_and_answers_do_not() -> None:
     assert dialogue.answers()[0].offset == 0
 
 
+def test_a_burst_that_waits_for_a_congested_peer_keeps_its_session() -> None:
+    dialogue = Dialogue()
+    dialogue.ask(Opcode.OPEN_FILE_RO, b"big")
+    dialogue.congested.add(GCS)
+    dialogue.tell(Packet(20, 0, Opcode.BURST_READ_FILE, 239))
+    assert not dialogue.answers(2000)  # 20 s
+    dialogue.congested.clear()
+    assert dialogue.answers()[0].opcode == Opcode.ACK
+
+
 def test_terminate_and_reset_stop_a_burst() -> None:
     for opcode in (Opcode.TERMINATE_SESSION, Opcode.RESET_SESSIONS):
         dialogue = Dialogue()

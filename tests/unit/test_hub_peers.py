@@ -9,7 +9,7 @@ import pytest
 
 from flightstack.assembly import build
 from flightstack.config import StackConfig
-from flightstack.ground.hub import FORWARDED_A_POLL, MAX_PEERS, PEER_FORGOTTEN_S
+from flightstack.ground.hub import FORWARDED_A_POLL, KEPT_TEXTS, MAX_PEERS, PEER_FORGOTTEN_S
 from flightstack.ground.peer import GROUND, PeerAddress
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import SILENT_AFTER_S, Link
@@ -122,6 +122,46 @@ def test_a_silent_peer_that_speaks_again_gets_its_streams_back(net: Net) -> None
     alice.heartbeat()
     net.run(4.0)
     assert len(alice.take("ATTITUDE")) == 8
+
+
+def test_status_texts_wait_for_a_silent_peer(net: Net) -> None:
+    alice = net.join(ALICE)
+    net.run(SILENT_AFTER_S + 0.5)
+    for number in range(2 * KEPT_TEXTS):
+        net.autopilot.say(NOTICE, f"text {number}")
+    net.run(1.0)
+    assert alice.take("STATUSTEXT") == []
+    alice.heartbeat()
+    net.run(0.1)
+    texts = [message.text for message in alice.take("STATUSTEXT")]
+    assert texts == [f"text {number}" for number in range(KEPT_TEXTS, 2 * KEPT_TEXTS)]
+
+
+def test_a_configured_ground_station_with_a_lost_uplink_keeps_its_telemetry(net: Net) -> None:
+    alice = net.join(ALICE, heard=False)
+    net.hub.add_peer(ALICE, permanent=True)
+    alice.heartbeat()
+    net.run(2.0 * SILENT_AFTER_S)
+    alice.inbox.clear()
+    net.autopilot.say(NOTICE, "failsafe")
+    net.run(1.0)
+    assert [message.text for message in alice.take("STATUSTEXT")] == ["failsafe"]
+    assert alice.take("ATTITUDE")
+
+
+def test_telemetry_waits_for_a_congested_peer_and_answers_do_not(net: Net) -> None:
+    alice, bob = net.join(ALICE), net.join(BOB)
+    net.run(0.1)
+    alice.inbox.clear()
+    alice.command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+    for _ in range(50):
+        net.now_s += 0.01
+        net.autopilot.now.time_us += 10_000
+        for where, data in net.hub.poll(net.now_s, {ALICE}):
+            net.stations[where].inbox += net.stations[where].codec.decode(data)
+    kinds = {message.get_type() for message in alice.inbox}
+    assert {"COMMAND_ACK", "HOME_POSITION"} <= kinds <= {"COMMAND_ACK", "HOME_POSITION", "HEARTBEAT"}
+    assert bob.take("ATTITUDE")
 
 
 def test_a_silent_tcp_client_keeps_its_streams(net: Net) -> None:

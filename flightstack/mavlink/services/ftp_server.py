@@ -113,10 +113,12 @@ class FtpServer:
         """Return the messages to send now, each with the peer it goes to."""
         if not (self._clients or self._outbox):  # most of the time, a hundred times a second
             return []
-        self._close_silent(now_s)
         for (peer, _), client in self._clients.items():
+            if client.is_streaming and not self._has_room(peer):
+                client.heard_s = now_s  # it waits for us
             if client.checksum is not None:
                 self._step_checksum(peer, client, client.checksum)
+        self._close_silent(now_s)
         outbox, self._outbox = self._outbox, []
         return [*outbox, *self._bursts(now_s)]
 
@@ -125,7 +127,7 @@ class FtpServer:
         clients = self._clients.values()
         if self._outbox or any(client.checksum is not None for client in clients):
             return -math.inf
-        if any(session.burst for client in clients for session in client.sessions.values()):
+        if any(client.is_streaming for client in clients):
             return self._pace.ready_s()
         return min((client.heard_s + SESSION_TIMEOUT_S for client in clients), default=None)
 

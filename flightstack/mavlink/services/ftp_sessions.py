@@ -95,6 +95,11 @@ class FtpSessions:
     last: tuple[Packet, Packet] | None = None
     """The last request that changed something, and its answer, for when that gets lost."""
 
+    @property
+    def is_streaming(self) -> bool:
+        """Whether a burst is under way."""
+        return any(session.burst is not None for session in self.sessions.values())
+
     def open(self, file: VirtualFile, wanted: int, now_s: float) -> int:
         """Return the session number of ``file``; raise FtpRefusal when too many are open.
 

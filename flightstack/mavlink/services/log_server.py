@@ -109,6 +109,9 @@ class LogServer:
         """Return the messages to send now, each with the peer it goes to, fairly shared."""
         if not self._clients:  # most of the time
             return []
+        for (peer, _), client in self._clients.items():
+            if client.is_busy and not self._has_room(peer):
+                client.heard_s = now_s  # it waits for us
         self._forget_silent(now_s)
         sent: list[tuple[Hashable | None, Message]] = []
         allowance = self._pace.allowance(now_s)
