@@ -557,5 +557,5 @@ def no_mujoco(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("no_mujoco")
 def test_says_what_to_install() -> None:
-    with pytest.raises(UsageProblemError, match=r"needs MuJoCo: pip install 'flightstack\[multibody\]'"):
+    with pytest.raises(UsageProblemError, match=r"needs MuJoCo: pip install mujoco pillow imageio-ffmpeg$"):
         plants.make_plant(load_vehicle("paper_quad"), "multibody", PlantOptions())
