@@ -23,19 +23,21 @@ def meet(miss: Callable[[FloatArray], FloatArray], ladder: Sequence[FloatArray])
     nothing is. No randomness: the same conditions give the same bits.
     """
     for limits in ladder:
-        x, rest = _newton(miss, limits)
+        x, rest = _newton(miss, np.zeros(len(limits)), limits)
         if np.abs(rest).max() < _GOOD:
             return x
-    return _compromise(miss, x, limits)
+    # least squares end some 1e-7 beside conditions that can be met after all
+    return _newton(miss, _compromise(miss, x, limits), limits)[0]
 
 
-def _newton(miss: Callable[[FloatArray], FloatArray], limits: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return knobs within the limits and what is missed with them.
+def _newton(
+    miss: Callable[[FloatArray], FloatArray], x: FloatArray, limits: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return knobs within the limits, from ``x`` on, and what is missed with them.
 
     Each step is the shortest one, measured in units of the limits, to where the linearised conditions are met
     (Gauss-Newton with the pseudo-inverse).
     """
-    x = np.zeros(len(limits))
     rest = miss(x)
     for _ in range(_ROUNDS):
         if np.abs(rest).max() < _MET:

@@ -150,7 +150,7 @@ def test_an_edit_is_noticed(site: Path) -> None:
 
 
 def test_without_a_declaration_every_field_is_a_parameter(installed: Path) -> None:
-    world = World(controller="lqr", params=["LQR_ANGLE_ROLL=250"], torque=(0.01, 0.0, 0.0))
+    world = World(controller="lqr", force=(0.0, 0.3, 0.0), params=["LQR_ANGLE_ROLL=250"])
     params = world.stack.params
     assert [name for name in params.specs if name.startswith("LQR_")] == [
         "LQR_ANGLE_PITCH", "LQR_ANGLE_ROLL", "LQR_ANGLE_YAW", "LQR_IX_KG_M2", "LQR_IY_KG_M2", "LQR_IZ_KG_M2",
