@@ -100,7 +100,7 @@ SOME = [
 def test_landing_in_wind(
     vehicle: str, plant: str, controller: str, gains: str, share: float, gust: float
 ) -> None:
-    """Measured in all: found within 2.5 s (tuned: 1.1 s), setpoint 1.0 m (0.52 m) below, slid 3.3 m below friction."""
+    """Largest of 192: found after 2.1 s (tuned: 0.94 s), setpoint 0.98 m (0.50 m) below, slid 1.4 m within friction."""
     fast = {} if gains == "tuned" else {"inner_hz": 1000.0}
     world = hover(
         vehicle=vehicle, plant=plant, controller=controller, gains=gains, gust=gust,
@@ -112,7 +112,7 @@ def test_landing_in_wind(
         f"{landing.found_s:.2f} s, {landing.deepest_m:.2f} m, {landing.slid_m:.2f} m, {landing.tilt_deg:.1f}°"
     )
     assert set(world.texts) == USUAL_TEXTS
-    assert landing.found_s < (1.5 if gains == "tuned" else 3.5)
+    assert landing.found_s < (1.5 if gains == "tuned" else 3.0)
     assert landing.deepest_m < (0.7 if gains == "tuned" else 1.5)
     if share < FRICTION:
         assert landing.slid_m < 2.5
