@@ -6,7 +6,6 @@ link) is no log, whatever a ground station asks for.
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import fcntl
 import math
@@ -77,7 +76,7 @@ def create_log_file(path: Path, overwrite: bool = False) -> BinaryIO:
 
 
 def _lock(file: BinaryIO) -> None:
-    """Lock a log that is written. An erase holds the other lock for microseconds; after ``_LOCK_TRIES`` go on without."""
+    """Lock a log that is written; go on without a lock after ``_LOCK_TRIES``. An erase holds its own for microseconds."""
     for _ in range(_LOCK_TRIES):
         try:
             fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
