@@ -221,6 +221,7 @@ def _loops_words(config: StackConfig) -> str:
 
 def main() -> None:
     """Run the command."""
+    console.replace_unencodable()
     try:
         sys.exit(app(prog_name="flightstack", standalone_mode=False))
     except UsageError as error:

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from typing import IO
+
+
+def replace_unencodable() -> None:
+    """Print "?" for characters that the encoding of stdout or stderr does not have, such as × and °."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # None when it is closed
+            stream.reconfigure(errors="replace")
 
 
 def say(line: object) -> Exception | None:
@@ -22,7 +30,9 @@ def _print(line: object, stream: IO[str] | None) -> Exception | None:
         return None
     try:
         print(line, file=stream, flush=True)
-    except (OSError, ValueError) as error:  # ValueError: the stream was closed since
+    except (OSError, ValueError) as error:
+        if isinstance(error, ValueError) and not stream.closed:
+            raise
         drop(stream)
         return error
     return None
