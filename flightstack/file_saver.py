@@ -9,14 +9,14 @@ from collections.abc import Callable
 class FileSaver:
     """Writes a file after every change, in a thread of its own; many changes at once become one file.
 
-    ``write`` is called in that thread; it writes the newest state, or raises OSError. ``failure`` begins the sentence
-    for the user then.
+    ``write`` is called in that thread and writes the newest state. If it raises an error, the sentence for the user
+    begins with ``failure``, and the next change is written again.
     """
 
     def __init__(self, write: Callable[[], None], failure: str) -> None:
         self._write = write
         self._failure = failure
-        self._error: OSError | None = None
+        self._error: Exception | None = None
         self._has_failed = False
         self._changed = threading.Event()
         self._closing = False
@@ -41,7 +41,7 @@ class FileSaver:
     def _save(self) -> None:
         try:
             self._write()
-        except OSError as error:
+        except Exception as error:  # a saver that ends loses every later change
             if not self._has_failed:
                 self._error = error
             self._has_failed = True
@@ -51,7 +51,10 @@ class FileSaver:
     def take_error(self) -> str | None:
         """Return the sentence why the file was not written, or None: one for each row of failures."""
         error, self._error = self._error, None
-        return None if error is None else f"{self._failure}: {error.strerror or error}"
+        if error is None:
+            return None
+        reason = error.strerror if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
+        return f"{self._failure}: {reason or error}"
 
     def close(self) -> None:
         """Write what has changed, and end; a second call does nothing."""
