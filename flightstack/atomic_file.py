@@ -75,8 +75,9 @@ def replacing(path: Path, mode: int | None = None) -> Iterator[Path]:
 
 
 def _is_replaceable(path: Path) -> bool:
-    """Tell whether this is a regular file or none at all."""
-    return path.is_file() or not path.exists()
+    """Tell whether this is a regular file or none at all, and not the name of an open descriptor like /dev/stdout."""
+    folder = os.path.realpath(path.parent)
+    return folder != "/dev" and not folder.startswith("/proc/") and (path.is_file() or not path.exists())
 
 
 def _sync_folder(folder: Path) -> None:

@@ -86,6 +86,14 @@ def test_a_pipe_named_by_its_descriptor_is_written_to() -> None:
     os.close(reader)
 
 
+def test_a_file_behind_a_descriptor_is_written_to_not_replaced(tmp_path: Path) -> None:
+    """As /dev/stdout is one after `gcs ... > file`: later output must go to the same file."""
+    with open(tmp_path / "output", "ab") as output:
+        write_text_atomically(Path(f"/dev/fd/{output.fileno()}"), "words")
+        output.write(b" and more")
+    assert (tmp_path / "output").read_text() == "words and more"
+
+
 @pytest.mark.parametrize("mode", [0o600, 0o664, 0o755])
 def test_a_replaced_file_keeps_its_permissions(tmp_path: Path, mode: int) -> None:
     path = tmp_path / "a.txt"
