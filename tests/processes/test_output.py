@@ -53,7 +53,9 @@ def test_an_error_into_a_closed_pipe_keeps_its_exit_code(program: str) -> None:
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_a_character_that_cannot_be_encoded_is_replaced(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_character_that_cannot_be_encoded_is_replaced(
+    program: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PYTHONIOENCODING", "latin-1")
     wrong = {"gcs_cli": ["--connect", "ψ", "status"]}.get(program, ["--vehicle", "ψ"])
     done = run([program, *wrong])
