@@ -1,4 +1,4 @@
-"""What a process prints: a reader that went away, or a full disk behind the output, never ends the process."""
+"""Prints lines on stdout and stderr: a closed pipe or a full disk behind the output never ends the process."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def say(line: object) -> Exception | None:
 
 
 def complain(line: object) -> None:
-    """Print a line on stderr, where it is seen at once, if that can be."""
+    """Print a line on stderr; an error is ignored."""
     _print(line, sys.stderr)
 
 
@@ -39,7 +39,7 @@ def _print(line: object, stream: IO[str] | None) -> Exception | None:
 
 
 def drop(stream: IO[str] | None) -> None:
-    """Send what is still to be written nowhere: Python would complain at its end."""
+    """Redirect a stream to /dev/null: an error while Python flushes it at exit would be printed."""
     if stream is None:
         return
     try:

@@ -176,8 +176,8 @@ class GroundHub:
     ) -> Iterator[tuple[PeerAddress, bytes]]:
         """Yield (address, bytes) of all that is to be sent now; file data waits for peers that are ``congested``.
 
-        Who has little time may take a part of it, and the rest later, before the next call; ``receive`` may be
-        called in between.
+        A caller with little time may take some of it now and the rest later, but before its next call of ``poll``;
+        ``receive`` may be called in between.
         """
         self._congested = congested
         changed = self._note_changes()

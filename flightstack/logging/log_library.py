@@ -76,7 +76,7 @@ def create_log_file(path: Path, overwrite: bool = False) -> BinaryIO:
 
 
 def _lock(file: BinaryIO) -> None:
-    """Lock a log that is written; go on without a lock after ``_LOCK_TRIES``. An erase holds its own for microseconds."""
+    """Lock a log that is written, after ``_LOCK_TRIES`` not at all: an erase holds its own lock for microseconds."""
     for _ in range(_LOCK_TRIES):
         try:
             fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
