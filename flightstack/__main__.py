@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import sys
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # the rest is imported when it runs: help stays quick
     from flightstack.app import App
     from flightstack.config import StackConfig
     from flightstack.process_config import ProcessConfig
+    from flightstack.state_directory import StateDirectory
 
 app = make_app(name="flightstack")
 
@@ -73,13 +74,13 @@ def run(
             raise ConfigError("--clock", clock, "is not one of lockstep, realtime")
         if allow_unsigned and signing_key is None:
             raise ConfigError("--allow-unsigned", "", "is for --signing-key: without a key all is unsigned")
-        kept_in = _state_directory(state, params, instance)
+        kept = _state_directory(state, params, instance)
         config = StackConfig(
             vehicle, controller, gains, loops, inner_hz,
             nearest_outer_hz(inner_hz) if outer_hz is None else outer_hz,
             ideal_rotors, clock == "lockstep",
             DEFAULT_HOME if home is None else parse_home(home), system_id(instance),
-            params_file=_param_file(params, kept_in),
+            params_file=_param_file(params, kept),
             params=tuple(param or []),
         )  # fmt: skip
         for sentence in (hidden_vehicle(vehicle), hidden_gains(gains)):
@@ -103,10 +104,12 @@ def run(
             signing_key,
             allow_unsigned,
             overwrite,
-            kept_in,
+            None if kept is None else kept.path,
         )
-        if state is not None and kept_in is not None:
-            _make_directory(kept_in)
+        if kept is not None:
+            if (sentence := kept.open()) is not None:
+                complain(sentence)
+            config = replace(config, params_file=_param_file(params, kept))
         if log is not None and process.log is not None:
             check_new(process.log, overwrite)
         if named_file is not None:
@@ -122,31 +125,19 @@ def run(
     sys.exit(vehicle_process.run())
 
 
-def _state_directory(state: str | None, params: str | None, instance: int) -> Path | None:
+def _state_directory(state: str | None, params: str | None, instance: int) -> StateDirectory | None:
     """Return where the vehicle keeps parameters and plans, or None if it is to keep nothing."""
+    from flightstack.state_directory import StateDirectory
+
     if state == "none" or (state is None and params == "none"):
         return None
-    return Path(f"runs/state-{instance}" if state is None else state)
+    return StateDirectory(None if state is None else Path(state), instance, has_params=params is None)
 
 
-def _param_file(params: str | None, state: Path | None) -> str | None:
-    from flightstack.plan_file import PARAMS_NAME
-
+def _param_file(params: str | None, kept: StateDirectory | None) -> str | None:
     if params is not None:
         return None if params == "none" else params
-    return None if state is None else str(state / PARAMS_NAME)
-
-
-def _make_directory(state: Path) -> None:
-    """Make a state directory that was named; raise ConfigError if nothing can be kept there."""
-    from flightstack.params.errors import ConfigError
-
-    try:
-        state.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError("--state", str(state), f"cannot be made: {error.strerror}") from None
-    if not os.access(state, os.W_OK | os.X_OK):
-        raise ConfigError("--state", str(state), "nothing can be written there: permission denied")
+    return None if kept is None else str(kept.params)
 
 
 def _log_path(log: str | None, instance: int) -> Path | None:
@@ -221,6 +212,7 @@ def _loops_words(config: StackConfig) -> str:
 
 def main() -> None:
     """Run the command."""
+    console.replace_unencodable()
     try:
         sys.exit(app(prog_name="flightstack", standalone_mode=False))
     except UsageError as error:

@@ -47,7 +47,7 @@ FIRST_CONTACT_S = 60.0
 
 
 class App:
-    """Runs one flight stack until it is told to stop or loses someone it needs."""
+    """Runs one flight stack until it is stopped, or until the simulator or a required ground station is lost."""
 
     def __init__(self, config: StackConfig, process: ProcessConfig) -> None:
         self._process = process

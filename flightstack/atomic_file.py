@@ -10,9 +10,8 @@ from pathlib import Path
 
 from flightstack.params.errors import ConfigError
 
-OPEN_TO_ALL = 0o666
-"""File mode, from which the umask of the process is taken away."""
 OWNER_ONLY = 0o600
+_OPEN_TO_ALL = 0o666  # less the umask of the process
 _LONGEST_TAIL = 60
 """Characters of a file's name that its temporary name ends with: the suffix is among them."""
 
@@ -29,7 +28,7 @@ def write_text_atomically(path: Path, text: str) -> None:
 
 
 def write_bytes_atomically(
-    path: Path, data: bytes, mode: int = OPEN_TO_ALL, *, survives_power_loss: bool = True
+    path: Path, data: bytes, mode: int | None = None, *, survives_power_loss: bool = True
 ) -> None:
     """Replace the file at ``path``; raise OSError when that fails, and the old one stays.
 
@@ -49,20 +48,26 @@ def write_bytes_atomically(
 
 
 @contextlib.contextmanager
-def replacing(path: Path, mode: int = OPEN_TO_ALL) -> Iterator[Path]:
+def replacing(path: Path, mode: int | None = None) -> Iterator[Path]:
     """Give a new, empty file with the suffix of ``path``, which takes its place at the end; raise OSError.
 
     Its name is random and the file is made by this call, so that no file or link that was put there is written to.
     If anything fails the temporary file is removed and ``path`` stays as it was. The target of a link is replaced,
-    not the link; a device or a pipe is written to, not replaced.
+    not the link; a device or a pipe is written to, not replaced. Without ``mode`` the new file has the permissions of
+    the old one.
     """
-    path = Path(os.path.realpath(path))
-    if not _is_replaceable(path):
+    if not _is_replaceable(path):  # before links are resolved: that of /dev/stdout may lead to "pipe:[1]"
         yield path
         return
+    path = Path(os.path.realpath(path))
+    is_kept = mode is None and path.exists()
+    if mode is None:
+        mode = path.stat().st_mode & 0o777 if is_kept else _OPEN_TO_ALL
     temporary = path.with_name(f".{secrets.token_hex(8)}.{path.name[-_LONGEST_TAIL:]}")
     os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode))
     try:
+        if is_kept:
+            temporary.chmod(mode)  # whatever the umask is now
         yield temporary
         temporary.replace(path)
     finally:
@@ -70,8 +75,9 @@ def replacing(path: Path, mode: int = OPEN_TO_ALL) -> Iterator[Path]:
 
 
 def _is_replaceable(path: Path) -> bool:
-    """Tell whether this is a regular file or none at all."""
-    return path.is_file() or not path.exists()
+    """Tell whether this is a regular file or none at all, and not the name of an open descriptor like /dev/stdout."""
+    folder = os.path.realpath(path.parent)
+    return folder != "/dev" and not folder.startswith("/proc/") and (path.is_file() or not path.exists())
 
 
 def _sync_folder(folder: Path) -> None:

@@ -1,10 +1,18 @@
-"""What a process prints: a reader that went away, or a full disk behind the output, never ends the process."""
+"""Prints lines on stdout and stderr: a closed pipe or a full disk behind the output never ends the process."""
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from typing import IO
+
+
+def replace_unencodable() -> None:
+    """Print "?" for characters that the encoding of stdout or stderr does not have, such as × and °."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # None when it is closed
+            stream.reconfigure(errors="replace")
 
 
 def say(line: object) -> Exception | None:
@@ -13,7 +21,7 @@ def say(line: object) -> Exception | None:
 
 
 def complain(line: object) -> None:
-    """Print a line on stderr, where it is seen at once, if that can be."""
+    """Print a line on stderr; an error is ignored."""
     _print(line, sys.stderr)
 
 
@@ -22,14 +30,16 @@ def _print(line: object, stream: IO[str] | None) -> Exception | None:
         return None
     try:
         print(line, file=stream, flush=True)
-    except (OSError, ValueError) as error:  # ValueError: the stream was closed since
+    except (OSError, ValueError) as error:
+        if isinstance(error, ValueError) and not stream.closed:
+            raise
         drop(stream)
         return error
     return None
 
 
 def drop(stream: IO[str] | None) -> None:
-    """Send what is still to be written nowhere: Python would complain at its end."""
+    """Redirect a stream to /dev/null: an error while Python flushes it at exit would be printed."""
     if stream is None:
         return
     try:

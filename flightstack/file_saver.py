@@ -9,14 +9,14 @@ from collections.abc import Callable
 class FileSaver:
     """Writes a file after every change, in a thread of its own; many changes at once become one file.
 
-    ``write`` is called in that thread; it writes the newest state, or raises OSError. ``failure`` begins the sentence
-    for the user then.
+    ``write`` is called in that thread and writes the newest state. If it raises an error, the sentence for the user
+    begins with ``failure``, and the next change is written again.
     """
 
     def __init__(self, write: Callable[[], None], failure: str) -> None:
         self._write = write
         self._failure = failure
-        self._error: OSError | None = None
+        self._error: Exception | None = None
         self._told = False
         self._changed = threading.Event()
         self._closing = False
@@ -41,7 +41,7 @@ class FileSaver:
     def _save(self) -> None:
         try:
             self._write()
-        except OSError as error:
+        except Exception as error:  # a saver that ends loses every later change
             self._error = error
         else:
             self._error, self._told = None, False
@@ -49,7 +49,10 @@ class FileSaver:
     def problem(self) -> str | None:
         """Return the sentence why the newest state is not in the file, or None if it is."""
         error = self._error
-        return None if error is None else f"{self._failure}: {error.strerror or error}"
+        if error is None:
+            return None
+        reason = error.strerror if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
+        return f"{self._failure}: {reason or error}"
 
     def take_error(self) -> str | None:
         """Return ``problem``, once for each row of failures."""

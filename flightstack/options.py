@@ -40,9 +40,16 @@ GroundStations = Annotated[
 ]
 GcsPort = Annotated[
     int | None,
-    typer.Option(help="UDP port of the ground station, without --gcs.  [default: 14550 + instance]"),
+    typer.Option(
+        help="UDP port of the ground station, without --gcs.  [default: 14550 + instance; above 9 see docs/mavlink.md]"
+    ),
 ]
-ApiPort = Annotated[int | None, typer.Option(help="UDP port of the API client.  [default: 14540 + instance]")]
+ApiPort = Annotated[
+    int | None,
+    typer.Option(
+        help="UDP port of the API client.  [default: 14540 + instance; above 9 see docs/mavlink.md]"
+    ),
+]
 TcpPort = Annotated[
     int | None, typer.Option(help="TCP port to listen on; 0 for none.  [default: 5760 + 10 x instance]")
 ]

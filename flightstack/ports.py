@@ -46,12 +46,12 @@ def described(config: PortsConfig) -> str:
 
 
 def warning(config: PortsConfig, signed: bool = False) -> str | None:
-    """Return what to say to who listens to more than this machine without signing."""
+    """Return a warning if the vehicle listens on a network without signing, or None."""
     if signed or is_loopback(config.listen):
         return None
     return (
-        f"warning: listening on {config.listen} without signing: whoever reaches this machine "
-        "can fly the vehicle"
+        f"warning: listening on {config.listen} without signing: any program that can "
+        "reach this machine can fly the vehicle"
     )
 
 

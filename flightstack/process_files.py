@@ -116,10 +116,11 @@ class ProcessFiles:
             self._tell(f"no log can be written to {path}: {error.strerror}")
             return None
 
-    def _own_log(self) -> object:
-        """Return something else whenever a log of this process has begun or ended."""
+    def _own_log(self) -> str | None:
+        """Return the name of the log that is being written, or None."""
         assert self._stack is not None
-        return self._logs.current, self._stack.recorder.is_logging
+        path = self._logs.current
+        return path.name if path is not None and self._stack.recorder.is_logging else None
 
     def _open_tail(self) -> FileTail | None:
         stack = self._stack

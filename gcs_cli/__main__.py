@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import signal
 import sys
 
 import typer
 
 from flightstack.command_line import UsageError, Version, make_app
-from flightstack.console import complain, drop
+from flightstack.console import complain, drop, replace_unencodable
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
 from gcs_cli.settings import ConnectOption, InstanceOption, Settings, SigningKeyOption, TimeoutOption
 
@@ -59,9 +58,7 @@ _register()
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the terminal is restored
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # None when it is closed
-            stream.reconfigure(errors="replace")  # for an output that has no × and no °
+    replace_unencodable()
     try:
         code = app(argv, prog_name="gcs", standalone_mode=False) or DONE
         if sys.stdout is not None:

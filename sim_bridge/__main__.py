@@ -192,6 +192,7 @@ def _table(state: dict[str, Any]) -> str:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command line; return the exit code."""
+    console.replace_unencodable()
     try:
         return app(argv, prog_name="sim-bridge", standalone_mode=False) or 0
     except PlantDivergedError as error:

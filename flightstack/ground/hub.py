@@ -183,8 +183,8 @@ class GroundHub:
 
         Telemetry and file data wait for peers that are ``congested``, answers and texts do not.
 
-        Who has little time may take a part of it, and the rest later, before the next call; ``receive`` may be
-        called in between.
+        A caller with little time may take some of it now and the rest later, but before its next call of ``poll``;
+        ``receive`` may be called in between.
         """
         self._congested, self._polled_s = congested, now_s
         changed = self._note_changes()

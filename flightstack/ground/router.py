@@ -38,7 +38,7 @@ class Route(NamedTuple, Generic[Peer]):
 
 
 class Router(Generic[Peer]):
-    """Learns who is where from what was heard, and decides where each message goes."""
+    """Learns from received messages which peer has which address, and decides where each message goes."""
 
     def __init__(self, own: Address) -> None:
         self._own = own
@@ -68,7 +68,7 @@ class Router(Generic[Peer]):
         """Forget a peer that is gone."""
         self._heard.pop(peer, None)
 
-    # ------------------------------------------------------------------ who is where
+    # ------------------------------------------------------------------ addresses of peers
 
     def _learn(self, peer: Peer, source: Address) -> None:
         addresses = self._heard.setdefault(peer, OrderedDict())

@@ -6,7 +6,6 @@ link) is no log, whatever a ground station asks for.
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import fcntl
 import math
@@ -26,7 +25,8 @@ MAX_LOGS = 65_535
 LOOK_S = 1.0
 """Time between two looks at the folder [s]."""
 LATELY_S = 60.0
-"""A log written so lately may still grow [s]."""
+"""Files written in the last ``LATELY_S`` are examined at each look, all others once in this time [s]."""
+_LOCK_TRIES, _LOCK_WAIT_S = 100, 1e-3
 
 
 class LogFileReader:
@@ -45,14 +45,13 @@ class LogFileReader:
         """Return up to ``count`` bytes from ``offset``; raise OSError."""
         return os.pread(self._descriptor, max(0, min(count, self._size - offset)), offset)
 
-    def is_being_written(self) -> bool:
-        """Tell whether somebody holds it open as ``create_log_file`` does."""
+    def claim(self) -> bool:
+        """Lock the log against ``create_log_file`` until it is closed; return False if it is being written."""
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            return error.errno == errno.EWOULDBLOCK
-        fcntl.flock(self._descriptor, fcntl.LOCK_UN)
-        return False
+        except OSError as error:  # some file systems have no locks
+            return error.errno != errno.EWOULDBLOCK
+        return True
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""
@@ -64,13 +63,37 @@ class LogFileReader:
 def create_log_file(path: Path, overwrite: bool = False) -> BinaryIO:
     """Open a new log for writing, unbuffered; raise OSError, FileExistsError for a file unless ``overwrite``.
 
-    A lock that lasts until it is closed tells every process, this one too, that it is being written.
+    A shared lock until the file is closed marks it as being written, for every process and this one too. A log that
+    was erased before it was locked is created again.
     """
     is_file = path.is_file() or not path.exists()  # a device or a pipe is written to
-    file = open(path, "xb" if is_file and not overwrite else "wb", buffering=0)  # noqa: SIM115  # its owner closes it
-    with contextlib.suppress(OSError):  # some file systems know no locks
-        fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
-    return file
+    while True:
+        file = open(path, "xb" if is_file and not overwrite else "wb", buffering=0)  # noqa: SIM115  # its owner closes it
+        _lock(file)
+        if not is_file or _is_at(path, file):
+            return file
+        file.close()
+
+
+def _lock(file: BinaryIO) -> None:
+    """Lock a log that is written, after ``_LOCK_TRIES`` not at all: an erase holds its own lock for microseconds."""
+    for _ in range(_LOCK_TRIES):
+        try:
+            fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(_LOCK_WAIT_S)
+        except OSError:  # some file systems have no locks
+            return
+        else:
+            return
+
+
+def _is_at(path: Path, file: BinaryIO) -> bool:
+    """Return whether ``path`` still names the open file."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(file.fileno()))
+    except FileNotFoundError:
+        return False
 
 
 class _Known(NamedTuple):
@@ -85,30 +108,35 @@ class _Known(NamedTuple):
 class LogLibrary:
     """The logs in ``folder``, by an index in memory.
 
-    The folder is examined at most once in ``LOOK_S``, and at once when ``own_log`` returns something else than before,
-    because a log of this process began or ended. Only new files and those written lately are examined again.
+    ``own_log`` returns the name of the log that this process is writing, or None. The folder is examined at most once
+    in ``LOOK_S``: new files, those written in the last ``LATELY_S``, and the own log. All files are examined once in
+    ``LATELY_S``, and at once when the own log begins or ends.
     """
 
-    def __init__(self, folder: Path, own_log: Callable[[], object] = lambda: None) -> None:
+    def __init__(self, folder: Path, own_log: Callable[[], str | None] = lambda: None) -> None:
         self._folder = folder
         self._own_log = own_log
-        self._own: object = None
+        self._own: str | None = None
         self._known: dict[str, _Known] = {}
         self._logs: tuple[LogInfo, ...] = ()
         self._folder_written_ns = -1
-        self._looked_s = -math.inf
+        self._looked_s = self._looked_at_all_s = -math.inf
 
     def logs(self) -> tuple[LogInfo, ...]:
         """Return all logs, the oldest first; none if the folder cannot be read. The same object until they change."""
         now_s, own = time.time(), self._own_log()
-        if own != self._own or not 0.0 <= now_s - self._looked_s < LOOK_S:
-            self._own = own
+        if own != self._own:
+            self._own, self._looked_at_all_s = own, -math.inf
+        if self._looked_at_all_s == -math.inf or not 0.0 <= now_s - self._looked_s < LOOK_S:
             self._look(now_s)
         return self._logs
 
     def _look(self, now_s: float) -> None:
         """Bring the index up to date."""
         self._looked_s = now_s
+        at_all = not 0.0 <= now_s - self._looked_at_all_s < LATELY_S
+        if at_all:
+            self._looked_at_all_s = now_s
         lately_ns = int((now_s - LATELY_S) * 1e9)
         try:
             written_ns = self._folder.stat().st_mtime_ns
@@ -120,7 +148,7 @@ class LogLibrary:
         changed = {
             name: fresh
             for name, known in listed.items()
-            if (known.info is None or known.written_ns > lately_ns)
+            if (at_all or known.info is None or known.written_ns > lately_ns or name == self._own)
             and (fresh := self._examined(name, known.inode)) != known
         }
         if changed or listed.keys() != self._known.keys():
@@ -173,7 +201,7 @@ class LogLibrary:
         self._look(time.time())
         for log in self._logs:
             reader = self.open(log.name)
-            if reader is not None and not reader.is_being_written():
+            if reader is not None and reader.claim():
                 (self._folder / log.name).unlink(missing_ok=True)
                 count += 1
             if reader is not None:

@@ -122,7 +122,7 @@ def read_param_file(path: Path) -> list[ParamLine]:
 def begin_param_file(path: Path, system_id: int) -> None:
     """Write a parameter file that changes nothing; raise ConfigError where that cannot be.
 
-    Who names a file finds at the start, and not after a flight, that it cannot be kept.
+    A file that cannot be written is an error at the start, and not after a flight.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -4,7 +4,7 @@ What a client does not read is kept up to ``MAX_UNSENT`` octets; beyond, whole f
 stream never holds half of one. A client that takes nothing for ``STALLED_S`` is closed: it is gone, or as good
 as gone. When all places are taken, a client that sent no valid MAVLink for ``SILENT_AFTER_S``, or none at all,
 gives way to a new one; the others stay. The kernel's own buffer is kept small: telemetry that is older than a
-second helps nobody.
+second is of no use.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ class TcpServer:
         for _ in range(_ACCEPTED_AT_ONCE):
             try:
                 connection, peer = self._listener.accept()
-            except OSError:  # nobody more, or gone before we came, or no descriptor left: later
+            except OSError:  # no connection waits, or it was reset, or no descriptor is left
                 return
             if len(self._clients) >= MAX_CLIENTS and not self._make_room(heard_s):
                 connection.close()

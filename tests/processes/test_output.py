@@ -52,6 +52,18 @@ def test_an_error_into_a_closed_pipe_keeps_its_exit_code(program: str) -> None:
     os.close(pipe)
 
 
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_a_character_that_cannot_be_encoded_is_replaced(
+    program: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONIOENCODING", "latin-1")
+    wrong = {"gcs_cli": ["--connect", "ψ", "status"]}.get(program, ["--vehicle", "ψ"])
+    done = run([program, *wrong])
+    assert done.returncode == 2
+    assert "?" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_a_vehicle_goes_on_when_its_output_is_closed(tmp_path: Path) -> None:
     with vehicle(tmp_path, "--log", "/dev/full", "--params", "none") as there:
         for stream in (there.stack.stdout, there.stack.stderr):

@@ -13,7 +13,9 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.mission_client import Done, MissionClient
+from flightstack.params.errors import ConfigError
 from flightstack.plan import MissionItem, load_plan
+from flightstack.state_directory import StateDirectory
 from flightstack.transport.udp import UdpSocket
 from tests.support.gcs import gcs
 from tests.support.vehicle_processes import LONG_S, VehicleProcesses, vehicle
@@ -66,6 +68,16 @@ def test_plans_home_and_parameters_survive_a_kill(tmp_path: Path) -> None:
         assert (round(home.latitude_deg, 6), round(home.altitude_m)) == (47.3978, 489)
         assert "4.5" in run(there, "param", "get", "MIS_TAKEOFF_ALT")
         assert kill(there) == ""
+
+
+def test_a_state_directory_is_held_over_a_reboot(tmp_path: Path) -> None:
+    with vehicle(tmp_path, *OPTIONS) as there:
+        run(there, "reboot")
+        run(there, "status")
+        with pytest.raises(ConfigError, match="another vehicle keeps its state there"):
+            StateDirectory(tmp_path / "state", 0).open()
+        assert kill(there) == "flightstack: rebooted\n"
+    StateDirectory(tmp_path / "state", 0).open()
 
 
 class Client:

@@ -77,6 +77,34 @@ def test_a_device_is_written_to_not_replaced() -> None:
     assert (raised.value.errno, raised.value.filename) == (errno.ENOSPC, "/dev/full")
 
 
+def test_a_pipe_named_by_its_descriptor_is_written_to() -> None:
+    """As /dev/stdout and the shell's >(command) name one."""
+    reader, writer = os.pipe()
+    write_text_atomically(Path(f"/dev/fd/{writer}"), "words")
+    os.close(writer)
+    assert os.read(reader, 99) == b"words"
+    os.close(reader)
+
+
+def test_a_file_behind_a_descriptor_is_written_to_not_replaced(tmp_path: Path) -> None:
+    """As /dev/stdout is one after `gcs ... > file`: later output must go to the same file."""
+    with open(tmp_path / "output", "ab") as output:
+        write_text_atomically(Path(f"/dev/fd/{output.fileno()}"), "words")
+        output.write(b" and more")
+    assert (tmp_path / "output").read_text() == "words and more"
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o664, 0o755])
+def test_a_replaced_file_keeps_its_permissions(tmp_path: Path, mode: int) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    path.chmod(mode)
+    write_text_atomically(path, "new")
+    assert (path.read_text(), path.stat().st_mode & 0o777) == ("new", mode)
+    write_bytes_atomically(path, b"key", OWNER_ONLY)
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
 def test_a_failed_write_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.txt"
     path.write_text("old")

@@ -211,11 +211,95 @@ def test_changes_by_other_programs_show_in_the_next_interval(
 def test_a_log_of_this_process_shows_at_once(thousand: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Clock(monkeypatch)
     own: list[str] = []
-    library = LogLibrary(thousand, lambda: tuple(own))
+    library = LogLibrary(thousand, lambda: own[0] if own else None)
     library.logs()
     write(thousand / "own.ulg", b"begun", 999_999)
-    own.append("is being written")
+    own.append("own.ulg")
     assert library.logs()[-1] == LogInfo("own.ulg", 5, 999_999)
     write(thousand / "own.ulg", b"begun and ended", 1_000_000)
     own.clear()
     assert library.logs()[-1] == LogInfo("own.ulg", 15, 1_000_000)
+
+
+def test_an_overwritten_log_shows_its_new_size(thousand: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock(monkeypatch)
+    own: list[str] = []
+    library = LogLibrary(thousand, lambda: own[0] if own else None)
+    library.logs()
+    own.append("0007.ulg")
+    with create_log_file(thousand / "0007.ulg", overwrite=True) as log:
+        log.write(b"a new log in the same file")
+        os.utime(thousand / "0007.ulg", (1_000_000, 1_000_000))
+    assert library.logs()[-1] == LogInfo("0007.ulg", 26, 1_000_000)
+    clock.take()
+    assert library.logs()[-1].size == 26
+    assert clock.take() == (0, -1)
+
+
+@pytest.mark.parametrize("ends", [False, True])
+def test_the_open_log_shows_its_size_after_a_pause(
+    thousand: Path, monkeypatch: pytest.MonkeyPatch, ends: bool
+) -> None:
+    clock = Clock(monkeypatch)
+    own: list[str] = ["own.ulg"]
+    write(thousand / "own.ulg", b"begun", 1_000_000)
+    library = LogLibrary(thousand, lambda: own[0] if own else None)
+    library.logs()
+    clock.now_s += 70.0
+    library.logs()
+    write(thousand / "own.ulg", b"begun, paused, grown", 1_000_070)
+    if ends:
+        own.clear()
+    else:
+        clock.now_s += log_library.LOOK_S
+    assert library.logs()[-1] == LogInfo("own.ulg", 20, 1_000_070)
+
+
+def test_an_old_log_that_another_process_grows_shows_its_size_in_a_minute(
+    thousand: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Clock(monkeypatch)
+    library = LogLibrary(thousand)
+    library.logs()
+    write(thousand / "0007.ulg", b"paused and grown", 1_000_030)
+    clock.now_s += log_library.LATELY_S
+    assert library.logs()[-1] == LogInfo("0007.ulg", 16, 1_000_030)
+
+
+def test_a_log_begun_during_an_erase_is_locked(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file is examined the very moment when its writer wants the lock."""
+    path, library = folder / "b.ulg", LogLibrary(folder)
+    examiner = library.open("b.ulg")
+    assert examiner is not None
+    assert examiner.claim()
+    monkeypatch.setattr(log_library.time, "sleep", lambda _: examiner.close())
+    with create_log_file(path, overwrite=True) as log:
+        log.write(b"in flight")
+        assert library.erase() == 2
+        assert path.read_bytes() == b"in flight"
+
+
+def test_a_log_erased_before_its_lock_is_begun_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = folder / "b.ulg"
+    examiner = LogLibrary(folder).open("b.ulg")
+    assert examiner is not None
+    assert examiner.claim()
+
+    def erase(_: float) -> None:
+        path.unlink(missing_ok=True)
+        examiner.close()
+
+    monkeypatch.setattr(log_library.time, "sleep", erase)
+    with create_log_file(path, overwrite=True) as log:
+        log.write(b"in flight")
+        assert path.read_bytes() == b"in flight"
+
+
+def test_a_lock_of_another_program_does_not_hold_up_a_log(folder: Path) -> None:
+    examiner = LogLibrary(folder).open("b.ulg")
+    assert examiner is not None
+    assert examiner.claim()
+    with create_log_file(folder / "b.ulg", overwrite=True) as log:
+        log.write(b"in flight")
+    examiner.close()
+    assert (folder / "b.ulg").read_bytes() == b"in flight"

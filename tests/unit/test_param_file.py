@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -242,6 +243,28 @@ def test_a_row_of_failed_saves_is_one_sentence() -> None:
         saver._save()
         said.append(saver.take_error())
     assert said == ["not saved: full", None, None, "not saved: broken"]
+
+
+def test_a_saver_goes_on_after_an_unexpected_error() -> None:
+    errors: list[Exception] = [ValueError("not a number"), ValueError("not a number")]
+    written = threading.Event()
+
+    def write() -> None:
+        if errors:
+            failed.release()
+            raise errors.pop()
+        written.set()
+
+    failed = threading.Semaphore(0)
+    saver = FileSaver(write, "not saved")
+    for _ in range(2):
+        saver.change()
+        failed.acquire()
+    saver.change()
+    written.wait()
+    saver.close()
+    assert saver.take_error() == "not saved: ValueError: not a number"
+    assert saver.take_error() is None
 
 
 # ---------------------------------------------------------------------- the vehicle
