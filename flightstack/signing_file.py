@@ -124,7 +124,7 @@ class _TimestampFile:
         """Return a link id that no other process of the role has claimed; any one if there is none left."""
         assert self._lock is not None
         first = secrets.randbelow(len(_LINK_IDS))
-        link_ids = [*_LINK_IDS[first:], *_LINK_IDS[:first]]
+        link_ids: list[int] = [*_LINK_IDS[first:], *_LINK_IDS[:first]]
         for link_id in link_ids:
             with contextlib.suppress(OSError):  # another process has locked this octet of the file
                 fcntl.lockf(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, link_id)
