@@ -1,4 +1,4 @@
-"""The numbers of instance N: ports that no other instance uses, and the system id.
+"""The vehicle's channels, and the numbers of instance N: ports that no other instance uses, and the system id.
 
 The vehicle's own ports are PX4's (18570 + N, 14580 + N), the simulator's too (4560 + N), and the TCP port is
 ArduPilot's (5760 + 10·N). Those of clients, which the vehicle calls unasked, are PX4's for the first ten instances:
@@ -7,6 +7,9 @@ other and the vehicles' own, so that each further ten instances begin 1000 ports
 """
 
 from __future__ import annotations
+
+GROUND, API, TCP = "ground", "api", "tcp"
+"""The channels of ground stations, of companions, and of TCP clients, which get the rates of a ground station."""
 
 INSTANCES = 250
 """Instances are numbered from 0; the last one has the highest system id of a vehicle."""

@@ -17,7 +17,10 @@ from flightstack.params.errors import ConfigError
 
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _LONGEST_FILE = 200  # a key in hexadecimal takes 64 characters
-_LINK_IDS = 256
+_LINK_IDS = range(16, 256)
+"""Drawn from at random. Other programs number their links from 0, often with the system and component id of ``gcs``."""
+_TIMESTAMP_LOCK = 256
+"""The octet of the lock file that is held while the timestamp is written; the one at n is that of link id n."""
 
 
 def create_key(path: Path) -> bytes:
@@ -120,22 +123,23 @@ class _TimestampFile:
     def claim_link_id(self) -> int:
         """Return a link id that no other process of the role has claimed; any one if there is none left."""
         assert self._lock is not None
-        first = secrets.randbelow(_LINK_IDS)
-        for link_id in ((first + offset) % _LINK_IDS for offset in range(_LINK_IDS)):
+        first = secrets.randbelow(len(_LINK_IDS))
+        link_ids: list[int] = [*_LINK_IDS[first:], *_LINK_IDS[:first]]
+        for link_id in link_ids:
             with contextlib.suppress(OSError):  # another process has locked this octet of the file
                 fcntl.lockf(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, link_id)
                 return link_id
-        return first
+        return link_ids[0]
 
     def _write(self, timestamp: int) -> None:
         if self._lock is None:
             self._replace(timestamp)
             return
-        fcntl.lockf(self._lock, fcntl.LOCK_EX, 1, _LINK_IDS)  # the octet behind those of the link ids
+        fcntl.lockf(self._lock, fcntl.LOCK_EX, 1, _TIMESTAMP_LOCK)
         try:
             self._replace(max(timestamp, _load_timestamp(self._path)))
         finally:
-            fcntl.lockf(self._lock, fcntl.LOCK_UN, 1, _LINK_IDS)
+            fcntl.lockf(self._lock, fcntl.LOCK_UN, 1, _TIMESTAMP_LOCK)
 
     def _replace(self, timestamp: int) -> None:
         """Write the file anew. It is not forced to the disk: a power cut sets the clock forward anyway."""

@@ -33,6 +33,8 @@ class Answer(NamedTuple):
     """Why not, in the vehicle's words if it gave any."""
     silent: bool = False
     """Whether the vehicle did not answer at all."""
+    cancelled: bool = False
+    """Whether the ground station ended it."""
     items: tuple[MissionItem, ...] = ()
     """The plan, of a download."""
     result: int = MissionResult.ACCEPTED

@@ -10,7 +10,7 @@ from flightstack.plan import MissionResult
 from flightstack.transport.udp import Address, PortBusyError, UdpSocket, resolve
 from gcs_cli.calls import Answer, Request
 from gcs_cli.endpoint import VEHICLE_CONNECTION, Endpoint
-from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError, PortInUseError
+from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError, PortInUseError, VehicleLostError
 from gcs_cli.session import Session
 
 _LONGEST_WAIT_S = 0.25
@@ -116,14 +116,14 @@ class Connection:
         while (answer := call.answer(self.now_s)) is None:
             if session.view.powered_off or session.view.lost(self.now_s):
                 how = "shut down" if session.view.powered_off else "was lost"
-                raise CliError(f"{name() if callable(name) else name}: the vehicle {how}")
+                raise VehicleLostError(f"{name() if callable(name) else name}: the vehicle {how}")
             self.step(self.now_s + _LONGEST_WAIT_S)
         if may_lack and answer.result == MissionResult.UNSUPPORTED:
             return Answer(True)
         if not answer.accepted:
             what = name() if callable(name) else name
-            refused = f"{what}: {answer.reason}" if answer.silent else f"{what} refused: {answer.reason}"
-            raise CliError(refused, NO_ANSWER if answer.silent else FAILED)
+            said = what if answer.silent or answer.cancelled else f"{what} refused"
+            raise CliError(f"{said}: {answer.reason}", NO_ANSWER if answer.silent else FAILED)
         return answer
 
     def _send(self, frames: list[bytes]) -> None:
@@ -133,7 +133,8 @@ class Connection:
                 self._socket.send(frame, peer)
 
     def close(self) -> None:
-        """Say goodbye and close the socket."""
+        """Send what still waits, a cancelled transfer's end say, then the farewell, and close the socket."""
+        self._send(self.session.poll(self.now_s))
         self._send(self.session.farewell())
         self._socket.close()
         if self._signing is not None:

@@ -19,6 +19,10 @@ class CliError(Exception):
         self.exit_code = exit_code
 
 
+class VehicleLostError(CliError):
+    """The vehicle shut down or was lost during a request."""
+
+
 class PortInUseError(CliError):
     """Another program listens on ``port``, named with its address."""
 

@@ -38,7 +38,7 @@ class Phase(Enum):
     FLY = "flying"
     CONFIRM = "asking how the mission ended"
     SHUT_DOWN = "shutting the vehicle down"
-    OVER = "over"
+    OVER = "flight completed"
 
 
 class Flight:

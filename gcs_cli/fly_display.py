@@ -165,6 +165,8 @@ def _share(flight: Flight) -> tuple[float, float]:
 
 def phase_words(flight: Flight) -> str:
     """Say what is going on: the mode in flight, else the phase."""
+    if flight.over and flight.outcome is not None and not flight.outcome.completed:
+        return "flight ended"
     return flight.view.mode or "flying" if flight.phase is Phase.FLY else flight.phase.value
 
 

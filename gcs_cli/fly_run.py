@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import Any, NamedTuple
 
 from flightstack.console import complain
@@ -30,6 +28,7 @@ from gcs_cli.fly_options import (
     simulator_arguments,
     stack_arguments,
 )
+from gcs_cli.interruption import Interruption
 from gcs_cli.processes import Child, Children
 from gcs_cli.run_directory import (
     LOG_NAME,
@@ -54,30 +53,6 @@ class Flown(NamedTuple):
     wall_time_s: float | None
     overruns: int | None
     returned_by_us: bool
-
-
-class Interruption:
-    """Turns the first Ctrl-C, SIGTERM or lost terminal into a flag; the second one interrupts at once."""
-
-    def __init__(self) -> None:
-        self.reason = ""
-        self._before: dict[int, Any] = {}
-
-    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
-        if self.reason:
-            raise KeyboardInterrupt
-        self.reason = (
-            "interrupted" if number == signal.SIGINT else f"interrupted ({signal.Signals(number).name})"
-        )
-
-    def __enter__(self) -> Interruption:
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            self._before[number] = signal.signal(number, self._on_signal)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
 
 
 def fly(

@@ -17,7 +17,7 @@ def example_plans() -> dict[str, Path]:
     here = Path(__file__).resolve().parent
     packaged = here / "missions"
     folder = packaged if packaged.is_dir() else here.parent / "missions"
-    return {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in (".plan", ".waypoints")}
+    return {path.stem: path for path in sorted(folder.glob("*")) if path.suffix in (".plan", ".waypoints")}
 
 
 def plan_file(given: str | Path) -> Path:
@@ -43,6 +43,6 @@ PLAN_ARGUMENT = typer.Argument(
     metavar="PLAN",
     parser=plan_file,
     autocompletion=_complete,
-    help="A .plan or .waypoints file, or the name of an example: every_item, fenced_square, hop, square, triangle.",
+    help=f"A .plan or .waypoints file, or the name of an example: {', '.join(example_plans())}.",
 )
 PlanArgument = Annotated[Path, PLAN_ARGUMENT]

@@ -45,6 +45,16 @@ InstanceOption = Annotated[
         show_default=False,
     ),
 ]
+FlownInstanceOption = Annotated[
+    int | None,
+    typer.Option(
+        "--instance",
+        metavar="N",
+        min=0,
+        max=INSTANCES - 1,
+        help="Shifts all ports, to fly beside another one.",
+    ),
+]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace what exists already.")]
 TimeoutOption = Annotated[
     float | None,

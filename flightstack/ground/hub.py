@@ -13,7 +13,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Set
 from flightstack.commands import VehicleContext
 from flightstack.ground.facts import AutopilotFacts
 from flightstack.ground.mission_service import MissionService
-from flightstack.ground.peer import API, TCP, Peer, PeerAddress
+from flightstack.ground.peer import Peer, PeerAddress
 from flightstack.ground.router import Router
 from flightstack.ground.service import Service
 from flightstack.ground.services import make_services
@@ -26,6 +26,7 @@ from flightstack.mavlink.signing import Signing
 from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
 from flightstack.mavlink.telemetry import MAKERS, VehicleFacts, heartbeat, messages, status_texts
 from flightstack.plan.kept_plans import KeptPlans
+from flightstack.port_numbers import API, TCP
 
 HEARTBEAT_S = 1.0
 PEER_FORGOTTEN_S = 30.0

@@ -9,9 +9,6 @@ from typing import NamedTuple
 from flightstack.mavlink.link import SILENT_AFTER_S, Link, Message
 from flightstack.mavlink.streams import Streams
 
-GROUND, API, TCP = "ground", "api", "tcp"
-"""The channels of ground stations, of companions, and of TCP clients, which get the rates of a ground station."""
-
 
 class PeerAddress(NamedTuple):
     """Where a peer is: the channel it uses, and its address there."""

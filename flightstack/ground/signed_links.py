@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from flightstack.autopilot import Autopilot
-from flightstack.ground.peer import API, GROUND, PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.signing_setup import SigningSetup
 from flightstack.mavlink.signing import LinkSigning, Signing
+from flightstack.port_numbers import API, GROUND
 from flightstack.snapshot import NOTICE
 from flightstack.transport.vehicle_ports import is_loopback
 

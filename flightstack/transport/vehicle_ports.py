@@ -8,12 +8,11 @@ import select
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from flightstack.port_numbers import vehicle_api_port, vehicle_ground_port
+from flightstack.port_numbers import API, GROUND, TCP, vehicle_api_port, vehicle_ground_port
 from flightstack.transport.fair_queue import FairQueue
 from flightstack.transport.tcp_server import TcpServer
 from flightstack.transport.udp import Address, PortBusyError, UdpSocket
 
-GROUND, API, TCP = "ground", "api", "tcp"
 LOOPBACK = "127.0.0.1"
 OCTETS_A_POLL = 4096
 """Handed out in one poll, all peers together: a millisecond of work at worst, 400 kB/s in real time."""

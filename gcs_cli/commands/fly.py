@@ -11,7 +11,7 @@ import typer
 
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly_flags import FlyOptions, flies
-from gcs_cli.settings import JsonOption, OverwriteOption, settings_of
+from gcs_cli.settings import FlownInstanceOption, JsonOption, OverwriteOption, settings_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -26,9 +26,7 @@ def fly(
         typer.Option("--out", "-o", help="Directory of the results.  [default: runs/<stamp>-<plan>]"),
     ] = None,
     overwrite: OverwriteOption = False,
-    instance: Annotated[
-        int | None, typer.Option(metavar="N", help="Shifts all ports, to fly beside another one.")
-    ] = None,
+    instance: FlownInstanceOption = None,
     open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
     as_json: JsonOption = False,
     timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 180]")] = None,

@@ -84,13 +84,22 @@ def download(
         if not logs:
             raise CliError("the vehicle has no logs")
         files = log_calls.fetch_files(connection)
+        refused: list[str] = []
         for log in logs if everything else [_chosen(logs, number)]:
             file = log_calls.file_of(log, logs, files)
             path = _path(log, file, output, everything)
             if everything and path.exists() and path.stat().st_size == log.size:
                 typer.echo(f"{path} is here already")
+            elif everything and path.is_file() and not overwrite:
+                refused.append(str(path))  # a log that has grown since, or another file
             else:
                 _fetch(connection, log, file, path, overwrite)
+    if refused:
+        verb = "exists" if len(refused) == 1 else "exist"
+        raise CliError(
+            f"{', '.join(refused)}: {verb} already with another size: give another --output, or --overwrite",
+            FAILED,
+        )
 
 
 def _fetch(connection: Connection, log: LogEntry, file: Entry | None, path: Path, overwrite: bool) -> None:

@@ -14,6 +14,8 @@ from gcs_cli.settings import ConnectOption, InstanceOption, OverwriteOption, Tim
 
 if TYPE_CHECKING:
     from flightstack.plan import MissionItem
+    from gcs_cli.connection import Connection
+    from gcs_cli.plan_parts import Uploads
 
 app = make_app(help="The vehicle's mission.", no_args_is_help=True)
 
@@ -35,20 +37,41 @@ def upload(
     timeout: TimeoutOption = None,
     instance: InstanceOption = None,
 ) -> None:
-    """Replace the vehicle's plans by those of a file.
+    """Replace the vehicle's mission by that of a file.
 
-    The mission, and geofence and rally points if the file has any; they go first, because the vehicle checks the
-    mission against them. If a part is refused, the vehicle gets back the plans that it held before.
+    Geofence and rally points are replaced if the file has any, else the vehicle keeps its own. They go first, because
+    the vehicle checks the mission against them. If a part is refused, or after Ctrl-C, the vehicle gets back the plans
+    that it held before; a second Ctrl-C ends at once.
     """
     from flightstack.plan import load_plan  # noqa: PLC0415
+    from gcs_cli.interruption import Interruption  # noqa: PLC0415
     from gcs_cli.plan_parts import Uploads, parts_to_send  # noqa: PLC0415
 
     plan = load_plan(file)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        uploads = Uploads(connection.session, plan, restores=True)
-        connection.complete(uploads, lambda: f"upload of the {uploads.name} of {file}")
+    with meet_vehicle(context, connect, timeout, instance) as connection, Interruption() as interruption:
+        uploads = Uploads(connection.session, plan, restores=True, interrupted=lambda: interruption.reason)
+        _complete(connection, uploads, file)
     for part in parts_to_send(plan):
         typer.echo(f"{part.name} of {len(part.items)} items uploaded")
+    for part in uploads.kept:
+        typer.echo(f"the vehicle keeps its {part.name} of {len(part.items)} items")
+
+
+def _complete(connection: Connection, uploads: Uploads, file: Path) -> None:
+    """Run an upload to its end; raise CliError, with what the vehicle holds if the upload ends early."""
+    from gcs_cli.errors import CliError, VehicleLostError  # noqa: PLC0415
+
+    def name() -> str:
+        return f"upload of the {uploads.name} of {file}"
+
+    try:
+        connection.complete(uploads, name)
+    except VehicleLostError as error:
+        raise CliError(f"{error}; {uploads.state}") from None
+    except KeyboardInterrupt:
+        raise CliError(f"{name()}: interrupted; {uploads.state}") from None
+    except OSError as error:
+        raise CliError(f"{name()}: {error.strerror or error}; {uploads.state}") from None
 
 
 @app.command()

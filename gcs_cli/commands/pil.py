@@ -13,7 +13,7 @@ from typer.core import TyperGroup
 from flightstack.command_line import HELP_FLAGS, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.fly_flags import FlyOptions, flies
-from gcs_cli.settings import JsonOption, OverwriteOption, settings_of
+from gcs_cli.settings import FlownInstanceOption, JsonOption, OverwriteOption, settings_of
 
 if TYPE_CHECKING:
     from gcs_cli.pil.result import Outcome
@@ -55,9 +55,7 @@ def fly(
     context: typer.Context,
     options: FlyOptions,
     target: TargetOption = "emulated",
-    instance: Annotated[
-        int | None, typer.Option(metavar="N", help="Shifts all ports, to fly beside another one.")
-    ] = None,
+    instance: FlownInstanceOption = None,
     out: OutOption = None,
     overwrite: OverwriteOption = False,
     fail_over: FailOverOption = False,

@@ -13,13 +13,14 @@ import numpy as np
 
 from flightstack.config import DEFAULT_HOME
 from flightstack.ground.hub import MAX_TO_FORWARD
-from flightstack.ground.peer import API, GROUND, PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import LARGEST_FRAME
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.mavlink.simulator_link import SimulatorLink
 from flightstack.params.vehicle import load_vehicle
+from flightstack.port_numbers import API, GROUND
 from gcs_cli.session import Session
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.lockstep import SimulatorLink as SimulatorEnd

@@ -10,11 +10,12 @@ import random
 import pytest
 
 from flightstack.ground.hub import MAX_PEERS, MAX_TO_FORWARD
-from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import LARGEST_FRAME
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import MAX_STREAMS, LinkSigning, Signing
+from flightstack.port_numbers import GROUND
 from tests.fuzz.guard import Guard
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import held

@@ -18,8 +18,9 @@ import pytest
 
 import flightstack
 from flightstack.mavlink.services.command_client import CommandClient, CommandTiming
+from flightstack.mavlink.services.log_client import LogEntry
 from flightstack.transport.udp import UdpSocket
-from gcs_cli import calls
+from gcs_cli import calls, log_calls
 from gcs_cli.__main__ import main
 from gcs_cli.connection import Connection
 from tests.support.fake_vehicle import ARM, FakeVehicle, serve
@@ -167,6 +168,70 @@ def test_a_refused_part_leaves_the_plans_of_before(tmp_path: Path, refused: int,
     assert f"gcs: upload of the {name} of {changed} refused: " in result.stderr
     assert result.stderr.endswith("; the vehicle holds its former plans\n")
     assert contents(vehicle) == before
+
+
+def test_an_upload_names_the_parts_that_stay_on_the_vehicle() -> None:
+    vehicle = FakeVehicle()
+    assert told(vehicle, "mission", "upload", "fenced_square").returncode == 0
+    assert told(vehicle, "mission", "upload", "hop").stdout.splitlines()[1:] == [
+        "the vehicle keeps its geofence of 5 items",
+        "the vehicle keeps its list of rally points of 1 items",
+    ]
+
+
+def test_a_refusal_by_a_geofence_that_is_not_in_the_file_names_it() -> None:
+    vehicle = FakeVehicle()
+    assert told(vehicle, "mission", "upload", "fenced_square").returncode == 0
+    vehicle.refused_type, vehicle.mission_refusal = 0, "Mission refused: item 2 is outside the geofence"
+    result = told(vehicle, "mission", "upload", "square")
+    assert result.returncode == 1
+    assert result.stderr.endswith(
+        "refused: item 2 is outside the geofence; the vehicle keeps its geofence of 5 items, which is not in the "
+        "file: remove it with `gcs mission clear --type fence`\n"
+    )
+
+
+@pytest.mark.parametrize("signals", [1, 2])
+def test_an_interrupted_upload_says_what_the_vehicle_holds(signals: int) -> None:
+    """One signal as the mission begins; the second as the former geofence, the first part, is restored."""
+    vehicle = FakeVehicle()
+    assert told(vehicle, "mission", "upload", "fenced_square").returncode == 0
+    before, ask = contents(vehicle), vehicle._ask_next_item
+    kinds = [0, 1][:signals]
+
+    def interrupt() -> None:
+        ask()
+        if kinds and vehicle._type == kinds[0]:
+            os.kill(os.getpid(), signal.SIGTERM)
+            kinds.pop(0)
+
+    vehicle._ask_next_item = interrupt  # type: ignore[method-assign]
+    result = told(vehicle, "mission", "upload", "fenced_square")
+    assert result.returncode == 1
+    if signals == 1:
+        assert result.stderr.endswith(": interrupted (SIGTERM); the vehicle holds its former plans\n")
+        assert contents(vehicle) == before
+    else:
+        assert result.stderr.endswith(
+            ": interrupted; the vehicle holds: geofence new, list of rally points new, mission former\n"
+        )
+
+
+def test_download_of_all_logs_goes_on_after_one_that_exists(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    logs = tuple(LogEntry(number, 3, 0) for number in range(3))
+    monkeypatch.setattr(log_calls, "fetch_list", lambda _: logs)
+    monkeypatch.setattr(log_calls, "fetch_files", lambda _: ())
+    monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
+    grown = tmp_path / "log_1.ulg"
+    grown.write_bytes(b"ab")
+    result = told(FakeVehicle(), "log", "download", "--all", "-o", tmp_path)
+    assert (result.returncode, grown.read_bytes()) == (1, b"ab")
+    assert result.stderr.startswith(f"gcs: {grown}: exists already with another size: ")
+    assert [(tmp_path / f"log_{number}.ulg").read_bytes() for number in (0, 2)] == [b"new", b"new"]
+    assert told(FakeVehicle(), "log", "download", "--all", "--overwrite", "-o", tmp_path).returncode == 0
+    assert grown.read_bytes() == b"new"
 
 
 def test_a_vehicle_without_geofence_is_downloaded_from() -> None:

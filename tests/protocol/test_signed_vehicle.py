@@ -8,8 +8,9 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from flightstack.ground.hub import MAX_PEERS
-from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.mavlink.signing import NO_KEY, Signing, timestamp_of
+from flightstack.port_numbers import GROUND
 from tests.support.world import World
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))

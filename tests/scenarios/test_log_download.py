@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.services.addressing import Address
 from flightstack.mavlink.services.ftp_client import FtpClient, FtpDone
@@ -15,6 +15,7 @@ from flightstack.mavlink.services.log_client import LogClient, LogDone
 from flightstack.mavlink.services.log_server import LogServer
 from flightstack.mavlink.services.log_store import FlatLogs
 from flightstack.mavlink.services.virtual_files import FileTree
+from flightstack.port_numbers import GROUND
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station
 from tests.support.world import World
 

@@ -22,7 +22,7 @@ from flightstack.assembly import Stack, build
 from flightstack.config import DEFAULT_HOME, StackConfig
 from flightstack.contract import Vector3
 from flightstack.geodesy import LocalFrame
-from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.lockstep import Lockstep
 from flightstack.logging.flight_log import FlightLog
 from flightstack.mavlink.dialect import mavlink
@@ -34,6 +34,7 @@ from flightstack.mavlink.services.log_store import NO_LOGS, LogStore
 from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
 from flightstack.modes import Mode
 from flightstack.plan import MissionItem, load_plan
+from flightstack.port_numbers import GROUND
 from sim_bridge.disturbance import Disturbance
 from sim_bridge.failure_command import inject_failure
 from sim_bridge.faults import parse_fault

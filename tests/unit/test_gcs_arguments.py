@@ -25,7 +25,7 @@ from gcs_cli.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
 from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.flight import Phase
 from gcs_cli.flight_outcome import Code, Outcome
-from gcs_cli.fly_display import LineDisplay, make_display, progress
+from gcs_cli.fly_display import LineDisplay, make_display, phase_words, progress
 from gcs_cli.fly_flags import NOT_PASSED, TO_SIMULATOR, TO_STACK, FlyOptions, flag_of
 from gcs_cli.fly_options import (
     check_ports,
@@ -401,9 +401,17 @@ def test_what_the_vehicle_says_of_an_early_end_is_not_shown() -> None:
     display.update(story.flight)
     story.run(most_s=10.0)
     display.update(story.flight)
+    assert phase_words(story.flight) == "flight ended"
     assert "Command refused: in the air" in [entry.text for entry in story.flight.view.texts]
     assert isinstance(console.file, io.StringIO)
     assert "Command refused" not in console.file.getvalue()
+
+
+@pytest.mark.parametrize("words", [["fly"], ["pil", "fly"]])
+def test_instance_of_a_flight_shows_its_range(words: list[str], capsys: Any) -> None:
+    assert main([*words, "--help"]) == DONE
+    assert "0<=x<=249" in capsys.readouterr().out.partition("--instance")[2][:200]
+    assert main([*words, "--instance", "250"]) == USAGE
 
 
 def test_a_dumb_terminal_gets_lines() -> None:
@@ -424,4 +432,4 @@ def test_lines_tell_the_course_of_a_flight() -> None:
     assert lines[1] == "arming"
     assert lines[2].startswith("MISSION  item ")
     assert "N   +1.0 E   +2.0 up   3.0 m" in lines[2]
-    assert lines[-1] == "over"
+    assert lines[-1] == "flight completed"

@@ -12,10 +12,11 @@ from pymavlink.dialects.v20 import ardupilotmega
 from flightstack.assembly import build
 from flightstack.config import StackConfig
 from flightstack.ground.hub import MAX_PEERS
-from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.modes import Mode
+from flightstack.port_numbers import GROUND
 from flightstack.snapshot import NOTICE
 
 ALICE, BOB = PeerAddress(GROUND, "alice", 1), PeerAddress("api", "bob", 2)

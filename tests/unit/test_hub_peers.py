@@ -10,9 +10,10 @@ import pytest
 from flightstack.assembly import build
 from flightstack.config import StackConfig
 from flightstack.ground.hub import FORWARDED_A_POLL, KEPT_TEXTS, MAX_PEERS, PEER_FORGOTTEN_S
-from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import SILENT_AFTER_S, Link
+from flightstack.port_numbers import GROUND
 from flightstack.reboot import carry_over
 from flightstack.snapshot import NOTICE
 from tests.unit.test_ground_hub import ALICE, BOB, Net
