@@ -10,7 +10,7 @@ from flightstack.arrays import store_position_setpoint, vehicle_state
 from flightstack.compiled import as_tuple, compiled, store
 from flightstack.contract import FloatArray, VehicleState
 from flightstack.guidance.aim import A_START_X, A_START_Y, RETURN, advance_return, aim_goal
-from flightstack.guidance.land_detector import STILL_M_S, LandMemory, land_detector_step, lift_share
+from flightstack.guidance.land_detector import LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
 from flightstack.guidance.mission import into_ground, mission_goal, mission_step
 from flightstack.guidance.offboard import attitude_step, point_step
@@ -26,10 +26,8 @@ T_YAW = 9
 GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
 LAND_MEMORY_SIZE = 4
 THRUST_AT = 4  # of the attitude target's array form
-LEAD_M, LEAD_LIFT = 0.5, 0.8
+LEAD_M, LEAD_LIFT = 0.5, 0.5
 """How far below the vehicle the reference sinks, and farther only until the loops reduce the lift to this share."""
-BELOW_M = 0.05
-"""How far below the vehicle a reference at rest asks for a descent."""
 
 
 @compiled
@@ -45,14 +43,6 @@ def _waiting(last: Trajectory, reference: Trajectory, down_m: float, lift: float
         return t
     z = max(last.z, down_m + LEAD_M)
     return Trajectory(t.x, t.y, z, t.vx, t.vy, t.vz, t.ax, t.ay, t.az, t.yaw_rad, t.yaw_rate_rad_s)
-
-
-@compiled
-def _descent(reference: Trajectory, down_m: float) -> float:
-    """Return the sink rate asked of a vehicle at ``down_m``, at least a slow one while the reference lies below it."""
-    if reference.z > down_m + BELOW_M and reference.vz > -BELOW_M:
-        return max(reference.vz, 2.0 * STILL_M_S)
-    return reference.vz
 
 
 @compiled
@@ -109,7 +99,7 @@ def goal_kernel(
     down_m = state.position_ned_m.z
     lift = lift_share(state, attitude_target[THRUST_AT], params.weight_n)
     reference = _waiting(last, trajectory_step(last, goal, _limits(params), dt_s), down_m, lift)
-    _finish(reference, state, trajectory, land, lift, _descent(reference, down_m), dt_s, setpoint)
+    _finish(reference, state, trajectory, land, lift, reference.vz, dt_s, setpoint)
 
 
 @compiled
@@ -146,5 +136,5 @@ def stream_kernel(
         else:
             reference = manual_step(last, stream, state, mode == POSITION, params, limits, dt_s)
         reference = _waiting(last, reference, down_m, lift)
-        descent_m_s = _descent(reference, down_m)
+        descent_m_s = reference.vz
     _finish(reference, state, trajectory, land, lift, descent_m_s, dt_s, setpoint)

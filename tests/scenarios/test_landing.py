@@ -250,6 +250,54 @@ def test_a_throttle_at_its_lowest_in_the_air_is_no_contact() -> None:
         watch_flight(world, 2.5)
 
 
+# ---------------------------------------------------------------------- upward forces
+
+PAPER, POLES, NO_INTEGRAL = ("x_quad", "paper"), ("paper_quad", "backstepping_poles"), ("x_quad", "tuned")
+FLOATS = [
+    (vehicle, gains, mode, share)
+    for vehicle, gains in (PAPER, ("paper_quad", "paper"), POLES, ("x_quad", "backstepping_poles"), NO_INTEGRAL)
+    for mode in (Mode.HOLD, Mode.POSITION, Mode.OFFBOARD)
+    for share in (0.1, 0.2, 0.3)
+]
+SOME_FLOATS = [(*PAPER, Mode.HOLD, 0.3), (*POLES, Mode.POSITION, 0.2), (*NO_INTEGRAL, Mode.OFFBOARD, 0.3)]
+
+
+def enter(world: World, mode: Mode) -> None:
+    """Stay in place in this mode, with the setpoint that the vehicle has."""
+    if mode is Mode.HOLD:
+        return
+    north, east, down = world.stack.autopilot.now.setpoint[:3].tolist()
+    maker = sticks if mode is Mode.POSITION else lambda: local_point((north, east, down))
+    stream(world, maker(), 0.2)
+    assert select(world, 3 if mode is Mode.POSITION else 6) == 0
+    world.streams["hold"] = maker
+
+
+@pytest.mark.parametrize(("vehicle", "gains", "mode", "share"), FLOATS if NIGHTLY else SOME_FLOATS)
+def test_hover_with_an_upward_force_is_no_contact(vehicle: str, gains: str, mode: Mode, share: float) -> None:
+    """A lighter battery, a dropped payload, stronger propellers."""
+    world = hover(
+        2.0, vehicle=vehicle, gains=gains, seconds=0.5,
+        controller="backstepping" if gains == "backstepping_poles" else "pid",
+        force=(0.0, 0.0, -share * load_vehicle(vehicle).weight_n),
+        params=["POS_Z_I=0"] if gains == "tuned" else [],
+        **({} if gains == "tuned" else {"inner_hz": 1000.0 if NIGHTLY else 500.0}),
+    )  # fmt: skip
+    enter(world, mode)
+    watch_flight(world, 40.0 if NIGHTLY else 6.0)
+
+
+@pytest.mark.parametrize(
+    ("altitude_m", "north_m_s", "mode"),
+    [(0.7, 8.0, Mode.HOLD)]
+    + NIGHTLY * [(0.7, 8.0, Mode.POSITION), (10.0, 6.0, Mode.HOLD), (10.0, 6.0, Mode.OFFBOARD)],
+)
+def test_hover_in_updraft_and_gusts_is_no_contact(altitude_m: float, north_m_s: float, mode: Mode) -> None:
+    world = hover(altitude_m, vehicle="x_quad", wind=(north_m_s, 0.0, -6.0), gust=6.0, seconds=0.0)
+    enter(world, mode)
+    watch_flight(world, 40.0 if NIGHTLY else 8.0)
+
+
 # ---------------------------------------------------------------------- wind that is too strong
 
 
