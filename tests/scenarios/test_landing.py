@@ -150,11 +150,11 @@ def test_python_and_c_land_alike() -> None:
     assert c.slid_m == pytest.approx(python.slid_m, abs=1e-6)
 
 
-def test_a_goto_below_the_ground_lands() -> None:
+def test_an_offboard_position_below_the_ground_lands() -> None:
     world = hover(vehicle="x_quad", wind=(12.0, 0.0, 0.0))
-    amsl = world.config.home.altitude_m - 5.0
-    nan = math.nan
-    assert world.command(mavlink.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, nan, nan, nan, amsl) == 0
+    stream(world, local_point((0.0, 0.0, 5.0)), 0.2)
+    assert select(world, 6) == 0
+    world.streams["point"] = lambda: local_point((0.0, 0.0, 5.0))
     landing = watch_landing(world)
     assert landing.found_s < 1.5
     assert landing.deepest_m < 0.7
@@ -285,6 +285,17 @@ def test_hover_with_an_upward_force_is_no_contact(vehicle: str, gains: str, mode
     )  # fmt: skip
     enter(world, mode)
     watch_flight(world, 40.0 if NIGHTLY else 6.0)
+
+
+@pytest.mark.parametrize(("vehicle", "gains"), [PAPER, POLES, NO_INTEGRAL])
+def test_a_payload_dropped_in_a_descent_is_no_contact(vehicle: str, gains: str) -> None:
+    world = hover(6.0, vehicle=vehicle, gains=gains, seconds=0.5, inner_hz=500.0)
+    assert world.land() == 0
+    watch_flight(world, 1.5)
+    world.simulator._plant_force_z = -0.3 * load_vehicle(vehicle).weight_n
+    landing = watch_landing(world)
+    assert set(world.texts) == USUAL_TEXTS
+    assert landing.deepest_m < 1.5
 
 
 @pytest.mark.parametrize(
