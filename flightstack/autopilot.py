@@ -124,6 +124,8 @@ class Autopilot(FlightRequests):
         touched = navigator.touches_ground
         navigator.step(mode, self._state, now.attitude_target)
         flies_attitude = navigator.flies_attitude(mode)
+        if touched and not navigator.touches_ground:  # it climbs, or was in the air
+            navigator.take_up(self._state)
         touches = flying and navigator.touches_ground and not flies_attitude
         self._rests = touches and navigator.rests
         if rested or self._rests or (touches and not touched):  # what the loops remember is of the ground

@@ -10,7 +10,7 @@ from flightstack.arrays import store_position_setpoint, vehicle_state
 from flightstack.compiled import as_tuple, compiled, store
 from flightstack.contract import FloatArray, VehicleState
 from flightstack.guidance.aim import A_START_X, A_START_Y, RETURN, advance_return, aim_goal
-from flightstack.guidance.land_detector import STILL_M_S, LandMemory, land_detector_step, lift_share
+from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
 from flightstack.guidance.mission import into_ground, mission_goal, mission_step
 from flightstack.guidance.offboard import attitude_step, point_step
@@ -26,10 +26,12 @@ T_YAW = 9
 GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
 LAND_MEMORY_SIZE = 4
 THRUST_AT = 4  # of the attitude target's array form
-LEAD_M, LEAD_LIFT = 0.5, 0.8
-"""How far below the vehicle the reference sinks, and farther only until the loops reduce the lift to this share."""
-BELOW_M = 0.05
-"""How far below the vehicle a reference at rest asks for a descent."""
+ACCELERATION_Z = 8  # of the setpoint's
+LEAD_M = 0.5
+"""How far below a vehicle that does not sink the reference sinks."""
+PRESS_1_S, PRESS_M_S2 = 7.0, 4.9
+"""Downward acceleration asked of such a vehicle, for its lack of sink rate, and at most: half the weight. It takes the
+thrust away whatever the gains are: a vehicle in the air then sinks."""
 
 
 @compiled
@@ -38,21 +40,23 @@ def _limits(params: GuidanceParams) -> TrajectoryLimits:
 
 
 @compiled
-def _waiting(last: Trajectory, reference: Trajectory, down_m: float, lift: float) -> Trajectory:
-    """Return the reference, which waits for a vehicle at ``down_m`` that does not sink although its lift is low."""
+def _waiting(last: Trajectory, reference: Trajectory, state: VehicleState) -> Trajectory:
+    """Return the reference, which waits for a vehicle that does not sink with it."""
     t = reference
-    if t.z <= max(last.z, down_m + LEAD_M) or lift >= LEAD_LIFT:
+    lowest_m = max(last.z, state.position_ned_m.z + LEAD_M)
+    if t.z <= lowest_m or state.velocity_ned_m_s.z >= 0.5 * t.vz:
         return t
-    z = max(last.z, down_m + LEAD_M)
-    return Trajectory(t.x, t.y, z, t.vx, t.vy, t.vz, t.ax, t.ay, t.az, t.yaw_rad, t.yaw_rate_rad_s)
+    return Trajectory(t.x, t.y, lowest_m, t.vx, t.vy, t.vz, t.ax, t.ay, t.az, t.yaw_rad, t.yaw_rate_rad_s)
 
 
 @compiled
-def _descent(reference: Trajectory, down_m: float) -> float:
-    """Return the sink rate asked of a vehicle at ``down_m``, at least a slow one while the reference lies below it."""
-    if reference.z > down_m + BELOW_M and reference.vz > -BELOW_M:
-        return max(reference.vz, 2.0 * STILL_M_S)
-    return reference.vz
+def _press_m_s2(reference: Trajectory, state: VehicleState) -> float:
+    """Return the downward acceleration to add for a vehicle that stays behind a sinking reference."""
+    lack_m_s = reference.vz - state.velocity_ned_m_s.z
+    if reference.vz < DESCENT_M_S or lack_m_s <= 0.0:
+        return 0.0
+    near = 2.0 * (reference.z - state.position_ned_m.z) / LEAD_M - 1.0
+    return min(max(near, 0.0), 1.0) * min(PRESS_1_S * lack_m_s, PRESS_M_S2)
 
 
 @compiled
@@ -69,6 +73,7 @@ def _finish(
     """Keep the reference, write the setpoint, and let the land detector see both."""
     store(trajectory, reference)
     store_position_setpoint(setpoint, setpoint_of(reference))
+    setpoint[ACCELERATION_Z] += _press_m_s2(reference, state)
     memory = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE))
     store(land, land_detector_step(memory, state, lift, descent_m_s, dt_s))
 
@@ -106,10 +111,9 @@ def goal_kernel(
         goal = aim_goal(mode, aim, params)
     goal = into_ground(goal, state.position_ned_m.z, params)
     last = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE))
-    down_m = state.position_ned_m.z
     lift = lift_share(state, attitude_target[THRUST_AT], params.weight_n)
-    reference = _waiting(last, trajectory_step(last, goal, _limits(params), dt_s), down_m, lift)
-    _finish(reference, state, trajectory, land, lift, _descent(reference, down_m), dt_s, setpoint)
+    reference = _waiting(last, trajectory_step(last, goal, _limits(params), dt_s), state)
+    _finish(reference, state, trajectory, land, lift, reference.vz, dt_s, setpoint)
 
 
 @compiled
@@ -135,7 +139,6 @@ def stream_kernel(
     state = vehicle_state(state_array)
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     last, limits = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE)), _limits(params)
-    down_m = state.position_ned_m.z
     lift = lift_share(state, attitude_target[THRUST_AT], params.weight_n)
     if mode == OFFBOARD and stream[S_KIND] >= ATTITUDE:
         reference = attitude_step(stream, attitude_target, state, params, limits, dt_s, target)
@@ -145,6 +148,6 @@ def stream_kernel(
             reference = point_step(last, stream, state, params, limits, dt_s)
         else:
             reference = manual_step(last, stream, state, mode == POSITION, params, limits, dt_s)
-        reference = _waiting(last, reference, down_m, lift)
-        descent_m_s = _descent(reference, down_m)
+        reference = _waiting(last, reference, state)
+        descent_m_s = reference.vz
     _finish(reference, state, trajectory, land, lift, descent_m_s, dt_s, setpoint)

@@ -2,8 +2,8 @@
 
 The stages are those of PX4's MulticopterLandDetector:
 
-* *Contact*: guidance asks for a descent, the thrust carries less than the weight, and yet the vehicle does not sink. It
-  is then levelled with hardly any thrust, so that a vehicle that touches nothing falls, and leaves the stage at once.
+* *Contact*: guidance descends, the thrust carries much less than the weight, and yet the vehicle does not sink. It is
+  then levelled with hardly any thrust, so that a vehicle in the air falls, and leaves the stage at once.
 * *Rest* (PX4's "maybe landed"): contact has lasted. The loops stop, so that nothing works against the ground.
 * *Landed*: since contact the vehicle has neither had thrust nor fallen for a while.
 
@@ -19,17 +19,22 @@ from flightstack.compiled import compiled
 from flightstack.contract import VehicleState
 from flightstack.params.vehicle import GRAVITY_M_S2
 
+SUPPORT_LIFT = 0.7
+"""Vertical thrust, as share of the weight, below which a vehicle sinks even if 0.3 of its weight is carried by an
+updraft, or is missing because of a dropped payload or stronger propellers."""
 CONTACT_M_S = 1.0
-"""Sink rate that the missing thrust should have led to, and has not: contact. In the air it is 0.5 m/s at most, the
-width of ``STILL_M_S``; the rest is for what an updraft carries."""
+"""Contact: sink rate that thrust below ``SUPPORT_LIFT`` would have caused in the air. In the air the sum stays below
+0.5 m/s, the width of ``STILL_M_S``, for upward forces up to 0.3 of the weight; the rest covers the lag of the rotors."""
 BOUNCE_SHARE = 0.5
-"""How fast that sum falls again while the vehicle is not still, in g: a bounce on its feet does not clear it."""
-REST_M_S = 4.0
-"""The same from which on the vehicle rests without any control: 0.3 s after contact, in which it has levelled."""
+"""Rate at which that sum decreases while the vehicle moves vertically, in g: a bounce on its feet does not clear it."""
+BLOCKED_M_S = 10.0
+"""After contact has ended in a fall, the sum starts this far below 0: no contact for 2 s at ``BOUNCE_SHARE``."""
+REST_M_S = 2.8
+"""The same sum from which on the vehicle rests without any control: 0.3 s after contact, in which it has levelled."""
+DESCENT_M_S = 0.05
+"""Sink rate of the reference from which on guidance descends, and climb rate from which on it climbs."""
 LANDED_S = 0.4
 """How long the signs of standing must agree after contact."""
-CONTACT_LIFT = 0.9
-"""Vertical thrust, as share of the weight, below which something else must carry a vehicle that does not sink."""
 LEVELLING_LIFT = 0.08
 """Thrust, as share of the weight, of a vehicle that is levelled: friction holds it, and yaw is controlled."""
 LANDED_LIFT = 0.15
@@ -47,7 +52,7 @@ CLIMB_M = 0.15
 class LandMemory(NamedTuple):
     """``landed`` is 0 or 1; ``ground_z_m`` is the down coordinate where the vehicle stands.
 
-    ``missing_m_s`` is the sink rate that has not come; ``stood_s`` counts from contact.
+    ``missing_m_s`` is the sink rate that the thrust should have caused; ``stood_s`` counts from contact.
     """
 
     landed: float
@@ -69,23 +74,31 @@ def land_detector_step(
 ) -> LandMemory:
     """Advance the detector by ``dt_s``.
 
-    ``lift`` is the ``lift_share`` of the thrust asked for, ``descent_m_s`` the sink rate that guidance asks for:
-    infinite for "as the thrust leads to", 0 or less for none. A landing ends with a rise by ``CLIMB_M``.
+    ``lift`` is the ``lift_share`` of the thrust asked for, ``descent_m_s`` the sink rate of the reference: infinite
+    if guidance gives the thrust itself. Contact begins only in a descent. A landing ends with a rise by ``CLIMB_M``.
     """
     vz, z = state.velocity_ned_m_s.z, state.position_ned_m.z
     if memory.landed > 0.0:
         if z < memory.ground_z_m - CLIMB_M:
             return LandMemory(0.0, 0.0, 0.0, z)
         return memory
-    if not (descent_m_s > 0.0 and lift < CONTACT_LIFT):
-        return LandMemory(0.0, 0.0, 0.0, z)
-    missing_m_s = memory.missing_m_s + (1.0 - lift) * GRAVITY_M_S2 * dt_s
-    if memory.missing_m_s < CONTACT_M_S:
-        if abs(vz) >= min(STILL_M_S, 0.5 * descent_m_s):
-            missing_m_s = max(0.0, memory.missing_m_s - BOUNCE_SHARE * GRAVITY_M_S2 * dt_s)
+    missing_m_s, change_m_s = memory.missing_m_s, (SUPPORT_LIFT - lift) * GRAVITY_M_S2 * dt_s
+    if missing_m_s < CONTACT_M_S:
+        decrease_m_s = BOUNCE_SHARE * GRAVITY_M_S2 * dt_s
+        if missing_m_s < 0.0:
+            missing_m_s = min(0.0, missing_m_s + decrease_m_s)
+        elif descent_m_s < DESCENT_M_S:
+            missing_m_s = 0.0
+        elif abs(vz) >= min(STILL_M_S, 0.5 * descent_m_s):
+            missing_m_s = max(0.0, missing_m_s - decrease_m_s)
+        else:
+            missing_m_s = max(0.0, missing_m_s + change_m_s)
         return LandMemory(0.0, missing_m_s, 0.0, z)
     if abs(vz) >= SETTLING_M_S:
+        return LandMemory(0.0, -BLOCKED_M_S, 0.0, z)
+    if descent_m_s < -DESCENT_M_S or lift >= SUPPORT_LIFT:
         return LandMemory(0.0, 0.0, 0.0, z)
     stands = lift < LANDED_LIFT and abs(vz) < STANDING_M_S
     stood_s = memory.stood_s + dt_s if stands else 0.0
-    return LandMemory(1.0 if stood_s >= LANDED_S - 1e-9 else 0.0, missing_m_s, stood_s, z)
+    landed = 1.0 if stood_s >= LANDED_S - 1e-9 else 0.0
+    return LandMemory(landed, missing_m_s + change_m_s, stood_s, z)

@@ -25,14 +25,19 @@ FRICTION = 0.7
 USUAL_TEXTS = {"Armed", "Takeoff detected", "Landing detected", "Disarmed"}
 
 
-def wind_that_pushes(vehicle: str, plant: str, share: float) -> dict[str, tuple[float, float, float]]:
-    """Wind, or a force where there is no drag, of this share of the weight; it blows between two rotors' arms."""
+def wind_that_pushes(
+    vehicle: str, plant: str, share: float, up: float = 0.0
+) -> dict[str, tuple[float, float, float]]:
+    """Wind, or a force where there is no drag, of this share of the weight; it blows between two rotors' arms.
+
+    ``up`` is an upward force as share of the weight.
+    """
     craft = load_vehicle(vehicle)
     north, east = share * craft.weight_n * 0.8, share * craft.weight_n * 0.6
     drag = craft.linear_drag_n_s_m[0]
     if plant == "paper" or drag == 0.0:
-        return {"force": (north, east, 0.0)}
-    return {"wind": (north / drag, east / drag, 0.0)}
+        return {"force": (north, east, -up * craft.weight_n)}
+    return {"wind": (north / drag, east / drag, 0.0), "force": (0.0, 0.0, -up * craft.weight_n)}
 
 
 class Landing(NamedTuple):
@@ -75,7 +80,7 @@ def watch_landing(world: World, limit_s: float = 30.0) -> Landing:
 
 GAINS = ("tuned", "paper", "paper_rate_fed", "backstepping_poles")
 ALL = [
-    (vehicle, plant, controller, gains, share, gust)
+    (vehicle, plant, controller, gains, share, gust, up)
     for vehicle in ("x_quad", "paper_quad")
     for plant in ("rigid", "paper", "multibody")
     for controller in ("pid", "backstepping")
@@ -83,28 +88,32 @@ ALL = [
     for share in ((0.0, 0.25, 0.6, 0.8, 0.95) if gains == "tuned" else (0.0, 0.25, 0.6))
     if not (plant == "multibody" and share > 0.9)  # 46 m/s tip x_quad over as it slides
     for gust in ((0.0, 2.0) if (vehicle, plant) == ("x_quad", "rigid") else (0.0,))
+    for up in ((-0.2, 0.0, 0.15, 0.3) if share < 0.5 and plant == "rigid" else (0.0,))
 ]
 SOME = [
-    ("x_quad", "rigid", "pid", "tuned", 0.25, 0.0),
-    ("x_quad", "rigid", "backstepping", "tuned", 0.95, 2.0),
-    ("x_quad", "rigid", "pid", "paper", 0.25, 0.0),
-    ("x_quad", "multibody", "pid", "tuned", 0.25, 0.0),
-    ("x_quad", "paper", "pid", "tuned", 0.6, 0.0),
-    ("paper_quad", "rigid", "pid", "paper", 0.6, 0.0),
+    ("x_quad", "rigid", "pid", "tuned", 0.25, 0.0, 0.0),
+    ("x_quad", "rigid", "backstepping", "tuned", 0.95, 2.0, 0.0),
+    ("x_quad", "rigid", "pid", "paper", 0.25, 0.0, 0.0),
+    ("x_quad", "multibody", "pid", "tuned", 0.25, 0.0, 0.0),
+    ("x_quad", "paper", "pid", "tuned", 0.6, 0.0, 0.0),
+    ("paper_quad", "rigid", "pid", "paper", 0.6, 0.0, 0.0),
+    ("x_quad", "rigid", "pid", "paper", 0.25, 0.0, 0.3),
+    ("paper_quad", "rigid", "backstepping", "backstepping_poles", 0.0, 0.0, 0.3),
+    ("x_quad", "rigid", "pid", "tuned", 0.25, 2.0, 0.3),
 ]
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "plant", "controller", "gains", "share", "gust"), ALL if NIGHTLY else SOME
+    ("vehicle", "plant", "controller", "gains", "share", "gust", "up"), ALL if NIGHTLY else SOME
 )
 def test_landing_in_wind(
-    vehicle: str, plant: str, controller: str, gains: str, share: float, gust: float
+    vehicle: str, plant: str, controller: str, gains: str, share: float, gust: float, up: float
 ) -> None:
     """Largest of 192: found after 2.1 s (tuned: 0.94 s), setpoint 0.98 m (0.50 m) below, slid 1.4 m within friction."""
     fast = {} if gains == "tuned" else {"inner_hz": 1000.0}
     world = hover(
         vehicle=vehicle, plant=plant, controller=controller, gains=gains, gust=gust,
-        **wind_that_pushes(vehicle, plant, share), **fast,
+        **wind_that_pushes(vehicle, plant, share, up), **fast,
     )  # fmt: skip
     assert world.land() == 0
     landing = watch_landing(world)
@@ -114,7 +123,7 @@ def test_landing_in_wind(
     assert set(world.texts) == USUAL_TEXTS
     assert landing.found_s < (1.5 if gains == "tuned" else 3.0)
     assert landing.deepest_m < (0.7 if gains == "tuned" else 1.5)
-    if share < FRICTION:
+    if share < FRICTION * (1.0 - up):
         assert landing.slid_m < 2.5
         assert landing.tilt_deg < 0.5
 
@@ -150,11 +159,11 @@ def test_python_and_c_land_alike() -> None:
     assert c.slid_m == pytest.approx(python.slid_m, abs=1e-6)
 
 
-def test_a_goto_below_the_ground_lands() -> None:
+def test_an_offboard_position_below_the_ground_lands() -> None:
     world = hover(vehicle="x_quad", wind=(12.0, 0.0, 0.0))
-    amsl = world.config.home.altitude_m - 5.0
-    nan = math.nan
-    assert world.command(mavlink.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, nan, nan, nan, amsl) == 0
+    stream(world, local_point((0.0, 0.0, 5.0)), 0.2)
+    assert select(world, 6) == 0
+    world.streams["point"] = lambda: local_point((0.0, 0.0, 5.0))
     landing = watch_landing(world)
     assert landing.found_s < 1.5
     assert landing.deepest_m < 0.7
@@ -248,6 +257,65 @@ def test_a_throttle_at_its_lowest_in_the_air_is_no_contact() -> None:
     for up in (-1.0, 1.0, -1.0, 0.0, -0.2):
         world.streams["sticks"] = lambda up=up: sticks(up=up)
         watch_flight(world, 2.5)
+
+
+# ---------------------------------------------------------------------- upward forces
+
+PAPER, POLES, NO_INTEGRAL = ("x_quad", "paper"), ("paper_quad", "backstepping_poles"), ("x_quad", "tuned")
+FLOATS = [
+    (vehicle, gains, mode, share)
+    for vehicle, gains in (PAPER, ("paper_quad", "paper"), POLES, ("x_quad", "backstepping_poles"), NO_INTEGRAL)
+    for mode in (Mode.HOLD, Mode.POSITION, Mode.OFFBOARD)
+    for share in (0.1, 0.2, 0.3)
+]
+SOME_FLOATS = [(*PAPER, Mode.HOLD, 0.3), (*POLES, Mode.POSITION, 0.2), (*NO_INTEGRAL, Mode.OFFBOARD, 0.3)]
+
+
+def enter(world: World, mode: Mode) -> None:
+    """Stay in place in this mode, with the setpoint that the vehicle has."""
+    if mode is Mode.HOLD:
+        return
+    north, east, down = world.stack.autopilot.now.setpoint[:3].tolist()
+    maker = sticks if mode is Mode.POSITION else lambda: local_point((north, east, down))
+    stream(world, maker(), 0.2)
+    assert select(world, 3 if mode is Mode.POSITION else 6) == 0
+    world.streams["hold"] = maker
+
+
+@pytest.mark.parametrize(("vehicle", "gains", "mode", "share"), FLOATS if NIGHTLY else SOME_FLOATS)
+def test_hover_with_an_upward_force_is_no_contact(vehicle: str, gains: str, mode: Mode, share: float) -> None:
+    """A lighter battery, a dropped payload, stronger propellers."""
+    world = hover(
+        2.0, vehicle=vehicle, gains=gains, seconds=0.5,
+        controller="backstepping" if gains == "backstepping_poles" else "pid",
+        force=(0.0, 0.0, -share * load_vehicle(vehicle).weight_n),
+        params=["POS_Z_I=0"] if gains == "tuned" else [],
+        **({} if gains == "tuned" else {"inner_hz": 1000.0 if NIGHTLY else 500.0}),
+    )  # fmt: skip
+    enter(world, mode)
+    watch_flight(world, 40.0 if NIGHTLY else 6.0)
+
+
+@pytest.mark.parametrize(("vehicle", "gains"), [PAPER, POLES, NO_INTEGRAL])
+def test_a_payload_dropped_in_a_descent_is_no_contact(vehicle: str, gains: str) -> None:
+    world = hover(6.0, vehicle=vehicle, gains=gains, seconds=0.5, inner_hz=500.0)
+    assert world.land() == 0
+    watch_flight(world, 1.5)
+    world.simulator._plant_force_z = -0.3 * load_vehicle(vehicle).weight_n
+    landing = watch_landing(world)
+    assert set(world.texts) == USUAL_TEXTS
+    assert landing.deepest_m < 1.5
+
+
+@pytest.mark.parametrize(
+    ("altitude_m", "north_m_s", "mode"),
+    [(0.7, 8.0, Mode.HOLD)]
+    + NIGHTLY * [(0.7, 8.0, Mode.POSITION), (10.0, 6.0, Mode.HOLD), (10.0, 6.0, Mode.OFFBOARD)],
+)
+def test_hover_in_updraft_and_gusts_is_no_contact(altitude_m: float, north_m_s: float, mode: Mode) -> None:
+    world = hover(altitude_m, vehicle="x_quad", wind=(north_m_s, 0.0, -6.0), gust=6.0, seconds=0.0)
+    enter(world, mode)
+    watch_flight(world, 40.0 if NIGHTLY else 8.0)
 
 
 # ---------------------------------------------------------------------- wind that is too strong

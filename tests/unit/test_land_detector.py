@@ -9,6 +9,8 @@ import pytest
 
 from flightstack.contract import Quaternion, Vector3, VehicleState
 from flightstack.guidance.land_detector import (
+    BLOCKED_M_S,
+    BOUNCE_SHARE,
     CLIMB_M,
     CONTACT_M_S,
     LANDED_S,
@@ -16,6 +18,7 @@ from flightstack.guidance.land_detector import (
     SETTLING_M_S,
     STANDING_M_S,
     STILL_M_S,
+    SUPPORT_LIFT,
     LandMemory,
     land_detector_step,
     lift_share,
@@ -48,9 +51,9 @@ def touches(memory: LandMemory) -> bool:
     return memory.missing_m_s >= CONTACT_M_S
 
 
-@pytest.mark.parametrize("lift", [0.0, 0.5, 0.85])
+@pytest.mark.parametrize("lift", [0.0, 0.5, 0.65])
 def test_contact_takes_the_time_of_the_missing_fall(lift: float) -> None:
-    needed_s = CONTACT_M_S / ((1.0 - lift) * GRAVITY_M_S2)
+    needed_s = CONTACT_M_S / ((SUPPORT_LIFT - lift) * GRAVITY_M_S2)
     assert not touches(watch(needed_s - 2 * DT_S, moving(), lift))
     assert touches(watch(needed_s + 2 * DT_S, moving(), lift))
 
@@ -61,7 +64,7 @@ def test_contact_takes_the_time_of_the_missing_fall(lift: float) -> None:
         (moving(down=0.3), 0.4, DESCENT_M_S),
         (moving(down=-0.3), 0.4, DESCENT_M_S),
         (moving(down=0.06), 0.4, 0.1),
-        (moving(), 0.95, DESCENT_M_S),
+        (moving(), 0.7, DESCENT_M_S),
         (moving(), 0.0, 0.0),
         (moving(), 0.0, -1.0),
     ],
@@ -74,9 +77,10 @@ def test_one_missing_sign_is_enough_for_no_contact(
 
 
 def test_thrust_or_a_fall_clears_the_signs_of_contact_and_a_bounce_does_not() -> None:
-    almost = watch(0.15, moving())
+    almost = watch(0.25, moving())
     assert 0.5 < almost.missing_m_s < CONTACT_M_S
-    assert watch(DT_S, moving(), lift=0.95, memory=almost).missing_m_s == 0.0
+    assert watch(0.3, moving(), lift=1.0, memory=almost).missing_m_s == 0.0
+    assert watch(DT_S, moving(), descent_m_s=0.0, memory=almost).missing_m_s == 0.0
     assert watch(0.04, moving(down=-0.4), memory=almost).missing_m_s > 0.5 * almost.missing_m_s
     assert watch(0.3, moving(down=0.5), memory=almost).missing_m_s == 0.0
 
@@ -95,28 +99,48 @@ def fly(
     return most
 
 
-@pytest.mark.parametrize("lift", [0.0, 0.3, 0.6, 0.89])
-def test_a_fall_through_the_apex_of_a_throw_is_no_contact(lift: float) -> None:
-    assert fly(lambda _: lift, vz=-2.0) <= 2.0 * STILL_M_S + GRAVITY_M_S2 * DT_S
+@pytest.mark.parametrize("updraft", [0.0, 0.1, 0.2, 0.3])
+@pytest.mark.parametrize("lift", [0.0, 0.3, 0.6, 0.69])
+def test_a_fall_through_the_apex_of_a_throw_is_no_contact(lift: float, updraft: float) -> None:
+    assert fly(lambda _: lift, updraft, vz=-2.0) <= 2.0 * STILL_M_S + GRAVITY_M_S2 * DT_S
 
 
+@pytest.mark.parametrize("updraft", [0.0, 0.3])
 @pytest.mark.parametrize("period_s", [0.1, 0.5, 2.0])
-def test_a_throttle_that_swings_in_the_air_is_no_contact(period_s: float) -> None:
-    assert fly(lambda t: 1.0 + 0.8 * math.sin(2.0 * math.pi * t / period_s)) < CONTACT_M_S
+def test_a_throttle_that_swings_in_the_air_is_no_contact(period_s: float, updraft: float) -> None:
+    """At most 0.58 m/s in all: the width of the band, and one step."""
+    hovering = 1.0 - updraft
+    for swing in (0.3, 0.8):
+        most = fly(lambda t: max(0.0, hovering + swing * math.sin(2.0 * math.pi * t / period_s)), updraft)  # noqa: B023
+        assert most <= 2.0 * STILL_M_S + GRAVITY_M_S2 * DT_S
 
 
-def test_hovering_in_an_updraft_is_no_landing() -> None:
-    """Even where the air carries most of the weight: contact at most, and without thrust the vehicle falls."""
-    assert watch(60.0, moving(), lift=0.95, descent_m_s=math.inf) == (0.0, 0.0, 0.0, -0.02)
-    for updraft in (0.1, 0.4, 0.8):
-        hovering = watch(60.0, moving(), lift=1.0 - updraft, descent_m_s=math.inf)
-        assert hovering.landed == 0.0
-        memory, vz = hovering, 0.0
-        for _ in range(200):  # guidance takes the thrust away
-            vz += (1.0 - updraft) * GRAVITY_M_S2 * DT_S
+def test_hovering_with_an_upward_force_is_no_contact() -> None:
+    """Above 0.3 of the weight a descent that does not come is a contact, and no landing: the vehicle falls."""
+    for updraft in (0.0, 0.1, 0.3):
+        assert watch(60.0, moving(), lift=1.0 - updraft, descent_m_s=math.inf).missing_m_s < 1e-9
+    for updraft in (0.4, 0.8):
+        assert watch(60.0, moving(), lift=1.0 - updraft, descent_m_s=0.0).missing_m_s == 0.0
+        memory, vz = watch(0.5, moving(), lift=1.0 - updraft, descent_m_s=math.inf), 0.0
+        while memory.missing_m_s >= 0.0 and vz < 2.0 * SETTLING_M_S:
+            vz += (1.0 - updraft) * GRAVITY_M_S2 * DT_S  # guidance takes the thrust away
             memory = land_detector_step(memory, moving(down=vz), 0.0, DESCENT_M_S, DT_S)
             assert memory.landed == 0.0
         assert not touches(memory)
+
+
+def test_contact_that_ended_in_a_fall_is_blocked_for_two_seconds() -> None:
+    fell = watch(DT_S, moving(down=SETTLING_M_S + 0.1), memory=TOUCHING)
+    assert fell.missing_m_s == -BLOCKED_M_S
+    blocked_s = BLOCKED_M_S / (BOUNCE_SHARE * GRAVITY_M_S2)
+    assert blocked_s == pytest.approx(2.0, abs=0.1)
+    assert not touches(watch(blocked_s, moving(), 0.0, memory=fell))
+    assert touches(watch(blocked_s + 0.2, moving(), 0.0, memory=fell))
+
+
+def test_contact_lasts_while_the_reference_rests() -> None:
+    """A pilot who centres the throttle on the ground has landed."""
+    assert watch(LANDED_S + DT_S, moving(), 0.0, descent_m_s=0.0, memory=TOUCHING).landed == 1.0
 
 
 def test_landed_means_standing_without_thrust_for_a_while() -> None:
@@ -142,8 +166,8 @@ def test_wind_that_pushes_a_vehicle_along_the_ground_does_not_prevent_landing() 
 
 
 def test_rest_begins_a_third_of_a_second_after_contact() -> None:
-    assert watch(0.25, moving(), 0.0, memory=TOUCHING).missing_m_s < REST_M_S
-    assert watch(0.35, moving(), 0.0, memory=TOUCHING).missing_m_s >= REST_M_S
+    assert watch(0.25, moving(), 0.08, memory=TOUCHING).missing_m_s < REST_M_S
+    assert watch(0.35, moving(), 0.08, memory=TOUCHING).missing_m_s >= REST_M_S
 
 
 @pytest.mark.parametrize("down", [SETTLING_M_S + 0.01, -SETTLING_M_S - 0.01])
