@@ -151,6 +151,8 @@ class Autopilot(FlightRequests):
             status = now.status
         if not status.armed:
             return
+        for rotor in supervisor.take_unmeasured():
+            self.say(WARNING, f"Rotor {rotor}: speed not measured, failures of it are not detected")
         if now.landed or navigator.landed:
             self._watch_ground(time_us)
         mode = now.status.mode
