@@ -183,7 +183,7 @@ class Autopilot(FlightRequests):
                 break
 
     def _watch_ground(self, time_us: int) -> None:
-        """Note takeoff and landing, and disarm who stands too long."""
+        """Note takeoff and landing, and disarm a vehicle that stands too long."""
         landed = self._navigator.landed
         if landed != self.now.landed:
             self.now.landed = landed

@@ -134,7 +134,7 @@ class ModeKeeper(PlanKeeper):
 
     def _mission_is_gone(self) -> None:
         if self.now.status.mode is Mode.MISSION:
-            self._apply(Event.SELECT_HOLD)  # nobody chose a mode: failsafes are not overridden
+            self._apply(Event.SELECT_HOLD)  # not a user's choice: failsafes are not overridden
 
     def _adopt(self, before: Status, after: Status, event: Event) -> None:
         self.now.status = after
@@ -171,7 +171,7 @@ class ModeKeeper(PlanKeeper):
         self._stands_here()
         self._navigator.rest_at(self._state)  # guidance may remember a flight that ended in the air
 
-    # ------------------------------------------------------------------ who flies
+    # ------------------------------------------------------------------ loops and guidance
 
     def _choose_loops(self, entering: bool = False) -> None:
         """Start or stop the loops, and let guidance enter the mode."""
