@@ -18,7 +18,6 @@ from flightstack.guidance.params import guidance_params
 from flightstack.modes import STREAM_MODES, Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
-from flightstack.plan.jumps import takes_off
 from flightstack.snapshot import INFO, WARNING, Recorder, Snapshot
 
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
@@ -205,7 +204,7 @@ class Autopilot(FlightRequests):
         event = self._ground.event(time_us, standing, self._behaviour)
         if event is Event.NO_TAKEOFF:
             waits = mode is _MISSION and not self._flying
-            if waits and takes_off(self.items, self._navigator.progress.current):
+            if waits and self._mission_takes_off():
                 self._ground.waits(time_us)
                 return
             self.say(WARNING, "Disarmed: no takeoff")
