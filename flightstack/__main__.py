@@ -218,11 +218,8 @@ def main() -> None:
     except UsageError as error:
         console.complain(f"flightstack: {error.format_message()}")
         sys.exit(2)
-    except OSError as error:  # stdout cannot be written
-        console.drop(sys.stdout)
-        if not isinstance(error, BrokenPipeError):  # a reader that closed the pipe has read enough
-            console.complain(f"flightstack: {error.strerror or error}")
-        sys.exit(1)
+    except OSError as error:
+        sys.exit(console.report_os_error("flightstack", error))
 
 
 if __name__ == "__main__":

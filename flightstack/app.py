@@ -38,7 +38,7 @@ from flightstack.transport.tcp import LinkClosedError, TcpClient
 
 GROUND_POLL_NS = 500_000
 GROUND_IDLE_NS = 2_000_000
-"""Time between two looks at the ground links, while somebody speaks and while nobody does: a look takes 40 µs."""
+"""Time between two looks at the ground links, with traffic and without: a look takes 40 µs."""
 GROUND_SHARE = 0.4
 """In real time, sending to ground stations takes so much of a tick at most; what is left waits for the next."""
 REPORT_S = 0.2
@@ -172,7 +172,7 @@ class App:
         return EXIT_LOST
 
     def _close(self, simulator: TcpClient | None, orderly: bool) -> None:
-        """End the log and, if all is in order, say goodbye: who hears nothing counts us as lost."""
+        """End the log and, if all is in order, announce the end: peers would report a lost vehicle."""
         self.stack.recorder.close()
         self._files.close_loops()
         if self._next is not None:
@@ -304,7 +304,7 @@ class App:
     # ------------------------------------------------------------------ ground links
 
     def _serve_ground(self) -> bool:
-        """Carry what both sides have to say; return whether somebody on the ground has spoken."""
+        """Carry what both sides have to say; return whether a ground peer has sent something."""
         now_s = time.monotonic()
         if now_s >= self._next_report_s:
             self._next_report_s = now_s + REPORT_S

@@ -18,7 +18,6 @@ from flightstack.guidance.params import guidance_params
 from flightstack.modes import STREAM_MODES, Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
-from flightstack.plan.jumps import takes_off
 from flightstack.snapshot import INFO, WARNING, Recorder, Snapshot
 
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
@@ -153,6 +152,8 @@ class Autopilot(FlightRequests):
             status = now.status
         if not status.armed:
             return
+        for rotor in supervisor.take_unmeasured():
+            self.say(WARNING, f"Rotor {rotor}: speed not measured, failures of it are not detected")
         if now.landed or navigator.landed:
             self._watch_ground(time_us)
         mode = now.status.mode
@@ -183,7 +184,7 @@ class Autopilot(FlightRequests):
                 break
 
     def _watch_ground(self, time_us: int) -> None:
-        """Note takeoff and landing, and disarm who stands too long."""
+        """Note takeoff and landing, and disarm a vehicle that stands too long."""
         landed = self._navigator.landed
         if landed != self.now.landed:
             self.now.landed = landed
@@ -205,7 +206,7 @@ class Autopilot(FlightRequests):
         event = self._ground.event(time_us, standing, self._behaviour)
         if event is Event.NO_TAKEOFF:
             waits = mode is _MISSION and not self._flying
-            if waits and takes_off(self.items, self._navigator.progress.current):
+            if waits and self._mission_takes_off():
                 self._ground.waits(time_us)
                 return
             self.say(WARNING, "Disarmed: no takeoff")

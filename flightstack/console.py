@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
 from typing import IO
+
+OUTPUT_ERRORS = frozenset({errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
+"""What writing to stdout may raise. Its errors name no file."""
 
 
 def replace_unencodable() -> None:
@@ -36,6 +40,20 @@ def _print(line: object, stream: IO[str] | None) -> Exception | None:
         drop(stream)
         return error
     return None
+
+
+def report_os_error(program: str, error: OSError) -> int:
+    """Report the error that ended ``program``, and return the exit code.
+
+    That is an error of the file that it names, or of stdout; any other is raised again.
+    """
+    if error.filename is None and error.errno not in OUTPUT_ERRORS:
+        raise error
+    drop(sys.stdout)
+    if not isinstance(error, BrokenPipeError):  # a reader that closed the pipe has read enough
+        where = "" if error.filename is None else f"{error.filename}: "
+        complain(f"{program}: {where}{error.strerror}")
+    return 1
 
 
 def drop(stream: IO[str] | None) -> None:

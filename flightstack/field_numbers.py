@@ -13,6 +13,18 @@ for _code, _bits in _SIZES.items():
     RANGES[_code] = -(1 << _bits - 1), (1 << _bits - 1) - 1
     RANGES[_code.upper()] = 0, (1 << _bits) - 1
 
+COUNTERS = frozenset({
+    "errors_comm", "errors_count1", "errors_count2", "errors_count3", "errors_count4", "rxerrors",
+    "breach_count", "clipping_0", "clipping_1", "clipping_2", "reset_counter", "sequence",
+    "mission_update_counter", "ticks", "overruns", "missed", "step", "steps", "repeats", "out_of_order",
+    "frames", "bad_frames", "skipped_octets", "uart_overruns", "dropped_frames", "uart_errors",
+    "loop_overruns", "safe_states",
+})  # fmt: skip
+"""Fields of messages and topics that count, and wrap.
+
+Other unsigned fields saturate: a quantity need not have a unit, as ``eph`` and ``rssi``.
+"""
+
 
 def whole(value: float, low: int, high: int) -> int:
     """Round a quantity into an integer field, saturated; a value that is not finite becomes 0."""

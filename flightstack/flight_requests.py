@@ -65,9 +65,10 @@ class FlightRequests(ModeKeeper):
         phase = USERS_CHOICES[Event.SELECT_MISSION]
         arms = not self.now.status.armed
         if arms:
-            refusal = "; ".join(self.arming_refusals(Mode.MISSION)) or None
+            refusal = "; ".join(self.arming_refusals(Mode.MISSION, first)) or None
         else:
-            refusal = transition(self.now.status, self.facts, Event.SELECT_MISSION).refusal
+            facts = self.facts._replace(mission_takes_off=self._mission_takes_off(first))
+            refusal = transition(self.now.status, facts, Event.SELECT_MISSION).refusal
             refusal = refusal or self._mission_refusal() or self._failsafe_refusal(phase)
         if refusal is not None:
             return refusal

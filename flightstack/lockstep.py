@@ -11,7 +11,7 @@ from __future__ import annotations
 from flightstack.autopilot import Autopilot
 from flightstack.contract import FloatArray, LoopRow
 from flightstack.mavlink.simulator_link import SimulatorLink
-from flightstack.mavlink.state_steps import GAP_US
+from flightstack.mavlink.state_steps import is_gap
 from flightstack.snapshot import CRITICAL, NOTICE
 
 STALL_NS = 1_000_000_000
@@ -51,7 +51,7 @@ class Lockstep:
             due_us + interval_us // 2
         ) // interval_us  # to the nearest: clocks are rounded to microseconds
         arrived = link.has_arrived
-        if due_us > GAP_US:  # the loops must not take the state after a gap for one of before
+        if is_gap(due_us):  # the loops must not take the state after a gap for one of before
             link.has_arrived = False
         for left in reversed(range(ticks)):
             if left == 0:

@@ -41,19 +41,28 @@ class ModeKeeper(PlanKeeper):
             upright=known.upright,
             landed=self.now.landed,
             has_mission=bool(self.items),
-            mission_takes_off=takes_off(self.items),
+            mission_takes_off=self._mission_takes_off(),
             manual_fresh=known.manual_fresh,
             offboard_fresh=known.offboard_fresh,
         )
 
-    def arming_refusals(self, mode: Mode | None = None) -> tuple[str, ...]:
-        """Return every reason for which the vehicle would not arm now, or in ``mode``; empty when it would."""
+    def _mission_takes_off(self, first: int | None = None) -> bool:
+        """Return whether a standing vehicle leaves the ground from item ``first``, or the current one, on."""
+        progress = self._navigator.progress
+        current = 0 if progress.finished else progress.current  # a finished mission begins anew
+        return takes_off(self.items, current if first is None else first)
+
+    def arming_refusals(self, mode: Mode | None = None, first: int | None = None) -> tuple[str, ...]:
+        """Return every reason for which the vehicle would not arm now, or in ``mode``; empty when it would.
+
+        ``first`` is the item that will be the mission's current one, if it is another.
+        """
         mode = self.now.status.mode if mode is None else mode
         known = self.supervisor.arming_facts(mode, self.has_state)
-        known = known._replace(throttle=self._throttle, mode_fault=self._fault_on_ground(mode) or "")
+        known = known._replace(throttle=self._throttle, mode_fault=self._fault_on_ground(mode, first) or "")
         return arming_refusals(known, self._behaviour)
 
-    def _fault_on_ground(self, mode: Mode) -> str | None:
+    def _fault_on_ground(self, mode: Mode, first: int | None) -> str | None:
         """Return why ``mode`` does not take a standing vehicle into the air, now or later, or None."""
         if mode in (Mode.RETURN, Mode.LAND):
             return f"{mode.name.lower()} mode cannot take off: select another mode first"
@@ -61,7 +70,7 @@ class ModeKeeper(PlanKeeper):
             return None
         if not self.items:
             return Need.MISSION.value
-        return self._mission_refusal() if takes_off(self.items) else Need.TAKES_OFF.value
+        return self._mission_refusal() if self._mission_takes_off(first) else Need.TAKES_OFF.value
 
     def say(self, severity: int, text: str) -> None:
         """Tell the operator and the log."""
@@ -134,7 +143,7 @@ class ModeKeeper(PlanKeeper):
 
     def _mission_is_gone(self) -> None:
         if self.now.status.mode is Mode.MISSION:
-            self._apply(Event.SELECT_HOLD)  # nobody chose a mode: failsafes are not overridden
+            self._apply(Event.SELECT_HOLD)  # not a user's choice: failsafes are not overridden
 
     def _adopt(self, before: Status, after: Status, event: Event) -> None:
         self.now.status = after
@@ -152,6 +161,8 @@ class ModeKeeper(PlanKeeper):
             self._navigator.set_speed(SpeedOverrides())
         if after.mode is Mode.MISSION and before.mode is not Mode.MISSION:
             self.now.mission_complete = False
+            if self._navigator.progress.finished and self.items:
+                self.restart_mission()  # before the loops are chosen: a finished mission does not rise
         if event in (Event.TAKEOFF_REACHED, Event.MISSION_FINISHED):
             if event is Event.MISSION_FINISHED:
                 self._navigator.hold_at_last_item()
@@ -171,7 +182,7 @@ class ModeKeeper(PlanKeeper):
         self._stands_here()
         self._navigator.rest_at(self._state)  # guidance may remember a flight that ended in the air
 
-    # ------------------------------------------------------------------ who flies
+    # ------------------------------------------------------------------ loops and guidance
 
     def _choose_loops(self, entering: bool = False) -> None:
         """Start or stop the loops, and let guidance enter the mode."""

@@ -203,10 +203,8 @@ def main(argv: list[str] | None = None) -> int:
         complain(message)
     except (UsageProblemError, ConfigError) as error:
         complain(error)
-    except OSError as error:  # stdout cannot be written
-        console.drop(sys.stdout)
-        complain(error.strerror or error)
-        return 1
+    except OSError as error:
+        return console.report_os_error("sim-bridge", error)
     return 2
 
 

@@ -14,7 +14,7 @@ class LinkFacts:
     """
 
     gcs_lost: bool = False
-    """Silent for too long; if that has an action, also who never spoke."""
+    """Silent for too long; if the loss has an action, also before the first heartbeat."""
     gcs_heard: bool = False
     """Whether a ground station has spoken since the vehicle booted."""
     offboard_lost: bool = True

@@ -18,7 +18,7 @@ from flightstack.params.vehicle import Vehicle
 from flightstack.portable_math import acos, asin, atan2, exp
 
 RELEASE_S = 1.0
-NOT_FINITE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT, MOVING = 1, 2, 4, 8, 16
+NOT_FINITE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT, MOVING, UNMEASURED = 1, 2, 4, 8, 16, 32
 """Bits of what ``detect`` returns."""
 MOVING_ABOVE = 1e-9
 """Speed [m/s] or rate [rad/s] that must change the state in twentieths of a second: its last digit is smaller yet."""
@@ -28,13 +28,15 @@ ROTOR_MEAN_S = 0.03
 """Rotors are compared by means over about this time: loops that shake them are no fault of theirs."""
 FASTEST_RAD_S = 1e6
 """A rotor speed beyond this is no measurement; ideal rotors without limits stay below it."""
+UNMEASURED_AFTER_S = 0.5
+"""A rotor without a measurement for this time is reported as not measured."""
 
 ROLL, PITCH, TILT_ERROR, POSITION, ROTORS = range(5)
 TIMERS = 5
 M_TRIGGERED = TIMERS
 DETECTOR_MEMORY_SIZE = 2 * TIMERS
 P_LIMIT, P_TIME, P_ROTORS, P_SLOW = 0, TIMERS, 2 * TIMERS, 2 * TIMERS + 1
-R_EXPECTED, R_MEAN, R_ERROR, R_MEASURED = 0, MAX_ROTORS, 2 * MAX_ROTORS, 3 * MAX_ROTORS
+R_EXPECTED, R_MEAN, R_ERROR, R_MISSING_S, R_MEASURED = (block * MAX_ROTORS for block in range(5))
 ROTOR_MEMORY_SIZE = R_MEASURED + 1
 
 _REFERENCE_AT = LoopRow.REFERENCE_ATTITUDE.start
@@ -66,27 +68,31 @@ def detector_params(behaviour: Behaviour, vehicle: Vehicle) -> FloatArray:
 
 def rotor_params(vehicle: Vehicle, dt_s: float) -> FloatArray:
     """Return the numbers that ``follow_rotors`` takes: for each rotor the share of its lag that passes in ``dt_s``,
-    and at the end that of the mean's time.
+    then that of the mean's time, and ``dt_s``.
     """
     shares = [1.0 - exp(-dt_s / r.lag_s) if r.lag_s > 0.0 else 1.0 for r in vehicle.rotors]
-    return np.array([*shares, 1.0 - exp(-dt_s / ROTOR_MEAN_S)], dtype=np.float64)
+    return np.array([*shares, 1.0 - exp(-dt_s / ROTOR_MEAN_S), dt_s], dtype=np.float64)
 
 
 @compiled
 def follow_rotors(row: FloatArray, memory: FloatArray, params: FloatArray) -> None:
     """Compare each rotor's measured speed with what its commands lead to; once per inner tick.
 
-    ``row`` (48,) holds speeds from before its commands. ``memory`` (25,) keeps, for each rotor, the speed that the
-    commands lead to (first-order lag, exact for commands that are held), its mean, and the mean of the error. A speed
-    or command that is not finite, or beyond ``FASTEST_RAD_S``, is left out.
+    ``row`` (48,) holds speeds from before its commands. ``memory`` (33,) keeps, for each rotor, the speed that the
+    commands lead to (first-order lag, exact for commands that are held), its mean, the mean of the error, and the time
+    without a measurement. A command that is not finite, or beyond ``FASTEST_RAD_S``, is left out. Such a speed is a
+    missing measurement: the mean of the error decays meanwhile, so that no old error outlasts the measurements.
     """
-    last = len(params) - 1
-    for i in range(last):
+    count = len(params) - 2
+    share, dt_s = params[count], params[count + 1]
+    for i in range(count):
         expected = memory[R_EXPECTED + i]
-        memory[R_MEAN + i] += (expected - memory[R_MEAN + i]) * params[last]
+        memory[R_MEAN + i] += (expected - memory[R_MEAN + i]) * share
         speed, command = row[_SPEED_AT + i], row[_COMMAND_AT + i]
-        if abs(speed) <= FASTEST_RAD_S:  # NaN is not
-            memory[R_ERROR + i] += (speed - expected - memory[R_ERROR + i]) * params[last]
+        is_measured = abs(speed) <= FASTEST_RAD_S  # NaN is not
+        error = speed - expected if is_measured else 0.0
+        memory[R_ERROR + i] += (error - memory[R_ERROR + i]) * share
+        memory[R_MISSING_S + i] = 0.0 if is_measured else memory[R_MISSING_S + i] + dt_s
         if abs(command) <= FASTEST_RAD_S:
             memory[R_EXPECTED + i] = expected + (command - expected) * params[i]
 
@@ -144,10 +150,10 @@ def detect(
     on_ground: bool,
     dt_s: float,
 ) -> int:
-    """Advance all detectors by one outer tick; return the bits of what is wrong, and ``MOVING``.
+    """Advance all detectors by one outer tick; return the bits of what is wrong, ``MOVING`` and ``UNMEASURED``.
 
     ``state`` (13,), ``setpoint`` (11,) and ``row`` (48,), the newest row of the inner loop, as in ``contract``;
-    ``rotors`` (25,) is the memory of ``follow_rotors``; ``memory`` (10,) is updated; ``params`` come from
+    ``rotors`` (33,) is the memory of ``follow_rotors``; ``memory`` (10,) is updated; ``params`` come from
     ``detector_params``. A state that is not finite leaves the other detectors, and what they found, as they are.
     ``on_ground``: the feet hold the vehicle, and its attitude need not follow the reference; it must still be upright.
     """
@@ -160,6 +166,9 @@ def detect(
     v, w = now.velocity_ned_m_s, now.rates_frd_rad_s
     if max(abs(v.x), abs(v.y), abs(v.z), abs(w.x), abs(w.y), abs(w.z)) > MOVING_ABOVE:
         result |= MOVING
+    for i in range(int(params[P_ROTORS])):
+        if params[P_LIMIT + ROTORS] > 0.0 and rotors[R_MISSING_S + i] >= UNMEASURED_AFTER_S:
+            result |= UNMEASURED
     qw, qx, qy, qz = now.attitude
     roll = atan2(2.0 * (qw * qx + qy * qz), 1.0 - 2.0 * (qx * qx + qy * qy))
     pitch = asin(min(1.0, max(-1.0, 2.0 * (qw * qy - qz * qx))))

@@ -10,8 +10,11 @@ from flightstack.commander.detectors import (
     DETECTOR_MEMORY_SIZE,
     MOVING,
     NOT_FINITE,
+    R_MISSING_S,
     ROTOR_FAULT,
     ROTOR_MEMORY_SIZE,
+    UNMEASURED,
+    UNMEASURED_AFTER_S,
     detect,
     detector_params,
     follow_rotors,
@@ -45,6 +48,7 @@ class FaultWatch:
         self._rotors = np.zeros(ROTOR_MEMORY_SIZE)
         self._nowhere = np.zeros(SETPOINT_SIZE)
         self._rotor_params = rotor_params(vehicle, self._dt_s / divisor)
+        self._unmeasured: set[int] = set()
         self.found = 0
         """Bits of ``detectors.detect``, of the newest look."""
         self.set_behaviour(behaviour)
@@ -62,6 +66,7 @@ class FaultWatch:
         """Forget what was seen before: a flight begins."""
         self._detector[:] = 0.0
         self._rotors[:] = 0.0
+        self._unmeasured.clear()
         self.found = 0
 
     def follow_rotors(self, row: FloatArray) -> None:
@@ -88,6 +93,20 @@ class FaultWatch:
     def moves(self) -> bool:
         """Whether the state's own speeds say that it must change."""
         return self.found & MOVING != 0
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether no fault was found."""
+        return not self.found & ~(MOVING | UNMEASURED)
+
+    def take_unmeasured(self) -> list[int]:
+        """Return the rotors, from 1, whose speed is no longer measured; each once in a flight."""
+        if not self.found & UNMEASURED:
+            return []
+        missing_s = self._rotors[R_MISSING_S : R_MISSING_S + len(self._vehicle.rotors)]
+        fresh = {int(i) + 1 for i in np.flatnonzero(missing_s >= UNMEASURED_AFTER_S)} - self._unmeasured
+        self._unmeasured |= fresh
+        return sorted(fresh)
 
     def failsafes(self) -> set[Failsafe]:
         """Return the failsafes of what was found."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from flightstack.commander.arming_checks import ArmingFacts
 from flightstack.commander.conditions import BatteryReading, LinkFacts, StateSource
-from flightstack.commander.detectors import MOVING, battery_level
+from flightstack.commander.detectors import battery_level
 from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase
 from flightstack.commander.failsafe_step import (
     IDLE,
@@ -65,6 +65,7 @@ class Supervisor:
         self.fence = FenceWatch(behaviour)
         self.faults = FaultWatch(vehicle, behaviour, outer_hz, divisor, state)
         self.follow_rotors = self.faults.follow_rotors
+        self.take_unmeasured = self.faults.take_unmeasured
         self.states = StateWatch(source)
         self.position_is_controlled = False
         """Whether the setpoint's place is flown to: not on the ground, nor while a stream gives attitudes."""
@@ -175,7 +176,7 @@ class Supervisor:
         breached = self.fence.step(self._state) != 0
         entries = self._memory.entries
         if (
-            not faults.found & ~MOVING
+            faults.is_quiet
             and not (breached or entries or states.is_stale or self.battery_level or self.links.gcs_lost)
             and mode not in STREAM_MODES
         ):

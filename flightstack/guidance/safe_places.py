@@ -51,14 +51,14 @@ class SafePlaces:
         self.home: ReturnPlace = HOME
         """Where home is; it may be set elsewhere than at the origin."""
         self.home_is_chosen = False
-        """Whether somebody named the place: then it does not follow the vehicle."""
+        """Whether a user named the place: then it does not follow the vehicle."""
         self.points: tuple[ReturnPlace, ...] = ()
         self._rally_items: tuple[MissionItem, ...] = ()
         self.ids: tuple[int, int, int] = (0, 0, 0)
         """Opaque ids of mission, geofence and rally points; the owner of the stores keeps them."""
 
     def set_home(self, point: GeoPoint, chosen: bool) -> str | None:
-        """Move home; return why not, or None. ``chosen`` is whether somebody named the place."""
+        """Move home; return why not, or None. ``chosen`` is true for a place that a user named."""
         if not all(math.isfinite(number) for number in point):
             return "home has no such position"
         if abs(point.latitude_deg) > 90.0 or abs(point.longitude_deg) > 180.0:

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from flightstack.contract import FloatArray, LoopRow
-from flightstack.field_numbers import fitted
+from flightstack.field_numbers import COUNTERS, fitted
 from flightstack.geodesy import GeoPoint
 from flightstack.logging import ulog
 from flightstack.logging.event_topics import EVENT_TOPICS
@@ -73,6 +73,10 @@ class _EventTopic:
         """``known`` fields have these values in every message that does not give another."""
         self._header = ulog.DATA_HEADER.pack(content_size(topic), ulog.DATA_TYPE, message_id)
         self._codes = "Q" + "".join(ulog.STRUCT_CODES[field.type] for field in topic.fields)
+        self._wraps = [
+            True,
+            *(f.type == "uint64_t" or f.name in COUNTERS for f in topic.fields),
+        ]  # uint64_t: times
         self._pack = struct.Struct("<" + self._codes).pack
         self._defaults: dict[str, float] = {
             field.name: field.default if field.type in ("float", "double") else int(field.default)
@@ -81,7 +85,7 @@ class _EventTopic:
         self._defaults |= known
 
     def encode(self, time_us: int, fields: Mapping[str, float]) -> bytes:
-        """Return the message. Unsigned fields (times, counters) wrap, signed ones saturate."""
+        """Return the message. Times and counters wrap, other integers saturate."""
         values = {**self._defaults, **fields}
         if len(values) != len(self._defaults):
             raise TypeError(f"not a field of the topic: {sorted(set(fields) - set(self._defaults))}")
@@ -89,8 +93,7 @@ class _EventTopic:
         try:
             return self._header + self._pack(*numbers)
         except (struct.error, OverflowError):
-            fits = [fitted(n, code, code.isupper()) for n, code in zip(numbers, self._codes, strict=True)]
-            return self._header + self._pack(*fits)
+            return self._header + self._pack(*map(fitted, numbers, self._codes, self._wraps))
 
 
 class FlightLog:

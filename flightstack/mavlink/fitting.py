@@ -1,10 +1,10 @@
 """Bring the values of a message into the ranges of its fields. Pure.
 
 No value that a program computes may keep a message from being sent: ``Link.encode`` packs each message as it is,
-which costs nothing, and fits it when that fails. What a value out of range becomes follows from its field:
+which costs nothing, and fits it when that fails. A value out of range becomes what suits its field:
 
-* a time (unsigned, 32 bits or more, in a unit of time; the signed nanoseconds of TIMESYNC) and a counter (unsigned,
-  without a unit) wrap: ``time_boot_ms`` after 49.7 days, as the specification has it;
+* a time (unsigned, 32 bits or more, in a unit of time; the signed nanoseconds of TIMESYNC) and a counter (a field of
+  ``field_numbers.COUNTERS``) wrap: ``time_boot_ms`` after 49.7 days, as the specification has it;
 * a quantity (any other integer) saturates; what is not finite becomes 0;
 * a floating-point number that single precision cannot hold becomes infinite.
 """
@@ -15,7 +15,7 @@ import struct
 from functools import cache
 from typing import Any, NamedTuple
 
-from flightstack.field_numbers import fitted
+from flightstack.field_numbers import COUNTERS, fitted
 
 PACKING_ERRORS = (struct.error, OverflowError)
 """What ``pack`` raises for a value that its field cannot hold."""
@@ -44,7 +44,7 @@ def _number_fields(kind: Any) -> tuple[_Field, ...]:
         if code is not None:
             unit = units.get(name, "")
             is_clock = unit in _TIMES and code in _CLOCK_CODES
-            fields.append(_Field(name, code, is_clock or (code.isupper() and not unit)))
+            fields.append(_Field(name, code, is_clock or name in COUNTERS))
     return tuple(fields)
 
 

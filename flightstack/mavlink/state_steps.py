@@ -9,9 +9,9 @@ from flightstack.mavlink.dialect import mavlink
 LONGEST_FLYABLE_US = 10_000
 """Longest step that loops of a shorter one fly by: both built-in vehicles fly the square at 16 ms, not at 20 ms."""
 GAP_US = 50_000
-"""A single step of so much is a gap: the loops rest in it, as without states."""
+"""A step longer than this is a gap: the loops rest in it, as without states."""
 WINDOW = 10
-"""So many steps make a mean."""
+"""So many consecutive steps make a mean."""
 CHANGE = 0.05
 """Share by which a mean must differ from the one that was told last."""
 PACE_SPAN_US = 5_000_000
@@ -26,12 +26,17 @@ class Notice(NamedTuple):
     text: str
 
 
+def is_gap(step_us: int) -> bool:
+    """Return whether a step, or the ticks that it makes due, is a gap."""
+    return step_us > GAP_US
+
+
 class StateSteps:
     """Watches the steps between states. Steps of ``interval_us``, the loops' own, are not shown to it."""
 
     def __init__(self, interval_us: int) -> None:
         self._interval_us = interval_us
-        self._sum_us = self._count = 0
+        self._sum_us = self._count = self._longest_us = 0
         self._mean_us = self._told_us = float(interval_us)
         self._latest_us = 0
         self._quiet_until_us = 0
@@ -57,18 +62,31 @@ class StateSteps:
         )
 
     def differs(self, step_us: int, time_us: int) -> None:
-        """Take a step that led to ``time_us`` and is not the loops' own."""
+        """Take a step that led to ``time_us`` and is not the loops' own.
+
+        Only consecutive steps make a mean: a hiccup now and then between steps of the loops' own is no rate.
+        """
+        if time_us - step_us != self._latest_us:
+            self._begin_window(time_us)
         self._latest_us = time_us
         self._sum_us += step_us
         self._count += 1
+        gap = is_gap(step_us)
+        self._longest_us = max(self._longest_us, 0 if gap else step_us)
         if self._count == WINDOW:
             self._mean_us = self._sum_us / WINDOW
-            self._sum_us = self._count = 0
+            self._sum_us = self._count = self._longest_us = 0
             if abs(self._mean_us - self._told_us) > CHANGE * self._told_us:
                 self._told_us = self._mean_us
                 self._tell_mean(time_us)
-        elif step_us >= GAP_US:
+        elif gap:
             self.jumps(step_us, time_us)
+
+    def _begin_window(self, time_us: int) -> None:
+        """Forget the steps of a window that steps of the loops' own ended; report one that was too long."""
+        if self._longest_us > max(LONGEST_FLYABLE_US, self._interval_us):
+            self.jumps(self._longest_us, time_us)
+        self._sum_us = self._count = self._longest_us = 0
 
     def _tell_mean(self, time_us: int) -> None:
         refusal = self.refusal(time_us)

@@ -264,7 +264,13 @@ def test_a_throttle_at_its_lowest_in_the_air_is_no_contact() -> None:
 PAPER, POLES, NO_INTEGRAL = ("x_quad", "paper"), ("paper_quad", "backstepping_poles"), ("x_quad", "tuned")
 FLOATS = [
     (vehicle, gains, mode, share)
-    for vehicle, gains in (PAPER, ("paper_quad", "paper"), POLES, ("x_quad", "backstepping_poles"), NO_INTEGRAL)
+    for vehicle, gains in (
+        PAPER,
+        ("paper_quad", "paper"),
+        POLES,
+        ("x_quad", "backstepping_poles"),
+        NO_INTEGRAL,
+    )
     for mode in (Mode.HOLD, Mode.POSITION, Mode.OFFBOARD)
     for share in (0.1, 0.2, 0.3)
 ]

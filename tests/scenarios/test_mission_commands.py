@@ -8,7 +8,7 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.modes import Mode
-from tests.support.world import World
+from tests.support.world import World, item
 
 ACCEPTED, REJECTED, DENIED = 0, 1, 2
 START, SET_CURRENT = mavlink.MAV_CMD_MISSION_START, mavlink.MAV_CMD_DO_SET_MISSION_CURRENT
@@ -60,3 +60,35 @@ def test_a_start_at_no_item_leaves_mode_and_item() -> None:
     assert world.command(START, 1) == ACCEPTED
     assert world.armed
     assert current(world) == 1
+
+
+def test_a_start_at_an_item_that_stays_on_the_ground_is_refused() -> None:
+    world = World()
+    world.upload([item(22, z=3.0), item(16, north=5.0, z=3.0), item(21)])
+    assert world.command(START, 2) == REJECTED
+    assert (world.mode, world.armed, current(world)) == (Mode.HOLD, False, 0)
+    world.arm()
+    assert world.command(START, 2) == REJECTED
+    assert (world.mode, current(world)) == (Mode.HOLD, 0)
+    assert world.command(START, 1) == ACCEPTED
+
+
+def test_a_current_item_that_stays_on_the_ground_keeps_it_from_arming() -> None:
+    world = World()
+    world.upload([item(22, z=3.0), item(16, north=5.0, z=3.0), item(21)])
+    assert world.command(SET_CURRENT, 2) == ACCEPTED
+    assert world.resume_mission() == ACCEPTED
+    assert world.arm() == REJECTED
+    assert world.command(SET_CURRENT, 0) == ACCEPTED
+    assert world.arm() == ACCEPTED
+    world.until_disarmed()
+    assert world.reached == [0, 1, 2]
+
+
+def test_a_finished_mission_starts_again() -> None:
+    world = World()
+    world.upload([item(22, z=3.0), item(21)])
+    for _ in range(2):
+        assert world.command(START) == ACCEPTED
+        world.until_disarmed()
+    assert world.reached == [0, 1, 0, 1]

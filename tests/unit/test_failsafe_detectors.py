@@ -26,6 +26,8 @@ from flightstack.commander.detectors import (
     follow_rotors,
     rotor_params,
 )
+from flightstack.commander.failsafe import Failsafe
+from flightstack.commander.fault_watch import FaultWatch
 from flightstack.commander.link_watch import LinkWatch
 from flightstack.commander.transitions import TERMINATED, Need
 from flightstack.contract import LoopRow, LoopStatus
@@ -245,6 +247,43 @@ def test_one_bad_rotor_sample_leaves_its_detector_as_it_was(column: int, bad: fl
     for _ in range(30):
         assert disturbed.run(DT_S) == quiet.run(DT_S)
     assert disturbed.run(DT_S) & ROTOR_FAULT
+
+
+@pytest.mark.parametrize("bad", BAD_NUMBERS)
+def test_a_deviation_before_missing_samples_is_no_rotor_fault(bad: float) -> None:
+    """40 ms of deviation are forgiven if the rotor is measured afterwards, and if it is not."""
+    bench = Bench()
+    bench.run(1.0)
+    bench.row[LoopRow.ROTOR_SPEED.start + 2] = 0.0
+    bench.run(0.04)
+    bench.row[LoopRow.ROTOR_SPEED.start + 2] = bad
+    for _ in range(300):
+        assert not bench.run(DT_S) & ROTOR_FAULT
+
+
+def test_each_rotor_without_measurement_is_reported_once() -> None:
+    watch = FaultWatch(VEHICLE, Behaviour(), 100.0, 5, Bench().state)
+    row = Bench().row
+
+    def run(seconds: float) -> list[int]:
+        reported: list[int] = []
+        for _ in range(round(seconds / DT_S)):
+            for _ in range(5):
+                watch.follow_rotors(row)
+            watch.look(np.zeros(11), row, True, False)
+            reported += watch.take_unmeasured()
+        return reported
+
+    assert run(1.0) == []
+    row[LoopRow.ROTOR_SPEED.start + 2] = math.nan
+    assert run(0.4) == []
+    assert run(2.0) == [3]
+    row[LoopRow.ROTOR_SPEED.start] = math.nan
+    assert run(1.0) == [1]
+    assert watch.is_quiet
+    row[LoopRow.ROTOR_SPEED.start + 1] = 0.0  # another rotor is still watched
+    assert run(0.5) == []
+    assert Failsafe.ROTOR in watch.failsafes()
 
 
 @pytest.mark.parametrize("bad", BAD_NUMBERS)

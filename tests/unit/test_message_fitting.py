@@ -144,6 +144,25 @@ def test_a_number_becomes_what_its_field_holds(value, code, wraps, expected) -> 
     assert fitted(value, code, wraps) == expected
 
 
+@pytest.mark.parametrize(
+    ("kind", "field", "value", "expected"),
+    [
+        (mavlink.MAVLink_gps_raw_int_message, "eph", 70_000, 0xFFFF),
+        (mavlink.MAVLink_gps_raw_int_message, "satellites_visible", 300, 255),
+        (mavlink.MAVLink_hil_gps_message, "epv", -1, 0),
+        (mavlink.MAVLink_rc_channels_message, "rssi", 256, 255),
+        (mavlink.MAVLink_mission_current_message, "seq", 70_000, 0xFFFF),
+        (mavlink.MAVLink_fence_status_message, "breach_count", 2**16 + 3, 3),
+        (mavlink.MAVLink_odometry_message, "reset_counter", 258, 2),
+        (mavlink.MAVLink_sys_status_message, "errors_comm", 2**16 + 1, 1),
+    ],
+)
+def test_counters_wrap_and_other_fields_saturate(kind, field: str, value: int, expected: int) -> None:
+    message = filled(kind, 0, b"")
+    setattr(message, field, value)
+    assert getattr(over_the_wire(message), field) == expected
+
+
 def logged(*events: tuple[int, dict[str, float]], topic: str) -> ULog:
     file = KeptBytes()
     log = FlightLog(file, 4)
@@ -171,3 +190,9 @@ def test_logged_counters_wrap() -> None:
     assert data.data["mission_update_counter"].tolist() == [7]
     data = logged((1, {"ticks": 2**32 + 9}), topic="loop_timing").get_dataset("loop_timing")
     assert data.data["ticks"].tolist() == [9]
+
+
+def test_logged_numbers_that_are_no_counters_saturate() -> None:
+    data = logged((1, {"command": 2**32 + 9, "confirmation": 256}), topic="vehicle_command")
+    fields = data.get_dataset("vehicle_command").data
+    assert (fields["command"].tolist(), fields["confirmation"].tolist()) == ([2**32 - 1], [255])

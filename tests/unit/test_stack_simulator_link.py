@@ -15,6 +15,7 @@ from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, FsPlantState, mavlink
 from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.mavlink.state_steps import is_gap
 from flightstack.params.vehicle import load_vehicle
 
 PAPER = load_vehicle("paper_quad")
@@ -394,6 +395,21 @@ def test_a_step_too_long_to_fly_is_refused_until_it_ends() -> None:
         time_us += 2_000
         receive(stack, plant_state(time_us))
     assert not stack.step_refusal
+
+
+@pytest.mark.parametrize("hiccup_us", [30_000, 45_000])
+def test_single_long_steps_are_no_rate(hiccup_us: int) -> None:
+    """One hiccup in each of 30 seconds: reported as jumps, every 10 s at most; the vehicle may arm."""
+    stack, time_us = booted(), 0
+    for number in range(30 * 500):
+        time_us += hiccup_us if number % 500 == 499 else 2_000
+        receive(stack, plant_state(time_us))
+        assert not stack.step_refusal
+    assert texts(stack) == [f"Simulator time jumped ahead by {hiccup_us * 1e-6:.4g} s"] * 3
+
+
+def test_a_gap_is_longer_than_50_ms_for_steps_and_ticks() -> None:
+    assert [is_gap(step_us) for step_us in (49_999, 50_000, 50_001)] == [False, False, True]
 
 
 def test_steps_that_cannot_be_followed_are_told_now_and_then() -> None:
