@@ -24,7 +24,7 @@ SUPPORT_LIFT = 0.7
 updraft, or is missing because of a dropped payload or stronger propellers."""
 CONTACT_M_S = 1.0
 """Contact: sink rate that thrust below ``SUPPORT_LIFT`` would have caused in the air. In the air the sum stays below
-0.5 m/s, the width of ``STILL_M_S``, for upward forces up to 0.3 of the weight; the rest covers the lag of the rotors."""
+0.5 m/s, the width of ``STILL_M_S``, for upward forces up to 0.3 of the weight; the rest covers the rotors' lag."""
 BOUNCE_SHARE = 0.5
 """Rate at which that sum decreases while the vehicle moves vertically, in g: a bounce on its feet does not clear it."""
 BLOCKED_M_S = 10.0
