@@ -88,7 +88,7 @@ ALL = [
     for share in ((0.0, 0.25, 0.6, 0.8, 0.95) if gains == "tuned" else (0.0, 0.25, 0.6))
     if not (plant == "multibody" and share > 0.9)  # 46 m/s tip x_quad over as it slides
     for gust in ((0.0, 2.0) if (vehicle, plant) == ("x_quad", "rigid") else (0.0,))
-    # x_quad tips over on the ground with the paper's gains and an upward force of 0.15: its attitude loop swings
+    # x_quad tips over on touchdown with the paper's gains, a wind of 0.25 and an upward force of 0.15
     for up in (
         (0.0, 0.15, 0.3)
         if share < 0.5 and plant == "rigid" and (vehicle == "paper_quad" or gains == "tuned")
