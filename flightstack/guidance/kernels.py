@@ -18,6 +18,7 @@ from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import ATTITUDE, S_KIND
 from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, setpoint_of, trajectory_step
 from flightstack.modes import Mode
+from flightstack.params.vehicle import GRAVITY_M_S2
 
 MISSION, OFFBOARD, POSITION = int(Mode.MISSION), int(Mode.OFFBOARD), int(Mode.POSITION)
 
@@ -26,12 +27,12 @@ T_YAW = 9
 GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
 LAND_MEMORY_SIZE = 4
 THRUST_AT = 4  # of the attitude target's array form
-ACCELERATION_Z = 8  # of the setpoint's
+ACCELERATION_Z = 8  # of the setpoint's and of the trajectory's
 LEAD_M = 0.5
 """How far below a vehicle that does not sink the reference sinks."""
-PRESS_1_S, PRESS_M_S2 = 7.0, 4.9
-"""Downward acceleration asked of such a vehicle, for its lack of sink rate, and at most: half the weight. It takes the
-thrust away whatever the gains are: a vehicle in the air then sinks."""
+PRESS_1_S, PRESSED_LIFT = 7.0, 0.45
+"""Downward acceleration asked of such a vehicle, for its lack of sink rate, until the lift is this share of the weight.
+It takes the thrust away whatever the gains are: a vehicle in the air then sinks."""
 
 
 @compiled
@@ -50,13 +51,13 @@ def _waiting(last: Trajectory, reference: Trajectory, state: VehicleState) -> Tr
 
 
 @compiled
-def _press_m_s2(reference: Trajectory, state: VehicleState) -> float:
-    """Return the downward acceleration to add for a vehicle that stays behind a sinking reference."""
+def _press_m_s2(reference: Trajectory, state: VehicleState, spare_m_s2: float) -> float:
+    """Return the downward acceleration to add, at most ``spare_m_s2``, for a vehicle behind a sinking reference."""
     lack_m_s = reference.vz - state.velocity_ned_m_s.z
     if reference.vz < DESCENT_M_S or lack_m_s <= 0.0:
         return 0.0
     near = 2.0 * (reference.z - state.position_ned_m.z) / LEAD_M - 1.0
-    return min(max(near, 0.0), 1.0) * min(PRESS_1_S * lack_m_s, PRESS_M_S2)
+    return min(max(near, 0.0), 1.0) * min(PRESS_1_S * lack_m_s, max(spare_m_s2, 0.0))
 
 
 @compiled
@@ -71,9 +72,11 @@ def _finish(
     setpoint: FloatArray,
 ) -> None:
     """Keep the reference, write the setpoint, and let the land detector see both."""
+    pressed_m_s2 = setpoint[ACCELERATION_Z] - trajectory[ACCELERATION_Z]
+    spare_m_s2 = pressed_m_s2 + (lift - PRESSED_LIFT) * GRAVITY_M_S2
     store(trajectory, reference)
     store_position_setpoint(setpoint, setpoint_of(reference))
-    setpoint[ACCELERATION_Z] += _press_m_s2(reference, state)
+    setpoint[ACCELERATION_Z] += _press_m_s2(reference, state, spare_m_s2)
     memory = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE))
     store(land, land_detector_step(memory, state, lift, descent_m_s, dt_s))
 
