@@ -144,6 +144,7 @@ class Autopilot(FlightRequests):
         """Turn what failsafes, guidance and the land detector found into events; once per outer tick."""
         now, supervisor, navigator = self.now, self.supervisor, self._navigator
         status = now.status
+        self._ground.watch(time_us, float(self._state[5]))
         supervisor.position_is_controlled = self._flying and not (self._target_is_given or self._rests)
         supervisor.on_ground = now.landed or navigator.touches_ground
         conditions = supervisor.look(time_us, status, now.landed, now.setpoint, now.row)
@@ -202,7 +203,7 @@ class Autopilot(FlightRequests):
         mode = self.now.status.mode
         goes_on = mode in AIRBORNE_MODES or (mode in STREAM_MODES and self._flying)
         lift = float(self.now.attitude_target[4]) / self._vehicle.weight_n
-        standing = Standing(goes_on, self._flying, float(self._state[2]), lift)
+        standing = Standing(goes_on, self._flying, float(self._state[2]), float(self._state[5]), lift)
         event = self._ground.event(time_us, standing, self._behaviour)
         if event is Event.NO_TAKEOFF:
             waits = mode is _MISSION and not self._flying

@@ -60,6 +60,7 @@ class ModeKeeper(PlanKeeper):
         mode = self.now.status.mode if mode is None else mode
         known = self.supervisor.arming_facts(mode, self.has_state)
         known = known._replace(throttle=self._throttle, mode_fault=self._fault_on_ground(mode, first) or "")
+        known = known._replace(is_at_rest=self._ground.is_at_rest(self.now.time_us))
         return arming_refusals(known, self._behaviour)
 
     def _fault_on_ground(self, mode: Mode, first: int | None) -> str | None:
@@ -151,6 +152,8 @@ class ModeKeeper(PlanKeeper):
             self._begin_flight()
         if before.armed and not after.armed:  # the log ends with disarming: its last words come first
             in_air = not self.now.landed
+            if in_air:
+                self._ground.dropped(self.now.time_us)
             self.say(CRITICAL if in_air else NOTICE, "Disarmed in the air" if in_air else "Disarmed")
         if after != before:
             self._recorder.status(self.now.time_us, after)

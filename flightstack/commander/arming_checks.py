@@ -32,6 +32,8 @@ class ArmingFacts(NamedTuple):
     """Throttle stick, −1 to 1; 0 at the centre, and without sticks."""
     mode_fault: str = ""
     """Why the mode does not take a standing vehicle into the air; empty: it may."""
+    is_at_rest: bool = True
+    """Whether the vehicle neither falls nor rises."""
     step_refusal: str = ""
     """Why the steps between the simulator's states cannot be flown, a sentence; empty: they can."""
 
@@ -54,6 +56,7 @@ def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]
         (not facts.mode_fault, facts.mode_fault),
         (not facts.step_refusal, facts.step_refusal),
         (facts.upright or not facts.state_is_valid, Need.UPRIGHT.value),
+        (facts.is_at_rest or not facts.state_is_valid, "the vehicle is falling or rising"),
         (facts.battery_level == 0, f"the battery is low: {facts.battery_remaining:.0%} left"),
         (ordered, "BAT_EMERGEN_THR, BAT_CRIT_THR and BAT_LOW_THR do not rise in this order"),
         (not facts.fence_breach or not b.fence_action, f"the vehicle {facts.fence_breach}"),

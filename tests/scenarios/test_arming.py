@@ -101,3 +101,19 @@ def test_a_vehicle_that_was_stopped_in_the_air_arms_as_one_that_stands() -> None
     assert world.texts == ["Armed"]
     assert world.takeoff(2.5) == 0
     world.until(lambda: world.altitude > 2.4)
+
+
+@pytest.mark.parametrize("after_s", [0.05, 0.3, 1.0])
+def test_a_falling_vehicle_does_not_arm(after_s: float) -> None:
+    world = World()
+    assert world.arm() == 0
+    assert world.takeoff(25.0) == 0
+    world.until(lambda: world.mode is Mode.HOLD)
+    assert world.disarm(force=True) == 0
+    world.run(after_s)
+    assert world.altitude > 15.0
+    assert world.arm() == DENIED
+    world.run(0.1)
+    assert any("the vehicle is falling or rising" in text for text in world.texts), world.texts
+    world.run(10.0)
+    assert world.arm() == 0
