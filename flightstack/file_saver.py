@@ -17,7 +17,7 @@ class FileSaver:
         self._write = write
         self._failure = failure
         self._error: Exception | None = None
-        self._told = False
+        self._untold: Exception | None = None
         self._changed = threading.Event()
         self._closing = False
         self._thread: threading.Thread | None = None
@@ -42,25 +42,26 @@ class FileSaver:
         try:
             self._write()
         except Exception as error:  # a saver that ends loses every later change
+            if self._error is None:
+                self._untold = error
             self._error = error
         else:
-            self._error, self._told = None, False
+            self._error = None
 
     def problem(self) -> str | None:
         """Return the sentence why the newest state is not in the file, or None if it is."""
-        error = self._error
+        return self._sentence(self._error)
+
+    def _sentence(self, error: Exception | None) -> str | None:
         if error is None:
             return None
         reason = error.strerror if isinstance(error, OSError) else f"{type(error).__name__}: {error}"
         return f"{self._failure}: {reason or error}"
 
     def take_error(self) -> str | None:
-        """Return ``problem``, once for each row of failures."""
-        problem = self.problem()
-        if problem is None or self._told:
-            return None
-        self._told = True
-        return problem
+        """Return the sentence why the file was not written, or None: one for each row of failures."""
+        error, self._untold = self._untold, None
+        return self._sentence(error)
 
     def flush(self) -> None:
         """Write what has changed before returning; later changes are written too."""

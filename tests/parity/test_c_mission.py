@@ -38,6 +38,7 @@ FLIGHTS: dict[str, dict[str, Any]] = {
             "gains": "paper",
             "wind": (2.0, 0.0, 0.0),
             "gust": 0.5,
+            "drag": True,
         },
     },
 }

@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 
 from flightstack.config import StackConfig
-from flightstack.ground.peer import GROUND, PeerAddress
+from flightstack.ground.peer import PeerAddress
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.hot_frames import PlantStateFrame
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.params.errors import ConfigError
+from flightstack.port_numbers import GROUND
 from flightstack.process_config import ProcessConfig
 from flightstack.process_files import ProcessFiles
 from flightstack.reboot import carry_over
