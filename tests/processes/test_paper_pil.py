@@ -38,7 +38,7 @@ def test_the_paper_controller_gives_the_same_bits_on_the_target_and_replaces_an_
         rows = [row for row in one["differences"] if row["pair"] == "SIL–PIL"]
         assert len(rows) > 10
         assert all(row["largest"] == 0.0 for row in rows)
-    assert rigid["differences"] != of["differences"]
+    assert rigid["differences"] == of["differences"]  # the plants are equal in a vertical step
     whole = of["profile"]["stages"]["whole"]
     assert of["profile"]["unit"] == "instructions"
     assert whole["count"] == of["flights"]["PIL"]["ticks"] == sum(whole["histogram"]["counts"]) > 3000
