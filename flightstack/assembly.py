@@ -33,8 +33,8 @@ from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.timing_report import TimingReport
 
 _KERNELS = (
-    "inner_kernel", "store_outer_row", "follow_rotors", "detect", "mission_start", "stream_kernel", "goal_kernel",
-    "outer_kernel", "fence_step",
+    "inner_kernel", "store_outer_row", "outer_heading", "follow_rotors", "detect", "mission_start", "rest_kernel",
+    "levelling_kernel", "stream_kernel", "goal_kernel", "outer_kernel", "fence_step",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
 

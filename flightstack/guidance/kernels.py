@@ -6,9 +6,15 @@ import math
 
 import numpy as np
 
-from flightstack.arrays import store_position_setpoint, vehicle_state
+from flightstack.arrays import (
+    attitude_target,
+    store_attitude_target,
+    store_position_setpoint,
+    vehicle_state,
+)
 from flightstack.compiled import as_tuple, compiled, store
-from flightstack.contract import FloatArray, VehicleState
+from flightstack.contract import AttitudeTarget, FloatArray, Quaternion, VehicleState
+from flightstack.geometry import blend, euler_from_quaternion
 from flightstack.guidance.aim import A_START_X, A_START_Y, RETURN, advance_return, aim_goal
 from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
@@ -19,6 +25,7 @@ from flightstack.guidance.setpoints import ATTITUDE, S_KIND
 from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, setpoint_of, trajectory_step
 from flightstack.modes import Mode
 from flightstack.params.vehicle import GRAVITY_M_S2
+from flightstack.portable_math import sin_cos
 
 MISSION, OFFBOARD, POSITION = int(Mode.MISSION), int(Mode.OFFBOARD), int(Mode.POSITION)
 
@@ -79,6 +86,33 @@ def _finish(
     setpoint[ACCELERATION_Z] += _press_m_s2(reference, state, spare_m_s2)
     memory = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE))
     store(land, land_detector_step(memory, state, lift, descent_m_s, dt_s))
+
+
+@compiled
+def rest_kernel(
+    state_array: FloatArray, trajectory: FloatArray, land: FloatArray, setpoint: FloatArray
+) -> None:
+    """Put reference and setpoint at the vehicle's position, at rest, on the ground; not at a state of NaNs."""
+    for value in state_array:
+        if not np.isfinite(value):
+            return
+    state = vehicle_state(state_array)
+    p = state.position_ned_m
+    yaw_rad = euler_from_quaternion(state.attitude).z
+    rest = Trajectory(p.x, p.y, p.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, yaw_rad, 0.0)
+    store(trajectory, rest)
+    store(land, LandMemory(1.0, 0.0, 0.0, p.z))
+    store_position_setpoint(setpoint, setpoint_of(rest))
+
+
+@compiled
+def levelling_kernel(last: FloatArray, thrust_n: float, fraction: float, target: FloatArray) -> None:
+    """Write the attitude target, shape (5,), at ``fraction`` of the way from ``last`` to level, with this thrust."""
+    q = attitude_target(last).attitude
+    sine, cosine = sin_cos(0.5 * euler_from_quaternion(q).z)
+    store_attitude_target(
+        target, AttitudeTarget(blend(q, Quaternion(cosine, 0.0, 0.0, sine), fraction), thrust_n)
+    )
 
 
 @compiled

@@ -7,10 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.arrays import store_position_setpoint, vehicle_state
 from flightstack.compiled import direct
-from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray, Quaternion
-from flightstack.geometry import blend, euler_from_quaternion
+from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
 from flightstack.guidance.aim import (
     A_HOME_X,
     A_HOME_Y,
@@ -26,7 +24,14 @@ from flightstack.guidance.aim import (
     AIM_SIZE,
     CLIMBING,
 )
-from flightstack.guidance.kernels import T_YAW, TRAJECTORY_SIZE, goal_kernel, stream_kernel
+from flightstack.guidance.kernels import (
+    T_YAW,
+    TRAJECTORY_SIZE,
+    goal_kernel,
+    levelling_kernel,
+    rest_kernel,
+    stream_kernel,
+)
 from flightstack.guidance.land_detector import CLIMB_M, CONTACT_M_S, LEVELLING_LIFT, REST_M_S, LandMemory
 from flightstack.guidance.manual import TAKEOFF_STICK, shaped
 from flightstack.guidance.mission import (
@@ -69,9 +74,9 @@ from flightstack.guidance.setpoints import (
     store_setpoint,
 )
 from flightstack.guidance.speeds import SpeedOverrides
-from flightstack.guidance.trajectory import BRAKING, Trajectory, setpoint_of
+from flightstack.guidance.trajectory import BRAKING
 from flightstack.modes import STREAM_MODES, Mode
-from flightstack.portable_math import atan2, distance, sin_cos
+from flightstack.portable_math import atan2, distance
 
 LEVEL_S = 0.1
 """Time constant with which a vehicle that touches the ground is levelled: a step would make it hop."""
@@ -117,6 +122,9 @@ class Navigator:
         self._jumps_left = np.zeros(0)
         self.set_plan(self._plan, self._jumps_left)
         state, target = np.zeros(STATE_SIZE), np.zeros(ATTITUDE_TARGET_SIZE)
+        self._levelling_target = np.zeros(ATTITUDE_TARGET_SIZE)
+        self._rest = direct(rest_kernel, state, self._trajectory, self._land, self.setpoint)
+        self._level = direct(levelling_kernel, target, 1.0, 1.0, self._levelling_target)
         self._fly_stream = direct(
             stream_kernel, 0, state, self._trajectory, self._stream, self._land, target,
             self._params_array, self._dt_s, self.setpoint, self.attitude_target,
@@ -186,11 +194,9 @@ class Navigator:
         From the last one, ``attitude_target``, it levels within about ``LEVEL_S``. The outer loop would lean against
         wind that friction withstands, and wind itself up.
         """
-        last = Quaternion(*attitude_target[:4].tolist())
-        sine, cosine = sin_cos(0.5 * euler_from_quaternion(last).z)
-        level = Quaternion(cosine, 0.0, 0.0, sine)
         thrust_n = LEVELLING_LIFT * self.params.weight_n
-        return np.array([*blend(last, level, self._dt_s / LEVEL_S), thrust_n])
+        self._level(attitude_target, thrust_n, self._dt_s / LEVEL_S, self._levelling_target)
+        return self._levelling_target
 
     @property
     def progress(self) -> MissionProgress:
@@ -244,13 +250,7 @@ class Navigator:
 
     def rest_at(self, state: FloatArray) -> None:
         """Put the reference at the vehicle's position, at rest, before it leaves the ground; not at a state of NaNs."""
-        if not np.isfinite(state).all():
-            return
-        self._trajectory[:] = 0.0
-        self._trajectory[:3] = state[:3]
-        self._trajectory[T_YAW] = euler_from_quaternion(vehicle_state(state).attitude).z
-        self._land[:] = (1.0, 0.0, 0.0, state[2])
-        store_position_setpoint(self.setpoint, setpoint_of(Trajectory(*self._trajectory.tolist())))
+        self._rest(state, self._trajectory, self._land, self.setpoint)
 
     def take_up(self, state: FloatArray) -> None:
         """Put the reference where the vehicle is, moving as it does: it could not follow the old one."""

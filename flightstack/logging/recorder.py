@@ -21,7 +21,7 @@ from flightstack.geodesy import GeoPoint
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.logging.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
 from flightstack.logging.flight_log import FlightLog
-from flightstack.logging.topics import OUTER
+from flightstack.logging.topics import OUTER, outer_heading
 from flightstack.modes import NAVIGATION_STATE
 
 OpenLog = Callable[[], FlightLog | None]
@@ -50,6 +50,7 @@ class FlightRecorder:
         """Return the row that the inner loop fills in this tick, given its time; that of no log while none is open."""
         sizes = (OUTER.size, STATE_SIZE, SETPOINT_SIZE, ATTITUDE_TARGET_SIZE)
         self._store_outer = direct(store_outer_row, *(np.zeros(size) for size in sizes), 0)
+        outer_heading(np.zeros((0, OUTER.size)))  # compiled here, not when the log is first written
         self._mission = (MissionProgress(0, -1, False, False), 0)
         self._missions = 0
         self._armed = False

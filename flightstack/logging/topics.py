@@ -54,7 +54,8 @@ class Topic(NamedTuple):
 
 
 @compiled
-def _outer_heading(rows: FloatArray) -> FloatArray:
+def outer_heading(rows: FloatArray) -> FloatArray:
+    """Return the headings [rad] of rows of the outer loop's trace, shape (n, 30)."""
     headings = np.empty(len(rows))
     for i in range(len(rows)):
         w, x, y, z = (
@@ -112,7 +113,7 @@ OUTER_TOPICS = (
             Field("float", "vx", 0, OUTER.state + 3),
             Field("float", "vy", 0, OUTER.state + 4),
             Field("float", "vz", 0, OUTER.state + 5),
-            Field("float", "heading", 0, _outer_heading),
+            Field("float", "heading", 0, outer_heading),
             Field("float", "ref_alt"),
             Field("bool", "xy_valid", default=1),
             Field("bool", "z_valid", default=1),

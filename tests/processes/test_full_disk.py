@@ -22,6 +22,7 @@ def test_a_disk_full_in_flight_is_told_once_and_the_flight_goes_on(tmp_path: Pat
         link = ("--connect", there.link, "--timeout", "60")
         watch = Process("gcs_cli", *link, "watch")
         watch.wait_for("HOLD")
+        there.wait_until_healthy()
         assert gcs(*link, "takeoff", "--alt", 3).returncode == 0
         watch.wait_for("Logging stopped: File too large")
         assert gcs(*link, "hold").returncode == 0
@@ -51,6 +52,7 @@ def test_a_disk_full_in_flight_is_told_once_and_the_flight_goes_on(tmp_path: Pat
 def test_a_log_that_cannot_be_begun_is_told_once(tmp_path: Path) -> None:
     with vehicle(tmp_path, "--log", "/dev/full", "--params", "none") as there:
         link = ("--connect", there.link, "--timeout", "60")
+        there.wait_until_healthy()
         assert gcs(*link, "takeoff", "--alt", 3).returncode == 0
         for mode in ("hold", "land", "hold"):
             assert gcs(*link, mode).returncode == 0

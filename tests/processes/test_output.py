@@ -69,6 +69,7 @@ def test_a_vehicle_goes_on_when_its_output_is_closed(tmp_path: Path) -> None:
         for stream in (there.stack.stdout, there.stack.stderr):
             assert stream is not None
             stream.close()  # as `head -1` does when it has read enough
+        there.wait_until_healthy()
         # arming opens the log, which fails, and the complaint goes nowhere
         for words in (("arm",), ("disarm", "--force"), ("reboot",), ("status",)):
             done = gcs("--connect", there.link, "--timeout", 60, *words)

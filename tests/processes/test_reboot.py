@@ -31,6 +31,7 @@ def test_a_reboot_keeps_plan_and_parameters(tmp_path: Path, options: tuple[str, 
         assert "4.5" in run("param", "get", "MIS_TAKEOFF_ALT")
         run("mission", "download", tmp_path / "after.plan")
         if "--wait-for-start" not in options:
+            there.wait_until_healthy()
             assert gcs("--connect", there.link, "arm").returncode == 0
             assert gcs("--connect", there.link, "disarm", "--force").returncode == 0
         there.stack.terminate()
@@ -41,6 +42,7 @@ def test_a_reboot_keeps_plan_and_parameters(tmp_path: Path, options: tuple[str, 
 
 def test_no_reboot_in_the_air(tmp_path: Path) -> None:
     with vehicle(tmp_path, "--log", "none", "--params", "none", speed="max") as there:
+        there.wait_until_healthy()
         assert gcs("--connect", there.link, "takeoff", "--alt", 3).returncode == 0
         refused = gcs("--connect", there.link, "reboot")
         assert refused.returncode == 1
@@ -77,6 +79,7 @@ def test_a_bad_parameter_file_refuses_the_reboot_and_the_vehicle_goes_on(tmp_pat
         assert code == 1, said
         assert "not rebooted" in said
         assert "vehicle.params" in said
+        there.wait_until_healthy()
         assert run("arm")[0] == 0
         assert run("disarm", "--force")[0] == 0
         file.write_text(good)
@@ -102,6 +105,7 @@ def test_the_log_after_a_reboot_has_the_loops_timing(tmp_path: Path, clock: str)
         for flight in range(2):
             if flight:
                 run("reboot")
+            there.wait_until_healthy()
             run("arm")
             while json.loads(run("status", "--json"))["armed"]:
                 pass  # it disarms by itself

@@ -13,6 +13,7 @@ from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
 from tests.support.free_instance import free_instance
 from tests.support.gcs import gcs
 from tests.support.process import BOUND_S, Process
+from tests.support.vehicle_processes import wait_until_healthy
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 
@@ -86,6 +87,7 @@ def test_a_step_too_long_is_told_on_the_terminal(start) -> None:
 def test_a_step_too_long_ends_a_stack_that_was_to_start_a_mission(start) -> None:
     stack = start(lambda number: 20_000 * number, "--wait-for-start")
     stack.wait_for("flightstack: paper_quad")
+    wait_until_healthy(stack.link)
     for words in (["mission", "upload", str(MISSIONS / "square.plan")], ["arm"], ["mission", "start"]):
         assert gcs("--connect", stack.link, "--timeout", 60, *words).returncode == 0
     assert stack.end() == 2

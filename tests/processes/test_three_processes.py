@@ -18,6 +18,7 @@ from pyulog import ULog
 from flightstack.port_numbers import ground_station_port
 from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process
+from tests.support.vehicle_processes import wait_until_healthy
 from tests.support.world import World
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
@@ -195,6 +196,7 @@ def test_real_time_clock_flies_with_a_simulator_that_does_not_wait(start: Start,
         "none",
     )
     stack.wait_for("flightstack: paper_quad")
+    wait_until_healthy(f"udpout:127.0.0.1:{18570 + instance}")
     for arguments in (["takeoff", "--alt", "1"], ["arm"]):
         command = start("gcs_cli", "--connect", f"udp:{port}", *arguments)
         assert command.end() == 0, command.output

@@ -9,7 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from gcs_cli.endpoint import vehicle_connection
+from gcs_cli import calls
+from gcs_cli.connection import Connection
+from gcs_cli.endpoint import parse_endpoint, vehicle_connection
 from tests.support.free_instance import free_instance
 
 LONG_S = 60.0
@@ -29,6 +31,20 @@ class VehicleProcesses:
     def link(self) -> str:
         """What ``gcs --connect`` needs."""
         return vehicle_connection(self.instance)
+
+    def wait_until_healthy(self) -> None:
+        """Wait for the simulator's first state: until then the vehicle refuses to arm."""
+        wait_until_healthy(self.link)
+
+
+def wait_until_healthy(link: str) -> None:
+    """Wait until the vehicle at ``link`` has a valid state; ask, because telemetry stands still before it."""
+    with Connection(parse_endpoint(link)) as connection:
+        connection.meet(LONG_S)
+        while not connection.session.view.healthy:
+            connection.complete(
+                calls.command(connection.session, *calls.REQUEST_SYS_STATUS, connection.now_s), "SYS_STATUS"
+            )
 
 
 @contextlib.contextmanager

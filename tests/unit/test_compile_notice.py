@@ -114,3 +114,15 @@ def test_kernels_of_a_plant_are_those_it_loads(plant: str) -> None:
     if plant == "multibody":
         pytest.importorskip("mujoco")
     assert loaded_kernels(PLANT.format(plant=plant)) == sorted(kernels_of(plant))
+
+
+@JIT
+def test_nothing_is_compiled_after_the_vehicle_is_built() -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "tests.support.kernels_of_flights"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout.split() == []
