@@ -9,6 +9,7 @@ NamedTuples. Inside, functions pass NamedTuples, so that a control law reads as 
 
 from __future__ import annotations
 
+import importlib
 import os
 from collections.abc import Callable
 from types import FunctionType
@@ -17,10 +18,26 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 from numba.extending import overload, register_jitable
+from numba.np import linalg
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from flightstack import portable_math
 from flightstack.kernel_cache import directory, is_own
+
+
+def _import_without_scipy() -> None:
+    """Import Numba's array functions without their early search for a BLAS, which imports scipy.linalg: 0.2 s.
+
+    A kernel that needs BLAS, of a user's controller say, makes the same search when it is compiled.
+    """
+    search, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = search
+
+
+_import_without_scipy()
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -84,6 +84,7 @@ def flying(start: Start, tmp_path: Path) -> dict[str, Process]:
         ),
     }  # fmt: skip
     processes["stack"].wait_for("flightstack: paper_quad")
+    wait_until_healthy(f"udpout:127.0.0.1:{18570 + instance}")
     connect = ["--connect", f"udp:{port}", "--timeout", str(BOUND_S)]
     for arguments in (["mission", "upload", str(MISSIONS / "square.plan")], ["mission", "start"]):
         command = start("gcs_cli", *connect, *arguments)

@@ -185,3 +185,24 @@ def test_a_home_that_cannot_be_written_does_not_stop_it(tmp_path: Path) -> None:
 
 def test_numbas_own_variable_wins(tmp_path: Path) -> None:
     assert cache_directory(NUMBA_CACHE_DIR=str(tmp_path)) == tmp_path
+
+
+@compiled
+def product(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    return np.dot(matrix, vector)
+
+
+def test_a_kernel_may_use_blas() -> None:
+    assert product(np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([5.0, 6.0])).tolist() == [17.0, 39.0]
+
+
+def test_a_vehicle_starts_without_scipy_linalg() -> None:
+    program = """
+import sys
+from flightstack.assembly import build
+from flightstack.config import DEFAULT_HOME, StackConfig
+build(StackConfig("paper_quad", "pid", "tuned", "python", 500.0, 100.0, False, True, DEFAULT_HOME, 1), lambda: None)
+print("scipy.linalg" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
