@@ -33,6 +33,7 @@ def is_own(module_name: str) -> bool:
     return module_name.partition(".")[0] in OWN_PACKAGES
 
 
+@cache
 def _path(top: Path, module_name: str) -> Path | None:
     base = top.joinpath(*module_name.split("."))
     for path in (base.with_suffix(".py"), base / "__init__.py"):
