@@ -42,8 +42,9 @@ async def test_a_fast_simulation_does_not_flood_the_client(drone: Drone) -> None
     await drone.telemetry.set_rate_odometry(20.0)
     await seconds_between(drone, 2)
     took_s = await seconds_between(drone, COUNTED)
-    # 20 Hz on the wall are 2 Hz of the vehicle's time
-    assert took_s >= (COUNTED - 1) / 20.0 * 5.0, took_s
+    # 20 Hz on the wall are 2 Hz of the vehicle's time; a busy machine simulates at 4 instead of 10 times real time.
+    # Streams that counted the vehicle's time would take COUNTED / 20 seconds of it at any speed.
+    assert took_s >= (COUNTED - 1) / 20.0 * 1.5, took_s
 
 
 @story()
