@@ -9,10 +9,26 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Sequence
 from queue import Empty, Queue
+
+from tests.support.programs import PROGRAMS, Program
 
 BOUND_S = 60.0
 MOST_LINES = 200
+
+
+def start(module: str, arguments: Sequence[str], listens: bool) -> Program | subprocess.Popen[str]:
+    """Start a program of ours from the server that has it in memory, another one as usual."""
+    if module in PROGRAMS:
+        return Program(module, arguments, listens=listens, joins_output=True)
+    return subprocess.Popen(
+        [sys.executable, "-u", "-m", module, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        stdin=subprocess.PIPE if listens else subprocess.DEVNULL,
+        text=True,
+    )
 
 
 class Process:
@@ -21,13 +37,7 @@ class Process:
     def __init__(self, module: str, *arguments: str, listens: bool = False) -> None:
         """Start it; with ``listens`` it gets the lines of :meth:`tell`, else no input."""
         self.name = module
-        self._popen = subprocess.Popen(
-            [sys.executable, "-u", "-m", module, *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            stdin=subprocess.PIPE if listens else subprocess.DEVNULL,
-            text=True,
-        )
+        self._popen = start(module, arguments, listens)
         self._fresh: Queue[str | None] = Queue()
         self.lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +11,7 @@ from gcs_cli import calls
 from gcs_cli.connection import Connection
 from gcs_cli.endpoint import parse_endpoint, vehicle_connection
 from tests.support.free_instance import free_instance
+from tests.support.programs import Program
 
 LONG_S = 60.0
 """A hang guard: no process of a test lives longer."""
@@ -23,8 +22,8 @@ class VehicleProcesses:
     """Where the vehicle is."""
 
     instance: int
-    simulator: subprocess.Popen[str] | None
-    stack: subprocess.Popen[str]
+    simulator: Program | None
+    stack: Program
     folder: Path
 
     @property
@@ -55,16 +54,13 @@ def vehicle(
     instance = free_instance()
     with contextlib.ExitStack() as ends:
 
-        def run(module: str, *words: object) -> subprocess.Popen[str]:
-            command = [sys.executable, "-m", module, "--instance", str(instance), *map(str, words)]
-            pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-            process = subprocess.Popen(command, cwd=folder, text=True, **pipes)
+        def run(module: str, *words: object) -> Program:
+            process = Program(module, ["--instance", str(instance), *map(str, words)], folder)
             ends.callback(process.communicate)
             ends.callback(process.kill)
             return process
 
         simulator = run("sim_bridge", "--speed", speed) if with_simulator else None
         stack = run("flightstack", *arguments)
-        assert stack.stdout is not None
         assert stack.stdout.readline(), "flightstack ended at its start"
         yield VehicleProcesses(instance, simulator, stack, folder)

@@ -1,0 +1,123 @@
+"""Our programs as processes of their own, with the part of ``subprocess.Popen``'s interface that tests use."""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import IO
+
+PROGRAMS = ("flightstack", "sim_bridge", "gcs_cli")
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@cache
+def _server() -> socket.socket:
+    """Start the server of this test process; it ends with this process."""
+    ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    command = [sys.executable, "-m", "tests.support.warm_server"]
+    server = subprocess.Popen(command, stdin=its, cwd=ROOT, start_new_session=True)
+    its.close()
+
+    def end() -> None:
+        ours.close()
+        server.wait()
+
+    atexit.register(end)
+    return ours
+
+
+class Program:
+    """A program that runs: ``stdin``, if asked for, and ``stdout`` and ``stderr`` are pipes of text."""
+
+    def __init__(
+        self,
+        module: str,
+        arguments: Sequence[str],
+        directory: Path | None = None,
+        *,
+        listens: bool = False,
+        joins_output: bool = False,
+    ) -> None:
+        """Start ``python -m MODULE ARGUMENTS``; with ``joins_output``, standard error goes to ``stdout``."""
+        self.args = (module, *arguments)
+        self.returncode: int | None = None
+        self.stdin: IO[str] | None = None
+        input_end, own_end = os.pipe() if listens else (os.open(os.devnull, os.O_RDONLY), None)
+        if own_end is not None:
+            self.stdin = open(own_end, "w")  # noqa: SIM115
+        output, output_end = os.pipe()
+        errors, errors_end = (None, output_end) if joins_output else os.pipe()
+        self._report, report_end = os.pipe()
+        request = {
+            "module": module,
+            "arguments": list(arguments),
+            "directory": str(directory or Path.cwd()),
+            "environment": dict(os.environ),
+        }
+        given = [input_end, output_end, errors_end, report_end]
+        server = _server()
+        socket.send_fds(server, [json.dumps(request).encode()], given)
+        for descriptor in set(given):
+            os.close(descriptor)
+        self.pid = int(server.recv(32))
+        self.stdout: IO[str] = open(output)  # noqa: SIM115
+        self.stderr: IO[str] | None = None if errors is None else open(errors)  # noqa: SIM115
+
+    def poll(self) -> int | None:
+        """Return the exit code, negative for a signal, or None while it runs."""
+        return self._end(0.0)
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Return the exit code; raise TimeoutExpired."""
+        code = self._end(timeout)
+        if code is None:
+            raise subprocess.TimeoutExpired(self.args, timeout or 0.0)
+        return code
+
+    def _end(self, timeout_s: float | None) -> int | None:
+        if self.returncode is None and select.select([self._report], [], [], timeout_s)[0]:
+            self.returncode = int(os.read(self._report, 32))
+            os.close(self._report)
+        return self.returncode
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+    def communicate(self, timeout: float | None = None) -> tuple[str, str]:
+        """Read all that it still writes, wait for its end and close the pipes; raise TimeoutExpired."""
+        texts = ["", ""]
+
+        def read(index: int, stream: IO[str] | None) -> None:
+            if stream is not None and not stream.closed:
+                with stream:
+                    texts[index] = stream.read()
+
+        readers = [
+            threading.Thread(target=read, args=each, daemon=True)
+            for each in enumerate((self.stdout, self.stderr))
+        ]
+        for reader in readers:
+            reader.start()
+        self.wait(timeout)
+        for reader in readers:
+            reader.join(timeout)
+        if self.stdin is not None:
+            self.stdin.close()
+        return texts[0], texts[1]
