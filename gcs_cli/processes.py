@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar
+
+from flightstack.own_program import own_program
 
 _TAIL_BYTES = 4096
 _POLL_S = 0.02
@@ -136,7 +137,7 @@ class Children:
 
     def start(self, name: str, module: str, arguments: Sequence[str]) -> Child:
         """Start a Python module of this installation; its output goes to ``<name>.log``."""
-        child = Child(name, [sys.executable, "-m", module, *arguments], self._folder / f"{name}.log")
+        child = Child(name, own_program(module, *arguments), self._folder / f"{name}.log")
         self.add(child)
         return child
 

@@ -11,12 +11,12 @@ import contextlib
 import os
 import struct
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from flightstack.contract import MAX_ROTORS, STATE_SIZE
+from flightstack.own_program import own_program
 from sim_bridge.errors import UsageProblemError
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 SNAPSHOT = struct.Struct(f"<d{STATE_SIZE}d{MAX_ROTORS}f")
 """Time [s], array form of ``VehicleState``, rotor speeds [rad/s]; shorter than what a pipe takes whole."""
 READY = b"ready\n"
-_WINDOW = (sys.executable, "-m", "sim_bridge.multibody.live_window")
 _PERIOD_S = 1.0 / 60.0
 _PATIENCE_S = 5.0
 
@@ -33,10 +32,10 @@ _PATIENCE_S = 5.0
 class LiveView:
     """The window's process, which has said that it stands; raise UsageProblemError when it cannot."""
 
-    def __init__(self, vehicle: str, window: Sequence[str] = _WINDOW) -> None:
+    def __init__(self, vehicle: str, window: Sequence[str] | None = None) -> None:
         """Open a window for a vehicle, by the name or the path of its file; ``window`` is the program that does it."""
         self._process = subprocess.Popen(
-            [*window, vehicle],
+            [*(window or own_program("sim_bridge.multibody.live_window")), vehicle],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

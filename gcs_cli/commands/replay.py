@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +11,7 @@ import typer
 
 from flightstack import picture_options as asked
 from flightstack.console import complain
+from flightstack.own_program import own_program
 from gcs_cli.errors import FAILED, CliError
 
 _NAME = "gcs replay"
@@ -67,7 +67,7 @@ def _render(arguments: list[str]) -> int:
 
     It has a session of its own: Ctrl-C is ours, and one signal lets it end in order.
     """
-    program = [sys.executable, "-m", "sim_bridge", "render", *arguments]
+    program = own_program("sim_bridge", "render", *arguments)
     with subprocess.Popen(program, start_new_session=True) as child:
         try:
             code = child.wait()

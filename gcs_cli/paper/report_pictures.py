@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -16,6 +15,7 @@ import numpy as np
 
 from flightstack.contract import FloatArray
 from flightstack.extras import INSTALL_MULTIBODY
+from flightstack.own_program import own_program
 from flightstack.poses_file import Poses, write_poses
 from gcs_cli.paper import cases
 from gcs_cli.paper.report_labels import LABELS, PLANTS, anchored
@@ -118,7 +118,7 @@ def _drawn(recording: Recording) -> list[Picture]:
 def _render(poses: Path, file: Path, camera: str, at_s: float) -> None:
     arguments = [f"--png={file}", f"--at={at_s:g}", f"--camera={camera}", f"--size={SIZE}", "--no-words"]
     subprocess.run(
-        [sys.executable, "-m", "sim_bridge", "render", str(poses), *arguments],
+        own_program("sim_bridge", "render", str(poses), *arguments),
         check=True,
         capture_output=True,
         text=True,

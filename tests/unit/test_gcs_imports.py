@@ -10,6 +10,7 @@ LIGHT = (
     "flightstack.command_line",
     "flightstack.console",
     "flightstack.options",
+    "flightstack.own_program",
     "flightstack.picture_options",
     "flightstack.port_numbers",
     "flightstack.simulation_options",
