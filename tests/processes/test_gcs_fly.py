@@ -20,7 +20,7 @@ from flightstack.transport.udp import UdpSocket
 from gcs_cli.fly_flags import FlyOptions
 from gcs_cli.processes import Child, Children
 from tests.support.free_instance import free_instance
-from tests.support.gcs import gcs
+from tests.support.commands import gcs
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds
 MISSIONS = Path(__file__).parents[2] / "missions"
