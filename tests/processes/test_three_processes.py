@@ -195,15 +195,16 @@ def test_real_time_clock_flies_with_a_simulator_that_does_not_wait(start: Start,
         "none",
     )
     stack.wait_for("flightstack: paper_quad")
-    wait_until_healthy(f"udpout:127.0.0.1:{18570 + instance}")
-    for arguments in (["takeoff", "--alt", "1"], ["arm"]):
-        command = start("gcs_cli", "--connect", f"udp:{port}", *arguments)
-        assert command.end() == 0, command.output
+    link = f"udpout:127.0.0.1:{18570 + instance}"
+    wait_until_healthy(link)
+    for arguments in (("takeoff", "--alt", 1), ("arm",)):
+        done = gcs("--connect", link, *arguments)
+        assert done.returncode == 0, done.stderr
     station = start("gcs_cli", "--connect", f"udp:{port}", "watch")
     station.wait_for("armed  N")
-    perf = start("gcs_cli", "--connect", f"udpout:127.0.0.1:{18570 + instance}", "perf", "--json")
-    assert perf.end() == 0, perf.output
-    figures = json.loads(perf.output)
+    perf = gcs("--connect", link, "perf", "--json")
+    assert perf.returncode == 0, perf.stderr
+    figures = json.loads(perf.stdout)
     assert figures["lockstep"] is False
     assert figures["ticks"] > 100
 
