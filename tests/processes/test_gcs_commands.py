@@ -23,9 +23,9 @@ from flightstack.transport.udp import UdpSocket
 from gcs_cli import calls, log_calls
 from gcs_cli.__main__ import main
 from gcs_cli.connection import Connection
+from tests.support.commands import Ended, gcs
 from tests.support.fake_vehicle import ARM, FakeVehicle, serve
 from tests.support.fences import circle
-from tests.support.gcs import Ended, gcs
 from tests.support.vehicle_processes import vehicle
 
 LONG_S = 30  # a bound for a machine that is busy; nothing is expected to take a second

@@ -19,8 +19,8 @@ from flightstack.port_numbers import simulator_port, vehicle_ground_port
 from flightstack.transport.udp import UdpSocket
 from gcs_cli.fly_flags import FlyOptions
 from gcs_cli.processes import Child, Children
+from tests.support.commands import Ended, gcs
 from tests.support.free_instance import free_instance
-from tests.support.gcs import gcs
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -28,19 +28,14 @@ INSTANCE = free_instance()
 PATIENT = ["--speed", "1"]  # leaves time to interfere
 
 
-def command(out: Path, *flags: str, plan: str = "hop.plan", instance: int = INSTANCE) -> list[str]:
+def command(out: Path, *flags: str, plan: str = "hop.plan") -> list[str]:
     fly = [sys.executable, "-m", "gcs_cli", "fly", str(MISSIONS / plan), "--out", str(out)]
-    return [*fly, "--instance", str(instance), *flags]
+    return [*fly, "--instance", str(INSTANCE), *flags]
 
 
-def run(out: Path, *flags: str, **names: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        command(out, *flags, **names),
-        capture_output=True,
-        text=True,
-        timeout=LONG_S,
-        check=False,  # type: ignore[arg-type]
-    )
+def run(out: Path, *flags: str, plan: str = "hop.plan") -> Ended:
+    """Fly within the test; simulator and flight stack are processes."""
+    return gcs(*command(out, *flags, plan=plan)[3:])
 
 
 def children_of(pid: int) -> dict[str, int]:
@@ -105,7 +100,7 @@ def summary_of(out: Path) -> dict[str, object]:
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
+def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
     """A whole flight: its directory and what it printed."""
     out = tmp_path_factory.mktemp("flown") / "run"
     flags = ("--json", "--seed", "5", "--controller", "backstepping", "--inner-hz", "250")
@@ -113,7 +108,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.Co
 
 
 def test_a_mission_is_flown_from_plan_to_report(
-    flown: tuple[Path, subprocess.CompletedProcess[str]],
+    flown: tuple[Path, Ended],
 ) -> None:
     out, result = flown
     assert result.returncode == 0, result.stderr
@@ -156,14 +151,14 @@ def test_overwrite_replaces_another_flight(tmp_path: Path) -> None:
     out = tmp_path / "run"
     out.mkdir()
     (out / "flight.ulg").write_bytes(b"x")
-    refused = run(out)
+    refused = subprocess.run(command(out), capture_output=True, text=True, timeout=LONG_S, check=False)
     assert (refused.returncode, refused.stdout) == (2, "")
     assert refused.stderr.endswith("choose another one, or give --overwrite\n")
     assert run(out, "--overwrite").returncode == 0
     assert summary_of(out)["outcome"] == "completed"
 
 
-def test_the_tlog_holds_both_directions(flown: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
+def test_the_tlog_holds_both_directions(flown: tuple[Path, Ended]) -> None:
     from pymavlink import mavutil  # noqa: PLC0415
 
     log = mavutil.mavlink_connection(str(flown[0] / "gcs.tlog"))
@@ -179,7 +174,7 @@ def test_the_tlog_holds_both_directions(flown: tuple[Path, subprocess.CompletedP
 
 def test_a_flight_is_never_overwritten(tmp_path: Path) -> None:
     (tmp_path / "flight.ulg").write_bytes(b"precious")
-    result = gcs(*command(tmp_path)[3:])
+    result = run(tmp_path)
     assert (result.stdout, result.returncode) == ("", 2)
     assert "flight.ulg of another flight is there" in result.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["flight.ulg"]
@@ -194,7 +189,7 @@ def test_a_busy_port_is_named_and_nothing_is_started(tmp_path: Path, number: Cal
         taken.bind(("127.0.0.1", port))
         if kind == "TCP":
             taken.listen(1)
-        result = gcs(*command(tmp_path / "run")[3:])
+        result = run(tmp_path / "run")
     assert (result.stdout, result.returncode) == ("", 2)
     assert f"{kind} port {port} on 127.0.0.1 is in use" in result.stderr
     assert "--instance" in result.stderr

@@ -5,18 +5,25 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import shutil
 import subprocess
-import sys
+import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from flightstack.firmware.build import host_program
-from gcs_cli.errors import DONE, FAILED, NO_ANSWER, USAGE
+from gcs_cli.errors import DONE, FAILED, NO_ANSWER, USAGE, CliError
+from gcs_cli.fly_flags import FlyOptions
+from gcs_cli.pil import run as pil_run
+from gcs_cli.pil.flight_samples import read_samples
+from gcs_cli.pil.result import Flown
 from tests.processes.test_gcs_fly import LONG_S, children_of
+from tests.support.commands import Ended, gcs
 from tests.support.free_instance import free_instance
 
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -26,13 +33,12 @@ emulation = pytest.mark.skipif(
 )
 
 
-def pil(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "gcs_cli", "pil", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=3 * LONG_S, check=False)
+def pil(*arguments: object) -> Ended:
+    return gcs("pil", *arguments)
 
 
-def fly(out: Path, target: str, *flags: str, plan: str = "hop.plan") -> subprocess.CompletedProcess[str]:
-    return pil(MISSIONS / plan, "--target", target, "--out", out, "--instance", str(INSTANCE), *flags)
+def fly(out: Path, target: str, *flags: str) -> Ended:
+    return pil(MISSIONS / "hop.plan", "--target", target, "--out", out, "--instance", INSTANCE, *flags)
 
 
 def result_of(out: Path) -> dict[str, Any]:
@@ -50,6 +56,24 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = fly(out, "host", "--fail-over")
     assert done.returncode == DONE, done.stdout + done.stderr
     return out
+
+
+@pytest.fixture
+def here_as_before(flown: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """Take the hop's MIL and SIL from ``flown``: the same options give the same logs. The parameter is PIL's speed."""
+    flights, fly_stage = result_of(flown)["flights"], pil_run._fly
+
+    def fly(stage: str, options: FlyOptions, *rest: Any) -> tuple[Flown, CliError | None]:
+        if stage == "PIL":
+            return fly_stage(stage, replace(options, speed=getattr(request, "param", "max")), *rest)
+        _, folder, *_ = rest
+        there = shutil.copytree(flown / stage.lower(), folder / stage.lower())
+        facts = {
+            name: flights[stage][name] for name in ("directory", "sim_time_s", "wall_time_s", "log_sha256")
+        }
+        return Flown("completed", read_samples(there / "flight.ulg"), facts), None
+
+    monkeypatch.setattr(pil_run, "_fly", fly)
 
 
 def test_three_flights_are_flown_compared_and_reported(flown: Path) -> None:
@@ -123,6 +147,7 @@ def board() -> Iterator[Board]:
     there.remove()
 
 
+@pytest.mark.usefixtures("here_as_before")
 def test_a_board_is_examined_and_flown_at_its_serial_port(board: Board, tmp_path: Path) -> None:
     done = pil("doctor", "--port", board.device, "--baud", "115200", "--exchanges", "50", "--json")
     assert done.returncode == DONE, done.stdout + done.stderr
@@ -137,24 +162,25 @@ def test_a_board_is_examined_and_flown_at_its_serial_port(board: Board, tmp_path
     assert limits[0] > 0.0  # of a board nobody asks for the same bits
 
 
+def unplug(board: Board, log: Path) -> None:
+    """Pull the plug when the log holds a part of the flight: a fifth of it."""
+    end_s = time.monotonic() + LONG_S
+    while time.monotonic() < end_s and not (log.exists() and log.stat().st_size > 100_000):
+        time.sleep(0.01)
+    board.remove()
+
+
+@pytest.mark.parametrize("here_as_before", ["1"], indirect=True)  # leaves time to unplug
+@pytest.mark.usefixtures("here_as_before")
 def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(board: Board, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "gcs_cli", "pil", str(MISSIONS / "square.plan"), "--out", str(out)]
-    more = ["--target", f"serial:{board.device}", "--instance", str(INSTANCE)]
-    with subprocess.Popen(
-        [*command, *more], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as run:
-        end_s = time.monotonic() + 3 * LONG_S
-        log = out / "pil" / "flight.ulg"
-        while not (log.exists() and log.stat().st_size > 100_000):
-            assert run.poll() is None, run.communicate()
-            assert time.monotonic() < end_s
-            time.sleep(0.01)
-        board.remove()
-        printed, complaint = run.communicate(timeout=LONG_S)
-        assert children_of(run.pid) == {}
-    assert run.returncode == NO_ANSWER, printed + complaint
-    assert board.device in complaint
+    unplugging = threading.Thread(target=unplug, args=(board, out / "pil" / "flight.ulg"))
+    unplugging.start()
+    done = fly(out, f"serial:{board.device}")
+    unplugging.join()
+    assert not {"sim_bridge", "flightstack"} & set(children_of(os.getpid()))
+    assert done.returncode == NO_ANSWER, done.stdout + done.stderr
+    assert board.device in done.stderr
     result = result_of(out)
     assert result["verdict"] == "failed"
     assert result["flights"]["SIL"]["outcome"] == "completed"

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+from tests.support.commands import flightstack_command, gcs
 from tests.support.free_instance import free_instance
 
 LONG_S = 180.0  # a bound for a busy machine that compiles kernels and firmware anew
@@ -29,15 +30,14 @@ def gcs_fly(out: Path, *flags: str) -> list[str]:
 
 
 def flown(out: Path, *flags: str) -> ULog:
-    done = subprocess.run(gcs_fly(out, *flags), capture_output=True, text=True, timeout=LONG_S, check=False)
+    done = gcs(*gcs_fly(out, *flags)[3:])
     assert done.returncode == 0, f"{done.stdout}{done.stderr}{(out / 'flightstack.log').read_text()}"
     return ULog(str(out / "flight.ulg"))
 
 
 def check(*flags: str) -> tuple[int, str]:
     """Return exit code and standard error of ``flightstack --check``."""
-    command = [sys.executable, "-m", "flightstack", "--check", *flags]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=LONG_S, check=False)
+    done = flightstack_command("--check", *flags)
     return done.returncode, done.stderr
 
 

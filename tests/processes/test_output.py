@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.gcs import gcs
+from tests.support.commands import gcs
 from tests.support.vehicle_processes import LONG_S, vehicle
 
 PROGRAMS = ("flightstack", "sim_bridge", "gcs_cli")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.support.gcs import gcs
+from tests.support.commands import gcs
 from tests.support.vehicle_processes import vehicle
 
 
 def test_a_missing_parameter_file_is_begun_and_kept(tmp_path: Path) -> None:
     path = tmp_path / "new" / "my.params"
-    with vehicle(tmp_path, "--log", "none", "--params", path) as there:
+    with vehicle(
+        tmp_path, "--log", "none", "--params", path, "--sim-timeout", 600, with_simulator=False
+    ) as there:
         assert path.is_file()
         done = gcs("--connect", there.link, "--timeout", 60, "param", "set", "MIS_TAKEOFF_ALT", 4.5)
         assert done.returncode == 0, done.stderr

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import threading
@@ -21,12 +20,12 @@ from flightstack.mavlink.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsF
 from flightstack.params.vehicle import load_vehicle
 from flightstack.poses_file import write_poses
 from sim_bridge import render_command
-from sim_bridge.__main__ import main
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.live_view import READY, SNAPSHOT, LiveView
 from sim_bridge.multibody.offscreen import choose
 from sim_bridge.multibody.viewer import show
 from sim_bridge.simulator import Simulator
+from tests.support.commands import gcs, sim_bridge_command
 from tests.support.process import Process
 from tests.support.sample_poses import sample_poses
 from tests.support.synthetic_flight import synthetic_flight_bytes
@@ -84,7 +83,9 @@ def test_pictures_a_sheet_and_films_of_the_asked_size(poses: Path, tmp_path: Pat
         assert picture.size == (96, 54)
         assert whole.size == (2 * 96 + 6, 54)
     assert frames_of(gif) == (5, (96, 54))
-    done = render(poses, *SMALL, "--video", mp4, "--fps", "10", "--speed", "4", "--camera", "fixed")
+    done = sim_bridge_command(
+        "render", poses, *SMALL, "--video", mp4, "--fps", "10", "--speed", "4", "--camera", "fixed"
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert frames_of(mp4) == (5, (96, 54))
     assert sorted(path.name for path in tmp_path.iterdir()) == [
@@ -96,35 +97,33 @@ def test_pictures_a_sheet_and_films_of_the_asked_size(poses: Path, tmp_path: Pat
     ]
 
 
-def test_a_log_is_replayed_from_end_to_end(poses: Path, tmp_path: Path) -> None:
+def test_a_log_is_replayed_from_end_to_end(
+    poses: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     """The synthetic flight, through ``gcs replay``, which takes the vehicle from the log."""
     (tmp_path / "flight.ulg").write_bytes(synthetic_flight_bytes(inner_ms=20, outer_ms=20, seconds=4.0))
-    arguments = ["replay", str(tmp_path), *SMALL, "--fps", "5", "--speed", "4", "--no-words"]
-    program = [sys.executable, "-m", "gcs_cli", *arguments]
-    done = subprocess.run(program, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    arguments = ("replay", tmp_path, *SMALL, "--fps", "5", "--speed", "4", "--no-words")
+    done = gcs(*arguments)
+    assert (done.returncode, done.stderr, capfd.readouterr().err) == (0, "", "")
     assert frames_of(tmp_path / "replay.mp4") == (5, (96, 54))
-    done = subprocess.run([*program, "--camera", "nose"], capture_output=True, text=True, check=False)
+    done = gcs(*arguments, "--camera", "nose")
     assert done.returncode == 2
-    assert done.stderr == "gcs: --camera: 'nose' is not one of chase, fixed, top, side, whole\n"
+    assert (
+        done.stderr + capfd.readouterr().err
+        == "gcs: --camera: 'nose' is not one of chase, fixed, top, side, whole\n"
+    )
 
 
-def test_a_damaged_log_is_drawn_as_far_as_it_goes_and_said_to_be_damaged(poses: Path, tmp_path: Path) -> None:
+def test_a_damaged_log_is_drawn_as_far_as_it_goes_and_said_to_be_damaged(
+    poses: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     log = synthetic_flight_bytes(inner_ms=20, outer_ms=20, seconds=4.0)
     (tmp_path / "flight.ulg").write_bytes(log[: len(log) * 3 // 4])
-    program = [
-        sys.executable,
-        "-m",
-        "gcs_cli",
-        "replay",
-        str(tmp_path),
-        "--png",
-        str(tmp_path / "p.png"),
-        *SMALL,
-    ]
-    done = subprocess.run(program, capture_output=True, text=True, check=False)
+    done = gcs("replay", tmp_path, "--png", tmp_path / "p.png", *SMALL)
     assert done.returncode == 0
-    said = re.fullmatch(r"gcs: warning: the log is damaged; drawn up to ([0-9.]+) s\n", done.stderr)
+    said = re.fullmatch(
+        r"gcs: warning: the log is damaged; drawn up to ([0-9.]+) s\n", done.stderr + capfd.readouterr().err
+    )
     assert said is not None, done.stderr
     assert 0.5 < float(said[1]) < 4.0
 
@@ -161,17 +160,13 @@ def test_bad_arguments_get_a_sentence(
     poses: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
     arguments: list[str],
     said: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    before = signal.getsignal(signal.SIGTERM)
-    try:
-        assert main(["render", str(poses), *arguments]) == 2
-    finally:
-        signal.signal(signal.SIGTERM, before)
-    assert f"sim-bridge: {said}" in capsys.readouterr().err
+    done = sim_bridge_command("render", poses, *arguments)
+    assert done.returncode == 2
+    assert f"sim-bridge: {said}" in done.stderr
     assert not list(tmp_path.iterdir())
 
 
@@ -182,20 +177,13 @@ def test_bad_arguments_get_a_sentence(
 def test_complaints_name_the_command_that_was_given(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
     arguments: list[str],
     said: str,
 ) -> None:
     write_poses(tmp_path / "poses.npz", sample_poses(1.0))
     monkeypatch.setattr(render_command, "find_spec", lambda _name: None)
-    before = signal.getsignal(signal.SIGTERM)
-    try:
-        assert (
-            main(["render", str(tmp_path / "poses.npz"), "--png", str(tmp_path / "p.png"), *arguments]) == 2
-        )
-    finally:
-        signal.signal(signal.SIGTERM, before)
-    assert capsys.readouterr().err == f"{said}: {INSTALL_MULTIBODY}\n"
+    done = sim_bridge_command("render", tmp_path / "poses.npz", "--png", tmp_path / "p.png", *arguments)
+    assert (done.returncode, done.stderr) == (2, f"{said}: {INSTALL_MULTIBODY}\n")
 
 
 def test_without_a_renderer_nothing_is_written(poses: Path, tmp_path: Path) -> None:

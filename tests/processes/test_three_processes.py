@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,6 +14,7 @@ import pytest
 from pyulog import ULog
 
 from flightstack.port_numbers import ground_station_port
+from tests.support.commands import flightstack_command, gcs
 from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process
 from tests.support.vehicle_processes import wait_until_healthy
@@ -41,13 +40,7 @@ def start() -> Iterator[Start]:
 
 
 def fly(out: Path, instance: int, *options: str) -> tuple[dict[str, object], bytes]:
-    run = subprocess.run(
-        [
-            sys.executable, "-m", "gcs_cli", "fly", str(MISSIONS / "hop.plan"), "--json", "--out", str(out),
-            "--instance", str(instance), *options,
-        ],
-        capture_output=True, text=True, timeout=4 * BOUND_S, check=False,
-    )  # fmt: skip
+    run = gcs("fly", MISSIONS / "hop.plan", "--json", "--out", out, "--instance", instance, *options)
     assert run.returncode == 0, run.stderr
     summary = json.loads(run.stdout)
     log = (out / "flight.ulg").read_bytes()
@@ -58,17 +51,21 @@ def fly(out: Path, instance: int, *options: str) -> tuple[dict[str, object], byt
 def test_the_same_flight_gives_the_same_log_at_any_speed_and_in_one_process(tmp_path: Path) -> None:
     logs, instance = [], free_instance()
     gusts = ("--gust", "1", "--torque-gust", "0.1", "--seed", "7")
-    for speed in ("max", "10", "1"):
+    for speed in ("max", "1"):
         summary, log = fly(tmp_path / speed, instance, "--speed", speed, "--vehicle", "x_quad", *gusts)
         assert summary["outcome"] == "completed"
         logs.append(log)
-    assert logs[0] == logs[1] == logs[2]
+    assert logs[0] == logs[1]
     system_id = instance + 1  # a parameter, and so in the log
     world = World(vehicle="x_quad", gust=1.0, torque_gust=0.1, seed=7, system_id=system_id)
     world.upload("hop.plan")
     world.start_mission()
     world.until_disarmed()
     assert world.log == logs[0]
+
+
+GCS_LOSS_S = 5
+"""As ``gcs fly`` has it. The station is there before the mission and heard each second until a test ends it."""
 
 
 @pytest.fixture
@@ -80,16 +77,17 @@ def flying(start: Start, tmp_path: Path) -> dict[str, Process]:
         "simulator": start("sim_bridge", "--instance", str(instance), "--speed", "2"),
         "stack": start(
             "flightstack", "--instance", str(instance), "--gcs-port", str(port), "--log", str(tmp_path / "flight.ulg"),
-            "--params", "none", "--exit-on-gcs-loss", "30",  # a ground station may take seconds to start
+            "--params", "none", "--exit-on-gcs-loss", str(GCS_LOSS_S),
         ),
+        "station": start("gcs_cli", "--connect", f"udp:{port}", "--timeout", str(BOUND_S), "watch"),
     }  # fmt: skip
     processes["stack"].wait_for("flightstack: paper_quad")
-    wait_until_healthy(f"udpout:127.0.0.1:{18570 + instance}")
-    connect = ["--connect", f"udp:{port}", "--timeout", str(BOUND_S)]
-    for arguments in (["mission", "upload", str(MISSIONS / "square.plan")], ["mission", "start"]):
-        command = start("gcs_cli", *connect, *arguments)
-        assert command.end() == 0, command.output
-    processes["station"] = start("gcs_cli", *connect, "watch")
+    processes["station"].wait_for("HOLD")
+    link = f"udpout:127.0.0.1:{18570 + instance}"
+    wait_until_healthy(link)
+    for arguments in (("upload", MISSIONS / "square.plan"), ("start",)):
+        done = gcs("--connect", link, "--timeout", BOUND_S, "mission", *arguments)
+        assert done.returncode == 0, done.stderr
     processes["station"].wait_for("MISSION")
     return processes
 
@@ -171,11 +169,11 @@ def test_a_busy_port_is_named(start: Start) -> None:
         (["--loops", "fortran"], "is none of python, c, host"),
     ],
 )
-def test_bad_arguments_are_one_sentence_and_exit_2(start: Start, arguments: list[str], sentence: str) -> None:
-    stack = start("flightstack", "--instance", str(free_instance()), *arguments)
-    assert stack.end() == 2
-    assert sentence in stack.output
-    assert len(stack.lines) == 1
+def test_bad_arguments_are_one_sentence_and_exit_2(arguments: list[str], sentence: str) -> None:
+    done = flightstack_command("--state", "none", *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 def test_real_time_clock_flies_with_a_simulator_that_does_not_wait(start: Start, tmp_path: Path) -> None:
@@ -197,15 +195,16 @@ def test_real_time_clock_flies_with_a_simulator_that_does_not_wait(start: Start,
         "none",
     )
     stack.wait_for("flightstack: paper_quad")
-    wait_until_healthy(f"udpout:127.0.0.1:{18570 + instance}")
-    for arguments in (["takeoff", "--alt", "1"], ["arm"]):
-        command = start("gcs_cli", "--connect", f"udp:{port}", *arguments)
-        assert command.end() == 0, command.output
+    link = f"udpout:127.0.0.1:{18570 + instance}"
+    wait_until_healthy(link)
+    for arguments in (("takeoff", "--alt", 1), ("arm",)):
+        done = gcs("--connect", link, *arguments)
+        assert done.returncode == 0, done.stderr
     station = start("gcs_cli", "--connect", f"udp:{port}", "watch")
     station.wait_for("armed  N")
-    perf = start("gcs_cli", "--connect", f"udpout:127.0.0.1:{18570 + instance}", "perf", "--json")
-    assert perf.end() == 0, perf.output
-    figures = json.loads(perf.output)
+    perf = gcs("--connect", link, "perf", "--json")
+    assert perf.returncode == 0, perf.stderr
+    figures = json.loads(perf.stdout)
     assert figures["lockstep"] is False
     assert figures["ticks"] > 100
 

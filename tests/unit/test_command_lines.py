@@ -15,8 +15,10 @@ import flightstack
 from flightstack.__main__ import app as flightstack_app
 from gcs_cli.__main__ import app as gcs_app
 from sim_bridge.__main__ import app as sim_bridge_app
+from tests.support.commands import flightstack_command, gcs, sim_bridge_command
 
 APPS = {"flightstack": flightstack_app, "gcs": gcs_app, "sim-bridge": sim_bridge_app}
+COMMANDS = {"flightstack": flightstack_command, "gcs": gcs, "sim-bridge": sim_bridge_command}
 MODULES = {"flightstack": "flightstack", "gcs": "gcs_cli", "sim-bridge": "sim_bridge"}
 BRACKETS = re.compile(r"\[[^\]]*\]")
 
@@ -70,7 +72,7 @@ def run(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize("program", APPS)
 def test_version_names_the_program(program: str) -> None:
-    result = run(program, "--version")
+    result = COMMANDS[program]("--version")
     assert (result.returncode, result.stdout) == (0, f"{program} {flightstack.__version__}\n")
 
 

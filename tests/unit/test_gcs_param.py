@@ -21,8 +21,8 @@ from flightstack.params.param_file import ParamLine, format_params
 from gcs_cli.param_file import load_parameters, render_parameters
 from gcs_cli.param_info import ParamInfo, number_text, parse_metadata
 from gcs_cli.param_table import matching, parameter_table
+from tests.support.commands import Ended, gcs
 from tests.support.fake_vehicle import serve
-from tests.support.gcs import Ended, gcs
 from tests.support.param_vehicle import METADATA, ParamVehicle
 
 

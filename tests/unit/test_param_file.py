@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import threading
@@ -30,6 +29,7 @@ from flightstack.params.param_file import (
 )
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore
+from tests.support.commands import flightstack_command
 from tests.support.world import PEER
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -286,24 +286,20 @@ def test_order_of_precedence(tmp_path: Path) -> None:
     assert {frame[5] for frame in frames} == {42}, "the system id in MAVLink 2's header"
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "flightstack", "--check", *arguments]
-    return subprocess.run(command, cwd=ROOT, env=os.environ, capture_output=True, text=True, check=False)
-
-
-def test_the_process_refuses_a_damaged_file_in_one_sentence(tmp_path: Path) -> None:
+def test_a_check_refuses_a_damaged_file_in_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "my.params"
     path.write_text("1\t1\tMPC_XY_CRUISE\t50\t9\n")
-    done = run("--params", str(path))
+    done = flightstack_command("--check", "--params", path)
     assert done.returncode == 2
     sentence = f"{path}: line 1: MPC_XY_CRUISE: 50 is outside 0.1 to 20 m/s"
     assert done.stderr == f"flightstack: {sentence}\n"
-    assert run("--params", "none", "--param", "PID_ROLL_P=100").returncode == 0
+    good = flightstack_command("--check", "--params", "none", "--param", "PID_ROLL_P=100")
+    assert good.returncode == 0
 
 
 def test_a_file_that_is_named_and_missing_is_mentioned_and_begun(tmp_path: Path) -> None:
     path = tmp_path / "new" / "my.params"
-    done = run("--params", str(path))
+    done = flightstack_command("--check", "--params", path)
     assert done.returncode == 0
     assert (
         done.stderr == f"flightstack: warning: {path}: there is no such file: it begins with the defaults\n"
@@ -311,7 +307,7 @@ def test_a_file_that_is_named_and_missing_is_mentioned_and_begun(tmp_path: Path)
     assert not path.exists()  # a check changes nothing
     begin_param_file(path, 3)
     assert read_param_file(path) == []
-    assert run("--params", str(path)).stderr == ""
+    assert flightstack_command("--check", "--params", path).stderr == ""
 
 
 def test_a_file_that_cannot_be_begun_ends_the_start(tmp_path: Path) -> None:

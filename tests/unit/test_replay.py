@@ -15,7 +15,7 @@ from gcs_cli.errors import CliError
 from gcs_cli.flight_data import Flight, series
 from gcs_cli.log_damage import is_whole
 from gcs_cli.replay import Run, find_run, poses_of
-from tests.support.gcs import gcs
+from tests.support.commands import gcs
 from tests.support.square_plan import square_plan
 from tests.support.synthetic_flight import synthetic_flight_bytes
 

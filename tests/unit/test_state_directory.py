@@ -11,6 +11,7 @@ import pytest
 
 from flightstack.params.errors import ConfigError
 from flightstack.state_directory import StateDirectory
+from tests.support.commands import flightstack_command
 
 SAVED = "1\t1\tMPC_XY_CRUISE\t50\t9\n"
 REFUSED = "line 1: MPC_XY_CRUISE: 50 is outside 0.1 to 20 m/s"
@@ -25,19 +26,23 @@ def runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def start(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Start a vehicle that ends at its parameter file or before."""
+    """Start a vehicle that ends at its parameter file, in a process: the lock ends with it."""
     command = [sys.executable, "-m", "flightstack", "--log", "none", *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def test_parameters_of_an_earlier_version_are_adopted(runs: Path) -> None:
     (runs / "params-3.params").write_text(SAVED)
-    assert start("--instance", "3", "--check").stderr == f"flightstack: runs/params-3.params: {REFUSED}\n"
+    check = ("--instance", "3", "--check")
+    assert flightstack_command(*check).stderr == f"flightstack: runs/params-3.params: {REFUSED}\n"
     assert os.listdir(runs) == ["params-3.params"]  # a check changes nothing
     new = "runs/state-3/vehicle.params"
     moved = f"flightstack: runs/params-3.params was moved to {new}, where parameters are saved now\n"
     assert start("--instance", "3").stderr == f"{moved}flightstack: {new}: {REFUSED}\n"
-    assert start("--instance", "3").stderr == f"flightstack: {new}: {REFUSED}\n"
+    assert flightstack_command(*check).stderr == f"flightstack: {new}: {REFUSED}\n"
+    directory = StateDirectory(None, 3)
+    assert directory.open() is None  # nothing is moved again
+    directory.close()
     assert os.listdir(runs) == ["state-3"]
 
 
@@ -59,7 +64,7 @@ def test_a_second_vehicle_is_refused_a_state_directory(tmp_path: Path) -> None:
     assert first.open() is None
     (tmp_path / "other").symlink_to("state")
     for name in ("state", "other"):
-        done = start("--instance", "3", "--state", name)
+        done = flightstack_command("--log", "none", "--instance", "3", "--state", name)
         assert (done.returncode, done.stderr) == (2, f"flightstack: --state: {name}: {IN_USE}\n")
     first.close()
     second = StateDirectory(Path("state"), 1)
