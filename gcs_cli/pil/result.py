@@ -35,6 +35,8 @@ FORMAT = "flightstack-pil-1"
 PASSED, FAILED = "passed", "failed"
 COMPLETED = "completed"
 """Outcome of a flight that came to its end; see ``flight_outcome``."""
+WALL_TIME = "ns"
+"""Unit of the costs of a target that is a program on this machine."""
 _SHOWN = ("position", "target_attitude", "torque", "rotor_command")
 _LANDING_TICKS = 25.0
 """Two flights whose touchdown differs may be found landed in different ticks of the land detector."""
@@ -197,7 +199,8 @@ def target_checks(record: TargetRecord | None, ticks: int) -> Iterator[Check]:
         safe_states = max(safe_states, record.counted["safe_states"])
         overruns = max(overruns, record.counted["loop_overruns"])
     yield Check("safe states of the target", 0.0, float(safe_states), "")
-    yield Check("steps that overran their period", 0.0, float(overruns), "")
+    if record.unit != WALL_TIME:  # which passes while other programs run, too
+        yield Check("steps that overran their period", 0.0, float(overruns), "")
 
 
 def profiles_of(record: TargetRecord | None) -> list[StageProfile]:
@@ -225,7 +228,7 @@ _ABOUT_UNIT = {
         "Instructions executed under emulation. They repeat exactly, and are no time: how many cycles an instruction "
         "takes depends on the processor, its memory and its pipeline."
     ),
-    "ns": "Nanoseconds of this machine, which did other things as well.",
+    WALL_TIME: "Nanoseconds of this machine, which did other things as well.",
 }
 
 

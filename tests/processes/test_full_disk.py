@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pyulog import ULog
 
-from tests.support.gcs import gcs
+from tests.support.commands import gcs
 from tests.support.process import Process
 from tests.support.vehicle_processes import LONG_S, vehicle
 

@@ -9,7 +9,7 @@ import pytest
 
 from flightstack.port_numbers import ground_station_port, system_id, vehicle_ground_port
 from flightstack.transport.udp import UdpSocket
-from tests.support.gcs import gcs
+from tests.support.commands import gcs
 from tests.support.vehicle_processes import VehicleProcesses, vehicle
 
 

@@ -18,5 +18,7 @@ def test_folders_of_the_same_name_are_not_run(
     (tmp_path / "flightstack").mkdir()
     (tmp_path / "flightstack" / "__init__.py").write_text("raise SystemExit('the wrong one')")
     monkeypatch.chdir(Path(flightstack.__file__).parents[1] if inside else tmp_path)
-    done = subprocess.run(own_program("flightstack", "--version"), capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        own_program("flightstack", "--version"), capture_output=True, text=True, check=False
+    )
     assert (done.stdout, done.stderr) == (f"flightstack {flightstack.__version__}\n", "")

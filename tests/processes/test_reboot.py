@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pyulog import ULog
 
-from tests.support.gcs import gcs
+from tests.support.commands import gcs
 from tests.support.vehicle_processes import vehicle
 
 MISSION = Path(__file__).parents[2] / "missions" / "square.plan"

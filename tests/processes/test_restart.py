@@ -17,7 +17,7 @@ from flightstack.params.errors import ConfigError
 from flightstack.plan import MissionItem, load_plan
 from flightstack.state_directory import StateDirectory
 from flightstack.transport.udp import UdpSocket
-from tests.support.gcs import gcs
+from tests.support.commands import gcs
 from tests.support.vehicle_processes import LONG_S, VehicleProcesses, vehicle
 
 MISSIONS = Path(__file__).parents[2] / "missions"

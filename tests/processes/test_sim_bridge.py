@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 import signal
 import socket
-import subprocess
-import sys
 from collections.abc import Iterator
 
 import pytest
@@ -16,6 +14,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.mavlink.link import Link
 from tests.support.commands import sim_bridge_command
+from tests.support.programs import Program
 
 WAIT_S = 60.0  # the bound of every wait: compiling anew on a loaded machine takes ten seconds
 
@@ -24,11 +23,7 @@ class SimBridge:
     """The process, started on a free port."""
 
     def __init__(self, *arguments: str) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "sim_bridge", "--port", "0", *arguments],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        assert self.process.stdout is not None
+        self.process = Program("sim_bridge", ["--port", "0", *arguments])
         self.first_line = self.process.stdout.readline()
         found = re.search(r":(\d+), speed", self.first_line)
         assert found, self.first_line + self.end()[2]

@@ -10,8 +10,8 @@ from threading import Thread
 import pytest
 
 from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
+from tests.support.commands import gcs
 from tests.support.free_instance import free_instance
-from tests.support.gcs import gcs
 from tests.support.process import BOUND_S, Process
 from tests.support.vehicle_processes import wait_until_healthy
 

@@ -10,7 +10,7 @@ import pytest
 
 from flightstack.mavlink.services.pil_operations import BAD_INPUT, OVERRUN, REPEATED
 from gcs_cli.pil.report import render_report
-from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
+from gcs_cli.pil.result import COMPLETED, WALL_TIME, Flown, Outcome, closed_loop
 from gcs_cli.pil.signals import SIGNALS, STAGES
 from gcs_cli.pil.target_record import TargetRecord, record_of
 from gcs_cli.pil.verdict import CLOSED_LOOP_ULPS, OPEN_LOOP_ULPS, Check, all_passed
@@ -115,6 +115,13 @@ def test_a_target_that_missed_steps_or_failed_fails_the_verdict() -> None:
     assert failed(three(of=record(steps=8))) == ["steps flown without the target"]
     assert failed(three(of=record(safe_states=1))) == ["safe states of the target"]
     assert failed(three(of=record(loop_overruns=2))) == ["steps that overran their period"]
+
+
+def test_overruns_are_not_judged_by_the_time_of_a_machine_with_other_programs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(IDENTITY, "cost_unit", WALL_TIME)
+    assert three(of=record(loop_overruns=2)).passed
 
 
 @pytest.mark.parametrize("before", [3, 2**32 - 1], ids=["some", "about to wrap"])
