@@ -134,7 +134,8 @@ def test_a_state_that_is_not_finite_repeats_the_last_row_with_a_status_bit() -> 
         held = flight.tick(13)
         assert held[LoopRow.STATUS] == LoopStatus.INPUT_NOT_FINITE, (column, bad)
         assert held[: LoopRow.STATUS].tolist() == good[: LoopRow.STATUS].tolist(), (column, bad)
-        for memory in ("_position_memory", "_reference_memory", "_controller_memory"):  # nothing was integrated
+        # nothing was integrated meanwhile
+        for memory in ("_position_memory", "_reference_memory", "_controller_memory"):
             kept, expected = getattr(flight.loops, memory), getattr(undisturbed.loops, memory)
             assert kept.tolist() == expected.tolist(), (column, bad, memory)
         flight.state = at_rest()
