@@ -46,10 +46,18 @@ def portable() -> Path:
 
 
 @functools.cache
+def driverlib() -> Path:
+    """Compile the fake in place of driverlib into one object, once per run of the tests."""
+    return compile_c(
+        Path(workshop().name) / "driverlib.o", [FAKE / "fake_driverlib.c"], "-r", *FLAGS, f"-I{FAKE}"
+    )
+
+
+@functools.cache
 def built(*options: str) -> Path:
     """Link the port with the fake in place of driverlib into a library, once per set of options; main is left out."""
     folder = Path(tempfile.mkdtemp(dir=workshop().name))
-    sources = [portable(), *PORT_SOURCES, *sorted(FAKE.glob("*.c"))]
+    sources = [portable(), driverlib(), *PORT_SOURCES, FAKE / "bench.c"]
     here = [f"-I{FAKE}", '-DF28_BOARD="simulated chip"', *options]
     return compile_c(folder / "port.so", sources, "-shared", *FLAGS, *here)
 

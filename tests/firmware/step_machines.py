@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import os
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -23,8 +22,6 @@ C = Path(__file__).parent / "c"
 LOOPS = [*c_files("core"), *c_files("mavlink")]
 STEPS = [C / "steps.c", C / "steps_parameters.c"]
 INCLUDES = [*includes("core", "mavlink"), f"-I{C}"]
-NIGHTLY = bool(os.environ.get("NIGHTLY"))
-"""Set by what runs at night: everything, however long it takes."""
 STAGES = ("outer", "inner", "mixer", "whole")
 LIMIT_S = 3600.0
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.firmware.step_machines import NIGHTLY, first_difference, on_avr, on_host
+from tests.firmware.step_machines import first_difference, on_avr, on_host
 from tests.firmware.step_streams import flown_steps, random_steps
+from tests.support.tools import NIGHTLY
 
 RANDOM_STEPS = 100_000 if NIGHTLY else 1_500
 FLOWN_STEPS = None if NIGHTLY else 500

@@ -167,20 +167,21 @@ def test_pymavlink_agrees_on_a_clean_line(codec: ctypes.CDLL) -> None:
     assert (summary.skipped, summary.bad, summary.held) == (0, 0, 0)
 
 
-@pytest.mark.parametrize("lost", range(116))
-def test_a_lost_octet_costs_no_other_frame(codec: ctypes.CDLL, lost: int) -> None:
+def test_a_lost_octet_costs_no_other_frame(codec: ctypes.CDLL) -> None:
     """Whichever it is: also in the header, where the rest reads as an unknown message that ends in the next frame."""
     first, second = step_frame(1), step_frame(2)
-    found, summary = parse(codec, first[:lost] + first[lost + 1 :] + second, flush=True)
-    assert [f.sequence for f in found] == [2]
-    assert (summary.skipped, summary.unknown) == (115, 0)
+    assert len(first) == 116
+    for lost in range(len(first)):
+        found, summary = parse(codec, first[:lost] + first[lost + 1 :] + second, flush=True)
+        assert [f.sequence for f in found] == [2], lost
+        assert (summary.skipped, summary.unknown) == (115, 0), lost
 
 
-@pytest.mark.parametrize("lost", range(116))
-def test_a_doubled_octet_costs_no_other_frame(codec: ctypes.CDLL, lost: int) -> None:
+def test_a_doubled_octet_costs_no_other_frame(codec: ctypes.CDLL) -> None:
     first, second = step_frame(1), step_frame(2)
-    found, _ = parse(codec, first[:lost] + first[lost : lost + 1] + first[lost:] + second, flush=True)
-    assert [f.sequence for f in found][-1] == 2
+    for doubled in range(len(first)):
+        found, _ = parse(codec, first[: doubled + 1] + first[doubled:] + second, flush=True)
+        assert [f.sequence for f in found][-1] == 2, doubled
 
 
 def test_frames_inside_a_false_start_come_at_once_when_it_is_found_out(codec: ctypes.CDLL) -> None:

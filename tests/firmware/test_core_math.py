@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from tests.firmware.core_support import Core, ulps
+from tests.support.tools import NIGHTLY
 
-COUNT = 1_000_000
+COUNT = 1_000_000 if NIGHTLY else 200_000
 REALS = ("float", "double")
 
 if np.finfo(np.longdouble).nmant < 60:

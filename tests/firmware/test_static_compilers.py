@@ -52,13 +52,15 @@ def test_the_boards_port_compiles_on_a_host_without_a_word(name: str, tmp_path: 
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("path", portable_sources(), ids=lambda path: path.name)
-def test_no_source_uses_what_a_target_lacks(path: Path) -> None:
-    """The poison header ends the compilation at the first such word."""
+def test_no_source_uses_what_a_target_lacks() -> None:
+    """The poison header ends the compilation at the first such word; gcc names the file."""
     available(TARGETS["gcc"])
-    allowed = ["-DPOISON_ALLOWS_MEMCPY"] if path.name in SIZEOF_IS_OF_AN_OBJECT else []
-    done = run([*POISON, *allowed, path])
-    assert (done.returncode, done.stderr) == (0, "")
+    sources = portable_sources()
+    copying = [path for path in sources if path.name in SIZEOF_IS_OF_AN_OBJECT]
+    others = [path for path in sources if path not in copying]
+    for command in ([*POISON, *others], [*POISON, "-DPOISON_ALLOWS_MEMCPY", *copying]):
+        done = run(command)
+        assert (done.returncode, done.stderr) == (0, "")
 
 
 FORBIDDEN = [

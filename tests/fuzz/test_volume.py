@@ -1,4 +1,4 @@
-"""Two hundred thousand seeded inputs on the vehicle's ground links: plain, signed and as a stream over TCP.
+"""Tens of thousands of seeded inputs on the vehicle's ground links: plain, signed and as a stream over TCP.
 
 A guard stands behind every single one: see ``tests.fuzz.guard``. The vehicle has logs to be asked for.
 """
@@ -22,9 +22,14 @@ from tests.fuzz.measure import held
 from tests.fuzz.memory_logs import MemoryLogs
 from tests.fuzz.script import KEY
 from tests.fuzz.targets import answers, check_vehicle
+from tests.support.tools import NIGHTLY
 from tests.support.world import World, item
 
-INPUTS = {"plain": 80_000, "signed": 60_000, "stream": 60_000}
+INPUTS = (
+    {"plain": 80_000, "signed": 60_000, "stream": 60_000}
+    if NIGHTLY
+    else dict.fromkeys(("plain", "signed", "stream"), 20_000)
+)
 A_WORLD = 10_000
 """Inputs until the vehicle is a new one: it may have been told to erase its logs, or to end its flight."""
 A_TICK = 100
@@ -118,7 +123,7 @@ def throw(name: str, world: World, inputs: Inputs, signatures: Signatures) -> tu
 
 
 @pytest.mark.parametrize("name", INPUTS)
-def test_two_hundred_thousand_inputs(name: str) -> None:
+def test_inputs_leave_the_vehicle_sound(name: str) -> None:
     seed = 1_000 + list(INPUTS).index(name)
     inputs, signatures = Inputs(seed, sources=(1, 7, 255)), Signatures(seed)
     tried = plans = parameters = 0
@@ -143,8 +148,5 @@ def test_two_hundred_thousand_inputs(name: str) -> None:
     assert tried == INPUTS[name]
     assert len(inputs.drawn) == len(KINDS)
     assert most_held < MOST_HELD
-    assert min(plans, parameters) > 100  # the guard has seen changes
-
-
-def test_the_inputs_are_as_many_as_the_title_says() -> None:
-    assert sum(INPUTS.values()) == 200_000
+    # the guard has seen changes; without NIGHTLY 28 of plans at the fewest
+    assert min(plans, parameters) > (100 if NIGHTLY else 15)

@@ -1,4 +1,4 @@
-"""Each law of the core in C against Python's, on a million random inputs.
+"""Each law of the core in C against Python's, on random inputs.
 
 With double the operations and their order are Python's: every number has the same bits. With float the difference is
 counted in units of the last place of the largest value that the quantity has among the samples (its full scale, as of
@@ -23,8 +23,9 @@ from tests.firmware import core_reference as python
 from tests.firmware.core_samples import Samples
 from tests.firmware.core_support import Core, same_bits, ulps
 from tests.support.rotor_sets import multirotor, ring
+from tests.support.tools import NIGHTLY
 
-COUNT = 1_000_000
+COUNT = 1_000_000 if NIGHTLY else 200_000
 DT_S = (0.0005, 0.02)
 
 

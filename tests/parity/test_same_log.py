@@ -1,7 +1,8 @@
 """The same log on every processor: flights under settings that make libraries choose the code of an older one.
 
 Each setting is first shown to act, on what its library computes in the same process. Where it does not, the machine has
-one variant only, and the test is skipped. Other architectures: tests/firmware/test_aarch64.py.
+one variant only, and the test is skipped. All settings act in one process; with NIGHTLY=1 each has its own, which shows
+which of them a difference comes from. Other architectures: tests/firmware/test_aarch64.py.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from tests.parity.flown_log import CONTROLLERS
+from tests.support.tools import NIGHTLY
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -29,21 +31,29 @@ SETTINGS = {
     "lapack": {"OPENBLAS_CORETYPE": "Nehalem"},
     "libm": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-AVX2"},
     "numpy": {"NPY_DISABLE_CPU_FEATURES": newer_features()},
+    "numba": {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""},
 }
 
 
 @functools.cache
-def digests(*settings: tuple[str, str]) -> dict[str, str]:
-    """Digests of libraries and logs in a process with these settings."""
+def digests(*libraries: str) -> dict[str, str]:
+    """Digests of libraries and logs in a process with the settings of these libraries."""
     command = [sys.executable, "-m", "tests.parity.flown_log", "square.plan"]
-    environment = {**os.environ, **dict(settings)}
+    environment = {
+        **os.environ,
+        **{name: value for one in libraries for name, value in SETTINGS[one].items()},
+    }
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True)
     return dict(line.split() for line in done.stdout.splitlines())
 
 
-@pytest.mark.parametrize("library", SETTINGS)
+def elsewhere(library: str) -> dict[str, str]:
+    return digests(*([library] if NIGHTLY else SETTINGS))
+
+
+@pytest.mark.parametrize("library", ["lapack", "libm", "numpy"])
 def test_log_does_not_depend_on_the_variant_of(library: str) -> None:
-    here, there = digests(), digests(*SETTINGS[library].items())
+    here, there = digests(), elsewhere(library)
     if here[library] == there[library]:
         pytest.skip(f"{library} has one variant on this machine")
     assert [here[law] for law in CONTROLLERS] == [there[law] for law in CONTROLLERS]
@@ -51,5 +61,5 @@ def test_log_does_not_depend_on_the_variant_of(library: str) -> None:
 
 def test_log_does_not_depend_on_the_processor_that_numba_compiles_for() -> None:
     """LLVM chooses instructions for the processor; it must neither contract nor reorder. Compiles anew: a minute."""
-    here, there = digests(), digests(("NUMBA_CPU_NAME", "generic"), ("NUMBA_CPU_FEATURES", ""))
+    here, there = digests(), elsewhere("numba")
     assert [here[law] for law in CONTROLLERS] == [there[law] for law in CONTROLLERS]

@@ -12,6 +12,7 @@ from flightstack.mavlink.services.log_store import DatedLogs, FlatLogs
 from flightstack.mavlink.services.virtual_files import Entry, FileTree, fixed
 from flightstack.transport.memory import LOSSLESS, Conditions
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station, content
+from tests.support.tools import NIGHTLY
 
 BIG = content(300_000)
 LOGS = MemoryLogs({"one.ulg": b"first", "two.ulg": content(1000)})
@@ -62,13 +63,13 @@ def test_a_made_up_file_sees_its_arguments() -> None:
     assert download("@PARAM/param.pck?withdefaults=1") == FtpDone(b"pack withdefaults=1")
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(8 if NIGHTLY else 2))
 def test_a_file_is_identical_over_a_link_that_loses_a_third(seed: int) -> None:
     # the worst of these seeds takes 9 s
     assert download("big.bin", LOSSY, seed, limit_s=25.0) == FtpDone(BIG)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(4 if NIGHTLY else 2))
 def test_half_of_all_packets_may_get_lost(seed: int) -> None:
     conditions = LOSSY._replace(loss=0.5)
     assert download("big.bin", conditions, seed, limit_s=60.0) == FtpDone(BIG)

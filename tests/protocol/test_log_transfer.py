@@ -11,6 +11,7 @@ from flightstack.mavlink.services.log_client import LogClient, LogDone, LogEntry
 from flightstack.mavlink.services.log_server import LogServer
 from flightstack.transport.memory import LOSSLESS, Conditions
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station, content
+from tests.support.tools import NIGHTLY
 
 LOGS = {"first.ulg": content(90 * 30), "empty.ulg": b"", "big.ulg": content(200_000), "open.ulg": content(91)}
 
@@ -48,7 +49,7 @@ def fetch(entry: LogEntry, conditions: Conditions = LOSSLESS, seed: int = 0) -> 
     return client.result, took_s
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(4 if NIGHTLY else 2))
 def test_the_list_is_complete(seed: int) -> None:
     client = LogClient(VEHICLE)
     client.start_list()
@@ -70,7 +71,7 @@ def test_a_log_comes_whole(name: str) -> None:
     assert took_s < 0.6  # 2223 messages at 4000 per second
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(6 if NIGHTLY else 2))
 def test_a_log_is_identical_over_a_link_that_loses_a_third(seed: int) -> None:
     result, took_s = fetch(entry_of("big.ulg"), LOSSY, seed)
     assert result == LogDone(content=LOGS["big.ulg"])

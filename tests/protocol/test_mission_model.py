@@ -14,6 +14,7 @@ from flightstack.mavlink.services.mission_store import MissionCleared, MissionRe
 from flightstack.plan import MissionItem, MissionResult, MissionType
 from tests.protocol.mission_harness import LOSSY, GroundStation, World, mission
 from tests.support.fences import circle, polygon, rally_point, square
+from tests.support.tools import NIGHTLY
 
 KINDS = (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)
 SERVICES = st.tuples(st.sampled_from(["one", "two"]), st.sampled_from(KINDS))
@@ -157,6 +158,6 @@ class Transfers(RuleBasedStateMachine):
 
 
 Transfers.TestCase.settings = settings(
-    derandomize=True, deadline=None, max_examples=200, stateful_step_count=40
+    derandomize=True, deadline=None, max_examples=200 if NIGHTLY else 60, stateful_step_count=40
 )
 TestTransfers = Transfers.TestCase

@@ -1,4 +1,4 @@
-"""System tools that tests need: without one a test is skipped, but where CI installs them all, it fails."""
+"""What the machine gives the tests: tools (without one a test is skipped, but fails on CI), and time."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import os
 from typing import NoReturn
 
 import pytest
+
+NIGHTLY = bool(os.environ.get("NIGHTLY"))
+"""True if all samples and combinations are run, however long it takes; otherwise a part of them."""
 
 
 def missing(sentence: str) -> NoReturn:

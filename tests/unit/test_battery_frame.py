@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -45,13 +44,14 @@ def test_the_bytes_are_those_of_pymavlink(report: BatteryReport, seq: int) -> No
     assert report_of(message) == report
 
 
-@pytest.mark.parametrize("at", range(48))
-def test_a_changed_octet_makes_it_no_battery(at: int) -> None:
+def test_a_changed_octet_makes_it_no_battery() -> None:
     """All but those of sequence, system and component are told by the header or the checksum; so are these."""
     frame = bytearray(encode_battery(THREE_CELLS, 0, 1, 200))
     assert len(frame) == 48
-    frame[at] ^= 0x10
-    assert decode_battery(frame) is None
+    for at in range(len(frame)):
+        changed = frame.copy()
+        changed[at] ^= 0x10
+        assert decode_battery(changed) is None, at
 
 
 @given(st.binary(max_size=80), st.integers(0, 60))

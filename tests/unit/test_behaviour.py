@@ -30,17 +30,15 @@ def test_a_change_is_a_copy() -> None:
     assert after.updated("MPC_XY_CRUISE", 4.0) == before
 
 
-@pytest.mark.parametrize("name", SPECS)
-def test_ranges_include_their_ends_and_nothing_beyond(name: str) -> None:
-    spec = SPECS[name]
-    for end in (spec.low, spec.high):
-        assert Behaviour().updated(name, end).by_name()[name] == end
-    beyond = (spec.low - 0.01, spec.high + 0.01, math.nan, math.inf, -math.inf)
-    for value in beyond:
-        with pytest.raises(
-            ConfigError, match=rf"^parameter: {name}: \S+ is outside {spec.low:g} to {spec.high:g}"
-        ):
-            Behaviour().updated(name, value)
+def test_ranges_include_their_ends_and_nothing_beyond() -> None:
+    for name, spec in SPECS.items():
+        for end in (spec.low, spec.high):
+            assert Behaviour().updated(name, end).by_name()[name] == end, name
+        beyond = (spec.low - 0.01, spec.high + 0.01, math.nan, math.inf, -math.inf)
+        sentence = rf"^parameter: {name}: \S+ is outside {spec.low:g} to {spec.high:g}"
+        for value in beyond:
+            with pytest.raises(ConfigError, match=sentence):
+                pytest.fail(f"{name} is {Behaviour().updated(name, value).by_name()[name]}")
 
 
 def test_assignments_are_read_in_order_and_in_any_case() -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import subprocess
 import sys
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -17,16 +20,34 @@ from flightstack.compiled import compiled
 JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
 ROOT = Path(__file__).resolve().parents[2]
 LOADED = """
+import json
+import os
 import sys
 from numba.core.dispatcher import Dispatcher
-{setup}
-found = {{id(value): value for name, module in list(sys.modules.items())
-         if name.partition(".")[0] in ("flightstack", "sim_bridge")
-         for value in [*vars(module).values(), *getattr(module, "_specialised", {{}}).values()]
-         if isinstance(value, Dispatcher)}}
-used = [kernel for kernel in found.values() if kernel.overloads]
-compiled = [kernel for kernel in used if sum(kernel.stats.cache_misses.values())]
-print("compiled" if compiled else " ".join(sorted(kernel.py_func.__name__.partition("__")[0] for kernel in used)))
+import flightstack.assembly
+import sim_bridge.simulator
+
+def report(name):
+    found = {id(value): value for module_name, module in list(sys.modules.items())
+             if module_name.partition(".")[0] in ("flightstack", "sim_bridge")
+             for value in [*vars(module).values(), *getattr(module, "_specialised", {}).values()]
+             if isinstance(value, Dispatcher)}
+    used = [kernel for kernel in found.values() if kernel.overloads]
+    compiled = any(sum(kernel.stats.cache_misses.values()) for kernel in used)
+    print(json.dumps([name, compiled, sorted(k.py_func.__name__.partition("__")[0] for k in used)]), flush=True)
+
+for name, setup in json.loads(sys.argv[1]).items():
+    child = os.fork()
+    if not child:
+        try:
+            exec(setup, {})
+            report(name)
+            os._exit(0)
+        except BaseException as error:
+            print(name, repr(error), file=sys.stderr, flush=True)
+        finally:
+            os._exit(1)
+    assert os.waitpid(child, 0)[1] == 0, name
 """
 STACK = """
 from flightstack.assembly import build
@@ -56,19 +77,24 @@ def whole(x: float) -> float:
     return 2.0 * part(x)
 
 
-def loaded_kernels(setup: str) -> list[str]:
-    """Names of the kernels that a process with warm caches reads: those that it calls, not what these call."""
+SETUPS = {
+    **{loops: STACK.format(loops=loops) for loops in ("python", "c")},
+    **{plant: PLANT.format(plant=plant) for plant in ("rigid", "paper")},
+    **({"multibody": PLANT.format(plant="multibody")} if find_spec("mujoco") else {}),
+}
+
+
+@cache
+def loaded_kernels() -> dict[str, list[str]]:
+    """Names of the kernels that each setup reads from warm caches: those that it calls, not what these call."""
+    command = [sys.executable, "-c", LOADED, json.dumps(SETUPS)]
     for _ in range(2):  # the first one may have to compile them
-        run = subprocess.run(
-            [sys.executable, "-c", LOADED.format(setup=setup)],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        if run.stdout.strip() != "compiled":
+        run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+        assert run.returncode == 0, run.stderr
+        reports = [json.loads(line) for line in run.stdout.splitlines() if line.startswith("[")]
+        if not any(compiled for _, compiled, _ in reports):
             break
-    return run.stdout.splitlines()[-1].split()
+    return {name: ["compiled"] if compiled else kernels for name, compiled, kernels in reports}
 
 
 @JIT
@@ -103,7 +129,7 @@ def test_kernels_of_the_stack_are_those_it_loads(loops: str) -> None:
     from flightstack.config import DEFAULT_HOME, StackConfig  # noqa: PLC0415
 
     config = StackConfig("paper_quad", "pid", "tuned", loops, 500.0, 100.0, False, True, DEFAULT_HOME, 1)
-    assert loaded_kernels(STACK.format(loops=loops)) == sorted(kernels_of(config))
+    assert loaded_kernels()[loops] == sorted(kernels_of(config))
 
 
 @JIT
@@ -113,7 +139,7 @@ def test_kernels_of_a_plant_are_those_it_loads(plant: str) -> None:
 
     if plant == "multibody":
         pytest.importorskip("mujoco")
-    assert loaded_kernels(PLANT.format(plant=plant)) == sorted(kernels_of(plant))
+    assert loaded_kernels()[plant] == sorted(kernels_of(plant))
 
 
 @JIT

@@ -101,16 +101,16 @@ def rigid_body() -> tuple[Evaluator, Evaluator, Evaluator]:
     return evaluator(turned), evaluator(kinematics), evaluator(rates)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_paper_plant_is_equation_7_corrected(seed: int) -> None:
-    start, speeds = random_start(np.random.default_rng(seed))
-    plant = CompiledPlant(PAPER, "paper", PlantOptions(initial=start, ground=False, limits=False))
-    plant.set_rotor_speeds(speeds)
-    slope, at = slopes(plant), values(start, speeds)
+def test_paper_plant_is_equation_7_corrected() -> None:
     acceleration, rates = equation_7()
-    assert np.allclose(slope[3:6], acceleration(at), rtol=1e-13, atol=1e-12)
-    assert slope[6:9] == pytest.approx(start.rates_frd_rad_s)
-    assert np.allclose(slope[9:12], rates(at), rtol=1e-12, atol=1e-11)
+    for seed in range(20):
+        start, speeds = random_start(np.random.default_rng(seed))
+        plant = CompiledPlant(PAPER, "paper", PlantOptions(initial=start, ground=False, limits=False))
+        plant.set_rotor_speeds(speeds)
+        slope, at = slopes(plant), values(start, speeds)
+        assert np.allclose(slope[3:6], acceleration(at), rtol=1e-13, atol=1e-12), seed
+        assert slope[6:9] == pytest.approx(start.rates_frd_rad_s), seed
+        assert np.allclose(slope[9:12], rates(at), rtol=1e-12, atol=1e-11), seed
 
 
 def quaternion(*angles: sp.Expr) -> sp.Matrix:
@@ -125,21 +125,20 @@ def quaternion(*angles: sp.Expr) -> sp.Matrix:
     return sp.Matrix(product(product(yaw, pitch), roll))
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_rigid_plant_is_newton_euler_with_full_kinematics(seed: int) -> None:
+def test_rigid_plant_is_newton_euler_with_full_kinematics() -> None:
     """Its quaternion turns as φ, θ, ψ do by W⁻¹ ω; its rates by I ω' + ω × (I ω + h e_z) = τ."""
-    start, speeds = random_start(np.random.default_rng(1000 + seed))
-    plant = CompiledPlant(
-        PAPER.with_ideal_rotors(), "rigid", PlantOptions(initial=start, ground=False, limits=False)
-    )
-    plant.set_rotor_speeds(speeds)
-    plant._memory[0]["command"][:4] = speeds
-    slope, at = slopes(plant), values(start, speeds)
     turned, kinematics, rates = rigid_body()
-    assert np.allclose(slope[3:6], equation_7()[0](at), rtol=1e-12, atol=1e-11)
-    sign = math.copysign(1.0, float(turned(at) @ plant._memory[0]["body"][6:10]))
-    assert np.allclose(slope[6:10], sign * kinematics(at), rtol=1e-11, atol=1e-11)
-    assert np.allclose(slope[10:13], rates(at), rtol=1e-12, atol=1e-11)
+    ideal = PAPER.with_ideal_rotors()
+    for seed in range(1000, 1020):
+        start, speeds = random_start(np.random.default_rng(seed))
+        plant = CompiledPlant(ideal, "rigid", PlantOptions(initial=start, ground=False, limits=False))
+        plant.set_rotor_speeds(speeds)
+        plant._memory[0]["command"][:4] = speeds
+        slope, at = slopes(plant), values(start, speeds)
+        assert np.allclose(slope[3:6], equation_7()[0](at), rtol=1e-12, atol=1e-11), seed
+        sign = math.copysign(1.0, float(turned(at) @ plant._memory[0]["body"][6:10]))
+        assert np.allclose(slope[6:10], sign * kinematics(at), rtol=1e-11, atol=1e-11), seed
+        assert np.allclose(slope[10:13], rates(at), rtol=1e-12, atol=1e-11), seed
 
 
 def test_rigid_plant_feels_its_rotors_spin_up() -> None:
@@ -168,41 +167,40 @@ def law() -> Callable[..., float]:
     return sp.lambdify([x1, x2, x1d, v1d, a1d, c1, c2, drift, gain], LAW)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_backstepping_code_is_the_corrected_law(seed: int) -> None:
+def test_backstepping_code_is_the_corrected_law() -> None:
     """U2, U3, U4 from the law with f = the model's row without its input, turned into torques."""
-    random = np.random.default_rng(seed)
-    c = random.uniform(1.0, 300.0, 6)
-    error, rates, rates_d, push = (random.uniform(-2.0, 2.0, 3) for _ in range(4))
-    omega_r = float(random.uniform(-200.0, 200.0))
-    ix, iy, iz = PAPER.inertia_kg_m2
-    params = BacksteppingParams(*c, 1.0, 1.0, ix, iy, iz, ROTOR.inertia_kg_m2)
-    upright = Quaternion(1.0, 0.0, 0.0, 0.0)
-    inputs = AttitudeInputs(
-        upright,
-        Vector3(*rates),
-        AttitudeReference(upright, Vector3(*rates_d), Vector3(*push)),
-        Vector3(*error),
-        omega_r,
-        Vector3(0.0, 0.0, 0.0),
-    )
-    _, torque = attitude_backstepping_step(BacksteppingMemory(0.0), inputs, params, 1e-3)
-    spin = sp.Symbol("W")
-    arms = (float(ARM.subs(TABLE_I)), float(ARM.subs(TABLE_I)), 1.0)
-    for axis, row in enumerate(attitude_rows(spin)):
-        known = {**dict(zip(RATES, rates, strict=True)), spin: omega_r, **TABLE_I}
-        effect = float(row.diff(U[axis + 1]).subs(known))
-        model = float(row.subs(U[axis + 1], 0).subs(known))
-        law = sp.lambdify([x1, x2, x1d, v1d, a1d, c1, c2, drift, gain], LAW)
-        u = law(
-            0.0,
-            rates[axis],
-            error[axis],
-            rates_d[axis],
-            push[axis],
-            c[2 * axis],
-            c[2 * axis + 1],
-            model,
-            effect,
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        c = random.uniform(1.0, 300.0, 6)
+        error, rates, rates_d, push = (random.uniform(-2.0, 2.0, 3) for _ in range(4))
+        omega_r = float(random.uniform(-200.0, 200.0))
+        ix, iy, iz = PAPER.inertia_kg_m2
+        params = BacksteppingParams(*c, 1.0, 1.0, ix, iy, iz, ROTOR.inertia_kg_m2)
+        upright = Quaternion(1.0, 0.0, 0.0, 0.0)
+        inputs = AttitudeInputs(
+            upright,
+            Vector3(*rates),
+            AttitudeReference(upright, Vector3(*rates_d), Vector3(*push)),
+            Vector3(*error),
+            omega_r,
+            Vector3(0.0, 0.0, 0.0),
         )
-        assert torque[axis] == pytest.approx(arms[axis] * u, rel=1e-11, abs=1e-12)
+        _, torque = attitude_backstepping_step(BacksteppingMemory(0.0), inputs, params, 1e-3)
+        spin = sp.Symbol("W")
+        arms = (float(ARM.subs(TABLE_I)), float(ARM.subs(TABLE_I)), 1.0)
+        for axis, row in enumerate(attitude_rows(spin)):
+            known = {**dict(zip(RATES, rates, strict=True)), spin: omega_r, **TABLE_I}
+            effect = float(row.diff(U[axis + 1]).subs(known))
+            model = float(row.subs(U[axis + 1], 0).subs(known))
+            u = law()(
+                0.0,
+                rates[axis],
+                error[axis],
+                rates_d[axis],
+                push[axis],
+                c[2 * axis],
+                c[2 * axis + 1],
+                model,
+                effect,
+            )
+            assert torque[axis] == pytest.approx(arms[axis] * u, rel=1e-11, abs=1e-12), (seed, axis)

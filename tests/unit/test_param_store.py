@@ -143,14 +143,14 @@ def test_names_are_sorted_and_single() -> None:
         ParamStore([GAIN, GAIN])
 
 
-@pytest.mark.parametrize("spec", SPECS.values(), ids=lambda spec: spec.name)
-def test_declarations_are_sound(spec: ParamSpec) -> None:
-    assert spec.accepted(spec.default) == spec.default
-    assert spec.group != "Miscellaneous"
-    assert not spec.help.endswith(".")
-    if spec.is_integer:
-        assert spec.decimals == 0
-        assert all(float(number).is_integer() for number in (spec.default, spec.low, spec.high))
-    for choice, meaning in spec.choices:
-        assert spec.low <= choice <= spec.high
-        assert meaning[0].isupper()
+def test_declarations_are_sound() -> None:
+    for spec in SPECS.values():
+        assert spec.accepted(spec.default) == spec.default, spec
+        assert spec.group != "Miscellaneous", spec
+        assert not spec.help.endswith("."), spec
+        if spec.is_integer:
+            assert spec.decimals == 0, spec
+            assert all(float(number).is_integer() for number in (spec.default, spec.low, spec.high)), spec
+        for choice, meaning in spec.choices:
+            assert spec.low <= choice <= spec.high, spec
+            assert meaning[0].isupper(), spec
