@@ -1,0 +1,62 @@
+"""Fly twenty flights in this process and print the SHA-256 of their logs: a change of form changes none of them.
+
+python -m tools.flight_hashes > before.txt; ...; python -m tools.flight_hashes | diff before.txt -
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+from tests.support.world import World
+
+GUSTY: dict[str, Any] = {"vehicle": "x_quad", "wind": (4.0, -2.0, 0.0), "gust": 1.0, "seed": 3}
+FLIGHTS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("square.plan", {}),
+    ("square.plan", {"controller": "backstepping"}),
+    ("square.plan", {"gains": "paper", "inner_hz": 1000.0, "ideal_rotors": True}),
+    (
+        "square.plan",
+        {"controller": "backstepping", "gains": "paper", "inner_hz": 1000.0, "ideal_rotors": True},
+    ),
+    ("square.plan", {"vehicle": "x_quad"}),
+    ("square.plan", {"vehicle": "x_quad", "controller": "backstepping"}),
+    ("square.plan", {"loops": "c"}),
+    ("square.plan", {"loops": "c", "controller": "backstepping", **GUSTY}),
+    ("square.plan", {"plant": "paper"}),
+    ("square.plan", {"plant": "multibody"}),
+    ("square.plan", {"plant": "multibody", "vehicle": "x_quad", "controller": "backstepping"}),
+    ("square.plan", GUSTY),
+    ("square.plan", {**GUSTY, "controller": "backstepping", "torque_gust": 0.02}),
+    ("hop.plan", {"inner_hz": 250.0, "outer_hz": 50.0}),
+    ("hop.plan", {"loops": "host"}),
+    ("hop.plan", {"loops": "emulated"}),
+    ("square.plan", {"force": (0.3, 0.1, 0.0), "params": ("MIS_TAKEOFF_ALT=4",)}),
+    ("fenced_square.plan", {**GUSTY, "loops": "c"}),
+    ("triangle.waypoints", {"vehicle": "x_quad"}),
+    ("every_item.plan", {**GUSTY, "seed": 5}),
+)
+"""Plans by vehicles, controllers, gains, plants, loops and rates."""
+LIMIT_S = 400.0
+
+
+def fly(plan: str, options: dict[str, Any]) -> str:
+    """Return the SHA-256 of the log."""
+    world = World(**options)
+    try:
+        world.upload(plan)
+        world.start_mission()
+        world.until_disarmed(LIMIT_S)
+    finally:
+        world.stack.loops.close()
+    return hashlib.sha256(world.log).hexdigest()
+
+
+def main() -> None:
+    """Print a line for each flight."""
+    for plan, options in FLIGHTS:
+        print(fly(plan, options), plan, *(f"{name}={value}" for name, value in options.items()), flush=True)
+
+
+if __name__ == "__main__":
+    main()
