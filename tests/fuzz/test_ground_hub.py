@@ -16,10 +16,9 @@ from flightstack.mavlink.signing import Signing
 from flightstack.port_numbers import API, GROUND
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import calls, held
-from tests.support.tools import NIGHTLY
 from tests.support.world import World, item
 
-MESSAGES = 8_000 if NIGHTLY else 4_000
+MESSAGES = 8_000
 TICK_EVERY = 40
 MOST_HELD = 1_000_000
 """Objects and octets that a hub may keep after any number of messages: its queue of 4096 frames is most of it."""
