@@ -39,10 +39,10 @@ fly: $(FLY_READY) ## Fly missions/square.plan: simulator, flight stack and groun
 	@$(BIN)/gcs fly missions/square.plan
 
 test: $(READY) ## Run every test
-	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --durations 15
+	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --durations 15
 
 stress: $(READY) ## Run every test beside a program that keeps each core busy
-	@$(BIN)/python tools/beside_load.py $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
+	@$(BIN)/python tools/beside_load.py $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 check: lint types imports generated test ## Everything that CI checks
 
