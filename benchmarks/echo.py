@@ -6,7 +6,7 @@ import socket
 import sys
 from collections.abc import Callable
 
-from flightstack.transport.tcp import wait_in_kernel
+from flightstack.transports.tcp import wait_in_kernel
 
 
 def receiver(connection: socket.socket, spin: bool) -> Callable[[], int]:

@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.ports import free_instance
 from benchmarks.real_time import PERIOD_NS, child
 from benchmarks.three_processes import ROOT
-from flightstack.port_numbers import ground_station_port, simulator_port
+from flightstack.core.port_numbers import ground_station_port, simulator_port
 
 START_TICKS = 500
 _START_S = 60.0

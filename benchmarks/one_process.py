@@ -7,9 +7,9 @@ from enum import Enum
 from typing import NamedTuple
 
 from benchmarks.measure import Figure, figure
-from flightstack.logging.flight_log import FlightLog
+from flightstack.flight_log.flight_log import FlightLog
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.mission_client import Done
+from gcs_cli.clients.mission_client import Done
 from tests.support.world import World
 
 PLAN = "square.plan"

@@ -9,10 +9,10 @@ import numpy as np
 
 from benchmarks.measure import Figure, figure, interleaved_us
 from benchmarks.three_processes import fly
-from flightstack.contract import Vector3
-from flightstack.mavlink.hot_frames import ARMED_FLAG
+from flightstack.core.contract import Vector3
 from flightstack.params.vehicle import load_vehicle
-from sim_bridge.plant import InitialState, PlantOptions
+from flightstack.simulator_link.hot_frames import ARMED_FLAG
+from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.plants import make_plant
 
 PLANTS = ("rigid", "multibody")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from flightstack.port_numbers import (
+from flightstack.core.port_numbers import (
     ground_station_port,
     simulator_port,
     tcp_port,

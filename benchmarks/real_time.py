@@ -17,8 +17,8 @@ import numpy as np
 
 from benchmarks.ports import free_instance
 from benchmarks.three_processes import ROOT
-from flightstack.clock import DeadlineScheduler, LoopTiming, ask_for_punctual_sleeps
-from flightstack.port_numbers import ground_station_port, simulator_port
+from flightstack.core.port_numbers import ground_station_port, simulator_port
+from flightstack.process.clock import DeadlineScheduler, LoopTiming, ask_for_punctual_sleeps
 
 PERIOD_NS = 2_000_000
 SLICES = 5

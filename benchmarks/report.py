@@ -14,7 +14,7 @@ from benchmarks.round_trip import WAYS
 from benchmarks.step_costs import Part
 from benchmarks.table import Row, table
 from benchmarks.three_processes import Flights
-from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
+from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 
 # on a machine of the same kind: PX4 with an external simulator, ArduCopter's SITL in one process
 PEERS = {500.0: ("≥ 20", "PX4 10"), 250.0: ("≥ 40", "PX4 18–23")}

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from benchmarks.echo import receiver
 from benchmarks.measure import Figure, figure
-from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
+from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 
 
 class Way(NamedTuple):

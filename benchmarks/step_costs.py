@@ -10,16 +10,16 @@ import numpy as np
 
 from benchmarks.measure import Figure, interleaved_us
 from benchmarks.one_process import BenchWorld, Station
-from flightstack.contract import MAX_ROTORS, LoopRow, Vector3
+from flightstack.core.contract import MAX_ROTORS, LoopRow, Vector3
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
-from flightstack.mavlink.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.streams import GROUND_RATES_HZ
-from flightstack.mavlink.telemetry import MAKERS
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.compiled_plant import CompiledPlant
-from sim_bridge.lockstep import SimulatorLink
-from sim_bridge.plant import InitialState, PlantOptions
+from flightstack.services.telemetry import MAKERS
+from flightstack.services.telemetry.streams import GROUND_RATES_HZ
+from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
+from sim_bridge.plant.compiled_plant import CompiledPlant
+from sim_bridge.plant.plant import InitialState, PlantOptions
+from sim_bridge.server.lockstep import SimulatorLink
 from sim_bridge.simulator import Simulator
 
 Call = Callable[[], object]

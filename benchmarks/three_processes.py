@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 from benchmarks.measure import Figure, figure
 from benchmarks.ports import free_instance
-from flightstack.config import DEFAULT_HOME
-from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.core.port_numbers import simulator_port
+from flightstack.params.config import DEFAULT_HOME
 from flightstack.params.vehicle import load_vehicle
-from flightstack.port_numbers import simulator_port
+from flightstack.simulator_link.endpoint import SimulatorLink
 
 ROOT = Path(__file__).resolve().parent.parent
 PLAN = ROOT / "missions" / "square.plan"

@@ -10,8 +10,8 @@ import sys
 import time
 from pathlib import Path
 
-from flightstack import clock
 from flightstack.__main__ import main
+from flightstack.process import clock
 
 lateness_ns: list[int] = []
 execution_ns: list[int] = []

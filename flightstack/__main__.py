@@ -8,15 +8,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flightstack import console, options
-from flightstack.command_line import UsageError, Version, make_app
-from flightstack.console import say
+from flightstack.process import console, options
+from flightstack.process.command_line import UsageError, Version, make_app
+from flightstack.process.console import say
 
 if TYPE_CHECKING:  # the rest is imported when it runs: help stays quick
-    from flightstack.app import App
-    from flightstack.config import StackConfig
-    from flightstack.process_config import ProcessConfig
-    from flightstack.state_directory import StateDirectory
+    from flightstack.params.config import StackConfig
+    from flightstack.process.app import App
+    from flightstack.process.process_config import ProcessConfig
+    from flightstack.process.state_directory import StateDirectory
 
 app = make_app(name="flightstack")
 
@@ -54,20 +54,20 @@ def run(
     version: Version = False,  # its callback does all
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
-    from flightstack.app import App
-    from flightstack.assembly import kernels_of
-    from flightstack.atomic_file import check_new
-    from flightstack.clock import nearest_outer_hz
-    from flightstack.compile_notice import announce_compilation
-    from flightstack.config import DEFAULT_HOME, StackConfig, parse_home
+    from flightstack.core.atomic_file import check_new
+    from flightstack.core.errors import ConfigError
+    from flightstack.core.port_numbers import simulator_port, system_id
     from flightstack.firmware.errors import TargetError
-    from flightstack.params.errors import ConfigError
+    from flightstack.params.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.params.gains_file import hidden_gains
     from flightstack.params.vehicle import hidden_vehicle
-    from flightstack.port_numbers import simulator_port, system_id
-    from flightstack.ports import ports_config
-    from flightstack.process_config import EXIT_TIMEOUT, EXIT_USAGE, ProcessConfig, complain
-    from flightstack.transport.udp import PortBusyError
+    from flightstack.process.app import App
+    from flightstack.process.assembly import kernels_of
+    from flightstack.process.clock import nearest_outer_hz
+    from flightstack.process.compile_notice import announce_compilation
+    from flightstack.process.ports import ports_config
+    from flightstack.process.process_config import EXIT_TIMEOUT, EXIT_USAGE, ProcessConfig, complain
+    from flightstack.transports.udp import PortBusyError
 
     try:
         if clock not in ("lockstep", "realtime"):
@@ -127,7 +127,7 @@ def run(
 
 def _state_directory(state: str | None, params: str | None, instance: int) -> StateDirectory | None:
     """Return where the vehicle keeps parameters and plans, or None if it is to keep nothing."""
-    from flightstack.state_directory import StateDirectory
+    from flightstack.process.state_directory import StateDirectory
 
     if state == "none" or (state is None and params == "none"):
         return None
@@ -142,7 +142,7 @@ def _param_file(params: str | None, kept: StateDirectory | None) -> str | None:
 
 def _log_path(log: str | None, instance: int) -> Path | None:
     """Return the first flight's log, or None for no logs."""
-    from flightstack.logging.log_files import default_log
+    from flightstack.process.log_files import default_log
 
     if log == "none":
         return None
@@ -152,7 +152,7 @@ def _log_path(log: str | None, instance: int) -> Path | None:
 
 def _mention_new(file: Path) -> None:
     """Say when a parameter file that was named is not there: it may be a typing error."""
-    from flightstack.process_config import complain
+    from flightstack.process.process_config import complain
 
     if not file.exists():
         complain(f"warning: {file}: there is no such file: it begins with the defaults")
@@ -168,7 +168,7 @@ def _begin_new(file: Path, config: StackConfig) -> None:
 
 def _check(config: StackConfig) -> None:
     """Build the stack, which compiles the loops, and say that it can fly; raise ConfigError."""
-    from flightstack.assembly import build
+    from flightstack.process.assembly import build
 
     stack = build(config, lambda: None)
     stack.loops.close()
@@ -177,8 +177,8 @@ def _check(config: StackConfig) -> None:
 
 def _introduce(vehicle_process: App, config: StackConfig, process: ProcessConfig) -> None:
     """Say what flies and where it is reached, and what the user should know about it."""
-    from flightstack.ports import described, warning
-    from flightstack.process_config import complain
+    from flightstack.process.ports import described, warning
+    from flightstack.process.process_config import complain
 
     stack = vehicle_process.stack
     if config.params_file is not None:

@@ -7,8 +7,8 @@ import sys
 
 import typer
 
-from flightstack.command_line import UsageError, Version, make_app
-from flightstack.console import complain, drop, replace_unencodable
+from flightstack.process.command_line import UsageError, Version, make_app
+from flightstack.process.console import complain, drop, replace_unencodable
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
 from gcs_cli.settings import ConnectOption, InstanceOption, Settings, SigningKeyOption, TimeoutOption
 
@@ -90,7 +90,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def _config_problem(error: Exception) -> str:
     """Return the sentence of a bad file; raise all else again."""
-    from flightstack.params.errors import ConfigError  # noqa: PLC0415
+    from flightstack.core.errors import ConfigError  # noqa: PLC0415
 
     if isinstance(error, ConfigError):
         return str(error)

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from flightstack.console import complain
-from flightstack.port_numbers import INSTANCES, system_id
-from gcs_cli.endpoint import (
+from flightstack.core.port_numbers import INSTANCES, system_id
+from flightstack.process.console import complain
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.link.endpoint import (
     DEFAULT_CONNECTION,
     VEHICLE_CONNECTION,
     Endpoint,
     parse_endpoint,
     vehicle_connection,
 )
-from gcs_cli.errors import USAGE, CliError
 
 if TYPE_CHECKING:
-    from gcs_cli.connection import Connection
+    from gcs_cli.link.connection import Connection
 
 DEFAULT_TIMEOUT_S = 5.0
 
@@ -128,9 +128,9 @@ def open_link(settings: Settings) -> Connection:
 
     While another ground station, `gcs watch` say, listens on the usual port, the vehicle is called at its own.
     """
-    from gcs_cli.connection import Connection  # noqa: PLC0415
     from gcs_cli.errors import PortInUseError  # noqa: PLC0415
-    from gcs_cli.signing import open_signing  # noqa: PLC0415
+    from gcs_cli.link.connection import Connection  # noqa: PLC0415
+    from gcs_cli.link.signing import open_signing  # noqa: PLC0415
 
     signing = open_signing(settings.signing_key)
     try:

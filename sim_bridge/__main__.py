@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from flightstack import console
-from flightstack.command_line import UsageError, Version, make_app
-from flightstack.contract import Vector3
-from flightstack.params.errors import ConfigError
+from flightstack.core.contract import Vector3
+from flightstack.core.errors import ConfigError
+from flightstack.process import console
+from flightstack.process.command_line import UsageError, Version, make_app
 from sim_bridge import arguments, options
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.export_command import export_mjcf
-from sim_bridge.live_view import LiveView
 from sim_bridge.output import complain, load_named_vehicle, print_result
-from sim_bridge.render_command import render, require
+from sim_bridge.render.live_view import LiveView
+from sim_bridge.render.render_command import render, require
 
 if TYPE_CHECKING:
     from flightstack.params.vehicle import Vehicle
-    from sim_bridge.plant import InitialState
-    from sim_bridge.server import ServerOptions
+    from sim_bridge.plant.plant import InitialState
+    from sim_bridge.server.server import ServerOptions
 
 app = make_app(name="sim-bridge")
 
@@ -31,7 +31,7 @@ _ZERO = "0,0,0"
 
 
 def _disturbance(wind: str, gust: float, force: str, torque: str, torque_gust: float) -> Any:
-    from sim_bridge.disturbance import Disturbance  # noqa: PLC0415
+    from sim_bridge.plant.disturbance import Disturbance  # noqa: PLC0415
 
     return Disturbance(
         arguments.wind("--wind", wind),
@@ -80,9 +80,9 @@ def run(
     arguments.plant(plant)
     arguments.in_range("--instance", instance, 0, 250)
     arguments.in_range("--seed", seed, 0, 2**63)
-    from sim_bridge.disturbance import check_wind  # noqa: PLC0415
-    from sim_bridge.plant import PlantOptions  # noqa: PLC0415
-    from sim_bridge.server import ServerOptions  # noqa: PLC0415
+    from sim_bridge.plant.disturbance import check_wind  # noqa: PLC0415
+    from sim_bridge.plant.plant import PlantOptions  # noqa: PLC0415
+    from sim_bridge.server.server import ServerOptions  # noqa: PLC0415
 
     loaded = _vehicle(vehicle, plant, drag)
     battery = arguments.battery(loaded, battery_start, battery_capacity, battery_drain)
@@ -107,7 +107,7 @@ def run(
 
 def _serve(served: ServerOptions, viewed: str | None) -> int:
     """Run the simulator, with a window on the vehicle ``viewed`` if there is one; return the exit code."""
-    from sim_bridge.server import serve  # noqa: PLC0415
+    from sim_bridge.server.server import serve  # noqa: PLC0415
 
     if viewed is None:
         return serve(served)
@@ -150,7 +150,7 @@ def open_loop(
     arguments.in_range("--dt", dt, 1e-6, 1.0)
     arguments.in_range("--seed", seed, 0, 2**63)
     initial = _initial(pos, vel, euler_deg, rates, no_ground)
-    from flightstack.compile_notice import announce_compilation  # noqa: PLC0415
+    from flightstack.process.compile_notice import announce_compilation  # noqa: PLC0415
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
     from sim_bridge.plants import kernels_of  # noqa: PLC0415
 
@@ -168,7 +168,7 @@ def open_loop(
 
 
 def _initial(pos: str, vel: str, euler_deg: str, rates: str, no_ground: bool) -> InitialState:
-    from sim_bridge.plant import InitialState  # noqa: PLC0415
+    from sim_bridge.plant.plant import InitialState  # noqa: PLC0415
 
     roll, pitch, yaw = (math.radians(angle) for angle in arguments.vector("--euler-deg", euler_deg))
     position = arguments.vector("--pos", pos)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from importlib.util import find_spec
 
-from flightstack.contract import Vector3
-from flightstack.geodesy import GeoPoint
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.battery import BatteryOptions
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.faults import Fault, Kind, parse_fault
+from sim_bridge.plant.battery import BatteryOptions
+from sim_bridge.plant.faults import Fault, Kind, parse_fault
 from sim_bridge.plant_names import MULTIBODY, NO_MUJOCO, PLANT_NAMES
 
 _LONGEST_QUOTE = 60

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from flightstack import console
-from flightstack.atomic_file import check_new, write_text_atomically
-from flightstack.picture_options import Overwrite
+from flightstack.core.atomic_file import check_new, write_text_atomically
+from flightstack.process import console
+from flightstack.process.picture_options import Overwrite
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.output import complain, load_named_vehicle, print_result
 

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.contract import MAX_ROTORS, FloatArray, Quaternion
-from flightstack.geometry import euler_from_quaternion
-from flightstack.mavlink.hot_frames import ARMED_FLAG
+from flightstack.core.contract import MAX_ROTORS, FloatArray, Quaternion
+from flightstack.core.geometry import euler_from_quaternion
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.disturbance import Disturbance
+from flightstack.simulator_link.hot_frames import ARMED_FLAG
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
-from sim_bridge.layout import CONTACT, DIVERGED
-from sim_bridge.plant import InitialState, Plant, PlantOptions
+from sim_bridge.plant.disturbance import Disturbance
+from sim_bridge.plant.layout import CONTACT, DIVERGED
+from sim_bridge.plant.plant import InitialState, Plant, PlantOptions
 from sim_bridge.plants import make_plant
 
 MOST_STEPS = 100_000_000  # at most a minute of computing

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from flightstack import console
+from flightstack.process import console
 
 if TYPE_CHECKING:
     from flightstack.params.vehicle import Vehicle

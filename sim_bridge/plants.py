@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.compiled_plant import CompiledPlant
-from sim_bridge.disturbance import check_wind
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant import Plant, PlantOptions
+from sim_bridge.plant.compiled_plant import CompiledPlant
+from sim_bridge.plant.disturbance import check_wind
+from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.plant_names import MULTIBODY, NO_MUJOCO
 
 _KERNELS = ("settle", "quaternion_from_euler", "rotate")

@@ -9,15 +9,20 @@ import math
 
 import numpy as np
 
-from flightstack.mavlink.battery_frame import encode_battery
-from flightstack.mavlink.hot_frames import GROUND_CONTACT_FLAG, HEADER_SIZE, ActuatorsFrame, PlantStateFrame
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.battery import INTERVAL_US as BATTERY_INTERVAL_US
-from sim_bridge.battery import battery_report
+from flightstack.simulator_link.battery_frame import encode_battery
+from flightstack.simulator_link.hot_frames import (
+    GROUND_CONTACT_FLAG,
+    HEADER_SIZE,
+    ActuatorsFrame,
+    PlantStateFrame,
+)
 from sim_bridge.errors import PlantDivergedError
-from sim_bridge.faults import Fault, Kind, Schedule
-from sim_bridge.layout import CONTACT, DIVERGED, OUTPUT
-from sim_bridge.plant import Plant, PlantOptions
+from sim_bridge.plant.battery import INTERVAL_US as BATTERY_INTERVAL_US
+from sim_bridge.plant.battery import battery_report
+from sim_bridge.plant.faults import Fault, Kind, Schedule
+from sim_bridge.plant.layout import CONTACT, DIVERGED, OUTPUT
+from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.plants import make_plant
 
 SIMULATOR_COMPONENT = 200

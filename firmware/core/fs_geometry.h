@@ -1,4 +1,4 @@
-/* Quaternions and vectors: flightstack/geometry.py. Hamilton, scalar first, body FRD to world NED.
+/* Quaternions and vectors: flightstack/core/geometry.py. Hamilton, scalar first, body FRD to world NED.
  *
  * What is called often and is short stands here, so that it costs no call.
  */

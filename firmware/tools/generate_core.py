@@ -9,11 +9,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from flightstack import contract
 from flightstack.control.attitude_backstepping import BacksteppingParams
 from flightstack.control.attitude_pid import PidMemory, PidParams
 from flightstack.control.attitude_reference import ReferenceMemory, ReferenceParams
 from flightstack.control.position_pid import PositionMemory, PositionParams
+from flightstack.core import contract
 from flightstack.firmware.numbers import CONTROLLERS, TARGET_NUMBERS, TargetNumber, default_numbers
 
 CORE = Path(__file__).resolve().parent.parent / "core"

@@ -10,12 +10,12 @@ import math
 
 import numpy as np
 
-from flightstack.arrays import vehicle_state
-from flightstack.compiled import compiled
-from flightstack.contract import MAX_ROTORS, FloatArray, LoopRow, LoopStatus
+from flightstack.core.arrays import vehicle_state
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import MAX_ROTORS, FloatArray, LoopRow, LoopStatus
+from flightstack.core.portable_math import acos, asin, atan2, exp
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
-from flightstack.portable_math import acos, asin, atan2, exp
 
 RELEASE_S = 1.0
 NOT_FINITE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT, MOVING, UNMEASURED = 1, 2, 4, 8, 16, 32

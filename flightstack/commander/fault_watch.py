@@ -21,8 +21,8 @@ from flightstack.commander.detectors import (
     rotor_params,
 )
 from flightstack.commander.failsafe import Failsafe
-from flightstack.compiled import direct
-from flightstack.contract import SETPOINT_SIZE, FloatArray, LoopRow
+from flightstack.core.compiled import direct
+from flightstack.core.contract import SETPOINT_SIZE, FloatArray, LoopRow
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
 from flightstack.guidance.fence import NO_FENCE, Fence, FenceMonitor
 from flightstack.params.behaviour import Behaviour
 

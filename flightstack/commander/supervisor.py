@@ -28,9 +28,9 @@ from flightstack.commander.fence_watch import FenceWatch
 from flightstack.commander.state_watch import StateWatch
 from flightstack.commander.takeover import Takeovers, opponents
 from flightstack.commander.transitions import Event, Status
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
+from flightstack.core.modes import STREAM_MODES, Mode
 from flightstack.guidance.fence import Fence
-from flightstack.modes import STREAM_MODES, Mode
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
 

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from flightstack.contract import AttitudeReference, Quaternion, Vector3
-from flightstack.kernel_cache import is_own
+from flightstack.core.contract import AttitudeReference, Quaternion, Vector3
+from flightstack.core.kernel_cache import is_own
 from flightstack.params.toml_reader import Table
 from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import Vehicle

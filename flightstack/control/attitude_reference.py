@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flightstack.compiled import compiled
-from flightstack.contract import AttitudeReference, Quaternion, Vector3
-from flightstack.geometry import (
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import AttitudeReference, Quaternion, Vector3
+from flightstack.core.geometry import (
     conjugate,
     normalised,
     quaternion_product,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
 from flightstack.params.spec import ParamSpec
 
 

@@ -7,9 +7,9 @@ from importlib.metadata import EntryPoint, entry_points
 
 import numpy as np
 
-from flightstack.contract import FloatArray
 from flightstack.control.attitude_controller import AttitudeController
-from flightstack.params.errors import ConfigError
+from flightstack.core.contract import FloatArray
+from flightstack.core.errors import ConfigError
 from flightstack.params.toml_reader import Table
 from flightstack.params.tunable import Tunable, declaration_problem, undeclared
 from flightstack.params.vehicle import Vehicle

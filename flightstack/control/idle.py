@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flightstack.contract import FloatArray, LoopRow, LoopStatus
+from flightstack.core.contract import FloatArray, LoopRow, LoopStatus
 from flightstack.params.vehicle import Vehicle
 
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.contract import FloatArray
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.attitude_reference import (
     REFERENCE_TUNABLES,
@@ -17,6 +16,7 @@ from flightstack.control.attitude_reference import (
 )
 from flightstack.control.controller_loading import controller_params, controller_tunables, fields_of
 from flightstack.control.position_pid import POSITION_TUNABLES, PositionParams, read_position_params
+from flightstack.core.contract import FloatArray
 from flightstack.params.behaviour import SPECS
 from flightstack.params.spec import ParamSpec
 from flightstack.params.toml_reader import Table

@@ -8,18 +8,6 @@ from typing import Any, TypeAlias
 import numba
 import numpy as np
 
-from flightstack.arrays import attitude_target, position_setpoint, store_attitude_target, vehicle_state
-from flightstack.compiled import as_tuple, compiled, direct, specialise, store
-from flightstack.contract import (
-    ATTITUDE_TARGET_SIZE,
-    MAX_ROTORS,
-    AttitudeReference,
-    FloatArray,
-    LoopRow,
-    LoopStatus,
-    Vector3,
-    Wrench,
-)
 from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
 from flightstack.control.attitude_reference import (
     ReferenceMemory,
@@ -36,10 +24,27 @@ from flightstack.control.position_pid import (
     PositionParams,
     position_pid_step,
 )
-from flightstack.geometry import blend, conjugate, quaternion_product, rotation_vector
+from flightstack.core.arrays import (
+    attitude_target,
+    position_setpoint,
+    store_attitude_target,
+    vehicle_state,
+)
+from flightstack.core.compiled import as_tuple, compiled, direct, specialise, store
+from flightstack.core.contract import (
+    ATTITUDE_TARGET_SIZE,
+    MAX_ROTORS,
+    AttitudeReference,
+    FloatArray,
+    LoopRow,
+    LoopStatus,
+    Vector3,
+    Wrench,
+)
+from flightstack.core.geometry import blend, conjugate, quaternion_product, rotation_vector
+from flightstack.core.portable_math import LARGEST_ANGLE_RAD
 from flightstack.params.toml_reader import Table
 from flightstack.params.vehicle import Vehicle
-from flightstack.portable_math import LARGEST_ANGLE_RAD
 
 RecordArray: TypeAlias = np.ndarray[Any, np.dtype[np.void]]
 

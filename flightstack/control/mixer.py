@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.compiled import compiled
-from flightstack.contract import FloatArray, Vector3, Wrench
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, Vector3, Wrench
 from flightstack.params.vehicle import Vehicle
 
 UNLIMITED_SPEED_SQUARED = 1e12  # (rad/s)²: stands for "no limit" with ideal rotors, and stays finite

@@ -7,10 +7,17 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from flightstack.contract import ATTITUDE_TARGET_SIZE, STATE_SIZE, FloatArray, LoopFlags, LoopRow, LoopStatus
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.idle import IdleRow
 from flightstack.control.loop_parameters import loop_numbers
+from flightstack.core.contract import (
+    ATTITUDE_TARGET_SIZE,
+    STATE_SIZE,
+    FloatArray,
+    LoopFlags,
+    LoopRow,
+    LoopStatus,
+)
 from flightstack.firmware.numbers import target_numbers
 from flightstack.params.spec import ParamSpec
 from flightstack.params.toml_reader import Table

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 
 PYTHON, C, HOST, EMULATED, SERIAL = "python", "c", "host", "emulated", "serial"
 DEFAULT_BAUD = 115_200

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from flightstack.extras import INSTALL_FIRMWARE
+from flightstack.core.extras import INSTALL_FIRMWARE
 from flightstack.firmware.build import (
     EXACT,
     BuildError,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE
 from flightstack.firmware.sources import source_hash
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
-from flightstack.transport.byte_link import LineError
-from flightstack.transport.serial_port import SerialPort
+from flightstack.transports.byte_link import LineError
+from flightstack.transports.serial_port import SerialPort
 
 _BAUD = 115_200
 _PATIENCE_S = 5.0

@@ -10,16 +10,16 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from flightstack.config import DEFAULT_INNER_HZ, DEFAULT_OUTER_HZ
-from flightstack.contract import MAX_ROTORS
 from flightstack.control import attitude_backstepping, attitude_pid
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.attitude_reference import REFERENCE_TUNABLES, ReferenceParams
 from flightstack.control.loop_parameters import TILT, LoopNumbers, loop_numbers, tilt_deg
 from flightstack.control.mixer import mixer_for
 from flightstack.control.position_pid import POSITION_TUNABLES, PositionParams
+from flightstack.core.contract import MAX_ROTORS
+from flightstack.core.errors import ConfigError
 from flightstack.params.behaviour import SPECS
-from flightstack.params.errors import ConfigError
+from flightstack.params.config import DEFAULT_INNER_HZ, DEFAULT_OUTER_HZ
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.toml_reader import Table
 from flightstack.params.tunable import Tunable

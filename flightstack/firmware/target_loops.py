@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlags
+from flightstack.core.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlags
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
 from flightstack.firmware.errors import TargetError, WrongFirmwareError
+from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilTiming
+from flightstack.firmware.pil_operations import PilReport, carried
 from flightstack.firmware.pil_record import COST_UNITS, PilRecord
 from flightstack.firmware.sources import source_hash
-from flightstack.mavlink.services.pil_client import DEFAULT_TIMING, PilClient, PilTiming
-from flightstack.mavlink.services.pil_operations import PilReport, carried
-from flightstack.transport.byte_link import ByteLink
+from flightstack.transports.byte_link import ByteLink
 
 NOTHING = (0.0,) * (TARGET_AT - SETPOINT_AT - ATTITUDE_TARGET_SIZE)
 MOST_READS = 100_000

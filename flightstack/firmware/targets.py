@@ -6,18 +6,18 @@ from pathlib import Path
 
 from flightstack.control.backend import ControlBackend
 from flightstack.control.loops import PythonLoops
-from flightstack.extras import INSTALL_FIRMWARE
+from flightstack.core.errors import ConfigError
+from flightstack.core.extras import INSTALL_FIRMWARE
 from flightstack.firmware.build import BuildError, host_library, host_program
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import EMULATED, PYTHON, SERIAL, C, LoopsChoice, parse_loops
 from flightstack.firmware.errors import WrongFirmwareError
 from flightstack.firmware.host_library import HostLoops
 from flightstack.firmware.host_target import HostTarget
+from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
-from flightstack.mavlink.services.pil_client import DEFAULT_TIMING, PilTiming
-from flightstack.params.errors import ConfigError
-from flightstack.transport.byte_link import ByteLink, LineError
-from flightstack.transport.serial_port import SerialPort
+from flightstack.transports.byte_link import ByteLink, LineError
+from flightstack.transports.serial_port import SerialPort
 
 EXCHANGE_BITS = 8000.0
 """Bits of a step and its report twice over, in start and stop bits: what a slow line needs on top."""

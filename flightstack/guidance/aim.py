@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from flightstack.compiled import compiled
-from flightstack.contract import FloatArray, VehicleState
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, VehicleState
+from flightstack.core.modes import Mode
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.trajectory import Goal
-from flightstack.modes import Mode
 
 TAKEOFF, RETURN, LAND = int(Mode.TAKEOFF), int(Mode.RETURN), int(Mode.LAND)
 

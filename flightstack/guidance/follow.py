@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
-from flightstack.compiled import compiled
-from flightstack.contract import Vector3
-from flightstack.geometry import wrap_pi
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import Vector3
+from flightstack.core.geometry import wrap_pi
 from flightstack.guidance.trajectory import (
     POLE_RAD_S,
     Goal,

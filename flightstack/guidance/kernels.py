@@ -6,15 +6,17 @@ import math
 
 import numpy as np
 
-from flightstack.arrays import (
+from flightstack.core.arrays import (
     attitude_target,
     store_attitude_target,
     store_position_setpoint,
     vehicle_state,
 )
-from flightstack.compiled import as_tuple, compiled, store
-from flightstack.contract import AttitudeTarget, FloatArray, Quaternion, VehicleState
-from flightstack.geometry import blend, euler_from_quaternion
+from flightstack.core.compiled import as_tuple, compiled, store
+from flightstack.core.contract import AttitudeTarget, FloatArray, Quaternion, VehicleState
+from flightstack.core.geometry import blend, euler_from_quaternion
+from flightstack.core.modes import Mode
+from flightstack.core.portable_math import sin_cos
 from flightstack.guidance.aim import A_START_X, A_START_Y, RETURN, advance_return, aim_goal
 from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
@@ -23,9 +25,7 @@ from flightstack.guidance.offboard import attitude_step, point_step
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import ATTITUDE, S_KIND
 from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, setpoint_of, trajectory_step
-from flightstack.modes import Mode
 from flightstack.params.vehicle import GRAVITY_M_S2
-from flightstack.portable_math import sin_cos
 
 MISSION, OFFBOARD, POSITION = int(Mode.MISSION), int(Mode.OFFBOARD), int(Mode.POSITION)
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flightstack.compiled import compiled
-from flightstack.contract import VehicleState
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import VehicleState
 from flightstack.params.vehicle import GRAVITY_M_S2
 
 SUPPORT_LIFT = 0.7

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-from flightstack.compiled import compiled
-from flightstack.contract import FloatArray, Vector3, VehicleState
-from flightstack.geometry import euler_from_quaternion
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, Vector3, VehicleState
+from flightstack.core.geometry import euler_from_quaternion
+from flightstack.core.portable_math import sin_cos, tan
 from flightstack.guidance.follow import follow_heading, follow_horizontally, follow_vertically, leashed
 from flightstack.guidance.mission import landing_speed
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import NOT_GIVEN, STICKS_AT
 from flightstack.guidance.trajectory import KA, Trajectory, TrajectoryLimits, clipped
 from flightstack.params.vehicle import GRAVITY_M_S2
-from flightstack.portable_math import sin_cos, tan
 
 TAKEOFF_STICK = 0.3
 """Shaped throttle, from the centre, beyond which a standing vehicle takes off; PX4's value."""

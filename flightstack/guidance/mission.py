@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
-from flightstack.compiled import compiled
-from flightstack.contract import FloatArray, VehicleState
-from flightstack.geometry import euler_from_quaternion, wrap_pi
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, VehicleState
+from flightstack.core.geometry import euler_from_quaternion, wrap_pi
+from flightstack.core.portable_math import atan2
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.trajectory import Goal
-from flightstack.portable_math import atan2
 
 # columns of the plan
 COMMAND, PARAM1, PARAM2, PARAM3, PARAM4, NORTH, EAST, DOWN = range(8)

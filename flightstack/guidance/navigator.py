@@ -7,8 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.compiled import direct
-from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
+from flightstack.core.compiled import direct
+from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
+from flightstack.core.modes import STREAM_MODES, Mode
+from flightstack.core.portable_math import atan2, distance
 from flightstack.guidance.aim import (
     A_HOME_X,
     A_HOME_Y,
@@ -75,8 +77,6 @@ from flightstack.guidance.setpoints import (
 )
 from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.guidance.trajectory import BRAKING
-from flightstack.modes import STREAM_MODES, Mode
-from flightstack.portable_math import atan2, distance
 
 LEVEL_S = 0.1
 """Time constant with which a vehicle that touches the ground is levelled: a step would make it hop."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from flightstack.arrays import attitude_target, store_attitude_target
-from flightstack.compiled import compiled
-from flightstack.contract import AttitudeTarget, FloatArray, Quaternion, Vector3, VehicleState
-from flightstack.geometry import (
+from flightstack.core.arrays import attitude_target, store_attitude_target
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import AttitudeTarget, FloatArray, Quaternion, Vector3, VehicleState
+from flightstack.core.geometry import (
     conjugate,
     euler_from_quaternion,
     normalised,

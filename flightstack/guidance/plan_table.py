@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flightstack.contract import FloatArray
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import FloatArray
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.mission import DO_JUMP, PLAN_COLUMNS
 from flightstack.plan import MissionItem
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.portable_math import distance
 from flightstack.plan import MissionItem
 from flightstack.plan.rally import rally_altitude_m
-from flightstack.portable_math import distance
 
 NEAREST, RALLY_FIRST = 0, 1
 """Values of RTL_TYPE, as PX4's: to the nearest of home and rally points, or of the rally points if there are any.

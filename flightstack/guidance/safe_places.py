@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from flightstack.contract import Vector3
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.portable_math import distance
 from flightstack.guidance.fence import NO_FENCE, Fence
 from flightstack.guidance.rally import HOME, NEAREST, RALLY_FIRST, ReturnPlace, choose, rally_points
 from flightstack.params.behaviour import Behaviour
@@ -19,7 +20,6 @@ from flightstack.plan import (
     check_mission,
     check_rally,
 )
-from flightstack.portable_math import distance
 
 
 def plan_limits(b: Behaviour) -> Limits:

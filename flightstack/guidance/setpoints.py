@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.contract import FloatArray, Quaternion, Vector3
+from flightstack.core.contract import FloatArray, Quaternion, Vector3
 
 NOT_GIVEN = Vector3(math.nan, math.nan, math.nan)
 IDENTITY = Quaternion(1.0, 0.0, 0.0, 0.0)

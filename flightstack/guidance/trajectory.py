@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flightstack.compiled import compiled
-from flightstack.contract import PositionSetpoint, Vector3
-from flightstack.geometry import wrap_pi
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import PositionSetpoint, Vector3
+from flightstack.core.geometry import wrap_pi
 
 
 class Trajectory(NamedTuple):

@@ -1,1 +1,1 @@
-"""MAVLink without I/O: dialect, frames, telemetry, services."""
+"""MAVLink without I/O: dialect, frames, links, signing, and messages that both ends share."""

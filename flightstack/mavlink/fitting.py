@@ -15,7 +15,7 @@ import struct
 from functools import cache
 from typing import Any, NamedTuple
 
-from flightstack.field_numbers import COUNTERS, fitted
+from flightstack.mavlink.field_numbers import COUNTERS, fitted
 
 PACKING_ERRORS = (struct.error, OverflowError)
 """What ``pack`` raises for a value that its field cannot hold."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 from flightstack.params.spec import ParamSpec, group_of
 from flightstack.params.store import read_assignment
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 
 
 def find_file(name_or_path: str, folder: Path, kind: str) -> Path:

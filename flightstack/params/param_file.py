@@ -13,8 +13,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from flightstack.atomic_file import write_text_atomically
-from flightstack.params.errors import ConfigError
+from flightstack.core.atomic_file import write_text_atomically
+from flightstack.core.errors import ConfigError
 from flightstack.params.spec import LARGEST_NAME, ParamSpec
 from flightstack.params.store import ParamStore
 

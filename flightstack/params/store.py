@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 from flightstack.params.spec import ParamSpec
 
 Listener = Callable[[str, float], None]

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 
 
 class Table:

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from flightstack.contract import MAX_ROTORS, FloatArray
-from flightstack.linear_algebra import pseudo_inverse
+from flightstack.core.contract import MAX_ROTORS, FloatArray
+from flightstack.core.errors import ConfigError
+from flightstack.core.linear_algebra import pseudo_inverse
 from flightstack.params.assembly import Part, read_parts
 from flightstack.params.battery import Battery, read_battery
-from flightstack.params.errors import ConfigError
 from flightstack.params.named_file import built_in_names, find_file, hidden_file
 from flightstack.params.toml_reader import Table, read_toml
 

@@ -9,7 +9,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.portable_math import distance
 from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.item import MissionItem
 from flightstack.plan.jumps import find_idle_loop
@@ -26,7 +27,6 @@ from flightstack.plan.vocabulary import (
     Frame,
     MissionResult,
 )
-from flightstack.portable_math import distance
 
 _ALTITUDE_TOLERANCE_M = 0.01  # a 32-bit float of an altitude above sea level is good to half a millimetre
 

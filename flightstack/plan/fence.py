@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from flightstack.geodesy import GeoPoint
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.fence_shape import Area, FenceShape, edges_that_cross
 from flightstack.plan.item import MissionItem
 from flightstack.plan.rejection import Fault, Rejection, item_rejection, place_fault

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.contract import FloatArray
-from flightstack.fence_layout import (
+from flightstack.core.contract import FloatArray
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.plan.fence_layout import (
     A_EAST,
     A_END,
     A_GROUP,
@@ -23,7 +24,6 @@ from flightstack.fence_layout import (
     A_START,
     AREA_COLUMNS,
 )
-from flightstack.geodesy import GeoPoint, LocalFrame
 
 
 class Area(NamedTuple):

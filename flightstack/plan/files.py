@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightstack.atomic_file import write_text_atomically
-from flightstack.params.errors import ConfigError
+from flightstack.core.atomic_file import write_text_atomically
+from flightstack.core.errors import ConfigError
 from flightstack.plan.plan import Plan
 from flightstack.plan.qgc_plan import read_plan
 from flightstack.plan.qgc_plan_writer import plan_to_json

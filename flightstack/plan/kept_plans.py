@@ -12,8 +12,8 @@ import zlib
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from flightstack.geodesy import GeoPoint
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionType
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.geodesy import GeoPoint
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.item import MissionItem
 from flightstack.plan.rejection import Fault, Rejection, item_rejection

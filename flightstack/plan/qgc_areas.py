@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flightstack.geodesy import GeoPoint
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import values
 from flightstack.plan.fence import fence_areas
 from flightstack.plan.item import MissionItem, integer_coordinate

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from flightstack.geodesy import GeoPoint
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import values
 from flightstack.plan.item import MissionItem
 from flightstack.plan.plan import Plan

@@ -7,7 +7,7 @@ import json
 import math
 from typing import Any
 
-from flightstack.geodesy import GeoPoint
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.item import MissionItem, float_coordinate
 from flightstack.plan.plan import Plan
 from flightstack.plan.qgc_areas import fence_document, rally_document

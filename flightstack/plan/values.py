@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from flightstack.geodesy import GeoPoint
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.item import MissionItem, as_float32, integer_coordinate
 from flightstack.plan.vocabulary import (
     GLOBAL_FRAMES,

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from flightstack.geodesy import GeoPoint
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import values
 from flightstack.plan.item import MissionItem, float_coordinate
 from flightstack.plan.plan import Plan

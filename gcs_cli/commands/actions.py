@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.px4_modes import mode_numbers, settable_modes
 from gcs_cli.settings import ConnectOption, InstanceOption, TimeoutOption, meet_vehicle
+from gcs_cli.vehicle.px4_modes import mode_numbers, settable_modes
 
 if TYPE_CHECKING:
-    from gcs_cli.connection import Connection
+    from gcs_cli.link.connection import Connection
 
 
 def order(connection: Connection, command: tuple[int, Sequence[float]], name: str) -> None:
     """Send a command and wait for its answer; raise CliError with the vehicle's reason."""
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     number, params = command
     connection.complete(calls.command(connection.session, number, params, connection.now_s), name)
@@ -30,7 +30,7 @@ def arm(
     instance: InstanceOption = None,
 ) -> None:
     """Arm the vehicle."""
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         order(connection, calls.ARM, "arming")
@@ -45,7 +45,7 @@ def disarm(
     instance: InstanceOption = None,
 ) -> None:
     """Disarm the vehicle."""
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         order(connection, calls.FORCE_DISARM if force else calls.DISARM, "disarming")
@@ -60,7 +60,7 @@ def takeoff(
     instance: InstanceOption = None,
 ) -> None:
     """Take off; a disarmed vehicle is armed for it."""
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     if alt is not None and not 0.0 < alt < 1e4:
         raise CliError(f"--alt {alt:g}: expected metres above zero", USAGE)
@@ -90,7 +90,7 @@ def land(
     instance: InstanceOption = None,
 ) -> None:
     """Land where the vehicle is."""
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         order(connection, calls.LAND, "landing")
@@ -104,7 +104,7 @@ def rtl(
     instance: InstanceOption = None,
 ) -> None:
     """Return to launch and land."""
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         order(connection, calls.RETURN, "return")
@@ -133,7 +133,7 @@ def mode(
     if numbers is None:
         known = ", ".join(settable_modes()).lower()
         raise CliError(f"mode {name}: there is none; known are {known}", USAGE)
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         order(connection, calls.mode_command(*numbers), f"mode {name.lower()}")
@@ -153,7 +153,7 @@ def goto(
 
     Put -- before negative degrees.
     """
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         raise CliError(f"goto {latitude:g} {longitude:g}: not a place on earth", USAGE)
@@ -171,7 +171,7 @@ def speed(
     instance: InstanceOption = None,
 ) -> None:
     """Fly at another speed until disarmed."""
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         order(connection, calls.speed_command(metres_per_second), "speed")
@@ -193,7 +193,7 @@ def sethome(
 
     Altitudes count from there. Put -- before negative degrees.
     """
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     if place and len(place) != 3:
         raise CliError("sethome: give latitude, longitude and altitude, or nothing for here", USAGE)
@@ -212,7 +212,7 @@ def reboot(
     instance: InstanceOption = None,
 ) -> None:
     """Reboot the vehicle, which must stand on the ground."""
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         order(connection, calls.REBOOT, "reboot")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.fly_flags import FlyOptions, flies
+from gcs_cli.fly.fly_flags import FlyOptions, flies
 from gcs_cli.settings import FlownInstanceOption, JsonOption, OverwriteOption, settings_of
 
 if TYPE_CHECKING:
@@ -32,11 +32,11 @@ def fly(
     timeout: Annotated[float | None, typer.Option(help="Wait for the vehicle, s.  [default: 180]")] = None,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""
-    from gcs_cli.fly_display import FlyConsole, make_display  # noqa: PLC0415
-    from gcs_cli.fly_options import checked_plan  # noqa: PLC0415
-    from gcs_cli.fly_run import fly as fly_plan  # noqa: PLC0415
-    from gcs_cli.fly_run import write_results  # noqa: PLC0415
-    from gcs_cli.run_directory import REPORT_NAME  # noqa: PLC0415
+    from gcs_cli.fly.fly_display import FlyConsole, make_display  # noqa: PLC0415
+    from gcs_cli.fly.fly_options import checked_plan  # noqa: PLC0415
+    from gcs_cli.fly.fly_run import fly as fly_plan  # noqa: PLC0415
+    from gcs_cli.fly.fly_run import write_results  # noqa: PLC0415
+    from gcs_cli.report.run_directory import REPORT_NAME  # noqa: PLC0415
 
     settings = settings_of(context).merged(None, timeout, instance)
     if settings.connect is not None:
@@ -70,7 +70,7 @@ def _open(report: Path) -> None:
 
 def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> None:
     """Print the figures of a flight on a few lines."""
-    from gcs_cli.report_conditions import conditions  # noqa: PLC0415
+    from gcs_cli.report.conditions import conditions  # noqa: PLC0415
 
     files = " ".join(sorted(path.name for path in folder.iterdir() if path.suffix != ".log"))
     lines = (
@@ -88,7 +88,7 @@ def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> No
 
 
 def _mission(summary: dict[str, Any]) -> str:
-    from gcs_cli.summary import max_overshoot_m  # noqa: PLC0415
+    from gcs_cli.report.summary import max_overshoot_m  # noqa: PLC0415
 
     rows = summary["waypoints"]
     misses = [row["miss_distance_m"] for row in rows if row["reached"] and row["miss_distance_m"] is not None]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightstack.command_line import make_app
+from flightstack.process.command_line import make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.settings import (
     ConnectOption,
@@ -21,9 +21,9 @@ from gcs_cli.settings import (
 )
 
 if TYPE_CHECKING:
-    from flightstack.mavlink.services.log_client import LogEntry
-    from flightstack.mavlink.services.virtual_files import Entry
-    from gcs_cli.connection import Connection
+    from flightstack.mavlink.virtual_files import Entry
+    from gcs_cli.clients.log_client import LogEntry
+    from gcs_cli.link.connection import Connection
 
 app = make_app(help="The vehicle's flight logs.", no_args_is_help=True)
 
@@ -39,7 +39,7 @@ def list_logs(
     instance: InstanceOption = None,
 ) -> None:
     """List the logs, the oldest first."""
-    from gcs_cli import log_calls  # noqa: PLC0415
+    from gcs_cli.transfers import log_calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         logs = log_calls.fetch_list(connection)
@@ -74,7 +74,7 @@ def download(
     instance: InstanceOption = None,
 ) -> None:
     """Fetch a log, or all of them."""
-    from gcs_cli import log_calls  # noqa: PLC0415
+    from gcs_cli.transfers import log_calls  # noqa: PLC0415
 
     number = _number(log_id)
     if everything and log_id != "latest":
@@ -103,9 +103,9 @@ def download(
 
 
 def _fetch(connection: Connection, log: LogEntry, file: Entry | None, path: Path, overwrite: bool) -> None:
-    from flightstack.atomic_file import check_new, write_bytes_atomically  # noqa: PLC0415
-    from gcs_cli import log_calls  # noqa: PLC0415
-    from gcs_cli.transfer_bar import TransferBar  # noqa: PLC0415
+    from flightstack.core.atomic_file import check_new, write_bytes_atomically  # noqa: PLC0415
+    from gcs_cli.transfers import log_calls  # noqa: PLC0415
+    from gcs_cli.tui.transfer_bar import TransferBar  # noqa: PLC0415
 
     check_new(path, overwrite)
     began_s = connection.now_s

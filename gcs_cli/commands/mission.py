@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightstack.command_line import make_app
-from gcs_cli.plan_files import PlanArgument
+from flightstack.process.command_line import make_app
 from gcs_cli.settings import ConnectOption, InstanceOption, OverwriteOption, TimeoutOption, meet_vehicle
+from gcs_cli.transfers.plan_files import PlanArgument
 
 if TYPE_CHECKING:
     from flightstack.plan import MissionItem
-    from gcs_cli.connection import Connection
-    from gcs_cli.plan_parts import Uploads
+    from gcs_cli.link.connection import Connection
+    from gcs_cli.transfers.plan_parts import Uploads
 
 app = make_app(help="The vehicle's mission.", no_args_is_help=True)
 
@@ -44,8 +44,8 @@ def upload(
     that it held before; a second Ctrl-C ends at once.
     """
     from flightstack.plan import load_plan  # noqa: PLC0415
-    from gcs_cli.interruption import Interruption  # noqa: PLC0415
-    from gcs_cli.plan_parts import Uploads, parts_to_send  # noqa: PLC0415
+    from gcs_cli.fly.interruption import Interruption  # noqa: PLC0415
+    from gcs_cli.transfers.plan_parts import Uploads, parts_to_send  # noqa: PLC0415
 
     plan = load_plan(file)
     with meet_vehicle(context, connect, timeout, instance) as connection, Interruption() as interruption:
@@ -80,10 +80,10 @@ def check(file: PlanArgument) -> None:
 
     Mission, geofence and rally points.
     """
-    from flightstack.geodesy import GeoPoint  # noqa: PLC0415
+    from flightstack.core.geodesy import GeoPoint  # noqa: PLC0415
     from flightstack.plan import load_plan  # noqa: PLC0415
     from gcs_cli.errors import FAILED, CliError  # noqa: PLC0415
-    from gcs_cli.plan_parts import plan_parts, plan_problem  # noqa: PLC0415
+    from gcs_cli.transfers.plan_parts import plan_parts, plan_problem  # noqa: PLC0415
 
     plan = load_plan(file)
     first = next((item.position_deg for item in plan.items if item.position_deg is not None), (0.0, 0.0))
@@ -106,11 +106,11 @@ def download(
     instance: InstanceOption = None,
 ) -> None:
     """Fetch the vehicle's mission, geofence and rally points."""
-    from flightstack.atomic_file import check_new  # noqa: PLC0415
-    from flightstack.geodesy import GeoPoint  # noqa: PLC0415
+    from flightstack.core.atomic_file import check_new  # noqa: PLC0415
+    from flightstack.core.geodesy import GeoPoint  # noqa: PLC0415
     from flightstack.plan import MissionType, Plan, save_plan  # noqa: PLC0415
-    from gcs_cli import calls  # noqa: PLC0415
-    from gcs_cli.plan_parts import plan_parts  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
+    from gcs_cli.transfers.plan_parts import plan_parts  # noqa: PLC0415
 
     if file is not None:
         check_new(file, overwrite)
@@ -147,7 +147,7 @@ def clear(
 ) -> None:
     """Remove the vehicle's mission, geofence or rally points."""
     from flightstack.plan import MissionType  # noqa: PLC0415
-    from gcs_cli import calls  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     kind = MissionType[part.name]
     name = {
@@ -169,8 +169,8 @@ def start(
     instance: InstanceOption = None,
 ) -> None:
     """Start the mission; the vehicle arms for it."""
-    from gcs_cli import calls  # noqa: PLC0415
     from gcs_cli.commands.actions import order  # noqa: PLC0415
+    from gcs_cli.link import calls  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         order(connection, calls.START_MISSION, "mission start")

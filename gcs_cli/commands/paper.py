@@ -40,9 +40,9 @@ def paper(
 
     A few minutes: report.html holds figures, tables and verdicts, results.json the numbers, the same in each run.
     """
-    from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
-    from gcs_cli.paper.printed import print_results  # noqa: PLC0415
-    from gcs_cli.paper.run import HTML_NAME, PaperOptions, run  # noqa: PLC0415
+    from gcs_cli.experiments.paper.printed import print_results  # noqa: PLC0415
+    from gcs_cli.experiments.paper.run import HTML_NAME, PaperOptions, run  # noqa: PLC0415
+    from gcs_cli.fly.fly_display import FlyConsole  # noqa: PLC0415
     from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
 
     if settings_of(context).connect is not None:

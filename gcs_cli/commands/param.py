@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flightstack.command_line import make_app
+from flightstack.process.command_line import make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.settings import (
     ConnectOption,
@@ -23,9 +23,9 @@ from gcs_cli.settings import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from flightstack.mavlink.services.param_values import Parameter
-    from gcs_cli.connection import Connection
-    from gcs_cli.param_info import ParamInfo
+    from flightstack.mavlink.param_values import Parameter
+    from gcs_cli.link.connection import Connection
+    from gcs_cli.vehicle.param_info import ParamInfo
 
 app = make_app(help="The vehicle's parameters.", no_args_is_help=True)
 
@@ -49,8 +49,8 @@ def list_parameters(
     instance: InstanceOption = None,
 ) -> None:
     """List the parameters; those that are not at their default stand out."""
-    from gcs_cli import param_calls  # noqa: PLC0415
-    from gcs_cli.param_table import matching  # noqa: PLC0415
+    from gcs_cli.transfers import param_calls  # noqa: PLC0415
+    from gcs_cli.vehicle.param_table import matching  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         found = matching(param_calls.fetch_all(connection), pattern)
@@ -70,9 +70,9 @@ def get(
     instance: InstanceOption = None,
 ) -> None:
     """Show one parameter."""
-    from gcs_cli import param_calls  # noqa: PLC0415
-    from gcs_cli.param_info import UNKNOWN  # noqa: PLC0415
-    from gcs_cli.param_table import description, facts  # noqa: PLC0415
+    from gcs_cli.transfers import param_calls  # noqa: PLC0415
+    from gcs_cli.vehicle.param_info import UNKNOWN  # noqa: PLC0415
+    from gcs_cli.vehicle.param_table import description, facts  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         told = param_calls.fetch(connection, name.upper())
@@ -93,9 +93,9 @@ def set_parameter(
     instance: InstanceOption = None,
 ) -> None:
     """Set a parameter."""
-    from gcs_cli import param_calls  # noqa: PLC0415
-    from gcs_cli.param_info import UNKNOWN  # noqa: PLC0415
-    from gcs_cli.param_table import change_line  # noqa: PLC0415
+    from gcs_cli.transfers import param_calls  # noqa: PLC0415
+    from gcs_cli.vehicle.param_info import UNKNOWN  # noqa: PLC0415
+    from gcs_cli.vehicle.param_table import change_line  # noqa: PLC0415
 
     number = _number(value)
     with meet_vehicle(context, connect, timeout, instance) as connection:
@@ -134,10 +134,10 @@ def save(
     instance: InstanceOption = None,
 ) -> None:
     """Write all parameters to a file, as QGroundControl does."""
-    from flightstack.atomic_file import check_new, write_text_atomically  # noqa: PLC0415
+    from flightstack.core.atomic_file import check_new, write_text_atomically  # noqa: PLC0415
     from flightstack.params.param_file import is_parameter_name  # noqa: PLC0415
-    from gcs_cli import param_calls  # noqa: PLC0415
-    from gcs_cli.param_file import render_parameters  # noqa: PLC0415
+    from gcs_cli.transfers import param_calls  # noqa: PLC0415
+    from gcs_cli.vehicle.param_file import render_parameters  # noqa: PLC0415
 
     check_new(file, overwrite)
     with meet_vehicle(context, connect, timeout, instance) as connection:
@@ -161,8 +161,8 @@ def load(
     instance: InstanceOption = None,
 ) -> None:
     """Set the parameters that a file has; the others stay as they are."""
-    from gcs_cli import param_calls  # noqa: PLC0415
-    from gcs_cli.param_file import load_parameters  # noqa: PLC0415
+    from gcs_cli.transfers import param_calls  # noqa: PLC0415
+    from gcs_cli.vehicle.param_file import load_parameters  # noqa: PLC0415
 
     wanted = load_parameters(file)
     with meet_vehicle(context, connect, timeout, instance) as connection:
@@ -200,10 +200,10 @@ def diff(
     instance: InstanceOption = None,
 ) -> None:
     """Show what differs from the defaults, or from a file."""
-    from gcs_cli import param_calls  # noqa: PLC0415
-    from gcs_cli.param_file import load_parameters  # noqa: PLC0415
-    from gcs_cli.param_info import UNKNOWN  # noqa: PLC0415
-    from gcs_cli.param_table import is_changed  # noqa: PLC0415
+    from gcs_cli.transfers import param_calls  # noqa: PLC0415
+    from gcs_cli.vehicle.param_file import load_parameters  # noqa: PLC0415
+    from gcs_cli.vehicle.param_info import UNKNOWN  # noqa: PLC0415
+    from gcs_cli.vehicle.param_table import is_changed  # noqa: PLC0415
 
     wanted = None if file is None else load_parameters(file)
     with meet_vehicle(context, connect, timeout, instance) as connection:
@@ -234,9 +234,9 @@ def _reset_all(connection: Connection) -> None:
 
 
 def _reset_some(connection: Connection, names: Iterable[str]) -> None:
-    from gcs_cli import param_calls  # noqa: PLC0415
-    from gcs_cli.param_info import UNKNOWN  # noqa: PLC0415
-    from gcs_cli.param_table import change_line  # noqa: PLC0415
+    from gcs_cli.transfers import param_calls  # noqa: PLC0415
+    from gcs_cli.vehicle.param_info import UNKNOWN  # noqa: PLC0415
+    from gcs_cli.vehicle.param_table import change_line  # noqa: PLC0415
 
     infos = param_calls.fetch_metadata(connection)
     for name in names:
@@ -251,7 +251,7 @@ def _reset_some(connection: Connection, names: Iterable[str]) -> None:
 def _show(
     parameters: Sequence[Parameter], infos: dict[str, ParamInfo], as_json: bool, compared: str = "default"
 ) -> None:
-    from gcs_cli.param_table import facts, parameter_table  # noqa: PLC0415
+    from gcs_cli.vehicle.param_table import facts, parameter_table  # noqa: PLC0415
 
     if as_json:
         typer.echo(json.dumps([facts(told, infos) for told in parameters]))
@@ -275,6 +275,6 @@ def _number(text: str) -> float:
 
 
 def _same(one: float, other: float) -> bool:
-    from gcs_cli.param_info import number_text  # noqa: PLC0415
+    from gcs_cli.vehicle.param_info import number_text  # noqa: PLC0415
 
     return number_text(one) == number_text(other)

@@ -21,8 +21,8 @@ from gcs_cli.settings import (
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from gcs_cli.connection import Connection
-    from gcs_cli.view_types import LoopTiming
+    from gcs_cli.link.connection import Connection
+    from gcs_cli.vehicle.view_types import LoopTiming
 
 
 def perf(
@@ -34,7 +34,7 @@ def perf(
     instance: InstanceOption = None,
 ) -> None:
     """Show the timing of the flight stack's loops."""
-    from gcs_cli.subscription import LOOP_TIMING  # noqa: PLC0415
+    from gcs_cli.link.subscription import LOOP_TIMING  # noqa: PLC0415
 
     patience_s = settings_of(context).merged(connect, timeout, instance).patience_s
     with meet_vehicle(context, connect, timeout, instance) as connection:
@@ -77,7 +77,7 @@ def timing_table(timing: LoopTiming) -> Table:
     from rich import box  # noqa: PLC0415
     from rich.table import Table  # noqa: PLC0415
 
-    from gcs_cli.panels import number  # noqa: PLC0415
+    from gcs_cli.tui.panels import number  # noqa: PLC0415
 
     clock = "lockstep" if timing.lockstep else "real time"
     factor = f", {timing.real_time_factor:.1f}× real time" if timing.real_time_factor else ""

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from flightstack.command_line import HELP_FLAGS, make_app
+from flightstack.process.command_line import HELP_FLAGS, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
-from gcs_cli.fly_flags import FlyOptions, flies
+from gcs_cli.fly.fly_flags import FlyOptions, flies
 from gcs_cli.settings import FlownInstanceOption, JsonOption, OverwriteOption, settings_of
 
 if TYPE_CHECKING:
@@ -67,8 +67,8 @@ def fly(
 
     The loops fly in Python (MIL), in C (SIL) and on a target (PIL).
     """
-    from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
-    from gcs_cli.fly_options import checked_plan  # noqa: PLC0415
+    from gcs_cli.fly.fly_display import FlyConsole  # noqa: PLC0415
+    from gcs_cli.fly.fly_options import checked_plan  # noqa: PLC0415
     from gcs_cli.pil.run import run  # noqa: PLC0415
     from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
 
@@ -106,7 +106,7 @@ def replay(
 
     Its outputs are compared with those that the log holds.
     """
-    from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
+    from gcs_cli.fly.fly_display import FlyConsole  # noqa: PLC0415
     from gcs_cli.pil import replay_run  # noqa: PLC0415
     from gcs_cli.pil.run import make_pil_directory, write_outcome  # noqa: PLC0415
     from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
@@ -139,10 +139,10 @@ def doctor(
     as_json: JsonOption = False,
 ) -> None:
     """Find out how well the link to a target works, and what to change."""
-    from gcs_cli.fly_display import FlyConsole  # noqa: PLC0415
+    from gcs_cli.fly.fly_display import FlyConsole  # noqa: PLC0415
     from gcs_cli.pil import doctor as examination  # noqa: PLC0415
     from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
-    from gcs_cli.transfer_bar import step_bar  # noqa: PLC0415
+    from gcs_cli.tui.transfer_bar import step_bar  # noqa: PLC0415
 
     if (port is None) == (target is None):
         raise CliError("give either --port DEVICE or --target", USAGE)

@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
-from flightstack import picture_options as asked
-from flightstack.console import complain
-from flightstack.own_program import own_program
+from flightstack.process import picture_options as asked
+from flightstack.process.console import complain
+from flightstack.process.own_program import own_program
 from gcs_cli.errors import FAILED, CliError
 
 _NAME = "gcs replay"
@@ -40,9 +40,9 @@ def replay(
     Without --png, --sheet, --video or --view it makes a film, replay.mp4 beside the log. That takes minutes without
     a graphics card; --from, --to and --size make it shorter.
     """
-    from flightstack.poses_file import write_poses  # noqa: PLC0415
-    from gcs_cli.analysis import read_flight  # noqa: PLC0415
-    from gcs_cli.replay import find_run, poses_of  # noqa: PLC0415
+    from flightstack.flight_log.poses_file import write_poses  # noqa: PLC0415
+    from gcs_cli.report.analysis import read_flight  # noqa: PLC0415
+    from gcs_cli.report.replay import find_run, poses_of  # noqa: PLC0415
 
     found = find_run(run)
     flight = read_flight(found.log)

@@ -11,7 +11,7 @@ import typer
 from gcs_cli.settings import ConnectOption, InstanceOption, JsonOption, TimeoutOption, meet_vehicle
 
 if TYPE_CHECKING:
-    from gcs_cli.view_types import VehicleView
+    from gcs_cli.vehicle.view_types import VehicleView
 
 GATHER_S = 2.0
 
@@ -24,7 +24,7 @@ def status(
     instance: InstanceOption = None,
 ) -> None:
     """Show how the vehicle is."""
-    from gcs_cli.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
+    from gcs_cli.link.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
 
     with meet_vehicle(context, connect, timeout, instance) as connection:
         session = connection.session

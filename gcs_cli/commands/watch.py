@@ -13,7 +13,7 @@ from gcs_cli.settings import ConnectOption, InstanceOption, TimeoutOption, open_
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-    from gcs_cli.connection import Connection
+    from gcs_cli.link.connection import Connection
 
 FRAME_S = 0.125
 LINE_S = 1.0
@@ -26,7 +26,7 @@ def watch(
     instance: InstanceOption = None,
 ) -> None:
     """Watch the vehicle; q or Ctrl-C ends."""
-    from gcs_cli.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
+    from gcs_cli.link.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
 
     settings = settings_of(context).merged(connect, timeout, instance)
     with open_link(settings) as connection:
@@ -52,7 +52,7 @@ def watch_screen(connection: Connection) -> None:
     from rich.console import Console  # noqa: PLC0415
     from rich.live import Live  # noqa: PLC0415
 
-    from gcs_cli.keyboard import Keyboard  # noqa: PLC0415
+    from gcs_cli.tui.keyboard import Keyboard  # noqa: PLC0415
 
     console = Console()
     with Keyboard() as keyboard, Live(console=console, screen=True, auto_refresh=False) as live:
@@ -62,7 +62,7 @@ def watch_screen(connection: Connection) -> None:
 
 
 def _picture(connection: Connection, console: Console) -> RenderableType:
-    from gcs_cli.watch_render import render  # noqa: PLC0415
+    from gcs_cli.tui.watch_render import render  # noqa: PLC0415
 
     width, height = console.size
     return render(connection.session.view, connection.now_s, width, height, str(connection.endpoint))
@@ -75,7 +75,7 @@ def _run(connection: Connection, until_s: float) -> None:
 
 def watch_lines(connection: Connection) -> None:
     """Print a line a second and one for each status text, until interrupted."""
-    from gcs_cli.watch_lines import state_line, text_line  # noqa: PLC0415
+    from gcs_cli.tui.watch_lines import state_line, text_line  # noqa: PLC0415
 
     seen = 0
     next_s = connection.now_s

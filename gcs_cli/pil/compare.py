@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
 from gcs_cli.pil.flight_samples import FlightSamples, Samples
 from gcs_cli.pil.signals import SIGNALS, Signal
 from gcs_cli.pil.ulps import Float32Array, steps_apart, ulp_of

@@ -13,7 +13,7 @@ from flightstack.firmware.build import BuildError
 from flightstack.firmware.choice import SERIAL, LoopsChoice
 from flightstack.firmware.sources import source_hash
 from flightstack.firmware.targets import open_link, timing_of
-from flightstack.transport.byte_link import LineError
+from flightstack.transports.byte_link import LineError
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.pil.advice import Port, advice
 from gcs_cli.pil.probe import Measurement, measured

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from pyulog import ULog, ULogException
 
-from flightstack.contract import LoopStatus
-from flightstack.params.errors import ConfigError
+from flightstack.core.contract import LoopStatus
+from flightstack.core.errors import ConfigError
 from gcs_cli.pil.signals import SIGNALS
 from gcs_cli.pil.ulps import Float32Array
 

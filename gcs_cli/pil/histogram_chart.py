@@ -8,7 +8,7 @@ from html import escape
 from itertools import pairwise
 
 from gcs_cli.pil.profile import STAGE_TITLES, StageProfile
-from gcs_cli.report_svg import Scale, nice_ticks, rectangle, segment, text, tick_text, upright_text
+from gcs_cli.report.svg import Scale, nice_ticks, rectangle, segment, text, tick_text, upright_text
 
 _WIDTH, _HEIGHT = 470, 190
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56, 22, 26, 36

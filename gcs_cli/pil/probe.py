@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.contract import LoopFlags
+from flightstack.core.contract import LoopFlags
+from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
 from flightstack.firmware.target_loops import described
-from flightstack.mavlink.services.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
-from flightstack.transport.byte_link import ByteLink
+from flightstack.transports.byte_link import ByteLink
 
 EXCHANGES = 300
 """Steps that are measured on a line that works."""

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
 
 STAGES = ("outer", "inner", "mixer", "whole")
 STAGE_TITLES = {"outer": "outer loop", "inner": "inner loop", "mixer": "mixer", "whole": "whole step"}

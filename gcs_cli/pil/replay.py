@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
-from flightstack.contract import MAX_ROTORS, FloatArray, LoopFlags, LoopStatus
+from flightstack.core.contract import MAX_ROTORS, FloatArray, LoopFlags, LoopStatus
 from gcs_cli.pil.flight_samples import FlightSamples, Samples, TimeArray
 from gcs_cli.pil.signals import BY_NAME
 

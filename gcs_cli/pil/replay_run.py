@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
+from flightstack.core.errors import ConfigError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
 from flightstack.firmware.errors import TargetError
 from flightstack.firmware.numbers import CONTROLLERS
 from flightstack.firmware.targets import finish_loops, make_loops
-from flightstack.params.errors import ConfigError
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError
@@ -39,8 +39,8 @@ from gcs_cli.pil.signals import BY_NAME, TARGET
 from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import has_same_bits, meaning
 from gcs_cli.pil.verdict import OPEN_LOOP_ULPS, board_limits, difference_checks, same_bits_limits
-from gcs_cli.run_directory import LOG_NAME
-from gcs_cli.transfer_bar import step_bar
+from gcs_cli.report.run_directory import LOG_NAME
+from gcs_cli.tui.transfer_bar import step_bar
 
 LOG = "log"
 _TILT = "MPC_TILTMAX_AIR"

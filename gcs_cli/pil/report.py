@@ -21,10 +21,10 @@ from gcs_cli.pil.report_tables import (
 )
 from gcs_cli.pil.signals import Signal
 from gcs_cli.pil.target_record import status_words
-from gcs_cli.report_chart import Line, time_chart
-from gcs_cli.report_plots import section
+from gcs_cli.report.chart import Line, time_chart
+from gcs_cli.report.plots import section
 
-_STYLE_SHEETS = (Path(__file__).parents[1] / "report.css", Path(__file__).with_name("pil.css"))
+_STYLE_SHEETS = (Path(__file__).parents[1] / "report" / "report.css", Path(__file__).with_name("pil.css"))
 _PAIR_STYLES = ("s1 target", "s2 thin", "s4")
 _DECADES = 4.0
 """Of a chart: what is smaller than the largest difference by more is drawn at the bottom."""

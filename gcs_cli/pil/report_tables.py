@@ -8,7 +8,7 @@ from typing import Any
 
 from gcs_cli.pil.profile import STAGE_TITLES
 from gcs_cli.pil.signals import BY_NAME, STAGES
-from gcs_cli.report_plots import section
+from gcs_cli.report.plots import section
 
 UNKNOWN = "–"
 

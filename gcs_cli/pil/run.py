@@ -9,22 +9,22 @@ from typing import Any, NamedTuple
 
 from rich.console import Console
 
-from flightstack.atomic_file import write_text_atomically
+from flightstack.core.atomic_file import write_text_atomically
+from flightstack.core.errors import ConfigError
 from flightstack.firmware.choice import PYTHON, C
-from flightstack.params.errors import ConfigError
 from flightstack.plan import Plan
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.flight import Flight
-from gcs_cli.fly_display import BarDisplay, Display, draws_bars
-from gcs_cli.fly_flags import FlyOptions
-from gcs_cli.fly_run import fly, write_results
+from gcs_cli.fly.flight import Flight
+from gcs_cli.fly.fly_display import BarDisplay, Display, draws_bars
+from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_run import fly, write_results
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.report import render_report
 from gcs_cli.pil.result import COMPLETED, Flown, Outcome, closed_loop
 from gcs_cli.pil.target_record import TargetRecord, read_record
 from gcs_cli.pil.targets import check_there, checked_target, has_same_bits, meaning
 from gcs_cli.pil.verdict import MIL, PIL, SIL
-from gcs_cli.run_directory import LOG_NAME, RUNS, fresh_directory
+from gcs_cli.report.run_directory import LOG_NAME, RUNS, fresh_directory
 
 JSON_NAME, HTML_NAME = "pil.json", "pil.html"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flightstack.contract import MAX_ROTORS
+from flightstack.core.contract import MAX_ROTORS
 
 TARGET, REFERENCE, WRENCH, ACTUATORS, TRAJECTORY = (
     "attitude target",

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
+from flightstack.core.errors import ConfigError
+from flightstack.firmware.pil_operations import BAD_INPUT, OVERRUN
 from flightstack.firmware.pil_record import COST_UNITS, LINK_FILE, STEPS_FILE
-from flightstack.mavlink.services.pil_operations import BAD_INPUT, OVERRUN
-from flightstack.params.errors import ConfigError
 
 StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 NO_COUNTERS = ("time_boot_ms", "stack_size", "stack_high_water", "state")

@@ -6,7 +6,7 @@ from flightstack.firmware.build import BuildError, host_library
 from flightstack.firmware.choice import EMULATED, HOST, SERIAL, C, LoopsChoice, parse_loops
 from flightstack.firmware.numbers import CONTROLLERS
 from flightstack.firmware.targets import open_link
-from flightstack.transport.byte_link import LineError
+from flightstack.transports.byte_link import LineError
 from gcs_cli.errors import USAGE, CliError
 
 MEANINGS = {

@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
 
 Float32Array: TypeAlias = np.ndarray[Any, np.dtype[np.float32]]
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]

@@ -1,1 +1,1 @@
-"""The vehicle as an assembly of bodies on MuJoCo, and the pictures of it; needs the extra ``multibody``."""
+"""The vehicle as an assembly of bodies on MuJoCo; needs the extra ``multibody``."""

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.contract import FloatArray
-from flightstack.params.errors import ConfigError
+from flightstack.core.contract import FloatArray
+from flightstack.core.errors import ConfigError
 from flightstack.params.vehicle import Rotor, Vehicle
 from sim_bridge.multibody.mass import MassProperties, about_point
 from sim_bridge.multibody.placing import PlacedPart, of_all, of_body, place

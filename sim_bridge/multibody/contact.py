@@ -6,7 +6,7 @@ and R feet under a mass the whole stands on a spring and damper with
 
     κ = R·d/(1 − d)     ω² = κ/(1 + κ)·k     2·ζ·ω = κ/(1 + κ)·b
 
-from which T and ζ*, MuJoCo's ``solref``, follow for the ω and ζ of ``sim_bridge/ground.py``.
+from which T and ζ*, MuJoCo's ``solref``, follow for the ω and ζ of ``sim_bridge/plant/ground.py``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.ground import DAMPING_RATIO, ground_contact
+from sim_bridge.plant.ground import DAMPING_RATIO, ground_contact
 
 _IMPEDANCE = 0.1
 IMPEDANCE = f"{_IMPEDANCE} {_IMPEDANCE} 0.001"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
 from flightstack.params.assembly import Part
 from sim_bridge.multibody.mesh_file import read_mesh
 

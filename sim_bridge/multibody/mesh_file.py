@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from flightstack.contract import FloatArray
-from flightstack.params.errors import ConfigError
+from flightstack.core.contract import FloatArray
+from flightstack.core.errors import ConfigError
 
 IntArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 

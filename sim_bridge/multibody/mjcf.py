@@ -12,10 +12,9 @@ from xml.etree.ElementTree import Element, indent, tostring
 
 import numpy as np
 
-from flightstack.geometry import quaternion_from_euler
+from flightstack.core.geometry import quaternion_from_euler
 from flightstack.params.assembly import Part
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
-from sim_bridge.contact import FRICTION
 from sim_bridge.multibody import contact
 from sim_bridge.multibody.actuators import add_actuators
 from sim_bridge.multibody.assembly import Assembly, assemble
@@ -24,6 +23,7 @@ from sim_bridge.multibody.mesh_file import corners_and_faces, read_mesh
 from sim_bridge.multibody.placing import PlacedPart
 from sim_bridge.multibody.usual_parts import foot_z_m
 from sim_bridge.multibody.xml import add, exact
+from sim_bridge.plant.contact import FRICTION
 
 _COLOURS = {
     "carbon": "0.12 0.12 0.13 1",

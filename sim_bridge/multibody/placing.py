@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.contract import FloatArray, Quaternion, Vector3
-from flightstack.geometry import quaternion_from_euler, rotate
+from flightstack.core.contract import FloatArray, Quaternion, Vector3
+from flightstack.core.geometry import quaternion_from_euler, rotate
 from flightstack.params.assembly import Part
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.multibody.mass import MassProperties, placed, solid, together

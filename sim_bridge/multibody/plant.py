@@ -12,19 +12,19 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from flightstack.contract import FloatArray, Vector3
-from flightstack.geometry import quaternion_from_euler
-from flightstack.params.errors import ConfigError
+from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.errors import ConfigError
+from flightstack.core.geometry import quaternion_from_euler
 from flightstack.params.vehicle import Vehicle
-from sim_bridge import rotor_drive
-from sim_bridge.layout import DIVERGED, RecordArray
 from sim_bridge.multibody import contact
 from sim_bridge.multibody.assembly import assemble
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.usual_parts import foot_z_m
-from sim_bridge.plant import InitialState, PlantOptions
-from sim_bridge.record_plant import DEFAULT_STEP_S, RecordPlant
-from sim_bridge.rotor_drive import LOST, NEAR
+from sim_bridge.plant import rotor_drive
+from sim_bridge.plant.layout import DIVERGED, RecordArray
+from sim_bridge.plant.plant import InitialState, PlantOptions
+from sim_bridge.plant.record_plant import DEFAULT_STEP_S, RecordPlant
+from sim_bridge.plant.rotor_drive import LOST, NEAR
 
 _NO_CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
 _AFTER_VELOCITY = int(mujoco.mjtStage.mjSTAGE_VEL)

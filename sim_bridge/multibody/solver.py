@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from flightstack.contract import FloatArray
+from flightstack.core.contract import FloatArray
 
 _ROUNDS = 40
 _STEP = 1e-6

@@ -5,9 +5,6 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from flightstack.arrays import position_setpoint, vehicle_state
-from flightstack.compiled import as_tuple, store
-from flightstack.contract import AttitudeReference, Quaternion, Vector3, Wrench
 from flightstack.control.attitude_backstepping import (
     BacksteppingMemory,
     BacksteppingParams,
@@ -23,7 +20,10 @@ from flightstack.control.attitude_reference import (
 )
 from flightstack.control.mixer import WORK_ROWS, mix, relative_rotor_speed
 from flightstack.control.position_pid import PositionMemory, PositionParams, position_pid_step
-from flightstack.geometry import blend, conjugate, quaternion_product, rotation_vector
+from flightstack.core.arrays import position_setpoint, vehicle_state
+from flightstack.core.compiled import as_tuple, store
+from flightstack.core.contract import AttitudeReference, Quaternion, Vector3, Wrench
+from flightstack.core.geometry import blend, conjugate, quaternion_product, rotation_vector
 
 compiled = numba.njit(error_model="numpy")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flightstack.contract import LoopStatus
+from flightstack.core.contract import LoopStatus
 from tests.firmware.core_samples import Samples, sequence
 from tests.firmware.core_support import OUTER_DUE, RESET, SET_TARGET, Core, Loops
 

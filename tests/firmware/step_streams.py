@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from fastcrc import crc16
 
-from flightstack.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
+from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
 from flightstack.mavlink.dialect import mavlink
 from tests.support.world import World
 

@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightstack.firmware.numbers import TARGET_NUMBERS, default_numbers
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.param_client import ParamClient, ParamDone, ParamFailed
 from flightstack.plan.item import as_float32
+from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed
 from tests.firmware.app_support import (
     ABOVE,
     BAD_INPUT,

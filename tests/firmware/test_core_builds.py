@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.contract import LoopStatus
+from flightstack.core.contract import LoopStatus
 from flightstack.firmware.numbers import TARGET_NUMBERS, default_numbers
 from tests.firmware.core_support import (
     CORE,

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightstack.contract import LoopRow, LoopStatus
 from flightstack.control.controller_loading import load_controller
 from flightstack.control.loops import PythonLoops
+from flightstack.core.contract import LoopRow, LoopStatus
 from flightstack.firmware.numbers import target_numbers
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle

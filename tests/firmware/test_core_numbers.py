@@ -7,8 +7,8 @@ import math
 import pytest
 
 from flightstack.control.controller_loading import load_controller
+from flightstack.core.errors import ConfigError
 from flightstack.firmware.numbers import TARGET_NUMBERS, default_numbers, target_numbers
-from flightstack.params.errors import ConfigError
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from tests.support.rotor_sets import multirotor, ring

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.command_client import CommandClient
-from flightstack.mavlink.services.ftp_client import FtpClient
-from flightstack.mavlink.services.log_client import LogClient, LogEntry
-from flightstack.mavlink.services.mission_client import MissionClient
-from flightstack.mavlink.services.param_client import ParamClient
-from gcs_cli.session import Service
+from gcs_cli.clients.command_client import CommandClient
+from gcs_cli.clients.ftp_client import FtpClient
+from gcs_cli.clients.log_client import LogClient, LogEntry
+from gcs_cli.clients.mission_client import MissionClient
+from gcs_cli.clients.param_client import ParamClient
+from gcs_cli.link.session import Service
 from tests.support.world import item
 
 VEHICLE, OWN = Address(1, 1), Address(255, 190)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.hot_frames import ActuatorsFrame
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.simulator_link import SimulatorLink
 from flightstack.params.vehicle import load_vehicle
-from gcs_cli.session import Service, Session
+from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.hot_frames import ActuatorsFrame
+from gcs_cli.link.session import Service, Session
 from tests.fuzz.clients import SERVICES
 from tests.fuzz.inputs import KINDS
 from tests.fuzz.memory_logs import MemoryLogs

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flightstack.ground.peer import PeerAddress
 from flightstack.mavlink.frame_finder import FrameFinder
 from flightstack.mavlink.link import Link, Message
+from flightstack.services.routing.peer import PeerAddress
 from tests.support.world import World
 
 _CHANGES_PARAMETERS = {"PARAM_SET", "COMMAND_LONG", "COMMAND_INT"}

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from fastcrc import crc16
 
-from flightstack.commands import HANDLERS
-from flightstack.ground.link_commands import LINK_COMMANDS
 from flightstack.mavlink.dialect import mavlink
+from flightstack.services.commands import HANDLERS
+from flightstack.services.commands.link_commands import LINK_COMMANDS
 
 _VALUES = (
     float("nan"), float("inf"), -float("inf"), 0.0, -0.0, 1.0, -1.0, 2.0, 3.4028234e38, -3.4028234e38,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from flightstack.mavlink.services.log_store import LogInfo
-from flightstack.mavlink.services.virtual_files import BytesFile, VirtualFile
+from flightstack.mavlink.virtual_files import BytesFile, VirtualFile
+from flightstack.services.logs.log_store import LogInfo
 
 
 class MemoryLogs:

@@ -11,20 +11,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flightstack.config import DEFAULT_HOME
-from flightstack.ground.hub import MAX_TO_FORWARD
-from flightstack.ground.peer import PeerAddress
+from flightstack.core.port_numbers import API, GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import LARGEST_FRAME
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import LinkSigning, Signing
-from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.params.config import DEFAULT_HOME
 from flightstack.params.vehicle import load_vehicle
-from flightstack.port_numbers import API, GROUND
-from gcs_cli.session import Session
+from flightstack.services.routing.hub import MAX_TO_FORWARD
+from flightstack.services.routing.peer import PeerAddress
+from flightstack.simulator_link.endpoint import SimulatorLink
+from gcs_cli.link.session import Session
 from sim_bridge.errors import PlantDivergedError
-from sim_bridge.lockstep import SimulatorLink as SimulatorEnd
-from sim_bridge.plant import PlantOptions
+from sim_bridge.plant.plant import PlantOptions
+from sim_bridge.server.lockstep import SimulatorLink as SimulatorEnd
 from sim_bridge.simulator import Simulator
 from tests.fuzz.clients import SERVICES
 from tests.fuzz.memory_logs import MemoryLogs

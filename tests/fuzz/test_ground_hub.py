@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.ground.hub import MAX_PEERS, MAX_TO_FORWARD
-from flightstack.ground.peer import PeerAddress
+from flightstack.core.port_numbers import API, GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.mission_client import Done
 from flightstack.mavlink.signing import Signing
-from flightstack.port_numbers import API, GROUND
+from flightstack.services.routing.hub import MAX_PEERS, MAX_TO_FORWARD
+from flightstack.services.routing.peer import PeerAddress
+from gcs_cli.clients.mission_client import Done
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import calls, held
 from tests.support.world import World, item

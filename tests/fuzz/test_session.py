@@ -10,9 +10,9 @@ from rich.console import Console
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from gcs_cli.session import Service, Session
-from gcs_cli.watch_lines import state_line, text_line
-from gcs_cli.watch_render import render
+from gcs_cli.link.session import Service, Session
+from gcs_cli.tui.watch_lines import state_line, text_line
+from gcs_cli.tui.watch_render import render
 from tests.fuzz.clients import SERVICES
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import calls, held

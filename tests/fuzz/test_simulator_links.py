@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from flightstack.config import DEFAULT_HOME
 from flightstack.mavlink.dialect import FS_ACTUATORS_ID, FS_PLANT_STATE_ID, mavlink
 from flightstack.mavlink.frames import LARGEST_FRAME
-from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.params.config import DEFAULT_HOME
 from flightstack.params.vehicle import load_vehicle
+from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 from sim_bridge.errors import PlantDivergedError
-from sim_bridge.lockstep import SimulatorLink as SimulatorEnd
-from sim_bridge.plant import PlantOptions
+from sim_bridge.plant.plant import PlantOptions
+from sim_bridge.server.lockstep import SimulatorLink as SimulatorEnd
 from sim_bridge.simulator import LONGEST_INTERVAL_US, SHORTEST_INTERVAL_US, Simulator
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import calls, held

@@ -9,13 +9,13 @@ import random
 
 import pytest
 
-from flightstack.ground.hub import MAX_PEERS, MAX_TO_FORWARD
-from flightstack.ground.peer import PeerAddress
+from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import LARGEST_FRAME
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import MAX_STREAMS, LinkSigning, Signing
-from flightstack.port_numbers import GROUND
+from flightstack.services.routing.hub import MAX_PEERS, MAX_TO_FORWARD
+from flightstack.services.routing.peer import PeerAddress
 from tests.fuzz.guard import Guard
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import held

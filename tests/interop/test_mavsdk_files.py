@@ -10,7 +10,7 @@ from mavsdk.plugins.ftp import FtpError, FtpResult
 from mavsdk.plugins.log_files import LogFilesResult
 from pyulog import ULog
 
-from flightstack.mavlink.services.component_metadata import GENERAL, LOGS_DATED, LOGS_FLAT
+from flightstack.services.files.component_metadata import GENERAL, LOGS_DATED, LOGS_FLAT
 from tests.interop.client import API, TCP, Client
 from tests.interop.drone import Drone
 

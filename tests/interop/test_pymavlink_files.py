@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from pymavlink.mavftp import MAVFTP, FtpError
 
-from flightstack.mavlink.services.component_metadata import GENERAL, LOGS_FLAT, PARAMETERS
+from flightstack.services.files.component_metadata import GENERAL, LOGS_FLAT, PARAMETERS
 from tests.interop.stack import HOST, RealVehicle
 from tests.interop.witness import Witness
 from tests.support.process import BOUND_S

@@ -14,7 +14,7 @@ import pytest
 
 from flightstack import __version__
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.param_pack import unpack_parameters
+from flightstack.mavlink.param_pack import unpack_parameters
 from tests.interop.qgc_actions import HOLD, LAND, MISSION, RETURN, TAKEOFF, Actions
 from tests.interop.qgc_commands import Commands
 from tests.interop.qgc_ftp import Files

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flightstack.contract import FloatArray, LoopRow
 from flightstack.control.controller_loading import load_controller
 from flightstack.control.loops import PythonLoops
+from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.firmware.numbers import target_numbers
 from flightstack.params.gains_file import open_gains
 from tests.support.world import World

@@ -17,12 +17,13 @@ from pathlib import Path
 import pytest
 
 import flightstack
-from flightstack.mavlink.services.command_client import CommandClient, CommandTiming
-from flightstack.mavlink.services.log_client import LogEntry
-from flightstack.transport.udp import UdpSocket
-from gcs_cli import calls, log_calls
+from flightstack.transports.udp import UdpSocket
 from gcs_cli.__main__ import main
-from gcs_cli.connection import Connection
+from gcs_cli.clients.command_client import CommandClient, CommandTiming
+from gcs_cli.clients.log_client import LogEntry
+from gcs_cli.link import calls
+from gcs_cli.link.connection import Connection
+from gcs_cli.transfers import log_calls
 from tests.support.commands import Ended, gcs
 from tests.support.fake_vehicle import ARM, FakeVehicle, serve
 from tests.support.fences import circle

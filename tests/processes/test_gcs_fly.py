@@ -15,10 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.port_numbers import simulator_port, vehicle_ground_port
-from flightstack.transport.udp import UdpSocket
-from gcs_cli.fly_flags import FlyOptions
-from gcs_cli.processes import Child, Children
+from flightstack.core.port_numbers import simulator_port, vehicle_ground_port
+from flightstack.transports.udp import UdpSocket
+from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.processes import Child, Children
 from tests.support.commands import Ended, gcs
 from tests.support.free_instance import free_instance
 

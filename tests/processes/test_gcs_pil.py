@@ -18,7 +18,7 @@ import pytest
 
 from flightstack.firmware.build import host_program
 from gcs_cli.errors import DONE, FAILED, NO_ANSWER, USAGE, CliError
-from gcs_cli.fly_flags import FlyOptions
+from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.pil import run as pil_run
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.result import Flown

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack.transport.udp import PortBusyError, UdpSocket, resolve
+from flightstack.transports.udp import PortBusyError, UdpSocket, resolve
 
 
 def test_datagrams_go_both_ways_whole() -> None:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from flightstack.port_numbers import ground_station_port, system_id, vehicle_ground_port
-from flightstack.transport.udp import UdpSocket
+from flightstack.core.port_numbers import ground_station_port, system_id, vehicle_ground_port
+from flightstack.transports.udp import UdpSocket
 from tests.support.commands import gcs
 from tests.support.vehicle_processes import VehicleProcesses, vehicle
 

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from flightstack.core.port_numbers import tcp_port
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.port_numbers import tcp_port
 from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process
 

@@ -167,7 +167,7 @@ def test_a_port_on_which_nobody_answers_is_given_up() -> None:
 
 
 def test_a_port_that_another_program_uses_is_refused() -> None:
-    from flightstack.transport.serial_port import SerialPort  # noqa: PLC0415
+    from flightstack.transports.serial_port import SerialPort  # noqa: PLC0415
 
     ours, theirs = pty.openpty()
     name = os.ttyname(theirs)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gcs_cli.paper import pil_section
+from gcs_cli.experiments.paper import pil_section
 from tests.support.free_instance import free_instance
 
 emulation = pytest.mark.skipif(

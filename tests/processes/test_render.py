@@ -15,15 +15,15 @@ import imageio_ffmpeg
 import pytest
 from PIL import Image
 
-from flightstack.extras import INSTALL_MULTIBODY
-from flightstack.mavlink.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
+from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.flight_log.poses_file import write_poses
 from flightstack.params.vehicle import load_vehicle
-from flightstack.poses_file import write_poses
-from sim_bridge import render_command
+from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.live_view import READY, SNAPSHOT, LiveView
-from sim_bridge.multibody.offscreen import choose
-from sim_bridge.multibody.viewer import show
+from sim_bridge.render import render_command
+from sim_bridge.render.live_view import READY, SNAPSHOT, LiveView
+from sim_bridge.render.offscreen import choose
+from sim_bridge.render.viewer import show
 from sim_bridge.simulator import Simulator
 from tests.support.commands import gcs, sim_bridge_command
 from tests.support.process import Process
@@ -310,7 +310,7 @@ def test_a_window_shows_a_flight_on_a_virtual_display(poses: Path) -> None:
         try:
             with os.fdopen(read) as told:
                 display = f":{int(told.readline())}"
-            program = [sys.executable, "-m", "sim_bridge.multibody.live_window", "paper_quad"]
+            program = [sys.executable, "-m", "sim_bridge.render.live_window", "paper_quad"]
             with subprocess.Popen(
                 program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                 env={**os.environ, "DISPLAY": display},

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.core.errors import ConfigError
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.mission_client import Done, MissionClient
-from flightstack.params.errors import ConfigError
 from flightstack.plan import MissionItem, load_plan
-from flightstack.state_directory import StateDirectory
-from flightstack.transport.udp import UdpSocket
+from flightstack.process.state_directory import StateDirectory
+from flightstack.transports.udp import UdpSocket
+from gcs_cli.clients.mission_client import Done, MissionClient
 from tests.support.commands import gcs
 from tests.support.vehicle_processes import LONG_S, VehicleProcesses, vehicle
 

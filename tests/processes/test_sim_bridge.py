@@ -11,8 +11,8 @@ import pytest
 from pymavlink import mavutil
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.mavlink.link import Link
+from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from tests.support.commands import sim_bridge_command
 from tests.support.programs import Program
 

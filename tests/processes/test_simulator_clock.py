@@ -9,7 +9,7 @@ from threading import Thread
 
 import pytest
 
-from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
+from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 from tests.support.commands import gcs
 from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from pyulog import ULog
 
-from flightstack.port_numbers import ground_station_port
+from flightstack.core.port_numbers import ground_station_port
 from tests.support.commands import flightstack_command, gcs
 from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process

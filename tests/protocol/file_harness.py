@@ -6,11 +6,11 @@ import random
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.log_store import LogInfo
-from flightstack.mavlink.services.virtual_files import BytesFile
-from flightstack.transport.memory import LOSSLESS, Conditions, LossyLink
+from flightstack.mavlink.virtual_files import BytesFile
+from flightstack.services.logs.log_store import LogInfo
+from flightstack.transports.memory import LOSSLESS, Conditions, LossyLink
 
 VEHICLE = Address(1, 1)
 GCS = Address(255, 190)

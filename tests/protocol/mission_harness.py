@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.mission_client import Done, MissionClient
-from flightstack.mavlink.services.mission_server import MissionServer
-from flightstack.mavlink.services.mission_store import MissionEvent
 from flightstack.plan import Command, Frame, MissionItem, MissionType, check_fence, check_mission, check_rally
-from flightstack.transport.memory import LOSSLESS, Conditions, LossyLink
+from flightstack.services.mission.mission_server import MissionServer
+from flightstack.services.mission.mission_store import MissionEvent
+from flightstack.transports.memory import LOSSLESS, Conditions, LossyLink
+from gcs_cli.clients.mission_client import Done, MissionClient
 from tests.support.fences import HOME
 
 VEHICLE = Address(1, 1)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.param_client import ParamClient, ParamResult
-from flightstack.mavlink.services.param_server import ParamServer
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore
-from flightstack.transport.memory import LOSSLESS, Conditions, LossyLink
+from flightstack.services.params.param_server import ParamServer
+from flightstack.transports.memory import LOSSLESS, Conditions, LossyLink
+from gcs_cli.clients.param_client import ParamClient, ParamResult
 
 VEHICLE = Address(1, 1)
 LOSSY = Conditions(loss=0.2, duplication=0.2, reordering=0.2, delay_s=0.02, jitter_s=0.03)

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.command_client import CommandClient, CommandResult
-from flightstack.mavlink.services.command_server import Command, CommandServer
-from flightstack.mavlink.services.peer_monitor import PeerMonitor
-from flightstack.transport.memory import LossyLink
+from flightstack.services.commands.command_server import Command, CommandServer
+from flightstack.services.routing.peer_monitor import PeerMonitor
+from flightstack.transports.memory import LossyLink
+from gcs_cli.clients.command_client import CommandClient, CommandResult
 from tests.protocol.mission_harness import LOSSY, NAN, VEHICLE
 
 GCS = Address(255, 190)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.ftp_messages import Opcode, Packet, ftp_message, read_packet
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.ftp_client import FtpClient, FtpDone
-from flightstack.mavlink.services.ftp_messages import Opcode, Packet, ftp_message, read_packet
-from flightstack.mavlink.services.ftp_server import MAX_ANSWERS, MAX_CLIENTS, FtpServer
-from flightstack.mavlink.services.ftp_sessions import MAX_SESSIONS
-from flightstack.mavlink.services.log_client import LogClient, LogDone, LogEntry
-from flightstack.mavlink.services.log_server import MAX_RANGES, LogServer
-from flightstack.mavlink.services.log_store import DatedLogs, FlatLogs
-from flightstack.mavlink.services.missing import Missing
-from flightstack.mavlink.services.virtual_files import BytesFile, FileTree, fixed
+from flightstack.mavlink.missing import Missing
+from flightstack.mavlink.virtual_files import BytesFile, FileTree, fixed
+from flightstack.services.files.ftp_server import MAX_ANSWERS, MAX_CLIENTS, FtpServer
+from flightstack.services.files.ftp_sessions import MAX_SESSIONS
+from flightstack.services.logs.log_server import MAX_RANGES, LogServer
+from flightstack.services.logs.log_store import DatedLogs, FlatLogs
+from gcs_cli.clients.ftp_client import FtpClient, FtpDone
+from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry
 from tests.protocol.file_harness import GCS, VEHICLE, Ether, MemoryLogs, Station, content
 
 BYTES = st.binary(max_size=251)

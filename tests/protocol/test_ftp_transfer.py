@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.ftp_client import FtpClient, FtpDone, FtpFailed
-from flightstack.mavlink.services.ftp_messages import FtpError
-from flightstack.mavlink.services.ftp_server import FtpServer
-from flightstack.mavlink.services.log_store import DatedLogs, FlatLogs
-from flightstack.mavlink.services.virtual_files import Entry, FileTree, fixed
-from flightstack.transport.memory import LOSSLESS, Conditions
+from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.ftp_messages import FtpError
+from flightstack.mavlink.virtual_files import Entry, FileTree, fixed
+from flightstack.services.files.ftp_server import FtpServer
+from flightstack.services.logs.log_store import DatedLogs, FlatLogs
+from flightstack.transports.memory import LOSSLESS, Conditions
+from gcs_cli.clients.ftp_client import FtpClient, FtpDone, FtpFailed
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station, content
 from tests.support.tools import NIGHTLY
 

@@ -8,11 +8,11 @@ from io import BytesIO
 import pytest
 from pyulog import ULog
 
-from flightstack.logging.log_tail import FileTail
+from flightstack.flight_log.log_tail import FileTail
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.log_stream import CHUNK, GIVE_UP_S, NO_MESSAGE_BEGINS, LogStream
+from flightstack.services.logs.log_stream import CHUNK, GIVE_UP_S, NO_MESSAGE_BEGINS, LogStream
 from tests.support.world import World
 
 VEHICLE, CLIENT = Address(1, 1), Address(255, 190)

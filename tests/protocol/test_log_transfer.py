@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.log_client import LogClient, LogDone, LogEntry, LogFailed
-from flightstack.mavlink.services.log_server import LogServer
-from flightstack.transport.memory import LOSSLESS, Conditions
+from flightstack.services.logs.log_server import LogServer
+from flightstack.transports.memory import LOSSLESS, Conditions
+from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station, content
 from tests.support.tools import NIGHTLY
 

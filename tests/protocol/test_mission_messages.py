@@ -9,15 +9,15 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.command_server import CommandServer
-from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
-from flightstack.mavlink.services.mission_messages import mission_id
-from flightstack.mavlink.services.mission_server import MissionServer
+from flightstack.mavlink.mission_messages import mission_id
 from flightstack.plan import Command, Frame, MissionItem, MissionResult, MissionType
 from flightstack.plan import vocabulary as words
+from flightstack.services.commands.command_server import CommandServer
+from flightstack.services.mission.mission_server import MissionServer
+from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from tests.protocol.mission_harness import CHECKS, NAN, VEHICLE, mission, waypoint
 
 GCS = Address(255, 190)

@@ -8,10 +8,10 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
-from flightstack.mavlink.services.mission_messages import mission_id
-from flightstack.mavlink.services.mission_store import MissionCleared, MissionRefused, MissionReplaced
+from flightstack.mavlink.mission_messages import mission_id
 from flightstack.plan import MissionItem, MissionResult, MissionType
+from flightstack.services.mission.mission_store import MissionCleared, MissionRefused, MissionReplaced
+from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from tests.protocol.mission_harness import LOSSY, GroundStation, World, mission
 from tests.support.fences import circle, polygon, rally_point, square
 from tests.support.tools import NIGHTLY

@@ -6,14 +6,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from flightstack.mavlink.services.mission_client import Done, Failed
-from flightstack.mavlink.services.mission_store import (
+from flightstack.plan import Command, Frame, MissionItem, MissionResult, MissionType, check_mission, load_plan
+from flightstack.services.mission.mission_store import (
     CurrentRequested,
     MissionCleared,
     MissionRefused,
     MissionReplaced,
 )
-from flightstack.plan import Command, Frame, MissionItem, MissionResult, MissionType, check_mission, load_plan
+from gcs_cli.clients.mission_client import Done, Failed
 from tests.protocol.mission_harness import HOME, LOSSY, NAN, GroundStation, World, mission, waypoint
 
 SEEDS = st.integers(0, 2**32)

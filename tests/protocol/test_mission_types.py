@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
-from flightstack.mavlink.services.mission_messages import message_from_item, mission_id
-from flightstack.mavlink.services.mission_server import MissionServer
-from flightstack.mavlink.services.mission_store import CurrentRequested, MissionCleared, MissionRefused
+from flightstack.mavlink.mission_messages import message_from_item, mission_id
 from flightstack.plan import MissionItem, MissionResult, MissionType
+from flightstack.services.mission.mission_server import MissionServer
+from flightstack.services.mission.mission_store import CurrentRequested, MissionCleared, MissionRefused
+from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from tests.protocol.mission_harness import CHECKS, VEHICLE, GroundStation, World, mission
 from tests.support.fences import circle, polygon, rally_point, square
 

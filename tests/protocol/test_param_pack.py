@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink import mavftp
 
-from flightstack.mavlink.services.param_pack import pack_file, pack_parameters, unpack_parameters
+from flightstack.mavlink.param_pack import pack_file, pack_parameters, unpack_parameters
 from flightstack.params.store import ParamStore
 from tests.protocol.param_harness import spec, store_of
 

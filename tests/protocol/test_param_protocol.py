@@ -13,8 +13,7 @@ from pymavlink.dialects.v20 import common
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.mavlink.services.param_client import ParamDone, ParamFailed
-from flightstack.mavlink.services.param_values import (
+from flightstack.mavlink.param_values import (
     INT32,
     LARGEST_INTEGER,
     REAL32,
@@ -26,7 +25,8 @@ from flightstack.mavlink.services.param_values import (
     wire_value,
 )
 from flightstack.params.store import ParamStore
-from flightstack.transport.memory import Conditions
+from flightstack.transports.memory import Conditions
+from gcs_cli.clients.param_client import ParamDone, ParamFailed
 from tests.protocol.param_harness import LOSSY, Station, World, spec, store_of
 
 SEEDS = st.integers(0, 2**32)

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.contract import LoopFlags, LoopRow, LoopStatus
 from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
 from flightstack.control.attitude_pid import CONTROLLER as PID
+from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.errors import TargetError, WrongFirmwareError
 from flightstack.firmware.host_library import HostLoops
+from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import FAREWELL_ATTEMPTS, TargetLoops
 from flightstack.firmware.targets import finish_loops
-from flightstack.mavlink.services.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.pil.result import target_checks

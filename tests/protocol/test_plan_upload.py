@@ -9,8 +9,6 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.mission_server import MissionServer
-from flightstack.mavlink.services.mission_store import Check, CurrentRequested, MissionReplaced
 from flightstack.plan import (
     MissionItem,
     MissionType,
@@ -20,10 +18,12 @@ from flightstack.plan import (
     check_rally,
     fence_shape,
 )
-from flightstack.transport.memory import LOSSLESS, Conditions, LossyLink
-from gcs_cli.calls import Answer
-from gcs_cli.plan_parts import Uploads
-from gcs_cli.session import Session
+from flightstack.services.mission.mission_server import MissionServer
+from flightstack.services.mission.mission_store import Check, CurrentRequested, MissionReplaced
+from flightstack.transports.memory import LOSSLESS, Conditions, LossyLink
+from gcs_cli.link.calls import Answer
+from gcs_cli.link.session import Session
+from gcs_cli.transfers.plan_parts import Uploads
 from tests.protocol.mission_harness import LOSSY, VEHICLE, mission
 from tests.support.fences import HOME, circle, polygon, rally_point, square
 
@@ -250,7 +250,7 @@ def test_an_upload_that_is_left_tells_what_the_vehicle_holds() -> None:
 
 
 def test_restoring_after_an_interrupt_has_a_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gcs_cli.plan_parts.RESTORE_PATIENCE_S", 0.0)
+    monkeypatch.setattr("gcs_cli.transfers.plan_parts.RESTORE_PATIENCE_S", 0.0)
     world = World()
     world.hold(OLD)
     plan = Plan(mission(2, mark=1), fence=ELSEWHERE)

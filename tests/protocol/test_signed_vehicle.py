@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import pytest
 from pymavlink.dialects.v20 import common
 
-from flightstack.ground.hub import MAX_PEERS
-from flightstack.ground.peer import PeerAddress
+from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.signing import NO_KEY, Signing, timestamp_of
-from flightstack.port_numbers import GROUND
+from flightstack.services.routing.hub import MAX_PEERS
+from flightstack.services.routing.peer import PeerAddress
 from tests.support.world import World
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))

@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 import pytest
 
-from flightstack.config import DEFAULT_HOME
-from flightstack.contract import Vector3
-from flightstack.geodesy import LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import LocalFrame
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.mission_client import Failed
-from flightstack.modes import Mode
+from flightstack.params.config import DEFAULT_HOME
+from gcs_cli.clients.mission_client import Failed
 from tests.support.fences import rally_point
 from tests.support.world import World, item
 

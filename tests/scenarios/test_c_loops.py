@@ -7,16 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from flightstack.assembly import build
-from flightstack.config import StackConfig
-from flightstack.contract import LoopFlags, LoopRow, LoopStatus
+from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
+from flightstack.core.errors import ConfigError
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import CLoops
 from flightstack.firmware.errors import TargetError
 from flightstack.firmware.host_library import HostLoops
 from flightstack.mavlink.dialect import mavlink
-from flightstack.params.errors import ConfigError
-from gcs_cli.analysis import read_flight
+from flightstack.params.config import StackConfig
+from flightstack.process.assembly import build
+from gcs_cli.report.analysis import read_flight
 from tests.firmware.app_support import Target
 from tests.parity.recorded_loops import record
 from tests.support.lossy_line import LossyLine, Weather
@@ -163,7 +163,7 @@ def test_other_loops_are_refused_in_one_sentence(word: str, sentence: str) -> No
 def test_a_controller_of_python_alone_cannot_fly_in_c(monkeypatch) -> None:
     from tests.support.failing_controller import CONTROLLER  # noqa: PLC0415
 
-    monkeypatch.setattr("flightstack.assembly.load_controller", lambda _: CONTROLLER)
+    monkeypatch.setattr("flightstack.process.assembly.load_controller", lambda _: CONTROLLER)
     with pytest.raises(ConfigError, match="exists in Python alone; in C there are pid, backstepping"):
         build(StackConfig(loops="c"), lambda: None)
 

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from flightstack.ground.failure_commands import LONGEST_WAIT_S
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.modes import Mode
+from flightstack.services.commands.failure_commands import LONGEST_WAIT_S
 from tests.support.world import World
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.modes import Mode
-from sim_bridge.disturbance import Disturbance
-from sim_bridge.plant import PlantOptions
+from sim_bridge.plant.disturbance import Disturbance
+from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.simulator import Simulator
 from tests.support.world import World, item
 

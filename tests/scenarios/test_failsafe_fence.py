@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flightstack.mavlink.services.mission_client import Done
-from flightstack.modes import Mode
+from flightstack.core.modes import Mode
 from flightstack.plan import MissionType
+from gcs_cli.clients.mission_client import Done
 from tests.scenarios.test_failsafes import HEIGHT, QUICK
 from tests.scenarios.test_guided import go_to
 from tests.scenarios.test_safe_places import upload

@@ -10,8 +10,8 @@ import pytest
 from pyulog import ULog
 
 from flightstack.commander.failsafe import Action, Failsafe
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.modes import Mode
 from tests.scenarios.test_failsafes import QUICK, blow_away, breach_fence, hold, landing, mission, sticks
 from tests.support.world import World, item
 

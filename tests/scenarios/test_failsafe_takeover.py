@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flightstack.commander.failsafe import Action, Failsafe
-from flightstack.mavlink.services.mission_client import Done
-from flightstack.modes import Mode
+from flightstack.core.modes import Mode
 from flightstack.plan import MissionType
+from gcs_cli.clients.mission_client import Done
 from tests.scenarios.test_failsafe_fence import (
     BRAKING,
     RADIUS,

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from flightstack.commander.failsafe import Failsafe, Phase
-from flightstack.contract import Vector3
-from flightstack.geodesy import LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import LocalFrame
+from flightstack.core.modes import CUSTOM_MODE, Mode
 from flightstack.guidance.fence import Fence
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.modes import CUSTOM_MODE, Mode
 from tests.support.world import World, item
 
 F, P = Failsafe, Phase

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.config import DEFAULT_HOME
-from flightstack.contract import Vector3
-from flightstack.geodesy import LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import LocalFrame
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.modes import Mode
+from flightstack.params.config import DEFAULT_HOME
 from tests.support.fences import circle
 from tests.support.streams import select, sticks, stream
 from tests.support.world import World

@@ -6,12 +6,12 @@ import math
 
 import pytest
 
-from flightstack.config import DEFAULT_HOME
-from flightstack.contract import Vector3
-from flightstack.geodesy import LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import LocalFrame
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.modes import Mode
+from flightstack.params.config import DEFAULT_HOME
 from tests.support.world import World
 
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, DENIED = 0, 1, 2, 3, 14

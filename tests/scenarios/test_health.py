@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.modes import Mode
 from tests.support.world import World
 
 SYS_STATUS, GPS_RAW_INT, ESTIMATOR_STATUS, FENCE_STATUS, BATTERY_STATUS = (

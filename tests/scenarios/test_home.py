@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.config import DEFAULT_HOME
-from flightstack.contract import Vector3
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.mission_client import Failed
-from flightstack.modes import Mode
+from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import MissionItem
-from gcs_cli.analysis import read_flight
-from gcs_cli.summary import item_ned_m
+from gcs_cli.clients.mission_client import Failed
+from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.summary import item_ned_m
 from tests.support.fences import polygon
 from tests.support.world import World, item
 

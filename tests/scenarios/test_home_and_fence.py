@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.config import DEFAULT_HOME
-from flightstack.contract import Vector3
-from flightstack.geodesy import LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import LocalFrame
+from flightstack.core.modes import Mode
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.mission_client import Done, MissionClient
-from flightstack.modes import Mode
+from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import MissionItem, MissionType
+from gcs_cli.clients.mission_client import Done, MissionClient
 from tests.support.fences import polygon, rally_point, square
 from tests.support.streams import select, sticks
 from tests.support.world import GCS, World, item

@@ -6,16 +6,16 @@ import random
 
 import pytest
 
-from flightstack.ground.peer import PeerAddress
+from flightstack.core.port_numbers import GROUND
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.ftp_client import FtpClient, FtpDone
-from flightstack.mavlink.services.ftp_server import FtpServer
-from flightstack.mavlink.services.log_client import LogClient, LogDone
-from flightstack.mavlink.services.log_server import LogServer
-from flightstack.mavlink.services.log_store import FlatLogs
-from flightstack.mavlink.services.virtual_files import FileTree
-from flightstack.port_numbers import GROUND
+from flightstack.mavlink.virtual_files import FileTree
+from flightstack.services.files.ftp_server import FtpServer
+from flightstack.services.logs.log_server import LogServer
+from flightstack.services.logs.log_store import FlatLogs
+from flightstack.services.routing.peer import PeerAddress
+from gcs_cli.clients.ftp_client import FtpClient, FtpDone
+from gcs_cli.clients.log_client import LogClient, LogDone
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station
 from tests.support.world import World
 

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.modes import Mode
 from tests.support.world import World, item
 
 ACCEPTED, REJECTED, DENIED = 0, 1, 2

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.mavlink.services.mission_client import Done
-from flightstack.modes import Mode
+from flightstack.core.modes import Mode
 from flightstack.plan import load_plan
-from gcs_cli.analysis import read_flight
-from gcs_cli.summary import RunInfo, summarise
+from gcs_cli.clients.mission_client import Done
+from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.summary import RunInfo, summarise
 from tests.support.world import MISSIONS, World, item
 
 SQUARE = [(10.0, 0.0, -3.0), (10.0, 10.0, -5.0), (0.0, 10.0, -4.0), (0.0, 0.0, -3.0)]

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.mission_client import Failed
-from flightstack.modes import Mode
+from gcs_cli.clients.mission_client import Failed
 from tests.support.world import World, item
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3

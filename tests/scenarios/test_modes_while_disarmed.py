@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from flightstack.core.modes import CUSTOM_MODE, Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.modes import CUSTOM_MODE, Mode
 from tests.support.world import World, item
 
 SELECTABLE = [mode for mode in Mode if mode is not Mode.TERMINATION]

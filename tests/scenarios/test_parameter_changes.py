@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from flightstack.contract import LoopRow
+from flightstack.core.contract import LoopRow
+from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.modes import Mode
 from tests.support.world import World, item
 
 LONG_WAY = [item(22, z=3.0), item(16, north=200.0, z=3.0), item(16, north=400.0, z=3.0), item(20)]

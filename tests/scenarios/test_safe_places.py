@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
-from flightstack.modes import Mode
+from flightstack.core.modes import Mode
+from flightstack.mavlink.addressing import Address
 from flightstack.plan import MissionItem, MissionType
+from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from tests.support.fences import circle, polygon, rally_point, square
 from tests.support.world import GCS, World
 

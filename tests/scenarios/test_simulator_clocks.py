@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flightstack.geodesy import LocalFrame
-from flightstack.mavlink.hot_frames import PlantStateFrame
+from flightstack.core.geodesy import LocalFrame
+from flightstack.core.modes import Mode
 from flightstack.mavlink.link import Link
-from flightstack.modes import Mode
-from sim_bridge.hil import HilControls, hil_state
+from flightstack.simulator_link.hot_frames import PlantStateFrame
+from sim_bridge.server.hil import HilControls, hil_state
 from tests.support.world import World
 
 UNIX_US = 1_790_000_000_000_000

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flightstack.compiled import compiled
-from flightstack.contract import Vector3
 from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import Vector3
 
 
 class OneFloat(NamedTuple):

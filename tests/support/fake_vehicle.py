@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
-from flightstack.transport.udp import UdpSocket
+from flightstack.transports.udp import UdpSocket
 
 ARM, START, SHUT_DOWN, REQUEST, RETURN, SET_INTERVAL = 400, 300, 246, 512, 20, 511
 HOLD, MISSION, RTL = (4 << 16 | sub << 24 for sub in (3, 4, 5))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flightstack.contract import Vector3
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.plan import RALLY_POINT, FenceCommand, Frame, MissionItem
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)

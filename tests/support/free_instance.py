@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from flightstack.transport.udp import PortBusyError, UdpSocket
+from flightstack.transports.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import CliError
-from gcs_cli.fly_flags import FlyOptions
-from gcs_cli.fly_options import check_ports
+from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_options import check_ports
 
 FIRST, COUNT = 60, 40
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))

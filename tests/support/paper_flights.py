@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from gcs_cli.paper import cases
-from gcs_cli.paper.closed_loop import fly
-from gcs_cli.paper.experiments import Flown, entry_of
-from gcs_cli.paper.results import results_of
-from gcs_cli.paper.types import Case
+from gcs_cli.experiments.paper import cases
+from gcs_cli.experiments.paper.closed_loop import fly
+from gcs_cli.experiments.paper.experiments import Flown, entry_of
+from gcs_cli.experiments.paper.results import results_of
+from gcs_cli.experiments.paper.types import Case
 
 INNER_HZ, OUTER_HZ = 250, 125
 CONTENDERS = [one for one in cases.CONTENDERS if one.name in (cases.PID, cases.BACKSTEPPING, cases.POLES)]

@@ -8,10 +8,10 @@ import struct
 from dataclasses import dataclass, field
 from typing import Any
 
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.ftp_server import FtpServer
-from flightstack.mavlink.services.virtual_files import FileTree, fixed
+from flightstack.mavlink.virtual_files import FileTree, fixed
+from flightstack.services.files.ftp_server import FtpServer
 from tests.support.fake_vehicle import ACCEPTED, FakeVehicle
 
 INT32, REAL32 = 6, 9

@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from flightstack.core.modes import Mode
 from flightstack.guidance.land_detector import LandMemory
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
-from flightstack.modes import Mode
 from flightstack.params.behaviour import Behaviour
 
 WEIGHT_N = 10.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flightstack.geometry_bulk import quaternions_from_euler
-from flightstack.poses_file import Poses
+from flightstack.core.geometry_bulk import quaternions_from_euler
+from flightstack.flight_log.poses_file import Poses
 
 
 def sample_poses(seconds: float = 4.0, rotors: int = 4, vehicle: str = "paper_quad") -> Poses:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from flightstack.contract import Vector3
-from flightstack.geodesy import LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import Command, Frame, MissionItem, Plan
 from tests.support.synthetic_flight import CORNERS_NED_M, HOME
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from flightstack.contract import LoopRow
-from flightstack.geodesy import GeoPoint
-from flightstack.logging.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
-from flightstack.logging.flight_log import FlightLog
-from flightstack.logging.topics import OUTER
-from flightstack.modes import NAVIGATION_STATE, Mode
+from flightstack.core.contract import LoopRow
+from flightstack.core.geodesy import GeoPoint
+from flightstack.core.modes import NAVIGATION_STATE, Mode
+from flightstack.flight_log.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
+from flightstack.flight_log.flight_log import FlightLog
+from flightstack.flight_log.topics import OUTER
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 CORNERS_NED_M = [(10.0, 0.0, -3.0), (10.0, 10.0, -4.0), (0.0, 10.0, -5.0), (0.0, 0.0, -3.0)]

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from gcs_cli import calls
-from gcs_cli.connection import Connection
-from gcs_cli.endpoint import parse_endpoint, vehicle_connection
+from gcs_cli.link import calls
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.endpoint import parse_endpoint, vehicle_connection
 from tests.support.free_instance import free_instance
 from tests.support.programs import Program
 

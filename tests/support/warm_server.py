@@ -18,19 +18,19 @@ import socket
 import sys
 from typing import Any
 
-from flightstack.assembly import build
-from flightstack.config import DEFAULT_HOME, StackConfig
+from flightstack.params.config import DEFAULT_HOME, StackConfig
 from flightstack.params.vehicle import load_vehicle
+from flightstack.process.assembly import build
 from sim_bridge.simulator import Simulator
 from tests.support.programs import PROGRAMS
 
 LARGEST_REQUEST = 1 << 18
 LATER = (
-    "flightstack.app",
-    "sim_bridge.server",
-    "sim_bridge.session",
-    "gcs_cli.connection",
-    "gcs_cli.watch_render",
+    "flightstack.process.app",
+    "sim_bridge.server.server",
+    "sim_bridge.server.session",
+    "gcs_cli.link.connection",
+    "gcs_cli.tui.watch_render",
 )
 """Modules that the programs import when they run."""
 

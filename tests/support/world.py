@@ -18,27 +18,27 @@ from pathlib import Path
 
 import numpy as np
 
-from flightstack.assembly import Stack, build
-from flightstack.config import DEFAULT_HOME, StackConfig
-from flightstack.contract import Vector3
-from flightstack.geodesy import LocalFrame
-from flightstack.ground.peer import PeerAddress
-from flightstack.lockstep import Lockstep
-from flightstack.logging.flight_log import FlightLog
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import LocalFrame
+from flightstack.core.modes import Mode
+from flightstack.core.port_numbers import GROUND
+from flightstack.flight_log.flight_log import FlightLog
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.hot_frames import ActuatorsFrame
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.command_client import CommandClient
-from flightstack.mavlink.services.log_store import NO_LOGS, LogStore
-from flightstack.mavlink.services.mission_client import Done, Failed, MissionClient
-from flightstack.modes import Mode
+from flightstack.params.config import DEFAULT_HOME, StackConfig
 from flightstack.plan import MissionItem, load_plan
-from flightstack.port_numbers import GROUND
-from sim_bridge.disturbance import Disturbance
-from sim_bridge.failure_command import inject_failure
-from sim_bridge.faults import parse_fault
-from sim_bridge.plant import PlantOptions
+from flightstack.process.assembly import Stack, build
+from flightstack.services.logs.log_store import NO_LOGS, LogStore
+from flightstack.services.routing.peer import PeerAddress
+from flightstack.simulator_link.hot_frames import ActuatorsFrame
+from flightstack.vehicle.lockstep import Lockstep
+from gcs_cli.clients.command_client import CommandClient
+from gcs_cli.clients.mission_client import Done, Failed, MissionClient
+from sim_bridge.plant.disturbance import Disturbance
+from sim_bridge.plant.faults import parse_fault
+from sim_bridge.plant.plant import PlantOptions
+from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.simulator import SIMULATOR_COMPONENT, Simulator
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import pytest
 
-from flightstack import atomic_file
-from flightstack.atomic_file import (
+from flightstack.core import atomic_file
+from flightstack.core.atomic_file import (
     OWNER_ONLY,
     check_new,
     replacing,
     write_bytes_atomically,
     write_text_atomically,
 )
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 
 
 def test_a_replaced_file_leaves_nothing_else(tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.contract import AttitudeReference, Quaternion, Vector3
 from flightstack.control.attitude_backstepping import (
     BacksteppingMemory,
     BacksteppingParams,
@@ -24,6 +23,7 @@ from flightstack.control.attitude_pid import (
     paper_arm_m,
     read_pid_params,
 )
+from flightstack.core.contract import AttitudeReference, Quaternion, Vector3
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 

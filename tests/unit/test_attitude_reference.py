@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flightstack.contract import AttitudeReference, Quaternion, Vector3
 from flightstack.control.attitude_reference import (
     ReferenceMemory,
     ReferenceParams,
     attitude_reference_step,
     in_body_frame,
 )
-from flightstack.geometry import rotation_vector
+from flightstack.core.contract import AttitudeReference, Quaternion, Vector3
+from flightstack.core.geometry import rotation_vector
 
 START = ReferenceMemory(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 AXIS = np.array([0.6, -0.48, 0.64])

@@ -5,9 +5,9 @@ from __future__ import annotations
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from flightstack.mavlink.battery_frame import BatteryReport, decode_battery, encode_battery, report_of
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
+from flightstack.simulator_link.battery_frame import BatteryReport, decode_battery, encode_battery, report_of
 
 WORD = st.integers(0, 0xFFFF)
 REPORTS = st.builds(

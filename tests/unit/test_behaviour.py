@@ -7,9 +7,9 @@ import re
 
 import pytest
 
+from flightstack.core.errors import ConfigError
 from flightstack.guidance.params import guidance_params
 from flightstack.params.behaviour import SPECS, Behaviour, with_assignments
-from flightstack.params.errors import ConfigError
 
 
 def test_every_parameter_has_a_wire_name_a_range_that_holds_its_default_and_a_line_of_help() -> None:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.clock import (
+from flightstack.core.errors import ConfigError
+from flightstack.process.clock import (
     NO_DURATIONS,
     WINDOW,
     DeadlineScheduler,
@@ -19,7 +20,6 @@ from flightstack.clock import (
     nearest_outer_hz,
     rates,
 )
-from flightstack.params.errors import ConfigError
 
 PERIOD = 2_000_000
 

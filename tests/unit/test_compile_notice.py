@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 from numba.core import event
 
-from flightstack.compile_notice import CompileNotice
-from flightstack.compiled import compiled
+from flightstack.core.compiled import compiled
+from flightstack.process.compile_notice import CompileNotice
 
 JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,7 +24,7 @@ import json
 import os
 import sys
 from numba.core.dispatcher import Dispatcher
-import flightstack.assembly
+import flightstack.process.assembly
 import sim_bridge.simulator
 
 def report(name):
@@ -50,17 +50,17 @@ for name, setup in json.loads(sys.argv[1]).items():
     assert os.waitpid(child, 0)[1] == 0, name
 """
 STACK = """
-from flightstack.assembly import build
-from flightstack.config import DEFAULT_HOME, StackConfig
+from flightstack.process.assembly import build
+from flightstack.params.config import DEFAULT_HOME, StackConfig
 build(StackConfig("paper_quad", "pid", "tuned", "{loops}", 500.0, 100.0, False, True, DEFAULT_HOME, 1), lambda: None)
 """
 PLANT = """
 from flightstack.params.vehicle import load_vehicle
-from sim_bridge.disturbance import Disturbance
-from sim_bridge.plant import PlantOptions
+from sim_bridge.plant.disturbance import Disturbance
+from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.simulator import Simulator
-from flightstack.contract import Vector3
-from sim_bridge.battery import BatteryOptions
+from flightstack.core.contract import Vector3
+from sim_bridge.plant.battery import BatteryOptions
 still = Vector3(0.0, 0.0, 0.0)
 options = PlantOptions(Disturbance(still, 0.0, still, still, 0.0), 1, battery=BatteryOptions())
 Simulator(load_vehicle("paper_quad"), "{plant}", options)
@@ -125,8 +125,8 @@ def test_compile_notice_names_a_kernel_that_is_not_listed() -> None:
 @JIT
 @pytest.mark.parametrize("loops", ["python", "c"])
 def test_kernels_of_the_stack_are_those_it_loads(loops: str) -> None:
-    from flightstack.assembly import kernels_of  # noqa: PLC0415
-    from flightstack.config import DEFAULT_HOME, StackConfig  # noqa: PLC0415
+    from flightstack.params.config import DEFAULT_HOME, StackConfig  # noqa: PLC0415
+    from flightstack.process.assembly import kernels_of  # noqa: PLC0415
 
     config = StackConfig("paper_quad", "pid", "tuned", loops, 500.0, 100.0, False, True, DEFAULT_HOME, 1)
     assert loaded_kernels()[loops] == sorted(kernels_of(config))

@@ -13,12 +13,12 @@ import numba
 import numpy as np
 import pytest
 
-from flightstack import compiled as module
-from flightstack import kernel_cache
-from flightstack.compiled import as_tuple, compiled, direct, specialise, store
 from flightstack.control.mixer import mix
-from flightstack.kernel_cache import is_own
-from sim_bridge.integrator import advance_kernel
+from flightstack.core import compiled as module
+from flightstack.core import kernel_cache
+from flightstack.core.compiled import as_tuple, compiled, direct, specialise, store
+from flightstack.core.kernel_cache import is_own
+from sim_bridge.plant.integrator import advance_kernel
 
 inner = None  # bound by ``specialise``
 FACTOR = 0.0
@@ -91,7 +91,7 @@ def test_arrays_become_tuples_and_tuples_arrays() -> None:
 
 def test_only_our_own_functions_are_cached_by_themselves() -> None:
     assert is_own("flightstack.control.mixer")
-    assert is_own("sim_bridge.rigid")
+    assert is_own("sim_bridge.plant.rigid")
     assert not is_own("lqr_controller")
     assert not is_own("flightstack_extras.law")
     assert Path(mix._cache.cache_path).is_dir()
@@ -113,7 +113,7 @@ def digest_of(top: Path, *modules: str) -> str:
 def test_the_digest_covers_direct_and_indirect_imports(tmp_path: Path) -> None:
     used = {
         "control/law.py": "from flightstack.control import helper\n"
-        "from flightstack.geometry import (  # frames\n    wrap,\n)\n",
+        "from flightstack.core.geometry import (  # frames\n    wrap,\n)\n",
         "control/helper.py": "import flightstack.deep as d\n",
         "control/__init__.py": "",
         "geometry.py": "x = 1\n",
@@ -132,7 +132,7 @@ def test_the_digest_covers_direct_and_indirect_imports(tmp_path: Path) -> None:
 def test_no_module_that_compiled_code_names_escapes_the_digest() -> None:
     """Compare the imports found in the text with what the running modules really hold."""
     top = Path(module.__file__).parent.parent
-    for name in ("flightstack.control.loops", "flightstack.guidance.kernels", "sim_bridge.integrator"):
+    for name in ("flightstack.control.loops", "flightstack.guidance.kernels", "sim_bridge.plant.integrator"):
         covered = set(kernel_cache.sources(top, [name]))
         for value in vars(importlib.import_module(name)).values():
             home = getattr(getattr(value, "py_func", value), "__module__", None) or ""
@@ -142,7 +142,7 @@ def test_no_module_that_compiled_code_names_escapes_the_digest() -> None:
 
 def test_a_specialised_kernel_is_cached_by_the_sources_of_all_its_parts() -> None:
     top = Path(module.__file__).parent.parent
-    made_of = ("sim_bridge.integrator", "sim_bridge.paper")
+    made_of = ("sim_bridge.plant.integrator", "sim_bridge.plant.paper")
     joined = ("flightstack.control.loops", "flightstack.control.attitude_backstepping")
     assert digest_of(top, *joined) != digest_of(top, *joined[:1])
     expected = kernel_cache.digest(top, made_of, numba.__version__)
@@ -199,8 +199,8 @@ def test_a_kernel_may_use_blas() -> None:
 def test_a_vehicle_starts_without_scipy_linalg() -> None:
     program = """
 import sys
-from flightstack.assembly import build
-from flightstack.config import DEFAULT_HOME, StackConfig
+from flightstack.process.assembly import build
+from flightstack.params.config import DEFAULT_HOME, StackConfig
 build(StackConfig("paper_quad", "pid", "tuned", "python", 500.0, 100.0, False, True, DEFAULT_HOME, 1), lambda: None)
 print("scipy.linalg" in sys.modules)
 """

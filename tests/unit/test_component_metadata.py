@@ -7,11 +7,11 @@ import lzma
 import re
 
 from flightstack import __version__
+from flightstack.mavlink.ftp_messages import mavlink_crc32
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.component_metadata import ComponentMetadata, vehicle_files
-from flightstack.mavlink.services.ftp_messages import mavlink_crc32
-from flightstack.mavlink.services.log_store import NoLogs
-from flightstack.mavlink.services.virtual_files import FileTree
+from flightstack.mavlink.virtual_files import FileTree
+from flightstack.services.files.component_metadata import ComponentMetadata, vehicle_files
+from flightstack.services.logs.log_store import NoLogs
 
 PARAMETERS = json.dumps({"version": 1, "parameters": [{"name": "MIS_TAKEOFF_ALT", "type": "Float"}]})
 METADATA = ComponentMetadata(PARAMETERS, "flightstack", "quadcopter", __version__)

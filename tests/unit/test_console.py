@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
-from flightstack import console
-from flightstack.console import report_os_error
+from flightstack.process import console
+from flightstack.process.console import report_os_error
 from sim_bridge import __main__ as sim_bridge
 
 

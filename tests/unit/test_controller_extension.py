@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 
-from flightstack.assembly import build
-from flightstack.config import StackConfig
-from flightstack.contract import LoopRow
 from flightstack.control.attitude_pid import CONTROLLER as PID
 from flightstack.control.controller_loading import _form_problem, controller_names, load_controller
-from flightstack.params.errors import ConfigError
+from flightstack.core.contract import LoopRow
+from flightstack.core.errors import ConfigError
+from flightstack.params.config import StackConfig
 from flightstack.params.gains_file import BUILT_IN
 from flightstack.params.tunable import Tunable, undeclared
+from flightstack.process.assembly import build
 from tests.support.commands import flightstack_command
 from tests.support.world import World
 
@@ -216,7 +216,7 @@ def test_a_declaration_that_cannot_be(name: str) -> None:
 
 def test_a_name_that_the_vehicle_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     taken = PID._replace(tunables=(Tunable("kp_roll", "MPC_XY_CRUISE", 0, 1e5, "", "Gain"),))
-    monkeypatch.setattr("flightstack.assembly.load_controller", lambda _: taken)
+    monkeypatch.setattr("flightstack.process.assembly.load_controller", lambda _: taken)
     with pytest.raises(
         ConfigError, match="declares the parameter MPC_XY_CRUISE, which the vehicle has already"
     ):

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from flightstack.contract import AttitudeReference, Quaternion, Vector3
 from flightstack.control.attitude_backstepping import (
     BacksteppingMemory,
     BacksteppingParams,
     attitude_backstepping_step,
 )
 from flightstack.control.attitude_controller import AttitudeInputs
-from sim_bridge.compiled_plant import CompiledPlant
-from sim_bridge.plant import InitialState, PlantOptions
+from flightstack.core.contract import AttitudeReference, Quaternion, Vector3
+from sim_bridge.plant.compiled_plant import CompiledPlant
+from sim_bridge.plant.plant import InitialState, PlantOptions
 from tests.support.paper_model import (
     ANGLES,
     ARM,

@@ -9,17 +9,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from flightstack.contract import Vector3
-from flightstack.extras import INSTALL_MULTIBODY
-from flightstack.mavlink.hot_frames import ARMED_FLAG
+from flightstack.core.contract import Vector3
+from flightstack.core.extras import INSTALL_MULTIBODY
 from flightstack.params.vehicle import load_vehicle
+from flightstack.simulator_link.hot_frames import ARMED_FLAG
 from gcs_cli.errors import CliError
-from gcs_cli.fly_flags import FlyOptions
-from gcs_cli.fly_options import checked_plan
+from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_options import checked_plan
 from sim_bridge.__main__ import main
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.plant import MultibodyPlant
-from sim_bridge.plant import InitialState, PlantOptions
+from sim_bridge.plant.plant import InitialState, PlantOptions
 
 SQUARE = Path(__file__).resolve().parents[2] / "missions" / "square.plan"
 
@@ -124,7 +124,7 @@ def test_an_unknown_vehicle(capsys: pytest.CaptureFixture[str]) -> None:
 def test_without_mujoco_both_commands_say_what_to_install(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for module in ("sim_bridge.arguments", "gcs_cli.fly_options"):
+    for module in ("sim_bridge.arguments", "gcs_cli.fly.fly_options"):
         monkeypatch.setattr(f"{module}.find_spec", lambda name: None)
     assert main(["--plant", "multibody"]) == 2
     assert capsys.readouterr().err == (f"sim-bridge: the multibody plant needs MuJoCo: {INSTALL_MULTIBODY}\n")

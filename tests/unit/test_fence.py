@@ -11,7 +11,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceMonitor
 from flightstack.plan import FenceCommand, FenceShape, fence_shape
 from flightstack.plan.fence_shape import Area, edges_that_cross

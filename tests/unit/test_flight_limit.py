@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.contract import Vector3
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.params.behaviour import Behaviour
 from flightstack.plan import Command, Frame, MissionItem, load_plan
-from gcs_cli.flight_limit import ENDLESS_S, EXTRA_S, ITEM_S, LONGEST_S, MARGIN, flight_limit_s
-from gcs_cli.fly_options import DEFAULT_HOME, FlyOptions, longest_flight_s
+from gcs_cli.fly.flight_limit import ENDLESS_S, EXTRA_S, ITEM_S, LONGEST_S, MARGIN, flight_limit_s
+from gcs_cli.fly.fly_options import DEFAULT_HOME, FlyOptions, longest_flight_s
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 B = Behaviour()

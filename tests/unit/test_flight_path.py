@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.poses_file import Poses
-from sim_bridge.live_view import SNAPSHOT
-from sim_bridge.multibody.cameras import CAMERAS, FIELD_DEG, Site, View, project, view
-from sim_bridge.multibody.film import gif_durations_ms
-from sim_bridge.multibody.live_window import LiveFlight, newest
-from sim_bridge.multibody.pictures import film_of, numbered, spread
-from sim_bridge.multibody.poses import FlightPath
+from flightstack.flight_log.poses_file import Poses
+from sim_bridge.render.cameras import CAMERAS, FIELD_DEG, Site, View, project, view
+from sim_bridge.render.film import gif_durations_ms
+from sim_bridge.render.live_view import SNAPSHOT
+from sim_bridge.render.live_window import LiveFlight, newest
+from sim_bridge.render.pictures import film_of, numbered, spread
+from sim_bridge.render.poses import FlightPath
 from tests.support.sample_poses import sample_poses
 
 SPAN_M, GROUND_M = 0.33, -0.1

@@ -12,7 +12,7 @@ import pytest
 from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
 from flightstack.control.attitude_pid import CONTROLLER as PID
 from flightstack.control.loops import PythonLoops
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 from flightstack.params.gains_file import BUILT_IN, built_in_gains, open_gains
 from flightstack.params.vehicle import load_vehicle
 

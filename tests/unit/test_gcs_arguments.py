@@ -18,16 +18,14 @@ from rich.spinner import Spinner
 from rich.text import Text
 
 from flightstack.__main__ import run as flightstack_run
-from flightstack.geodesy import GeoPoint
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from gcs_cli.__main__ import main
-from gcs_cli.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
 from gcs_cli.errors import DONE, USAGE, CliError
-from gcs_cli.flight import Phase
-from gcs_cli.flight_outcome import Code, Outcome
-from gcs_cli.fly_display import LineDisplay, make_display, phase_words, progress
-from gcs_cli.fly_flags import NOT_PASSED, TO_SIMULATOR, TO_STACK, FlyOptions, flag_of
-from gcs_cli.fly_options import (
+from gcs_cli.fly.flight import Phase
+from gcs_cli.fly.fly_display import LineDisplay, make_display, phase_words, progress
+from gcs_cli.fly.fly_flags import NOT_PASSED, TO_SIMULATOR, TO_STACK, FlyOptions, flag_of
+from gcs_cli.fly.fly_options import (
     check_ports,
     checked_plan,
     flown_vehicle,
@@ -35,8 +33,10 @@ from gcs_cli.fly_options import (
     simulator_arguments,
     stack_arguments,
 )
-from gcs_cli.replay import Run
-from gcs_cli.run_directory import LOG_NAME, make_run_directory
+from gcs_cli.link.endpoint import DEFAULT_CONNECTION, Endpoint, parse_endpoint
+from gcs_cli.report.flight_outcome import Code, Outcome
+from gcs_cli.report.replay import Run
+from gcs_cli.report.run_directory import LOG_NAME, make_run_directory
 from sim_bridge.__main__ import run as sim_bridge_run
 from tests.support.fake_vehicle import SHUT_DOWN, FakeVehicle
 from tests.support.free_instance import free_instance
@@ -364,7 +364,7 @@ def test_what_a_flight_that_never_began_has_left_does_not_stay_beside_the_next_o
 
 
 def test_a_directory_without_permission_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gcs_cli.run_directory.os.access", lambda *_: False)  # root may write anywhere
+    monkeypatch.setattr("gcs_cli.report.run_directory.os.access", lambda *_: False)  # root may write anywhere
     with pytest.raises(CliError, match="nothing can be written there: permission denied") as error:
         make_run_directory(HOP, tmp_path)
     assert error.value.exit_code == USAGE

@@ -8,11 +8,11 @@ import pytest
 
 from flightstack.plan import RALLY_POINT, Command, FenceCommand, Frame, MissionItem, MissionType, Plan
 from gcs_cli.errors import DONE, FAILED, NO_ANSWER
-from gcs_cli.flight import Flight, Phase
-from gcs_cli.flight_outcome import Code, Outcome
-from gcs_cli.flight_watch import STALL_S
-from gcs_cli.fly_display import phase_words
-from gcs_cli.session import Session
+from gcs_cli.fly.flight import Flight, Phase
+from gcs_cli.fly.flight_watch import STALL_S
+from gcs_cli.fly.fly_display import phase_words
+from gcs_cli.link.session import Session
+from gcs_cli.report.flight_outcome import Code, Outcome
 from tests.support.fake_vehicle import ARM, RETURN, SHUT_DOWN, START, FakeVehicle
 
 STEP_S = 0.05

@@ -7,13 +7,13 @@ import sys
 
 HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich")
 LIGHT = (
-    "flightstack.command_line",
-    "flightstack.console",
-    "flightstack.options",
-    "flightstack.own_program",
-    "flightstack.picture_options",
-    "flightstack.port_numbers",
-    "flightstack.simulation_options",
+    "flightstack.process.command_line",
+    "flightstack.process.console",
+    "flightstack.process.options",
+    "flightstack.process.own_program",
+    "flightstack.process.picture_options",
+    "flightstack.core.port_numbers",
+    "flightstack.process.simulation_options",
 )
 """Of the flight stack's modules only those that print, or hold words and numbers for the help."""
 

@@ -13,14 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
-from flightstack.mavlink.services.param_client import ParamTiming
-from flightstack.mavlink.services.param_values import Parameter
+from flightstack.core.errors import ConfigError
+from flightstack.mavlink.param_values import Parameter
 from flightstack.mavlink.signing import timestamp_of
-from flightstack.params.errors import ConfigError
 from flightstack.params.param_file import ParamLine, format_params
-from gcs_cli.param_file import load_parameters, render_parameters
-from gcs_cli.param_info import ParamInfo, number_text, parse_metadata
-from gcs_cli.param_table import matching, parameter_table
+from gcs_cli.clients.param_client import ParamTiming
+from gcs_cli.vehicle.param_file import load_parameters, render_parameters
+from gcs_cli.vehicle.param_info import ParamInfo, number_text, parse_metadata
+from gcs_cli.vehicle.param_table import matching, parameter_table
 from tests.support.commands import Ended, gcs
 from tests.support.fake_vehicle import serve
 from tests.support.param_vehicle import METADATA, ParamVehicle
@@ -240,7 +240,7 @@ def test_a_bad_file_is_a_usage_error_before_anything_is_asked(tmp_path: Path) ->
 
 
 def test_a_vehicle_that_does_not_answer_about_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gcs_cli.param_calls.TIMING", ParamTiming(timeout_s=0.1, retries=1))
+    monkeypatch.setattr("gcs_cli.transfers.param_calls.TIMING", ParamTiming(timeout_s=0.1, retries=1))
     vehicle = ParamVehicle(deaf_to={"PARAM_REQUEST_READ"})
     result = told(vehicle, "get", "ROLL_P")
     assert (result.returncode, result.stdout) == (3, "")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from gcs_cli.processes import Child, Children, culprit, is_explained
+from gcs_cli.fly.processes import Child, Children, culprit, is_explained
 
 
 class Ended(NamedTuple):

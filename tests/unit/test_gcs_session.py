@@ -6,9 +6,9 @@ from typing import Any
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from gcs_cli import calls
-from gcs_cli.calls import Answer, Call
-from gcs_cli.session import Session
+from gcs_cli.link import calls
+from gcs_cli.link.calls import Answer, Call
+from gcs_cli.link.session import Session
 from tests.support.fake_vehicle import ARM, FakeVehicle
 
 HERE, THERE = ("10.0.0.1", 18570), ("10.0.0.2", 18570)

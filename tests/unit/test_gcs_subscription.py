@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, FsLoopTiming, mavlink
-from gcs_cli.subscription import RENEW_S, RETRY_S, ROTORS_AND_TIMING, Subscription
+from gcs_cli.link.subscription import RENEW_S, RETRY_S, ROTORS_AND_TIMING, Subscription
 
 VEHICLE = (7, 1)
 SET_INTERVAL = int(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)

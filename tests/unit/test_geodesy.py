@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.contract import Vector3
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 
 SEMI_MAJOR_M = 6378137.0
 FLATTENING = 1.0 / 298.257223563  # WGS 84 by definition: independent of the module's eccentricity

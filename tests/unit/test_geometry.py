@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flightstack.contract import Quaternion, Vector3
-from flightstack.geometry import (
+from flightstack.core.contract import Quaternion, Vector3
+from flightstack.core.geometry import (
     blend,
     conjugate,
     cross,

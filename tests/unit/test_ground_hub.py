@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
-from flightstack.assembly import build
-from flightstack.config import StackConfig
-from flightstack.ground.hub import MAX_PEERS
-from flightstack.ground.peer import PeerAddress
+from flightstack.core.modes import Mode
+from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.link import Link
-from flightstack.modes import Mode
-from flightstack.port_numbers import GROUND
-from flightstack.snapshot import NOTICE
+from flightstack.params.config import StackConfig
+from flightstack.process.assembly import build
+from flightstack.services.routing.hub import MAX_PEERS
+from flightstack.services.routing.peer import PeerAddress
+from flightstack.vehicle.snapshot import NOTICE
 
 ALICE, BOB = PeerAddress(GROUND, "alice", 1), PeerAddress("api", "bob", 2)
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from flightstack.config import DEFAULT_HOME
-from flightstack.geodesy import GeoPoint
+from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
+from flightstack.params.config import DEFAULT_HOME
 from tests.unit.test_ground_hub import ACCEPTED, ALICE, BOB, DENIED, NAN, REJECTED, UNSUPPORTED, Net, Station
 
 SET_HOME, GET_HOME = mavlink.MAV_CMD_DO_SET_HOME, mavlink.MAV_CMD_GET_HOME_POSITION

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.contract import Vector3
+from flightstack.core.contract import Vector3
+from flightstack.core.modes import Mode
 from flightstack.guidance.setpoints import AttitudeSetpoint, PointSetpoint
-from flightstack.modes import Mode
 from tests.support.perfect_vehicle import WEIGHT_N, PerfectVehicle
 
 BAD = [math.nan, math.inf, -math.inf]

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightstack.mavlink.dialect import FsActuators, FsPlantState, mavlink
-from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
 from flightstack.mavlink.link import Link
+from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 
 properties = settings(derandomize=True, deadline=None, max_examples=60)
 times = st.integers(0, 2**64 - 1)

@@ -7,15 +7,15 @@ import random
 
 import pytest
 
-from flightstack.assembly import build
-from flightstack.config import StackConfig
-from flightstack.ground.hub import FORWARDED_A_POLL, KEPT_TEXTS, MAX_PEERS, PEER_FORGOTTEN_S
-from flightstack.ground.peer import PeerAddress
+from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import SILENT_AFTER_S, Link
-from flightstack.port_numbers import GROUND
-from flightstack.reboot import carry_over
-from flightstack.snapshot import NOTICE
+from flightstack.params.config import StackConfig
+from flightstack.process.assembly import build
+from flightstack.process.reboot import carry_over
+from flightstack.services.routing.hub import FORWARDED_A_POLL, KEPT_TEXTS, MAX_PEERS, PEER_FORGOTTEN_S
+from flightstack.services.routing.peer import PeerAddress
+from flightstack.vehicle.snapshot import NOTICE
 from tests.unit.test_ground_hub import ALICE, BOB, Net
 
 CAMERA = PeerAddress("tcp", "camera", 3)

@@ -11,16 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightstack import atomic_file
-from flightstack.assembly import Stack, build
-from flightstack.config import DEFAULT_HOME, StackConfig
-from flightstack.geodesy import GeoPoint
-from flightstack.mavlink.services.mission_messages import mission_id
-from flightstack.params.errors import ConfigError
+from flightstack.core import atomic_file
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
+from flightstack.mavlink.mission_messages import mission_id
+from flightstack.params.config import DEFAULT_HOME, StackConfig
 from flightstack.plan import MissionItem, load_plan
 from flightstack.plan.item import UNSET_E7
 from flightstack.plan.kept_plans import KeptPlans, plans_from_text, plans_to_text
-from flightstack.plan_file import PlanFile
+from flightstack.process.assembly import Stack, build
+from flightstack.process.plan_file import PlanFile
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 NEAR_HOME = DEFAULT_HOME._replace(altitude_m=489.0)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from flightstack.contract import Quaternion, Vector3, VehicleState
+from flightstack.core.contract import Quaternion, Vector3, VehicleState
 from flightstack.guidance.land_detector import (
     BLOCKED_M_S,
     BOUNCE_SHARE,

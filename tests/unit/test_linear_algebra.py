@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flightstack.linear_algebra import largest_eigenvalue, pseudo_inverse
+from flightstack.core.linear_algebra import largest_eigenvalue, pseudo_inverse
 from flightstack.params.vehicle import built_in_vehicles, load_vehicle
 from tests.support.rotor_sets import ring
 

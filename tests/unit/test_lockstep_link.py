@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from flightstack.transport.processor import Follower, Roamer
-from flightstack.transport.tcp import LinkClosedError, TcpClient
+from flightstack.transports.processor import Follower, Roamer
+from flightstack.transports.tcp import LinkClosedError, TcpClient
 
 PROCESSORS = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
 needs_two = pytest.mark.skipif(len(PROCESSORS) < 2, reason="this machine offers one processor only")

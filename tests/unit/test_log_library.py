@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.logging import log_library
-from flightstack.logging.log_files import LogFiles, default_log
-from flightstack.logging.log_library import LogLibrary, create_log_file
-from flightstack.mavlink.services.log_store import DatedLogs, FlatLogs, LogInfo
-from flightstack.mavlink.services.virtual_files import Entry
+from flightstack.mavlink.virtual_files import Entry
+from flightstack.process import log_library
+from flightstack.process.log_files import LogFiles, default_log
+from flightstack.process.log_library import LogLibrary, create_log_file
+from flightstack.services.logs.log_store import DatedLogs, FlatLogs, LogInfo
 
 
 def write(path: Path, data: bytes, time_s: int) -> Path:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
 
-from flightstack.contract import LoopRow, LoopStatus
 from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.attitude_pid import CONTROLLER as PID
 from flightstack.control.loops import PythonLoops
 from flightstack.control.mixer import mixer_for
+from flightstack.core.contract import LoopRow, LoopStatus
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from tests.support.failing_controller import CONTROLLER as FAILING

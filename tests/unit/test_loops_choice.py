@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from flightstack.core.errors import ConfigError
 from flightstack.firmware.choice import LoopsChoice, parse_loops
-from flightstack.params.errors import ConfigError
 
 
 @pytest.mark.parametrize(

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightstack.core.modes import Mode
 from flightstack.guidance.manual import shaped
 from flightstack.guidance.setpoints import Sticks
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.manual_server import ManualServer, read_sticks
-from flightstack.mavlink.services.stream_watch import StreamWatch
-from flightstack.modes import Mode
+from flightstack.services.streams.manual_server import ManualServer, read_sticks
+from flightstack.services.streams.stream_watch import StreamWatch
 from tests.support.perfect_vehicle import PerfectVehicle
 
 

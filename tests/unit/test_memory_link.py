@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 
-from flightstack.transport.memory import Conditions, LossyLink, memory_link
+from flightstack.transports.memory import Conditions, LossyLink, memory_link
 
 
 def datagrams(count: int) -> list[bytes]:

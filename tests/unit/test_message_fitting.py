@@ -12,21 +12,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyulog import ULog
 
-from flightstack.field_numbers import fitted
-from flightstack.geodesy import GeoPoint, LocalFrame
-from flightstack.logging.event_topics import EVENT_TOPICS
-from flightstack.logging.flight_log import FlightLog
-from flightstack.mavlink.battery_frame import decode_battery, encode_battery
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.modes import Mode
+from flightstack.flight_log.event_topics import EVENT_TOPICS
+from flightstack.flight_log.flight_log import FlightLog
 from flightstack.mavlink.dialect import FsLoopTiming, mavlink
+from flightstack.mavlink.field_numbers import fitted
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.log_messages import log_data_message
-from flightstack.mavlink.services.mission_client import MissionClient
-from flightstack.mavlink.telemetry import MAKERS, messages, status_texts
-from flightstack.mavlink.telemetry.facts import FenceBreaches, FlightTimes, PlanIds
-from flightstack.modes import Mode
+from flightstack.mavlink.log_messages import log_data_message
 from flightstack.params.vehicle import load_vehicle
-from sim_bridge.battery import BatteryState, battery_report
-from sim_bridge.hil import hil_state
+from flightstack.services.telemetry import MAKERS, messages, status_texts
+from flightstack.services.telemetry.facts import FenceBreaches, FlightTimes, PlanIds
+from flightstack.simulator_link.battery_frame import decode_battery, encode_battery
+from gcs_cli.clients.mission_client import MissionClient
+from sim_bridge.plant.battery import BatteryState, battery_report
+from sim_bridge.server.hil import hil_state
 from sim_bridge.simulator import Simulator
 from tests.support.synthetic_flight import HOME, KeptBytes
 from tests.unit.test_telemetry import facts

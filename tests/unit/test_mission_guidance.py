@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.modes import Mode
 from flightstack.guidance.mission import LOG_SIZE
 from flightstack.guidance.plan_table import plan_table
-from flightstack.modes import Mode
 from flightstack.plan import MissionItem
 from tests.support.perfect_vehicle import NAN, PerfectVehicle
 

@@ -10,8 +10,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from flightstack.contract import Vector3, Wrench
 from flightstack.control.mixer import WORK_ROWS, mix, mixer_for, relative_rotor_speed
+from flightstack.core.contract import Vector3, Wrench
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from tests.support.rotor_sets import irregular_vehicles, ring
 

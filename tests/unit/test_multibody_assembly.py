@@ -12,14 +12,14 @@ import mujoco
 import numpy as np
 import pytest
 
+from flightstack.core.errors import ConfigError
 from flightstack.params.assembly import MATERIALS, Part
-from flightstack.params.errors import ConfigError
 from flightstack.params.vehicle import BUILT_IN, Vehicle, load_vehicle
 from sim_bridge.multibody.assembly import TOLERANCE, assemble
 from sim_bridge.multibody.mass import about_point, solid
 from sim_bridge.multibody.mass_table import mass_table, tuned_masses
 from sim_bridge.multibody.mjcf import model_xml
-from sim_bridge.plant import PlantOptions
+from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plants import make_plant
 from tests.support.rotor_sets import multirotor
 

@@ -12,23 +12,23 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from flightstack.config import DEFAULT_HOME
-from flightstack.contract import Vector3
-from flightstack.geodesy import LocalFrame
-from flightstack.mavlink.hot_frames import ARMED_FLAG, ActuatorsFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import LocalFrame
+from flightstack.params.config import DEFAULT_HOME
 from flightstack.params.vehicle import Vehicle, load_vehicle
+from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame
 from sim_bridge import plants
-from sim_bridge.contact import FRICTION
-from sim_bridge.disturbance import NO_DISTURBANCE, Disturbance
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
-from sim_bridge.hil import hil_state
-from sim_bridge.layout import CONTACT, DIVERGED
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.plant import MultibodyPlant
-from sim_bridge.plant import AT_REST, InitialState, Plant, PlantOptions
+from sim_bridge.plant.contact import FRICTION
+from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
+from sim_bridge.plant.layout import CONTACT, DIVERGED
+from sim_bridge.plant.plant import AT_REST, InitialState, Plant, PlantOptions
 from sim_bridge.plant_names import PLANT_NAMES
 from sim_bridge.plants import make_plant
+from sim_bridge.server.hil import hil_state
 from sim_bridge.simulator import Simulator
 from tests.support.tools import NIGHTLY
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 from flightstack.params.gains_file import hidden_gains, open_gains
 from flightstack.params.vehicle import BUILT_IN, hidden_vehicle, load_vehicle
 

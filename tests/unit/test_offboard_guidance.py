@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.contract import Quaternion, Vector3
+from flightstack.core.contract import Quaternion, Vector3
+from flightstack.core.modes import Mode
 from flightstack.guidance.setpoints import (
     NOT_GIVEN,
     AttitudeSetpoint,
@@ -17,7 +18,6 @@ from flightstack.guidance.setpoints import (
     PointSetpoint,
     Sticks,
 )
-from flightstack.modes import Mode
 from flightstack.params.vehicle import GRAVITY_M_S2
 from tests.support.perfect_vehicle import WEIGHT_N, PerfectVehicle
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.contract import Vector3
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import AttitudeSetpoint, PointSetpoint
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.setpoint_messages import Here, read_setpoint
+from flightstack.services.streams.setpoint_messages import Here, read_setpoint
 
 HOME = GeoPoint(47.0, 8.0, 500.0)
 HERE = Here(Vector3(10.0, 20.0, -30.0), math.pi / 2, LocalFrame(HOME), HOME.altitude_m)

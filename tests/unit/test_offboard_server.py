@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from flightstack.contract import Vector3
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import OffboardSetpoint, PointSetpoint
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.setpoint_messages import Here
-from flightstack.mavlink.services.setpoint_server import SetpointServer
-from flightstack.mavlink.services.stream_watch import StreamWatch
+from flightstack.mavlink.addressing import Address
+from flightstack.services.streams.setpoint_messages import Here
+from flightstack.services.streams.setpoint_server import SetpointServer
+from flightstack.services.streams.stream_watch import StreamWatch
 from tests.support.streams import local_point
 
 

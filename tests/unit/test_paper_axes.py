@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gcs_cli.paper.report_axes import BOTTOM, LEFT, RIGHT, TOP, Axis, Guide, chart, spanning
-from gcs_cli.paper.report_curves import Mark
-from gcs_cli.paper.report_space import Path, space_chart
-from gcs_cli.report_chart import Line
+from gcs_cli.experiments.paper.report_axes import BOTTOM, LEFT, RIGHT, TOP, Axis, Guide, chart, spanning
+from gcs_cli.experiments.paper.report_curves import Mark
+from gcs_cli.experiments.paper.report_space import Path, space_chart
+from gcs_cli.report.chart import Line
 from tests.unit.test_report import parsed
 
 SIZE = (480, 250)

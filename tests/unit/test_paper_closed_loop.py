@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.assembly import build
-from flightstack.config import StackConfig
-from flightstack.contract import LoopRow, LoopStatus, Vector3
-from flightstack.logging.flight_log import FlightLog
-from flightstack.mavlink.hot_frames import ActuatorsFrame
+from flightstack.core.contract import LoopRow, LoopStatus, Vector3
+from flightstack.flight_log.flight_log import FlightLog
+from flightstack.params.config import StackConfig
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
-from gcs_cli.paper import closed_loop
-from gcs_cli.paper.cases import (
+from flightstack.process.assembly import build
+from flightstack.simulator_link.hot_frames import ActuatorsFrame
+from gcs_cli.experiments.paper import closed_loop
+from gcs_cli.experiments.paper.cases import (
     BACKSTEPPING,
     CONDITIONS,
     CONTENDERS,
@@ -25,15 +25,15 @@ from gcs_cli.paper.cases import (
     RATE_FED_PID,
     make_case,
 )
-from gcs_cli.paper.closed_loop import fly, fly_rows, hover_speeds
-from gcs_cli.paper.comparisons import shared_overshoots
-from gcs_cli.paper.experiments import entry_of
-from gcs_cli.paper.metrics import measure, path_metrics
-from gcs_cli.paper.plants import ROUNDING_M, difference
-from gcs_cli.paper.trajectory import Move, Trajectory, load_trajectory, setpoints
-from gcs_cli.paper.types import Case, Recording
-from sim_bridge.disturbance import Disturbance
-from sim_bridge.plant import PlantOptions
+from gcs_cli.experiments.paper.closed_loop import fly, fly_rows, hover_speeds
+from gcs_cli.experiments.paper.comparisons import shared_overshoots
+from gcs_cli.experiments.paper.experiments import entry_of
+from gcs_cli.experiments.paper.metrics import measure, path_metrics
+from gcs_cli.experiments.paper.plants import ROUNDING_M, difference
+from gcs_cli.experiments.paper.trajectory import Move, Trajectory, load_trajectory, setpoints
+from gcs_cli.experiments.paper.types import Case, Recording
+from sim_bridge.plant.disturbance import Disturbance
+from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.simulator import Simulator
 
 PLANTS = ("paper", "rigid")

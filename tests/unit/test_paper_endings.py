@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.contract import STATE_SIZE, FloatArray
-from flightstack.geometry_bulk import quaternions_from_euler
-from gcs_cli.paper.endings import Ending, ending
+from flightstack.core.contract import STATE_SIZE, FloatArray
+from flightstack.core.geometry_bulk import quaternions_from_euler
+from gcs_cli.experiments.paper.endings import Ending, ending
 
 HZ = 100.0
 TICKS = 1000

@@ -15,9 +15,9 @@ from scipy import signal
 from scipy.linalg import expm
 
 from flightstack.params.vehicle import load_vehicle
-from gcs_cli.paper.linear import continuous, tables
-from gcs_cli.paper.linear.exponential import exponential
-from gcs_cli.paper.linear.gains import (
+from gcs_cli.experiments.paper.linear import continuous, tables
+from gcs_cli.experiments.paper.linear.exponential import exponential
+from gcs_cli.experiments.paper.linear.gains import (
     ATTITUDE_AXES,
     AttitudeGains,
     Gains,
@@ -25,16 +25,22 @@ from gcs_cli.paper.linear.gains import (
     ReferenceFilter,
     backstepping_gains,
 )
-from gcs_cli.paper.linear.instability import IDEAL, LAGGING, SPIN_UP, Onset, find_onset
-from gcs_cli.paper.linear.margins import closed, lowest_stable_hz, margins, response, spectral_radius
-from gcs_cli.paper.linear.outer_onset import (
+from gcs_cli.experiments.paper.linear.instability import IDEAL, LAGGING, SPIN_UP, Onset, find_onset
+from gcs_cli.experiments.paper.linear.margins import (
+    closed,
+    lowest_stable_hz,
+    margins,
+    response,
+    spectral_radius,
+)
+from gcs_cli.experiments.paper.linear.outer_onset import (
     find_outer_onset,
     longest_period,
     lowest_outer_hz,
     period_of,
 )
-from gcs_cli.paper.linear.sampled import Actuators, AttitudeTick, Rates
-from gcs_cli.paper.linear.small_signal import (
+from gcs_cli.experiments.paper.linear.sampled import Actuators, AttitudeTick, Rates
+from gcs_cli.experiments.paper.linear.small_signal import (
     STEP_M,
     STEP_RAD,
     actuators_of,
@@ -44,7 +50,7 @@ from gcs_cli.paper.linear.small_signal import (
     small_case,
     spin_up_lead_s,
 )
-from gcs_cli.paper.linear.steps import SecondOrder, StepFigures, exact_figures, read_figures
+from gcs_cli.experiments.paper.linear.steps import SecondOrder, StepFigures, exact_figures, read_figures
 from tests.support.tools import NIGHTLY
 
 properties = settings(derandomize=True, deadline=None, max_examples=60)

@@ -10,16 +10,16 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from gcs_cli.paper.linear.gains import AttitudeGains
-from gcs_cli.paper.linear.sampled import Actuators, AttitudeTick
-from gcs_cli.paper.report_alike import alike, hidden_note
-from gcs_cli.paper.report_lag import INNER_HZ, beyond_note, doubling_time_s
-from gcs_cli.paper.report_metrics import metrics_cells
-from gcs_cli.paper.report_onset import onset_table
-from gcs_cli.paper.report_poles import pole_maps
+from gcs_cli.experiments.paper.linear.gains import AttitudeGains
+from gcs_cli.experiments.paper.linear.sampled import Actuators, AttitudeTick
+from gcs_cli.experiments.paper.report_alike import alike, hidden_note
+from gcs_cli.experiments.paper.report_lag import INNER_HZ, beyond_note, doubling_time_s
+from gcs_cli.experiments.paper.report_metrics import metrics_cells
+from gcs_cli.experiments.paper.report_onset import onset_table
+from gcs_cli.experiments.paper.report_poles import pole_maps
 from gcs_cli.pil.histogram_chart import histogram_chart
 from gcs_cli.pil.profile import StageProfile
-from gcs_cli.report_chart import Line
+from gcs_cli.report.chart import Line
 from tests.support.paper_flights import linear_part, onset_part
 from tests.unit.test_report import parsed
 

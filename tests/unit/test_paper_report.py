@@ -14,20 +14,20 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from flightstack.extras import INSTALL_MULTIBODY
+from flightstack.core.extras import INSTALL_MULTIBODY
 from flightstack.params.vehicle import load_vehicle
-from gcs_cli.paper import cases
-from gcs_cli.paper.printed import print_results
-from gcs_cli.paper.report import render
-from gcs_cli.paper.report_flights import signals
-from gcs_cli.paper.report_labels import LABELS, fixed, number
-from gcs_cli.paper.report_matrix import matrix_table, space_rms
-from gcs_cli.paper.report_metrics import metrics_table, step_table
-from gcs_cli.paper.report_moves import moves_table, shared_moves
-from gcs_cli.paper.report_pictures import Picture, poses_of, quaternions, take
-from gcs_cli.paper.report_sentences import sentences
-from gcs_cli.paper.report_steps import yaw_authority, yaw_note
-from gcs_cli.paper.report_tables import plain
+from gcs_cli.experiments.paper import cases
+from gcs_cli.experiments.paper.printed import print_results
+from gcs_cli.experiments.paper.report import render
+from gcs_cli.experiments.paper.report_flights import signals
+from gcs_cli.experiments.paper.report_labels import LABELS, fixed, number
+from gcs_cli.experiments.paper.report_matrix import matrix_table, space_rms
+from gcs_cli.experiments.paper.report_metrics import metrics_table, step_table
+from gcs_cli.experiments.paper.report_moves import moves_table, shared_moves
+from gcs_cli.experiments.paper.report_pictures import Picture, poses_of, quaternions, take
+from gcs_cli.experiments.paper.report_sentences import sentences
+from gcs_cli.experiments.paper.report_steps import yaw_authority, yaw_note
+from gcs_cli.experiments.paper.report_tables import plain
 from tests.support.paper_flights import linear_part, onset_part, pil_part, small_flights, small_results
 from tests.unit.test_report import parsed
 
@@ -315,7 +315,7 @@ def test_pictures_that_cannot_be_had_are_a_sentence(monkeypatch: pytest.MonkeyPa
     (picture,) = take({})
     assert picture.data_uri == ""
     assert "No pictures" in picture.caption
-    monkeypatch.setattr("gcs_cli.paper.report_pictures.find_spec", lambda name: None)
+    monkeypatch.setattr("gcs_cli.experiments.paper.report_pictures.find_spec", lambda name: None)
     (picture,) = take(small_flights().recordings)
     assert INSTALL_MULTIBODY in picture.caption
     assert "pip install" in parsed(render(small_results(), {}, [picture])).text

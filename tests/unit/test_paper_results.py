@@ -16,9 +16,9 @@ from rich.console import Console
 from flightstack.params.gains_file import BUILT_IN
 from gcs_cli.__main__ import main
 from gcs_cli.errors import CliError
-from gcs_cli.paper import claims as claims_module
-from gcs_cli.paper import claims_stability, comparisons, linear, pil_section, plants, run
-from gcs_cli.paper.cases import (
+from gcs_cli.experiments.paper import claims as claims_module
+from gcs_cli.experiments.paper import claims_stability, comparisons, linear, pil_section, plants, run
+from gcs_cli.experiments.paper.cases import (
     BACKSTEPPING,
     CONDITIONS,
     CONTENDERS,
@@ -34,17 +34,17 @@ from gcs_cli.paper.cases import (
     key,
     matrix,
 )
-from gcs_cli.paper.claims import claims
-from gcs_cli.paper.closed_loop import fly
-from gcs_cli.paper.comparisons import shared_overshoots
-from gcs_cli.paper.corrections import CORRECTIONS
-from gcs_cli.paper.experiments import entry_of, run_cases, thinned
-from gcs_cli.paper.linear.tables import actuator_settings
-from gcs_cli.paper.results import results_of, text_of
-from gcs_cli.paper.run import HTML_NAME, JSON_NAME, PaperOptions
-from gcs_cli.paper.tables import table_1, table_2, table_3
-from gcs_cli.paper.trajectory import trajectory_names
-from gcs_cli.paper.verdicts import NotFlownError, flight
+from gcs_cli.experiments.paper.claims import claims
+from gcs_cli.experiments.paper.closed_loop import fly
+from gcs_cli.experiments.paper.comparisons import shared_overshoots
+from gcs_cli.experiments.paper.corrections import CORRECTIONS
+from gcs_cli.experiments.paper.experiments import entry_of, run_cases, thinned
+from gcs_cli.experiments.paper.linear.tables import actuator_settings
+from gcs_cli.experiments.paper.results import results_of, text_of
+from gcs_cli.experiments.paper.run import HTML_NAME, JSON_NAME, PaperOptions
+from gcs_cli.experiments.paper.tables import table_1, table_2, table_3
+from gcs_cli.experiments.paper.trajectory import trajectory_names
+from gcs_cli.experiments.paper.verdicts import NotFlownError, flight
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 FEW = [

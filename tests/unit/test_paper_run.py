@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 from gcs_cli.__main__ import main
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.paper import experiments, linear, run
-from gcs_cli.paper.experiments import run_cases
-from gcs_cli.paper.run import HTML_NAME, JSON_NAME, PaperOptions
-from gcs_cli.paper.types import Case
+from gcs_cli.experiments.paper import experiments, linear, run
+from gcs_cli.experiments.paper.experiments import run_cases
+from gcs_cli.experiments.paper.run import HTML_NAME, JSON_NAME, PaperOptions
+from gcs_cli.experiments.paper.types import Case
 
 QUICK = Case("one", "step_roll", inner_hz=250)
 PLAIN = PaperOptions(Path(), pil=False, multibody=False, jobs=1)

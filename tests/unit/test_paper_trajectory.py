@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.params.errors import ConfigError
-from gcs_cli.paper.trajectory import (
+from flightstack.core.errors import ConfigError
+from gcs_cli.experiments.paper.trajectory import (
     ATTITUDE,
     MODEL_M_S2,
     MODEL_RAD_S,

@@ -11,11 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightstack import atomic_file
-from flightstack.assembly import build
-from flightstack.config import StackConfig
-from flightstack.file_saver import FileSaver
-from flightstack.params.errors import ConfigError
+from flightstack.core import atomic_file
+from flightstack.core.errors import ConfigError
+from flightstack.params.config import StackConfig
 from flightstack.params.param_file import (
     NOTHING_LOADED,
     ParamLine,
@@ -29,6 +27,8 @@ from flightstack.params.param_file import (
 )
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore
+from flightstack.process.assembly import build
+from flightstack.process.file_saver import FileSaver
 from tests.support.commands import flightstack_command
 from tests.support.world import PEER
 
@@ -182,7 +182,7 @@ def test_the_process_may_die_between_writing_and_renaming(tmp_path: Path) -> Non
     path.write_text("1\t1\tFS_SPEED\t5.0\t9\n")
     script = (
         "import os, pathlib\n"
-        "from flightstack.atomic_file import write_text_atomically\n"
+        "from flightstack.core.atomic_file import write_text_atomically\n"
         "pathlib.Path.replace = lambda *_: os._exit(9)\n"
         f"write_text_atomically(pathlib.Path({str(path)!r}), 'half')\n"
     )

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flightstack.core.errors import ConfigError
 from flightstack.params.behaviour import SPECS
-from flightstack.params.errors import ConfigError
 from flightstack.params.spec import ParamSpec, shortest
 from flightstack.params.store import ParamStore, apply_assignments
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flightstack.firmware.pil_client import PilClient, PilReport, PilTiming
+from flightstack.firmware.pil_operations import BAD_INPUT, OUT_OF_ORDER, REPEATED
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.pil_client import PilClient, PilReport, PilTiming
-from flightstack.mavlink.services.pil_operations import BAD_INPUT, OUT_OF_ORDER, REPEATED
 
 REST = [0.0] * 13 + [1.0] * 11
 CODEC = mavlink.MAVLink(None, 1, 1)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightstack.contract import LoopStatus
+from flightstack.core.contract import LoopStatus
 from gcs_cli.pil.compare import compared, deviation, status_differences, ticks_apart
 from gcs_cli.pil.flight_samples import AIRBORNE_M, FlightSamples, Samples
 from gcs_cli.pil.signals import BY_NAME, SIGNALS

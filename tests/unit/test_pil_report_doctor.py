@@ -10,9 +10,9 @@ import pytest
 from rich.console import Console
 
 from flightstack.firmware.choice import LoopsChoice
+from flightstack.firmware.pil_client import PilCounters
 from flightstack.firmware.sources import source_hash
 from flightstack.firmware.targets import open_link, timing_of
-from flightstack.mavlink.services.pil_client import PilCounters
 from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.pil import doctor
 from gcs_cli.pil.advice import Port, advice

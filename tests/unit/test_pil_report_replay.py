@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from flightstack.contract import FloatArray, LoopFlags
-from flightstack.params.errors import ConfigError
+from flightstack.core.contract import FloatArray, LoopFlags
+from flightstack.core.errors import ConfigError
 from gcs_cli.errors import CliError
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import UnfitLogError, recording

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.geodesy import LocalFrame
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import LocalFrame
 from flightstack.guidance.rally import HOME as AT_HOME
 from flightstack.guidance.rally import NEAREST, RALLY_FIRST, ReturnPlace, choose, rally_points
-from flightstack.params.errors import ConfigError
 from flightstack.plan import (
     DEFAULT_LIMITS,
     Command,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.geodesy import GeoPoint
+from flightstack.core.geodesy import GeoPoint
 from flightstack.params.behaviour import Behaviour
 from flightstack.plan import UNSET_E7, Command, Frame, Limits, MissionItem, MissionResult, check_mission
 from flightstack.plan.item import as_float32, integer_coordinate

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.mavwp import MAVWPLoader
 
-from flightstack.geodesy import GeoPoint
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import UNSET_E7, Command, Frame, MissionItem, Plan, check_mission, load_plan, save_plan
 from flightstack.plan.qgc_plan import read_plan
 from flightstack.plan.qgc_plan_writer import plan_to_json

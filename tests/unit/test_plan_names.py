@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from flightstack.extras import INSTALL_FIRMWARE, INSTALL_MULTIBODY
+from flightstack.core.extras import INSTALL_FIRMWARE, INSTALL_MULTIBODY
 from gcs_cli.__main__ import main
 from gcs_cli.errors import DONE, USAGE, CliError
-from gcs_cli.fly_flags import FlyOptions
-from gcs_cli.plan_files import PLAN_ARGUMENT, example_plans, plan_file
+from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.transfers.plan_files import PLAN_ARGUMENT, example_plans, plan_file
 
 ROOT = Path(__file__).parents[2]
 
@@ -52,7 +52,7 @@ def test_gcs_fly_flies_the_square_by_default(monkeypatch: pytest.MonkeyPatch) ->
         asked.append(options)
         raise CliError("enough", USAGE)
 
-    monkeypatch.setattr("gcs_cli.fly_options.checked_plan", check)
+    monkeypatch.setattr("gcs_cli.fly.fly_options.checked_plan", check)
     assert main(["fly"]) == USAGE
     assert main(["pil", "hop"]) == USAGE
     assert [options.plan_path.name for options in asked] == ["square.plan", "hop.plan"]

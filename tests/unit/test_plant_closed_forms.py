@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flightstack.contract import Vector3
-from flightstack.mavlink.hot_frames import ARMED_FLAG
+from flightstack.core.contract import Vector3
 from flightstack.params.vehicle import Vehicle, load_vehicle
-from sim_bridge.compiled_plant import CompiledPlant
-from sim_bridge.disturbance import (
+from flightstack.simulator_link.hot_frames import ARMED_FLAG
+from sim_bridge.plant.compiled_plant import CompiledPlant
+from sim_bridge.plant.disturbance import (
     GUST_DOWN_RATIO,
     GUST_TIME_S,
     TORQUE_GUST_TIME_S,
     TORQUE_GUST_YAW_RATIO,
     Disturbance,
 )
-from sim_bridge.layout import OUTPUT
-from sim_bridge.plant import AT_REST, InitialState, PlantOptions
+from sim_bridge.plant.layout import OUTPUT
+from sim_bridge.plant.plant import AT_REST, InitialState, PlantOptions
 
 G = 9.81
 PAPER, X_QUAD = load_vehicle("paper_quad"), load_vehicle("x_quad")

@@ -10,11 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from flightstack.contract import Vector3
+from flightstack.core.contract import Vector3
 from flightstack.params.vehicle import Vehicle, load_vehicle
-from sim_bridge.disturbance import NO_DISTURBANCE, Disturbance
 from sim_bridge.open_loop import OpenLoop, run_open_loop
-from sim_bridge.plant import InitialState
+from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
+from sim_bridge.plant.plant import InitialState
 
 G = 9.81
 

@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.contract import Vector3
-from flightstack.mavlink.hot_frames import ARMED_FLAG
+from flightstack.core.contract import Vector3
 from flightstack.params.vehicle import load_vehicle
-from sim_bridge.compiled_plant import CompiledPlant
-from sim_bridge.contact import FRICTION
-from sim_bridge.disturbance import NO_DISTURBANCE, Disturbance
-from sim_bridge.layout import CONTACT
-from sim_bridge.plant import AT_REST, InitialState, PlantOptions
+from flightstack.simulator_link.hot_frames import ARMED_FLAG
+from sim_bridge.plant.compiled_plant import CompiledPlant
+from sim_bridge.plant.contact import FRICTION
+from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
+from sim_bridge.plant.layout import CONTACT
+from sim_bridge.plant.plant import AT_REST, InitialState, PlantOptions
 
 BOTH_PLANTS = pytest.mark.parametrize("plant", ["rigid", "paper"])
 BOTH_VEHICLES = pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])

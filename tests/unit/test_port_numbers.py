@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack import port_numbers as ports
-from flightstack.ports import ports_config
+from flightstack.core import port_numbers as ports
+from flightstack.process.ports import ports_config
 
 UDP = (
     ports.vehicle_ground_port,

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack import portable_math
-from flightstack.compiled import compiled
-from flightstack.portable_math import acos, asin, atan2, exp, log, sin_cos, tan
+from flightstack.core import portable_math
+from flightstack.core.compiled import compiled
+from flightstack.core.portable_math import acos, asin, atan2, exp, log, sin_cos, tan
 from tests.support.tools import NIGHTLY
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -125,14 +125,14 @@ LIBM = {
 NOT_FLIGHT = (
     "sim_bridge/multibody/",  # MuJoCo's own arithmetic: docs/decisions.md
     "flightstack/mavlink/telemetry/",  # what ground stations are shown
-    "flightstack/geometry_bulk.py",  # reports
-    "flightstack/poses_file.py",  # pictures
+    "flightstack/core/geometry_bulk.py",  # reports
+    "flightstack/flight_log/poses_file.py",  # pictures
     "flightstack/plan/fence_shape.py",  # whether a plan is accepted
-    "flightstack/transport/memory.py",  # random.Random of a lossy line, integers alone
+    "flightstack/transports/memory.py",  # random.Random of a lossy line, integers alone
 )
 ALLOWED = {
     ("flightstack/params/vehicle.py", "linalg"),  # whether a vehicle is accepted: the rank of its rotors
-    ("sim_bridge/turbulence.py", "random"),  # PCG64, integers alone
+    ("sim_bridge/plant/turbulence.py", "random"),  # PCG64, integers alone
 }
 
 

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightstack.geometry_bulk import euler_from_quaternions, quaternions_from_euler
-from flightstack.params.errors import ConfigError
-from flightstack.poses_file import Poses, read_poses, write_poses
+from flightstack.core.errors import ConfigError
+from flightstack.core.geometry_bulk import euler_from_quaternions, quaternions_from_euler
+from flightstack.flight_log.poses_file import Poses, read_poses, write_poses
 from tests.support.sample_poses import sample_poses
 
 

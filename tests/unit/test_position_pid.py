@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flightstack.contract import AttitudeTarget, PositionSetpoint, Quaternion, Vector3, VehicleState
 from flightstack.control.position_pid import (
     PositionMemory,
     PositionParams,
     position_pid_step,
     read_position_params,
 )
+from flightstack.core.contract import AttitudeTarget, PositionSetpoint, Quaternion, Vector3, VehicleState
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import GRAVITY_M_S2, load_vehicle
 

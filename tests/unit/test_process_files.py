@@ -6,19 +6,19 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.config import StackConfig
-from flightstack.ground.peer import PeerAddress
+from flightstack.core.errors import ConfigError
+from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.hot_frames import PlantStateFrame
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import LinkSigning, Signing
-from flightstack.params.errors import ConfigError
-from flightstack.port_numbers import GROUND
-from flightstack.process_config import ProcessConfig
-from flightstack.process_files import ProcessFiles
-from flightstack.reboot import carry_over
-from flightstack.signing_file import load_key
-from flightstack.transport.vehicle_ports import PortsConfig
+from flightstack.params.config import StackConfig
+from flightstack.process.process_config import ProcessConfig
+from flightstack.process.process_files import ProcessFiles
+from flightstack.process.reboot import carry_over
+from flightstack.process.signing_file import load_key
+from flightstack.services.routing.peer import PeerAddress
+from flightstack.simulator_link.hot_frames import PlantStateFrame
+from flightstack.transports.vehicle_ports import PortsConfig
 
 PEER = PeerAddress(GROUND, "127.0.0.1", 5000)
 REBOOT = mavlink.MAVLink_command_long_message(1, 1, 246, 0, 1, 0, 0, 0, 0, 0, 0)

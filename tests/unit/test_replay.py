@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 from flightstack.plan import save_plan
-from gcs_cli.analysis import read_flight
 from gcs_cli.errors import CliError
-from gcs_cli.flight_data import Flight, series
-from gcs_cli.log_damage import is_whole
-from gcs_cli.replay import Run, find_run, poses_of
+from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.flight_data import Flight, series
+from gcs_cli.report.log_damage import is_whole
+from gcs_cli.report.replay import Run, find_run, poses_of
 from tests.support.commands import gcs
 from tests.support.square_plan import square_plan
 from tests.support.synthetic_flight import synthetic_flight_bytes

@@ -16,16 +16,16 @@ from hypothesis import strategies as st
 from flightstack.mavlink.dialect import FsLoopTiming
 from flightstack.mavlink.link import Link
 from flightstack.plan import Plan
-from gcs_cli.analysis import read_flight
-from gcs_cli.flight_data import Flight, Text, loop_timing, series
-from gcs_cli.report import render_report, write_report
-from gcs_cli.report_chart import Level, Line, decimated, time_chart
-from gcs_cli.report_conditions import conditions
-from gcs_cli.report_plots import mode_bands, plots
-from gcs_cli.report_svg import nice_ticks, tick_text
-from gcs_cli.report_timing import read_loop_timing
-from gcs_cli.summary import RunInfo, summarise
-from gcs_cli.tlog_file import TlogFile
+from gcs_cli.link.tlog_file import TlogFile
+from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.chart import Level, Line, decimated, time_chart
+from gcs_cli.report.conditions import conditions
+from gcs_cli.report.flight_data import Flight, Text, loop_timing, series
+from gcs_cli.report.page import render_report, write_report
+from gcs_cli.report.plots import mode_bands, plots
+from gcs_cli.report.summary import RunInfo, summarise
+from gcs_cli.report.svg import nice_ticks, tick_text
+from gcs_cli.report.timing import read_loop_timing
 from tests.support.square_plan import square_plan
 from tests.support.synthetic_flight import synthetic_flight_bytes
 

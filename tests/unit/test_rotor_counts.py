@@ -7,11 +7,11 @@ from io import BytesIO
 import pytest
 from pyulog import ULog
 
-from flightstack.config import DEFAULT_HOME
-from flightstack.logging.flight_log import FlightLog
+from flightstack.flight_log.flight_log import FlightLog
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.simulator_link import SimulatorLink
+from flightstack.params.config import DEFAULT_HOME
+from flightstack.simulator_link.endpoint import SimulatorLink
 from tests.support.rotor_sets import ring
 
 TYPES = [(4, mavlink.MAV_TYPE_QUADROTOR), (6, mavlink.MAV_TYPE_HEXAROTOR), (8, mavlink.MAV_TYPE_OCTOROTOR)]

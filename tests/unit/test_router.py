@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack.ground.router import MAX_ADDRESSES, MAX_REMEMBERED, Router
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.addressing import Address
+from flightstack.services.routing.router import MAX_ADDRESSES, MAX_REMEMBERED, Router
 
 OWN = Address(1, 1)
 GCS, CAMERA, OTHER_VEHICLE, SECOND_GCS = Address(255, 190), Address(1, 100), Address(2, 1), Address(254, 190)

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import pytest
 import serial
 
-from flightstack.transport.byte_link import LineError
-from flightstack.transport.serial_port import SerialPort
+from flightstack.transports.byte_link import LineError
+from flightstack.transports.serial_port import SerialPort
 
 
 @pytest.fixture

@@ -12,12 +12,18 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.core.errors import ConfigError
+from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.services.addressing import Address
-from flightstack.mavlink.services.signing_setup import SigningSetup
 from flightstack.mavlink.signing import KEEP_TICKS, NO_KEY, Signing, timestamp_of
-from flightstack.params.errors import ConfigError
-from flightstack.signing_file import create_key, load_key, open_shared_signing, open_signing, replace_key
+from flightstack.process.signing_file import (
+    create_key,
+    load_key,
+    open_shared_signing,
+    open_signing,
+    replace_key,
+)
+from flightstack.services.routing.signing_setup import SigningSetup
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))
 
@@ -115,7 +121,7 @@ def test_a_timestamp_ahead_of_the_clock_is_restored(key_file: Path) -> None:
 
 def test_processes_that_share_a_key_have_different_link_ids(key_file: Path) -> None:
     program = (
-        "import sys; from pathlib import Path; from flightstack.signing_file import open_shared_signing\n"
+        "import sys; from pathlib import Path; from flightstack.process.signing_file import open_shared_signing\n"
         "link = open_shared_signing(Path(sys.argv[1]), 'gcs'); print(link.link_id, flush=True); sys.stdin.read()"
     )
     drawn = (0, 100, 239, 239)  # the random numbers with which each begins its search

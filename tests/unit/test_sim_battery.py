@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from flightstack.mavlink.battery_frame import encode_battery
+from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.hot_frames import ARMED_FLAG, ActuatorsFrame
 from flightstack.mavlink.link import Link
 from flightstack.params.battery import LIPO_CELL_V, Battery
-from flightstack.params.errors import ConfigError
 from flightstack.params.vehicle import BUILT_IN, Vehicle, load_vehicle
-from sim_bridge.battery import BatteryOptions, BatteryState, battery_report
-from sim_bridge.plant import PlantOptions
+from flightstack.simulator_link.battery_frame import encode_battery
+from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame
+from sim_bridge.plant.battery import BatteryOptions, BatteryState, battery_report
+from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.simulator import Simulator
 
 PAPER = load_vehicle("paper_quad")

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frame_finder import FrameFinder
 from flightstack.mavlink.frames import LARGEST_FRAME
-from flightstack.mavlink.hot_frames import ActuatorsFrame
 from flightstack.mavlink.link import Link
+from flightstack.simulator_link.hot_frames import ActuatorsFrame
 
 HEARTBEAT = Link(1, 1).encode(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
 ACTUATORS = bytes(ActuatorsFrame().seal(4000, 6))

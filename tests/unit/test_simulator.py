@@ -13,20 +13,20 @@ import numba
 import numpy as np
 import pytest
 
-from flightstack.contract import Vector3
+from flightstack.core.contract import Vector3
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.hot_frames import (
+from flightstack.params.vehicle import load_vehicle
+from flightstack.simulator_link.hot_frames import (
     ARMED_FLAG,
     GROUND_CONTACT_FLAG,
     LOCKSTEP_FLAG,
     ActuatorsFrame,
     PlantStateFrame,
 )
-from flightstack.params.vehicle import load_vehicle
-from sim_bridge.compiled_plant import CompiledPlant
-from sim_bridge.disturbance import Disturbance
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
-from sim_bridge.plant import InitialState, PlantOptions
+from sim_bridge.plant.compiled_plant import CompiledPlant
+from sim_bridge.plant.disturbance import Disturbance
+from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.simulator import Simulator
 
 PAPER, X_QUAD = load_vehicle("paper_quad"), load_vehicle("x_quad")

@@ -11,13 +11,13 @@ from fastcrc import crc16
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.geodesy import GeoPoint
+from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, FsActuators, mavlink
-from flightstack.mavlink.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import load_vehicle
+from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from sim_bridge.errors import PlantDivergedError
-from sim_bridge.lockstep import HIL_STATE_QUATERNION_ID, SimulatorLink
+from sim_bridge.server.lockstep import HIL_STATE_QUATERNION_ID, SimulatorLink
 from sim_bridge.simulator import Simulator
 
 PAPER = load_vehicle("paper_quad")

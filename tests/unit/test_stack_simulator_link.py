@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.contract import Vector3
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, FsPlantState, mavlink
-from flightstack.mavlink.hot_frames import ActuatorsFrame, PlantStateFrame
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.simulator_link import SimulatorLink
-from flightstack.mavlink.state_steps import is_gap
 from flightstack.params.vehicle import load_vehicle
+from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
+from flightstack.simulator_link.state_steps import is_gap
 
 PAPER = load_vehicle("paper_quad")
 HOME = GeoPoint(47.397742, 8.545594, 488.0)

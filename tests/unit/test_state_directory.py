@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.params.errors import ConfigError
-from flightstack.state_directory import StateDirectory
+from flightstack.core.errors import ConfigError
+from flightstack.process.state_directory import StateDirectory
 from tests.support.commands import flightstack_command
 
 SAVED = "1\t1\tMPC_XY_CRUISE\t50\t9\n"

@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flightstack.geometry_bulk import euler_from_quaternions
-from flightstack.modes import NAVIGATION_STATE, Mode
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
+from flightstack.core.geometry_bulk import euler_from_quaternions
+from flightstack.core.modes import NAVIGATION_STATE, Mode
 from flightstack.plan import Command, Frame, MissionItem, Plan
-from gcs_cli.analysis import read_flight
 from gcs_cli.errors import FAILED
-from gcs_cli.flight_data import Flight, MissionProgress, Series, Status, series
-from gcs_cli.flight_figures import attitude_error, rms_command_rate_rad_s2, rms_torque_n_m
-from gcs_cli.flight_outcome import COMPLETED, Code, Outcome, with_log
-from gcs_cli.summary import RunInfo, item_ned_m, summarise, waypoint_rows, write_summary
+from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.flight_data import Flight, MissionProgress, Series, Status, series
+from gcs_cli.report.flight_figures import attitude_error, rms_command_rate_rad_s2, rms_torque_n_m
+from gcs_cli.report.flight_outcome import COMPLETED, Code, Outcome, with_log
+from gcs_cli.report.summary import RunInfo, item_ned_m, summarise, waypoint_rows, write_summary
 from tests.support.square_plan import item_at, square_plan
 from tests.support.synthetic_flight import CORNERS_NED_M, HOME, INFO, PARAMETERS, synthetic_flight_bytes
 

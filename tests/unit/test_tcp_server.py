@@ -13,8 +13,8 @@ import pytest
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import FrameReader
 from flightstack.mavlink.link import SILENT_AFTER_S, Link
-from flightstack.transport.tcp_server import MAX_CLIENTS, MAX_UNSENT, STALLED_S, TcpServer
-from flightstack.transport.udp import Address, PortBusyError
+from flightstack.transports.tcp_server import MAX_CLIENTS, MAX_UNSENT, STALLED_S, TcpServer
+from flightstack.transports.udp import Address, PortBusyError
 
 WAIT_MS = 10_000
 FRAME = Link(1, 1).encode(mavlink.MAVLink_statustext_message(6, b"x" * 50, 0, 0))

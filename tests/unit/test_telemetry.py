@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flightstack.contract import LoopRow
-from flightstack.geodesy import GeoPoint, LocalFrame
+from flightstack.core.contract import LoopRow
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.modes import CUSTOM_MODE, Mode
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, FsLoopTiming, mavlink
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
-from flightstack.mavlink.telemetry import MAKERS, autopilot_version, heartbeat, messages, status_texts
-from flightstack.mavlink.telemetry.facts import FenceBreaches, FlightTimes, NoBattery, PlanIds
-from flightstack.modes import CUSTOM_MODE, Mode
+from flightstack.services.telemetry import MAKERS, autopilot_version, heartbeat, messages, status_texts
+from flightstack.services.telemetry.facts import FenceBreaches, FlightTimes, NoBattery, PlanIds
+from flightstack.services.telemetry.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 EULER = (0.1, -0.2, 2.5)

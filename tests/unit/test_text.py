@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.services.ftp_client import FtpClient, FtpDone
-from flightstack.mavlink.services.ftp_server import FtpServer
-from flightstack.mavlink.services.virtual_files import FileTree, fixed
 from flightstack.mavlink.text import clean
-from flightstack.transport.udp import Address
-from gcs_cli.log_calls import is_plain_name
-from gcs_cli.session import Session
-from gcs_cli.watch_lines import text_line
+from flightstack.mavlink.virtual_files import FileTree, fixed
+from flightstack.services.files.ftp_server import FtpServer
+from flightstack.transports.udp import Address
+from gcs_cli.clients.ftp_client import FtpClient, FtpDone
+from gcs_cli.link.session import Session
+from gcs_cli.transfers.log_calls import is_plain_name
+from gcs_cli.tui.watch_lines import text_line
 from tests.fuzz.clients import OWN, VEHICLE
 
 PEER: Address = ("192.0.2.1", 18570)

@@ -6,7 +6,7 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.services.timesync import TimeService
+from flightstack.services.streams.timesync import TimeService
 
 
 class Clock:

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.compiled import as_tuple, compiled, store
-from flightstack.contract import FloatArray
+from flightstack.core.compiled import as_tuple, compiled, store
+from flightstack.core.contract import FloatArray
 from flightstack.guidance.params import guidance_params
 from flightstack.guidance.trajectory import (
     KP,

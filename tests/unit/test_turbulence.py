@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sim_bridge.turbulence import normal_deviates
+from sim_bridge.plant.turbulence import normal_deviates
 
 COUNT = 1_000_000
 

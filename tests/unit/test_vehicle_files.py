@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.params.errors import ConfigError
+from flightstack.core.errors import ConfigError
 from flightstack.params.vehicle import BUILT_IN, Vehicle, built_in_vehicles, load_vehicle
 
 PAPER = (BUILT_IN / "paper_quad.toml").read_text(encoding="utf-8")

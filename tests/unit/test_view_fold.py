@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
 from flightstack.mavlink.link import Link
-from gcs_cli.px4_modes import mode_name, mode_numbers, settable_modes
-from gcs_cli.status_texts import PIECE_PATIENCE_S
-from gcs_cli.vehicle_view import update
-from gcs_cli.view_types import TEXTS_KEPT, VehicleView
+from gcs_cli.vehicle.px4_modes import mode_name, mode_numbers, settable_modes
+from gcs_cli.vehicle.status_texts import PIECE_PATIENCE_S
+from gcs_cli.vehicle.vehicle_view import update
+from gcs_cli.vehicle.view_types import TEXTS_KEPT, VehicleView
 
 NAN, INF = math.nan, math.inf
 MISSION_MODE = 4 << 16 | 4 << 24
@@ -276,7 +276,7 @@ def test_no_payload_raises(messages: list[tuple[int, bytes]]) -> None:
 
 
 def test_the_list_of_folded_messages_is_whole() -> None:
-    from gcs_cli.vehicle_view import _FOLDS  # noqa: PLC0415
+    from gcs_cli.vehicle.vehicle_view import _FOLDS  # noqa: PLC0415
 
     assert {mavlink.mavlink_map[number].msgname for number in FOLDED} == set(_FOLDS)
 

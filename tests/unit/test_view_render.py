@@ -10,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console, RenderableType
 
-from gcs_cli.horizon import heading_tape, horizon
-from gcs_cli.view_types import (
+from gcs_cli.tui.horizon import heading_tape, horizon
+from gcs_cli.tui.watch_lines import state_line, text_line
+from gcs_cli.tui.watch_render import render
+from gcs_cli.vehicle.view_types import (
     Battery,
     Euler,
     GeoPosition,
@@ -24,8 +26,6 @@ from gcs_cli.view_types import (
     Vector,
     VehicleView,
 )
-from gcs_cli.watch_lines import state_line, text_line
-from gcs_cli.watch_render import render
 
 TIMING = LoopTiming(41, 20500, 3, 2, 500, 100, 52.3, 13.2, 25.5, 130, 4, 5, 6, True)
 BARE = VehicleView(identity=Identity(1, 1, 2, 12), last_heartbeat_s=9.5)

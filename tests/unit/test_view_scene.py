@@ -11,18 +11,18 @@ import mujoco
 import numpy as np
 import pytest
 
-from flightstack.geometry_bulk import quaternions_from_euler
+from flightstack.core.geometry_bulk import quaternions_from_euler
+from flightstack.flight_log.poses_file import Poses
 from flightstack.params.vehicle import built_in_vehicles, load_vehicle
-from flightstack.poses_file import Poses
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.multibody import offscreen
-from sim_bridge.multibody.cameras import CAMERAS, Site, View, project, view
 from sim_bridge.multibody.frames import flip_vector
-from sim_bridge.multibody.labels import Place, bar
-from sim_bridge.multibody.overlay import Overlay
-from sim_bridge.multibody.pictures import announcement, film_of
-from sim_bridge.multibody.poses import FlightPath, Moment
-from sim_bridge.multibody.renderer import Picture, Renderer, Stage
+from sim_bridge.render import offscreen
+from sim_bridge.render.cameras import CAMERAS, Site, View, project, view
+from sim_bridge.render.labels import Place, bar
+from sim_bridge.render.overlay import Overlay
+from sim_bridge.render.pictures import announcement, film_of
+from sim_bridge.render.poses import FlightPath, Moment
+from sim_bridge.render.renderer import Picture, Renderer, Stage
 from tests.support.sample_poses import sample_poses
 from tests.support.tools import missing
 

@@ -1,0 +1,1 @@
+"""Types, arrays, geometry, geodesy and compilation: what every other package builds on."""

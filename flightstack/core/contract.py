@@ -1,0 +1,120 @@
+"""The types that cross the borders of the flight stack; the C port has the same ones in ``fs_types.h``.
+
+World frame NED, body frame FRD, quaternions Hamilton, scalar first, body to world. SI units, radians.
+
+Each type has an array form, the fields in order as float64, which kernels exchange with Python and with the C
+backends (``flightstack.core.arrays``).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+FloatArray: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
+
+MAX_ROTORS = 8
+STATE_SIZE = 13
+SETPOINT_SIZE = 11
+ATTITUDE_TARGET_SIZE = 5
+
+
+class LoopRow:
+    """Columns of what the inner loop writes in each tick: its inputs, each stage's output, and a status.
+
+    Logs, processor-in-the-loop checks and tests read the loops through this row.
+    """
+
+    STATE = slice(0, 13)
+    REFERENCE_ATTITUDE = slice(13, 17)
+    REFERENCE_RATES = slice(17, 20)
+    REFERENCE_ACCELERATION = slice(20, 23)
+    WRENCH = slice(23, 27)
+    WRENCH_ACHIEVED = slice(27, 31)
+    ROTOR_COMMAND = slice(31, 31 + MAX_ROTORS)
+    ROTOR_SPEED = slice(39, 39 + MAX_ROTORS)
+    STATUS = 47
+    SIZE = 48
+
+
+class LoopStatus:
+    """Bits of the status column."""
+
+    INPUT_NOT_FINITE = 1
+    ROLL_SATURATED = 2
+    PITCH_SATURATED = 4
+    YAW_SATURATED = 8
+    THRUST_SATURATED = 16
+    IDLE = 32
+    OUTPUT_NOT_FINITE = 64
+    INPUT_STALE = 128
+
+
+class LoopFlags:
+    """Bits that say what a tick of the loops begins with; FS_PIL_STEP and the log carry them."""
+
+    OUTER_DUE = 1
+    """The outer loop runs on the setpoint."""
+    SET_TARGET = 2
+    """Guidance gives the attitude target, in place of the outer loop."""
+    RESET = 4
+    """The loops forget the past: they begin to fly."""
+
+
+class Vector3(NamedTuple):
+    """A vector; its name tells frame and unit."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Quaternion(NamedTuple):
+    """A unit quaternion, Hamilton convention, body FRD to world NED."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
+class VehicleState(NamedTuple):
+    """Rigid-body state of the vehicle at one instant."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    attitude: Quaternion
+    rates_frd_rad_s: Vector3
+
+
+class PositionSetpoint(NamedTuple):
+    """What guidance asks of the outer loop: a point of a trajectory and the heading."""
+
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    acceleration_ned_m_s2: Vector3
+    yaw_rad: float
+    yaw_rate_rad_s: float
+
+
+class AttitudeTarget(NamedTuple):
+    """What the outer loop asks of the inner loop: an attitude and the collective thrust."""
+
+    attitude: Quaternion
+    thrust_n: float
+
+
+class AttitudeReference(NamedTuple):
+    """The attitude target after the reference filter, with its derivatives in the body frame."""
+
+    attitude: Quaternion
+    rates_frd_rad_s: Vector3
+    acceleration_frd_rad_s2: Vector3
+
+
+class Wrench(NamedTuple):
+    """Collective thrust along −z of the body and torque about the body axes."""
+
+    thrust_n: float
+    torque_frd_n_m: Vector3

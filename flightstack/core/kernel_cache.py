@@ -1,0 +1,110 @@
+"""Where compiled kernels are cached: one directory for each state of the sources that a kernel is made from.
+
+Numba's cache notices a change in the file of a function, not in a file that it calls into. A compiled function can
+only use names that its module imports, so the sources that count are the module's and all that it imports, directly
+or not, within our packages. An edited function is never flown in an older version, and an edit elsewhere
+recompiles nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+OWN_PACKAGES = ("flightstack", "sim_bridge")
+_KEPT_S = 14 * 86_400.0
+"""Time for which a directory that no process opened is kept."""
+_IMPORT = re.compile(
+    rf"^[ \t]*(?:from[ \t]+((?:{'|'.join(OWN_PACKAGES)})[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]+)"
+    rf"|import[ \t]+((?:{'|'.join(OWN_PACKAGES)})[^\n]*))",
+    re.MULTILINE,
+)
+
+
+def is_own(module_name: str) -> bool:
+    """Return whether a module is this project's, so that the digest of its imports covers its sources."""
+    return module_name.partition(".")[0] in OWN_PACKAGES
+
+
+@cache
+def _path(top: Path, module_name: str) -> Path | None:
+    base = top.joinpath(*module_name.split("."))
+    for path in (base.with_suffix(".py"), base / "__init__.py"):
+        if path.is_file():
+            return path
+    return None
+
+
+def _imports(text: str) -> set[str]:
+    """Return every module name that a source may import; a name from a module may be a module of its own."""
+    found: set[str] = set()
+    for package, names, plain in _IMPORT.findall(text):
+        if plain:
+            found.update(name.split()[0] for name in plain.split(",") if name.strip())
+            continue
+        found.add(package)
+        code = re.sub(r"#[^\n]*", "", names).strip("()")
+        found.update(f"{package}.{name.split()[0]}" for name in code.split(",") if name.strip())
+    return found
+
+
+@cache
+def _read(path: Path) -> tuple[bytes, frozenset[str]]:
+    content = path.read_bytes()
+    return content, frozenset(_imports(content.decode("utf-8", "replace")))
+
+
+def sources(top: Path, module_names: Iterable[str]) -> list[Path]:
+    """Return the files of the modules and of all own modules that they import, directly or not, sorted."""
+    waiting, found = list(module_names), set[Path]()
+    while waiting:
+        name = waiting.pop()
+        path = _path(top, name)
+        if path is not None and path not in found:
+            found.add(path)
+            waiting.extend(_read(path)[1])
+            waiting.extend(parent for parent in (name.rpartition(".")[0],) if parent)
+    return sorted(found)
+
+
+def digest(top: Path, module_names: Iterable[str], version: str) -> str:
+    """Return a digest of ``version`` and of all sources that code of these modules can be made from."""
+    result = hashlib.sha256(version.encode())
+    for path in sources(top, module_names):
+        result.update(str(path.relative_to(top)).encode())
+        result.update(_read(path)[0])
+    return result.hexdigest()[:16]
+
+
+@cache
+def _base() -> Path:
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flightstack" / "kernels"
+    try:
+        base.mkdir(parents=True, exist_ok=True)
+        _remove_old(base)
+    except OSError:  # a read-only home: compile anew in each process
+        return Path(tempfile.mkdtemp(prefix="flightstack-kernels-"))
+    return base
+
+
+def _remove_old(base: Path) -> None:
+    oldest_s = time.time() - _KEPT_S
+    for entry in os.scandir(base):
+        if entry.stat().st_mtime < oldest_s:
+            shutil.rmtree(entry.path, ignore_errors=True)
+
+
+@cache
+def directory(module_names: frozenset[str], version: str) -> Path:
+    """Return the cache directory for kernels made from these modules; ``version`` is the compiler's."""
+    path = _base() / digest(Path(__file__).resolve().parents[2], module_names, version)
+    path.mkdir(parents=True, exist_ok=True)
+    os.utime(path)
+    return path

@@ -1,0 +1,213 @@
+"""The flight's log: a streaming ULog writer that costs a loop only the writing of its row.
+
+The loops write float64 rows into ``Trace`` arrays. Rows become bytes in bulk, and bytes go to the file in
+whole blocks, so that the file of a killed process is readable up to its last block. Nothing of the wall clock
+goes in: the same flight gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import struct
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+import numpy as np
+
+from flightstack.core.contract import FloatArray, LoopRow
+from flightstack.core.geodesy import GeoPoint
+from flightstack.flight_log import ulog
+from flightstack.flight_log.event_topics import EVENT_TOPICS
+from flightstack.flight_log.row_block import RowBlock, TimeArray, content_size
+from flightstack.flight_log.topics import OUTER, OUTER_TOPICS, Topic, inner_topics
+from flightstack.mavlink.field_numbers import COUNTERS, fitted
+from flightstack.params.vehicle import Vehicle, system_type
+
+DEFAULT_CAPACITY = 256
+
+
+class LogFile(Protocol):
+    """What the log needs of a file: ``open(path, "wb", buffering=0)`` has it."""
+
+    def write(self, data: bytes | memoryview, /) -> int | None:
+        """Write bytes; return how many were written."""
+
+    def truncate(self, size: int, /) -> int:
+        """Shorten the file; raise OSError."""
+
+    def close(self) -> None:
+        """Close the file."""
+
+
+class Trace:
+    """Rows waiting to be written: ``rows[:n]``, shape (capacity, columns), and ``times_us[:n]``.
+
+    A loop may write ``rows[n]`` and ``times_us[n]`` itself, add one to ``n`` and call ``FlightLog.flush``
+    when ``n`` has reached ``capacity``; ``append`` does the same at the cost of a call and a view.
+    """
+
+    __slots__ = ("_each", "_flush", "capacity", "n", "rows", "times_us")
+
+    def __init__(self, capacity: int, columns: int, flush: Callable[[], None]) -> None:
+        self.capacity = capacity
+        self.rows: FloatArray = np.zeros((capacity, columns))
+        self._each: list[FloatArray] = list(self.rows)  # a view made anew takes longer than one found
+        self.times_us: TimeArray = np.zeros(capacity, np.uint64)
+        self.n = 0
+        self._flush = flush
+
+    def append(self, time_us: int) -> FloatArray:
+        """Return the next row for the caller to fill before its next call; writes the trace out when full."""
+        if self.n == self.capacity:
+            self._flush()
+        index = self.n
+        self.times_us[index] = time_us
+        self.n = index + 1
+        return self._each[index]
+
+
+class _EventTopic:
+    """Packs one message of an event topic."""
+
+    def __init__(self, topic: Topic, message_id: int, known: Mapping[str, float]) -> None:
+        """``known`` fields have these values in every message that does not give another."""
+        self._header = ulog.DATA_HEADER.pack(content_size(topic), ulog.DATA_TYPE, message_id)
+        self._codes = "Q" + "".join(ulog.STRUCT_CODES[field.type] for field in topic.fields)
+        self._wraps = [
+            True,
+            *(f.type == "uint64_t" or f.name in COUNTERS for f in topic.fields),
+        ]  # uint64_t: times
+        self._pack = struct.Struct("<" + self._codes).pack
+        self._defaults: dict[str, float] = {
+            field.name: field.default if field.type in ("float", "double") else int(field.default)
+            for field in topic.fields
+        }
+        self._defaults |= known
+
+    def encode(self, time_us: int, fields: Mapping[str, float]) -> bytes:
+        """Return the message. Times and counters wrap, other integers saturate."""
+        values = {**self._defaults, **fields}
+        if len(values) != len(self._defaults):
+            raise TypeError(f"not a field of the topic: {sorted(set(fields) - set(self._defaults))}")
+        numbers = (time_us, *values.values())
+        try:
+            return self._header + self._pack(*numbers)
+        except (struct.error, OverflowError):
+            return self._header + self._pack(*map(fitted, numbers, self._codes, self._wraps))
+
+
+class FlightLog:
+    """Writes one flight into ``file``, which it owns from then on.
+
+    A file that cannot be written (disk full) must not end the flight: the first error is kept in ``error``, the file
+    ends with the last whole message, and nothing more is written.
+    """
+
+    def __init__(self, file: LogFile, rotors: int, capacity: int = DEFAULT_CAPACITY) -> None:
+        self._file = file
+        self._inner_topics = inner_topics(rotors)
+        self.inner = Trace(capacity, LoopRow.SIZE, self.flush)
+        self.outer = Trace(capacity, OUTER.size, self.flush)
+        self.error: OSError | None = None
+        self._size = 0  # of what was written whole
+        self._closed = False
+        first_outer_id = len(self._inner_topics)
+        first_event_id = first_outer_id + len(OUTER_TOPICS)
+        self._inner_block = RowBlock(self._inner_topics, 0, capacity)
+        self._first_outer_id = first_outer_id
+        self._outer_block: RowBlock | None = None
+        known = {"vehicle_status": {"system_type": system_type(rotors)}}
+        self._events = {
+            topic.name: _EventTopic(topic, message_id, known.get(topic.name, {}))
+            for message_id, topic in enumerate(EVENT_TOPICS, first_event_id)
+        }
+
+    def start(
+        self,
+        time_us: int,
+        info: Mapping[str, str | int | float],
+        parameters: Mapping[str, float],
+        origin: GeoPoint,
+    ) -> None:
+        """Write header and definitions; ``origin`` is that of the local frame. Call once, first."""
+        self._outer_block = RowBlock(
+            OUTER_TOPICS,
+            self._first_outer_id,
+            self.outer.capacity,
+            {"ref_lat": origin.latitude_deg, "ref_lon": origin.longitude_deg, "ref_alt": origin.altitude_m},
+        )
+        topics = (*self._inner_topics, *OUTER_TOPICS, *EVENT_TOPICS)
+        self._write(ulog.file_header(time_us), ulog.HEADER_SIZE)
+        parts = []
+        for topic in topics:
+            fields = [("uint64_t", 0, "timestamp"), *((f.type, f.length, f.name) for f in topic.fields)]
+            parts.append(ulog.format_definition(topic.name, fields))
+        parts.extend(ulog.information(key, value) for key, value in info.items())
+        parts.extend(ulog.parameter(name, value) for name, value in parameters.items())
+        parts.extend(ulog.subscription(message_id, topic.name) for message_id, topic in enumerate(topics))
+        self._write(b"".join(parts))
+
+    def flush(self) -> None:
+        """Write all waiting rows. The rows of both traces are free again."""
+        inner, outer = self.inner, self.outer
+        if inner.n:
+            self._write(self._inner_block.encode(inner.times_us[: inner.n], inner.rows[: inner.n]))
+            inner.n = 0
+        if outer.n:
+            assert self._outer_block is not None, "start() comes first"
+            self._write(self._outer_block.encode(outer.times_us[: outer.n], outer.rows[: outer.n]))
+            outer.n = 0
+
+    def event(self, topic: str, time_us: int, **fields: float) -> None:
+        """Write one message of an event topic, after the rows before it; fields left out have defaults."""
+        self.flush()
+        self._write(self._events[topic].encode(time_us, fields))
+
+    def message(self, time_us: int, level: int, text: str) -> None:
+        """Write a text; ``level`` is its MAV_SEVERITY, 0 (emergency) to 7 (debug)."""
+        self.flush()
+        self._write(ulog.logged_string(time_us, level, text))
+
+    def parameter(self, name: str, value: float) -> None:
+        """Write a parameter's new value; it is in force after the rows before it."""
+        self.flush()
+        self._write(ulog.parameter(name, value))
+
+    def close(self) -> None:
+        """Write what waits and close the file; a second call does nothing."""
+        if self._closed:
+            return
+        self.flush()
+        self._closed = True
+        try:
+            self._file.close()
+        except OSError as error:
+            self.error = self.error or error
+
+    def _write(self, data: bytes | memoryview, header_size: int = 0) -> None:
+        """Write whole messages, after ``header_size`` bytes that are none."""
+        written = 0
+        try:
+            while self.error is None and written < len(data):
+                now = self._file.write(data[written:])
+                if not now:
+                    raise OSError("the log file takes no more data")
+                written += now
+        except OSError as error:
+            self.error = error
+            with contextlib.suppress(OSError):  # a pipe cannot
+                self._file.truncate(self._size + ulog.whole_messages(data, written, header_size))
+        self._size += written
+
+
+def vehicle_info(vehicle: Vehicle) -> dict[str, str | int | float]:
+    """Return the info entries of a vehicle that reports need; without limits, ideal rotors have none."""
+    info: dict[str, str | int | float] = {
+        "vehicle": vehicle.name,
+        "rotor_count": len(vehicle.rotors),
+        "mass_kg": vehicle.mass_kg,
+    }
+    if not vehicle.ideal_rotors:
+        info["rotor_min_speed_rad_s"] = min(rotor.min_speed_rad_s for rotor in vehicle.rotors)
+        info["rotor_max_speed_rad_s"] = max(rotor.max_speed_rad_s for rotor in vehicle.rotors)
+    return info

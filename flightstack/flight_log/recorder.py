@@ -1,0 +1,178 @@
+"""From the autopilot's events to flight logs: one log for each flight, from arming to disarming."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from flightstack.commander.transitions import Status
+from flightstack.core.arrays import store_outer_row
+from flightstack.core.compiled import direct
+from flightstack.core.contract import (
+    ATTITUDE_TARGET_SIZE,
+    SETPOINT_SIZE,
+    STATE_SIZE,
+    FloatArray,
+    LoopRow,
+    Vector3,
+)
+from flightstack.core.geodesy import GeoPoint
+from flightstack.core.modes import NAVIGATION_STATE
+from flightstack.flight_log.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
+from flightstack.flight_log.flight_log import FlightLog
+from flightstack.flight_log.topics import OUTER, outer_heading
+from flightstack.guidance.navigator import MissionProgress
+
+OpenLog = Callable[[], FlightLog | None]
+
+
+class FlightRecorder:
+    """Implements the autopilot's ``Recorder``. While no log is open, rows go to a scratch row."""
+
+    def __init__(
+        self,
+        open_log: OpenLog,
+        info: Mapping[str, str | int | float],
+        parameters: Callable[[], Mapping[str, float]],
+        home: GeoPoint,
+    ) -> None:
+        """``parameters`` returns the present values, which begin a log; ``home`` is the local frame's origin too."""
+        self._open_log = open_log
+        self._info = info
+        self._parameters = parameters
+        self._origin = home
+        self._home = (home, Vector3(0.0, 0.0, 0.0))
+        self._log: FlightLog | None = None
+        scratch = np.zeros(LoopRow.SIZE)
+        self._no_row: Callable[[int], FloatArray] = lambda _: scratch
+        self.inner_row: Callable[[int], FloatArray] = self._no_row
+        """Return the row that the inner loop fills in this tick, given its time; that of no log while none is open."""
+        sizes = (OUTER.size, STATE_SIZE, SETPOINT_SIZE, ATTITUDE_TARGET_SIZE)
+        self._store_outer = direct(store_outer_row, *(np.zeros(size) for size in sizes), 0)
+        outer_heading(np.zeros((0, OUTER.size)))  # compiled here, not when the log is first written
+        self._mission = (MissionProgress(0, -1, False, False), 0)
+        self._missions = 0
+        self._armed = False
+        self._error: OSError | None = None
+
+    @property
+    def is_logging(self) -> bool:
+        """Whether a log is being written."""
+        return self._log is not None
+
+    def take_back_row(self) -> None:
+        """Forget the newest row of ``inner_row``: the loops failed before they filled it."""
+        if self._log is not None and self._log.inner.n:
+            self._log.inner.n -= 1
+
+    def outer(
+        self,
+        time_us: int,
+        state: FloatArray,
+        setpoint: FloatArray,
+        attitude_target: FloatArray,
+        loop_flags: int,
+    ) -> None:
+        """Record one outer tick; ``loop_flags`` say what the loops began it with, 0 while they rest."""
+        if self._log is None:
+            return
+        row = self._log.outer.append(time_us)
+        self._store_outer(row, state, setpoint, attitude_target, loop_flags)
+
+    def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
+        """Record mode and arming, and whether a failsafe acts; arming begins a log, disarming ends it."""
+        if status.armed and not self._armed:  # not again in a flight whose log could not be written
+            self._begin(time_us)
+        self._armed = status.armed
+        if self._log is None:
+            return
+        self._log.event(
+            "vehicle_status",
+            time_us,
+            nav_state_timestamp=time_us,
+            arming_state=ARMING_STATE_ARMED if status.armed else ARMING_STATE_DISARMED,
+            nav_state=NAVIGATION_STATE[status.mode],
+            failsafe=int(failsafe),
+            pre_flight_checks_pass=1,
+        )
+        if not status.armed:
+            self.close()
+
+    def _begin(self, time_us: int) -> None:
+        self._log = self._open_log()
+        if self._log is None:
+            return
+        self.inner_row = self._log.inner.append
+        self._log.start(time_us, self._info, self._parameters(), self._origin)
+        self._write_home(time_us)
+        self.landed(time_us, True)
+        self._write_mission(time_us)
+
+    def landed(self, time_us: int, landed: bool) -> None:
+        """Record a change of the land detector."""
+        if self._log is not None:
+            self._log.event("vehicle_land_detected", time_us, landed=int(landed), ground_contact=int(landed))
+
+    def home(self, time_us: int, home: GeoPoint, position_ned_m: Vector3) -> None:
+        """Record where home is now."""
+        self._home = (home, position_ned_m)
+        self._write_home(time_us)
+
+    def _write_home(self, time_us: int) -> None:
+        if self._log is None:
+            return
+        (lat, lon, alt), (x, y, z) = self._home
+        self._log.event("home_position", time_us, lat=lat, lon=lon, alt=alt, x=x, y=y, z=z)
+
+    def mission(self, time_us: int, progress: MissionProgress, count: int) -> None:
+        """Record progress of the mission."""
+        if count != self._mission[1] or progress.reached < self._mission[0].reached:
+            self._missions += 1
+        self._mission = (progress, count)
+        self._write_mission(time_us)
+
+    def _write_mission(self, time_us: int) -> None:
+        if self._log is None:
+            return
+        progress, count = self._mission
+        self._log.event(
+            "mission_result",
+            time_us,
+            seq_reached=progress.reached,
+            seq_current=min(progress.current, max(0, count - 1)),
+            seq_total=count,
+            mission_update_counter=self._missions,
+            valid=int(count > 0),
+            finished=int(progress.finished),
+        )
+
+    def timing(self, time_us: int, **figures: float) -> None:
+        """Record the timing of the loops; only what is the same in every run of the same flight, in lockstep."""
+        if self._log is not None:
+            self._log.event("loop_timing", time_us, **figures)
+
+    def parameter(self, name: str, value: float) -> None:
+        """Record a change of a parameter."""
+        if self._log is not None:
+            self._log.parameter(name, value)
+
+    def text(self, time_us: int, severity: int, text: str) -> None:
+        """Record a text."""
+        if self._log is not None:
+            self._log.message(time_us, severity, text)
+
+    def take_error(self) -> OSError | None:
+        """Return the error that ended a log early, once; None if there is none. The flight goes on without a log."""
+        if self._log is not None and self._log.error is not None:
+            self.close()
+        error, self._error = self._error, None
+        return error
+
+    def close(self) -> None:
+        """End the log in good order; a later flight opens the next."""
+        if self._log is not None:
+            self._log.close()
+            self._error = self._log.error
+            self._log = None
+            self.inner_row = self._no_row

@@ -1,0 +1,82 @@
+"""Rows of a trace to ULog data messages, in bulk: one row becomes one message of every topic of the block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from flightstack.core.contract import FloatArray
+from flightstack.flight_log import ulog
+from flightstack.flight_log.topics import Derived, Field, Topic
+
+TimeArray: TypeAlias = np.ndarray[Any, np.dtype[np.uint64]]
+_Records: TypeAlias = np.ndarray[Any, Any]
+
+_TIMESTAMP = "Q"
+
+
+def content_size(topic: Topic) -> int:
+    """Size [bytes] of a data message's content: subscription id, timestamp and fields."""
+    return 2 + 8 + sum(_field_dtype(field).itemsize for field in topic.fields)
+
+
+def _field_dtype(field: Field) -> np.dtype[Any]:
+    code = "<" + ulog.STRUCT_CODES[field.type]
+    return np.dtype((code, (field.length,))) if field.length else np.dtype(code)
+
+
+class RowBlock:
+    """Packs rows into a buffer of packed records, laid out once; what never changes is filled in once."""
+
+    def __init__(
+        self,
+        topics: Sequence[Topic],
+        first_message_id: int,
+        capacity: int,
+        constants: Mapping[str, float] | None = None,
+    ) -> None:
+        """Lay out ``capacity`` rows. ``constants`` holds the values of fields without a source, by name."""
+        columns: list[tuple[str, Any]] = []
+        for topic in topics:
+            columns.append((f"{topic.name}.header", "V5"))
+            columns.append((f"{topic.name}.timestamp", "<u8"))
+            columns.extend((f"{topic.name}.{field.name}", _field_dtype(field)) for field in topic.fields)
+        records = np.zeros(capacity, np.dtype(columns))
+        self._stamps: list[_Records] = []
+        self._copies: list[tuple[_Records, slice | int]] = []
+        self._derived: list[tuple[_Records, Derived]] = []
+        for message_id, topic in enumerate(topics, first_message_id):
+            header = ulog.DATA_HEADER.pack(content_size(topic), ulog.DATA_TYPE, message_id)
+            records[f"{topic.name}.header"] = np.void(header)
+            self._stamps.append(records[f"{topic.name}.timestamp"])
+            for field in topic.fields:
+                self._bind(records[f"{topic.name}.{field.name}"], field, constants or {})
+        self.row_size = records.dtype.itemsize
+        self._bytes = records.view(np.uint8).data
+
+    def _bind(self, column: _Records, field: Field, constants: Mapping[str, float]) -> None:
+        if field.source is None:
+            column[:] = constants.get(field.name, field.default)
+        elif not isinstance(field.source, int):
+            self._derived.append((column, field.source))
+        elif field.length:
+            self._copies.append((column, slice(field.source, field.source + field.length)))
+        else:
+            self._copies.append((column, field.source))
+
+    def encode(self, times_us: TimeArray, rows: FloatArray) -> memoryview:
+        """Return the messages of ``rows``, shape (n, columns), n ≤ capacity; valid until the next call.
+
+        Values that their type cannot hold become infinite (floats) or undefined (integers), never an error.
+        """
+        count = len(rows)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for column in self._stamps:
+                column[:count] = times_us
+            for column, source in self._copies:
+                column[:count] = rows[:, source]
+            for column, derive in self._derived:
+                column[:count] = derive(rows)
+        return self._bytes[: count * self.row_size]

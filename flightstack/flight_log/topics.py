@@ -1,0 +1,146 @@
+"""What the log holds: the columns of the traces (the inner loop's: ``LoopRow``) and the topics made of them.
+
+Topics and fields have PX4's names where they mean the same. Fields come largest type first, as PX4
+lays them out, so that no padding is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray, LoopRow, Quaternion
+from flightstack.core.geometry import heading
+
+Derived: TypeAlias = Callable[[FloatArray], FloatArray]
+
+
+class OuterColumns(NamedTuple):
+    """First column of each group in a row of the outer loop's trace; ``size`` is the length of a row."""
+
+    state: int = 0  # VehicleState, 13
+    setpoint: int = 13  # PositionSetpoint, 11
+    target_attitude: int = 24  # AttitudeTarget: quaternion, 4
+    target_thrust: int = 28  # AttitudeTarget: thrust [N]
+    loop_flags: int = 29  # LoopFlags, 0 while the loops rest
+    size: int = 30
+
+
+OUTER = OuterColumns()
+ATTITUDE_AT = OUTER.state + 6
+
+
+class Field(NamedTuple):
+    """One field, an array if it has a ``length``.
+
+    ``source``: first column of the trace, a function of its rows, or None for a constant.
+    """
+
+    type: str
+    name: str
+    length: int = 0
+    source: int | Derived | None = None
+    default: float = 0.0
+
+
+class Topic(NamedTuple):
+    """A topic; every topic starts with ``uint64_t timestamp`` [µs]."""
+
+    name: str
+    fields: tuple[Field, ...]
+
+
+@compiled
+def outer_heading(rows: FloatArray) -> FloatArray:
+    """Return the headings [rad] of rows of the outer loop's trace, shape (n, 30)."""
+    headings = np.empty(len(rows))
+    for i in range(len(rows)):
+        w, x, y, z = (
+            rows[i, ATTITUDE_AT],
+            rows[i, ATTITUDE_AT + 1],
+            rows[i, ATTITUDE_AT + 2],
+            rows[i, ATTITUDE_AT + 3],
+        )
+        headings[i] = heading(Quaternion(w, x, y, z))
+    return headings
+
+
+def inner_topics(rotors: int) -> tuple[Topic, ...]:
+    """Topics written at the inner loop's rate, for a vehicle with ``rotors`` rotors."""
+    return (
+        Topic("vehicle_attitude", (Field("float", "q", 4, LoopRow.STATE.start + 6),)),
+        Topic("vehicle_angular_velocity", (Field("float", "xyz", 3, LoopRow.STATE.start + 10),)),
+        Topic(
+            "attitude_reference",
+            (
+                Field("float", "q", 4, LoopRow.REFERENCE_ATTITUDE.start),
+                Field("float", "rates_rad_s", 3, LoopRow.REFERENCE_RATES.start),
+                Field("float", "acceleration_rad_s2", 3, LoopRow.REFERENCE_ACCELERATION.start),
+            ),
+        ),
+        Topic(
+            "wrench",
+            (
+                Field("float", "thrust_n", 0, LoopRow.WRENCH.start),
+                Field("float", "torque_n_m", 3, LoopRow.WRENCH.start + 1),
+                Field("float", "thrust_achieved_n", 0, LoopRow.WRENCH_ACHIEVED.start),
+                Field("float", "torque_achieved_n_m", 3, LoopRow.WRENCH_ACHIEVED.start + 1),
+                Field("uint16_t", "status", 0, LoopRow.STATUS),
+            ),
+        ),
+        Topic(
+            "rotor_speeds",
+            (
+                Field("float", "command_rad_s", rotors, LoopRow.ROTOR_COMMAND.start),
+                Field("float", "speed_rad_s", rotors, LoopRow.ROTOR_SPEED.start),
+            ),
+        ),
+    )
+
+
+OUTER_TOPICS = (
+    Topic(
+        "vehicle_local_position",
+        (
+            Field("double", "ref_lat"),
+            Field("double", "ref_lon"),
+            Field("float", "x", 0, OUTER.state),
+            Field("float", "y", 0, OUTER.state + 1),
+            Field("float", "z", 0, OUTER.state + 2),
+            Field("float", "vx", 0, OUTER.state + 3),
+            Field("float", "vy", 0, OUTER.state + 4),
+            Field("float", "vz", 0, OUTER.state + 5),
+            Field("float", "heading", 0, outer_heading),
+            Field("float", "ref_alt"),
+            Field("bool", "xy_valid", default=1),
+            Field("bool", "z_valid", default=1),
+            Field("bool", "v_xy_valid", default=1),
+            Field("bool", "v_z_valid", default=1),
+            Field("bool", "heading_good_for_control", default=1),
+            Field("bool", "xy_global", default=1),
+            Field("bool", "z_global", default=1),
+        ),
+    ),
+    Topic(
+        "trajectory_setpoint",
+        (
+            Field("float", "position", 3, OUTER.setpoint),
+            Field("float", "velocity", 3, OUTER.setpoint + 3),
+            Field("float", "acceleration", 3, OUTER.setpoint + 6),
+            Field("float", "yaw", 0, OUTER.setpoint + 9),
+            Field("float", "yawspeed", 0, OUTER.setpoint + 10),
+        ),
+    ),
+    Topic(
+        "vehicle_attitude_setpoint",
+        # PX4's thrust_body is normalised; ours is in newtons, so it has a name of its own
+        (
+            Field("float", "q_d", 4, OUTER.target_attitude),
+            Field("float", "thrust_n", 0, OUTER.target_thrust),
+            Field("uint8_t", "loop_flags", 0, OUTER.loop_flags),
+        ),
+    ),
+)

@@ -1,0 +1,103 @@
+"""The messages of a ULog file as bytes, per PX4's ULog file format (version 1). Pure.
+
+A file is a header, the definitions (flag bits, formats, info, parameters), then the data section
+(subscriptions, data, logged strings). Every message is: uint16 size, uint8 type, content, little-endian.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable
+
+from flightstack.mavlink.field_numbers import fitted, int32
+
+MAGIC = b"ULog\x01\x12\x35"
+VERSION = 1
+
+_MESSAGE = struct.Struct("<HB")
+_SUBSCRIPTION = struct.Struct("<BH")
+_LOGGED_STRING = struct.Struct("<BQ")
+_FLAG_BITS = bytes(40)  # no compatible or incompatible flag, no appended data
+_MAX_CONTENT = 0xFFFF
+
+HEADER_SIZE = len(MAGIC) + 1 + 8
+"""Bytes of the file header, before the first message."""
+DATA_HEADER = struct.Struct("<HBH")  # size, type 'D', subscription id
+DATA_TYPE = ord("D")
+
+STRUCT_CODES = {
+    "int8_t": "b",
+    "uint8_t": "B",
+    "int16_t": "h",
+    "uint16_t": "H",
+    "int32_t": "i",
+    "uint32_t": "I",
+    "int64_t": "q",
+    "uint64_t": "Q",
+    "float": "f",
+    "double": "d",
+    "bool": "?",
+}
+"""ULog's types as codes of ``struct``; the same codes serve as NumPy's after "<"."""
+
+
+def _message(kind: str, content: bytes) -> bytes:
+    if len(content) > _MAX_CONTENT:
+        raise ValueError(f"a ULog message holds at most {_MAX_CONTENT} bytes, this one has {len(content)}")
+    return _MESSAGE.pack(len(content), ord(kind)) + content
+
+
+def file_header(time_us: int) -> bytes:
+    """Return the file header and the flag bits, which must come first. ``time_us``: start of the log."""
+    return MAGIC + struct.pack("<BQ", VERSION, time_us) + _message("B", _FLAG_BITS)
+
+
+def whole_messages(data: bytes | memoryview, count: int, begin: int = 0) -> int:
+    """Return how many of the first ``count`` bytes are whole messages; they begin after ``begin`` other bytes."""
+    end = begin
+    while end + _MESSAGE.size <= count:
+        after = end + _MESSAGE.size + _MESSAGE.unpack_from(data, end)[0]
+        if after > count:
+            break
+        end = after
+    return end if end <= count else 0
+
+
+def format_definition(name: str, fields: Iterable[tuple[str, int, str]]) -> bytes:
+    """Define a topic from its fields (type, length of the array or 0, name), in the order of its data."""
+    text = "".join(f"{kind}{f'[{length}]' if length else ''} {field};" for kind, length, field in fields)
+    return _message("F", f"{name}:{text}".encode())
+
+
+def _keyed(kind: str, key: str, value: bytes) -> bytes:
+    name = key.encode()
+    return _message(kind, bytes([len(name)]) + name + value)
+
+
+def information(key: str, value: str | int | float) -> bytes:
+    """Return an information message; an int is stored as int32_t where it fits, a float as double."""
+    if isinstance(value, str):
+        text = value.encode()
+        return _keyed("I", f"char[{len(text)}] {key}", text)
+    if isinstance(value, float):
+        return _keyed("I", f"double {key}", struct.pack("<d", value))
+    if -(2**31) <= value < 2**31:
+        return _keyed("I", f"int32_t {key}", struct.pack("<i", value))
+    return _keyed("I", f"int64_t {key}", struct.pack("<q", value))
+
+
+def parameter(name: str, value: float) -> bytes:
+    """Return a parameter: an int as int32_t, a float as float, the two types that ULog allows."""
+    if isinstance(value, int):
+        return _keyed("P", f"int32_t {name}", struct.pack("<i", int32(value)))
+    return _keyed("P", f"float {name}", struct.pack("<f", fitted(value, "f", wraps=False)))
+
+
+def subscription(message_id: int, name: str) -> bytes:
+    """Bind ``message_id`` to the topic ``name`` (its only instance)."""
+    return _message("A", _SUBSCRIPTION.pack(0, message_id) + name.encode())
+
+
+def logged_string(time_us: int, level: int, text: str) -> bytes:
+    """Return a text message; ``level`` is 0 (emergency) to 7 (debug), as in syslog and MAVLink."""
+    return _message("L", _LOGGED_STRING.pack(ord("0") + level, time_us) + text.encode())

@@ -1,1 +1,0 @@
-"""MAVLink services as state machines without I/O: receive, poll, next_deadline, events."""

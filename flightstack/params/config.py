@@ -1,0 +1,54 @@
+"""Everything that a flight stack process is told at its start."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
+from flightstack.params.behaviour import Behaviour
+from flightstack.params.gains_file import DEFAULT_GAINS
+from flightstack.params.vehicle import DEFAULT_VEHICLE
+
+DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
+DEFAULT_CONTROLLER = "pid"
+DEFAULT_INNER_HZ = 500.0
+DEFAULT_OUTER_HZ = 100.0
+
+
+@dataclass(frozen=True)
+class StackConfig:
+    """What decides the flight; the same configuration gives the same log."""
+
+    vehicle: str = DEFAULT_VEHICLE
+    controller: str = DEFAULT_CONTROLLER
+    gains: str = DEFAULT_GAINS
+    loops: str = "python"
+    """Which loops fly; ``flightstack.firmware.choice`` has what may stand here."""
+    inner_hz: float = DEFAULT_INNER_HZ
+    outer_hz: float = DEFAULT_OUTER_HZ
+    ideal_rotors: bool = False
+    lockstep: bool = True
+    home: GeoPoint = DEFAULT_HOME
+    system_id: int = 1
+    behaviour: Behaviour = field(default_factory=Behaviour)
+    params_file: str | None = None
+    """Parameter file to start from."""
+    params: tuple[str, ...] = ()
+    """``NAME=VALUE`` of any parameter; stronger than file and ``behaviour``, in force for this run alone."""
+
+
+def parse_home(text: str) -> GeoPoint:
+    """Read ``LAT,LON,ALT``; raise ConfigError."""
+    try:
+        latitude, longitude, altitude = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError(
+            "--home", text, "must be LATITUDE,LONGITUDE,ALTITUDE in degrees and metres"
+        ) from None
+    if not (
+        abs(latitude) < 90.0 and abs(longitude) <= 180.0 and math.isfinite(altitude) and abs(altitude) < 2e4
+    ):
+        raise ConfigError("--home", text, "is not a place on earth")
+    return GeoPoint(latitude, longitude, altitude)

@@ -1,0 +1,338 @@
+"""The flight stack process: the only place where clock, transports and autopilot meet."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import select
+import signal
+import time
+from dataclasses import replace
+from types import FrameType
+
+from flightstack.core.errors import ConfigError
+from flightstack.core.modes import Mode
+from flightstack.firmware.choice import PYTHON, SERIAL, parse_loops
+from flightstack.firmware.errors import TargetError
+from flightstack.params.config import StackConfig
+from flightstack.process.assembly import Stack
+from flightstack.process.clock import DeadlineScheduler, ask_for_punctual_sleeps
+from flightstack.process.ground_end import GroundEnd
+from flightstack.process.process_config import (
+    EXIT_LOST,
+    EXIT_OK,
+    EXIT_TIMEOUT,
+    EXIT_USAGE,
+    Ended,
+    ProcessConfig,
+    RebootRequestedError,
+    complain,
+)
+from flightstack.process.process_files import ProcessFiles
+from flightstack.process.reboot import carry_over, config_after
+from flightstack.process.simulator_end import check_deadline, connect, wait_for_state
+from flightstack.transports.processor import Follower
+from flightstack.transports.tcp import LinkClosedError, TcpClient
+from flightstack.vehicle.lockstep import Lockstep
+from flightstack.vehicle.snapshot import NOTICE
+
+GROUND_POLL_NS = 500_000
+GROUND_IDLE_NS = 2_000_000
+"""Time between two looks at the ground links, with traffic and without: a look takes 40 µs."""
+GROUND_SHARE = 0.4
+"""In real time, sending to ground stations takes so much of a tick at most; what is left waits for the next."""
+REPORT_S = 0.2
+FIRST_CONTACT_S = 60.0
+"""How long a process that must not outlive its ground station waits for the first word from it."""
+
+
+class App:
+    """Runs one flight stack until it is stopped, or until the simulator or a required ground station is lost."""
+
+    def __init__(self, config: StackConfig, process: ProcessConfig) -> None:
+        self._process = process
+        self._config = config
+        self._files = ProcessFiles(process)
+        self.stack = self._files.build(config)
+        self._files.adopt(self.stack, config)
+        self.stack.ground.vehicle.prepare_reboot = self._prepare_reboot
+        self._next: tuple[Stack, StackConfig] | None = None
+        self._ground = GroundEnd(process.ports, self.stack.ground)
+        self._lockstep = config.lockstep
+        self._stop_signal = 0
+        self._began_s = time.monotonic()
+        self._next_report_s = self._began_s + REPORT_S
+        self._next_log_us = 0
+        self._next_ground_ns = 0
+        self._follower: Follower | None = None
+
+    # ------------------------------------------------------------------ life
+
+    def run(self) -> int:
+        """Run to the end; return the exit code."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._on_signal)
+        simulator: TcpClient | None = None
+        code = EXIT_LOST
+        try:
+            simulator = self._connect()
+            self._fly(simulator)
+        except Ended as ended:
+            if str(ended):
+                complain(ended)
+            code = ended.code
+        except TargetError as error:
+            self.stack.recorder.take_back_row()
+            complain(error)
+            code = EXIT_TIMEOUT
+        except ConfigError as error:  # at a reboot
+            complain(error)
+            code = EXIT_USAGE
+        except LinkClosedError:
+            code = self._simulator_gone()
+        finally:
+            self._close(simulator, orderly=code == EXIT_OK)
+        return code
+
+    def _connect(self) -> TcpClient:
+        """Connect to the simulator; a reboot meanwhile begins anew."""
+        while True:
+            try:
+                return connect(self._process, self._meanwhile)
+            except RebootRequestedError:
+                self._reboot()
+
+    def _fly(self, simulator: TcpClient) -> None:
+        """Wait for the first state and run the loops until the process ends; a reboot begins anew."""
+        holds_time, waits = self._process.wait_for_start, True
+        simulator.send(self.stack.simulator.hello(self.stack.rates.interval_us))
+        while True:
+            try:
+                if waits:
+                    wait_for_state(simulator, self.stack, self._process, self._meanwhile)
+                waits = False
+                if holds_time:
+                    self._hold_time(simulator)
+                holds_time = False
+                if self._lockstep:
+                    self._run_lockstep(simulator)
+                else:
+                    self._run_real_time(simulator)
+            except RebootRequestedError:
+                self._reboot()
+                if not holds_time:  # the last state was answered: the next one comes by itself
+                    waits = True
+
+    def _prepare_reboot(self) -> str | None:
+        """Build the stack that a reboot begins with; return why it cannot be: then the present one goes on."""
+        config = config_after(self.stack, self._config)
+        is_exclusive = parse_loops(config.loops).kind == SERIAL  # a line is opened once: the rest must do
+        try:
+            stack = self._files.build(replace(config, loops=PYTHON) if is_exclusive else config)
+        except (ConfigError, TargetError) as error:
+            complain(f"not rebooted: {error}")
+            return f"not rebooted: {error}"
+        if (problem := self._files.unsaved_parameters()) is not None:
+            stack.loops.close()
+            return f"not rebooted: {problem}"
+        self._next = None if is_exclusive else (stack, config)
+        return None
+
+    def _reboot(self) -> None:
+        """Put the stack that was prepared in place of the present one."""
+        old = self.stack
+        old.recorder.close()
+        self._files.attend()
+        self._ground.leave(time.monotonic())  # with the command's answer
+        self._files.close_loops()
+        config = config_after(old, self._config)
+        new, config = self._next or (self._files.build(config), config)
+        self._next = None
+        self._files.adopt(new, config)
+        self.stack = new
+        new.ground.vehicle.prepare_reboot = self._prepare_reboot
+        self._ground.join(new.ground)
+        self._next_log_us = 0
+        carry_over(old, new)
+        new.autopilot.say(NOTICE, "Rebooted")
+        complain("rebooted")
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self._stop_signal = number
+
+    def _simulator_gone(self) -> int:
+        now = self.stack.autopilot.now
+        if self._stop_signal:
+            return EXIT_OK
+        at = f"at t={now.time_us * 1e-6:.3f} s"
+        if self.stack.simulator.peer_said_goodbye and not now.status.armed:
+            complain(f"the simulator was shut down {at}")
+            return EXIT_OK
+        complain(f"simulator lost {at}: it closed the connection")
+        return EXIT_LOST
+
+    def _close(self, simulator: TcpClient | None, orderly: bool) -> None:
+        """End the log and, if all is in order, announce the end: peers would report a lost vehicle."""
+        self.stack.recorder.close()
+        self._files.close_loops()
+        if self._next is not None:
+            self._next[0].loops.close()
+        self._files.close_parameters()
+        self._files.attend()
+        self._files.close_plans()
+        self._files.attend()
+        if orderly:
+            self._ground.farewell()
+        self._files.close_signing()
+        if simulator is not None:
+            if orderly:
+                with contextlib.suppress(LinkClosedError):
+                    armed = self.stack.autopilot.now.status.armed
+                    simulator.send(self.stack.simulator.heartbeat(armed, leaving=True))
+            simulator.close()
+        self._ground.close()
+
+    # ------------------------------------------------------------------ start
+
+    def _hold_time(self, simulator: TcpClient) -> None:
+        """Keep time at zero until the vehicle flies a mission; the ground links go on meanwhile."""
+        poller = select.poll()
+        poller.register(simulator, select.POLLIN)
+        self._ground.register(poller)
+        now = self.stack.autopilot.now
+        next_sign_s = 0.0
+        while not (now.status.armed and now.status.mode is Mode.MISSION):
+            self._meanwhile()
+            if time.monotonic() >= next_sign_s:  # the simulator waits for an answer: say that we are here
+                next_sign_s = time.monotonic() + 1.0
+                simulator.send(self.stack.simulator.heartbeat(now.status.armed))
+            self._pass_requests(simulator)
+            poller.poll(20)
+            data = simulator.receive_now()
+            if data is not None:
+                self.stack.simulator.receive(data)
+
+    # ------------------------------------------------------------------ loops
+
+    def _run_lockstep(self, simulator: TcpClient) -> None:
+        """Answer each state with actuators; the simulator owns time."""
+        link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
+        lockstep = Lockstep(link, autopilot, self.stack.rates.interval_us)
+        receive, clock_ns = simulator.receive, time.monotonic_ns
+        self._follower = Follower(simulator.socket)
+        divisor, tick = self.stack.rates.divisor, 0
+        fresh = True  # the state that came before the start
+        while True:
+            if fresh:
+                began_ns = clock_ns()
+                commands = lockstep.tick(began_ns)
+                simulator.send(link.answer(commands, autopilot.now.status.armed))
+                timing.tick(began_ns, clock_ns())
+                tick += 1
+                if tick % divisor == 0:
+                    self._between_ticks(simulator)
+            data = receive()
+            fresh = self._wait_slowly(simulator) if data is None else link.receive(data)
+
+    def _wait_slowly(self, simulator: TcpClient) -> bool:
+        """Serve the ground links while the simulator takes its time; return whether a state came."""
+        deadline_s = time.monotonic() + self._process.simulator_timeout_s
+        while True:
+            self._meanwhile()
+            data = simulator.receive()
+            if data is not None:
+                return self.stack.simulator.receive(data)
+            check_deadline(deadline_s, self.stack, self._process)
+
+    def _run_real_time(self, simulator: TcpClient) -> None:
+        """Tick at fixed deadlines on the newest state; the machine's clock owns time."""
+        link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
+        ask_for_punctual_sleeps()
+        scheduler = DeadlineScheduler(timing)
+        self._ground.slice_ns = round(GROUND_SHARE * timing.period_ns)
+        interval_us, tick, time_us = self.stack.rates.interval_us, 0, 0
+        heard_s = time.monotonic()
+        while True:
+            time_us += interval_us * scheduler.wait()
+            began_ns = time.monotonic_ns()
+            data = simulator.receive_now()
+            if data is not None and link.receive(data):
+                heard_s = began_ns * 1e-9
+            commands = autopilot.tick(time_us)
+            simulator.send(link.answer(commands, autopilot.now.status.armed))
+            timing.tick(began_ns, time.monotonic_ns())
+            tick += 1
+            if tick % self.stack.rates.divisor == 0:
+                self._between_ticks(simulator)
+                check_deadline(heard_s + self._process.simulator_timeout_s, self.stack, self._process)
+            elif self._ground.is_sending:
+                self._ground.send()
+
+    def _between_ticks(self, simulator: TcpClient) -> None:
+        """Do what is due between two ticks: ground links, timing report, reasons to stop."""
+        time_us = self.stack.autopilot.now.time_us
+        if time_us >= self._next_log_us:
+            self._next_log_us = time_us + 1_000_000
+            fields = self.stack.report.log_fields(time_us // self.stack.rates.interval_us)
+            self.stack.recorder.timing(time_us, **fields)
+            if not self._lockstep:
+                self.stack.simulator.steps.compare(self.stack.simulator.time_us, time_us)
+        self._pass_notices()
+        now_ns = time.monotonic_ns()
+        if now_ns < self._next_ground_ns:
+            return
+        if self._follower is not None:
+            self._follower.follow()
+        heard = self._serve_ground()
+        self._next_ground_ns = now_ns + (GROUND_POLL_NS if heard else GROUND_IDLE_NS)
+        self._pass_requests(simulator)
+        self._check_stop()
+
+    def _pass_notices(self) -> None:
+        """Tell the operator what is wrong with the simulator's steps; do not begin a mission that cannot be flown."""
+        link, now = self.stack.simulator, self.stack.autopilot.now
+        for severity, text in link.steps.take_notices():
+            self.stack.autopilot.say(severity, text)
+            complain(text[0].lower() + text[1:])
+            if self._process.wait_for_start and now.landed and (refusal := link.step_refusal):
+                raise Ended(EXIT_USAGE, refusal)
+
+    def _pass_requests(self, simulator: TcpClient) -> None:
+        if requests := self.stack.simulator.take_requests():
+            simulator.send(requests)
+
+    # ------------------------------------------------------------------ ground links
+
+    def _serve_ground(self) -> bool:
+        """Carry what both sides have to say; return whether a ground peer has sent something."""
+        now_s = time.monotonic()
+        if now_s >= self._next_report_s:
+            self._next_report_s = now_s + REPORT_S
+            self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
+        heard = self._ground.serve(now_s)
+        self._files.attend()
+        return heard
+
+    def _meanwhile(self) -> None:
+        """Do what must go on while the simulator is waited for."""
+        self._check_stop()
+        self._serve_ground()
+
+    # ------------------------------------------------------------------ reasons to stop
+
+    def _check_stop(self) -> None:
+        if self._stop_signal:
+            raise Ended(EXIT_OK, "stopped")
+        if self.stack.ground.vehicle.reboot_requested:
+            raise RebootRequestedError
+        if self.stack.ground.vehicle.shutdown_requested:
+            raise Ended(EXIT_OK, "shut down by the ground station")
+        limit_s = self._process.exit_on_ground_loss_s
+        if limit_s is None:
+            return
+        heard_s = self.stack.ground.last_heard_s
+        now_s = time.monotonic()
+        if heard_s > -math.inf and now_s - heard_s > limit_s:
+            raise Ended(EXIT_LOST, f"ground station lost: nothing heard for {limit_s:g} s")
+        if heard_s == -math.inf and now_s - self._began_s > FIRST_CONTACT_S:
+            raise Ended(EXIT_TIMEOUT, f"no ground station within {FIRST_CONTACT_S:g} s")

@@ -1,0 +1,140 @@
+"""Put a flight stack together from its configuration: everything but clock and transports.
+
+The process (``app``) and the tests that fly in one process build the same stack here.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flightstack import __version__
+from flightstack.control.backend import ControlBackend
+from flightstack.control.controller_loading import load_controller
+from flightstack.firmware.c_loops import LoopsSetup
+from flightstack.firmware.choice import PYTHON
+from flightstack.firmware.targets import make_loops
+from flightstack.flight_log.flight_log import vehicle_info
+from flightstack.flight_log.recorder import FlightRecorder, OpenLog
+from flightstack.params.config import StackConfig
+from flightstack.params.gains_file import open_gains
+from flightstack.params.identity import AUTOPILOT, GENERIC, SYSTEM_ID
+from flightstack.params.param_file import LoadedParams
+from flightstack.params.store import ParamStore
+from flightstack.params.vehicle import Vehicle, load_vehicle
+from flightstack.process.clock import LoopTiming, Rates, rates
+from flightstack.process.timing_report import TimingReport
+from flightstack.services.commands import VehicleContext
+from flightstack.services.logs.log_store import NO_LOGS, LogStore
+from flightstack.services.routing.hub import GroundHub
+from flightstack.services.vehicle_facts import AutopilotFacts
+from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.parameters import behaviour_of, connect_parameters, load_parameters
+
+_KERNELS = (
+    "inner_kernel", "store_outer_row", "outer_heading", "follow_rotors", "detect", "mission_start", "rest_kernel",
+    "levelling_kernel", "stream_kernel", "goal_kernel", "outer_kernel", "fence_step",
+)  # fmt: skip
+_LOOP_KERNELS = ("inner_kernel", "outer_kernel")
+
+
+class Stack(NamedTuple):
+    """The parts that a process or a test drives."""
+
+    vehicle: Vehicle
+    rates: Rates
+    simulator: SimulatorLink
+    autopilot: Autopilot
+    ground: GroundHub
+    recorder: FlightRecorder
+    timing: LoopTiming
+    report: TimingReport
+    params: ParamStore
+    loaded_params: LoadedParams
+    """What the parameter file held at the start."""
+    loops: ControlBackend
+
+
+def vehicle_of(config: StackConfig) -> Vehicle:
+    """Load the vehicle; raise ConfigError."""
+    vehicle = load_vehicle(config.vehicle)
+    return vehicle.with_ideal_rotors() if config.ideal_rotors else vehicle
+
+
+def kernels_of(config: StackConfig) -> tuple[str, ...]:
+    """Names of the kernels that ``build`` compiles, or reads from the cache, in this order."""
+    needs_loops = config.loops == PYTHON
+    return tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
+
+
+def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> Stack:
+    """Build a stack, which shows ``logs`` to its ground stations.
+
+    Raise ConfigError for anything in the configuration that cannot fly.
+    """
+    vehicle = vehicle_of(config)
+    pace = rates(config.inner_hz, config.outer_hz)
+    setup = LoopsSetup(
+        vehicle,
+        load_controller(config.controller),
+        open_gains(config.gains),
+        math.radians(config.behaviour.max_tilt_deg),
+        pace.inner_hz,
+        pace.outer_hz,
+        pace.divisor,
+    )
+    backend = make_loops(config.loops, setup, config.lockstep)
+    try:
+        return _join(config, vehicle, pace, backend, open_log, logs)
+    except BaseException:
+        backend.close()  # a target may be a process, or hold a line
+        raise
+
+
+def _join(
+    config: StackConfig,
+    vehicle: Vehicle,
+    pace: Rates,
+    backend: ControlBackend,
+    open_log: OpenLog,
+    logs: LogStore,
+) -> Stack:
+    info: dict[str, str | int | float] = {
+        "sys_name": "flightstack",
+        "ver_sw": __version__,
+        **vehicle_info(vehicle),
+        "controller": config.controller,
+        "gains": config.gains,
+        "loops": config.loops,
+        "ver_loops": backend.version,
+        "inner_hz": pace.inner_hz,
+        "outer_hz": pace.outer_hz,
+    }
+    params, loaded = load_parameters(config, backend)
+    behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
+    recorder = FlightRecorder(open_log, info, params.values, config.home)
+    simulator = SimulatorLink(vehicle, config.home, config.lockstep, system_id, pace.interval_us)
+    autopilot = Autopilot(
+        vehicle,
+        backend,
+        behaviour,
+        config.home,
+        pace.divisor,
+        pace.outer_hz,
+        recorder,
+        simulator.state,
+        simulator.rotor_speed_rad_s,
+        simulator,
+    )
+    backend.warm_up(simulator.state, autopilot.now.setpoint, simulator.rotor_speed_rad_s)
+    autopilot.supervisor.warm_up()
+    connect_parameters(params, autopilot, backend, recorder)
+    timing = LoopTiming(round(1e9 / pace.inner_hz))
+    report = TimingReport(timing, pace, config.lockstep)
+    generic = params.value(AUTOPILOT) == GENERIC
+    facts = AutopilotFacts(autopilot, vehicle, system_id, generic, report.message, lambda: simulator.battery)
+    ground = GroundHub(VehicleContext(autopilot, params, simulator, generic, logs=logs), facts, system_id)
+    return Stack(
+        vehicle, pace, simulator, autopilot, ground, recorder, timing, report, params, loaded, backend
+    )

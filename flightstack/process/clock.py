@@ -1,0 +1,147 @@
+"""Fixed-rate scheduling: rate groups, the deadline scheduler of real time, and what the loops' timing was.
+
+The only module that reads the machine's clock for the loops. In lockstep the simulator owns time and only the
+execution time of a tick is measured here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from flightstack.core.errors import ConfigError
+
+MIN_INNER_HZ, MAX_INNER_HZ = 10.0, 20_000.0
+DEFAULT_OUTER_HZ = 100.0
+WINDOW = 4096
+
+
+def ask_for_punctual_sleeps() -> None:
+    """Set this process's timer slack to its minimum (Linux: 50 µs otherwise); elsewhere nothing happens."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/timerslack_ns").write_text("1", encoding="ascii")
+
+
+class Rates(NamedTuple):
+    """The rates of the loops. The outer one runs in every ``divisor``-th inner tick."""
+
+    inner_hz: float
+    outer_hz: float
+    divisor: int
+    interval_us: int
+
+
+def nearest_outer_hz(inner_hz: float) -> float:
+    """Return the rate nearest to 100 Hz that divides ``inner_hz``: what an outer loop runs at unless told."""
+    return inner_hz / max(1, round(inner_hz / DEFAULT_OUTER_HZ))
+
+
+def rates(inner_hz: float, outer_hz: float) -> Rates:
+    """Check and return the rates; raise ConfigError unless the outer one divides the inner one."""
+    if not MIN_INNER_HZ <= inner_hz <= MAX_INNER_HZ:
+        raise ConfigError("--inner-hz", f"{inner_hz:g}", f"is outside {MIN_INNER_HZ:g} to {MAX_INNER_HZ:g}")
+    interval_us = round(1e6 / inner_hz)
+    if abs(interval_us * inner_hz - 1e6) > 1e-6:
+        raise ConfigError(
+            "--inner-hz", f"{inner_hz:g}", "does not make a whole number of microseconds per tick"
+        )
+    if not 0.0 < outer_hz <= inner_hz:
+        raise ConfigError("--outer-hz", f"{outer_hz:g}", f"is outside 0 to the inner rate {inner_hz:g}")
+    divisor = round(inner_hz / outer_hz)
+    if abs(divisor * outer_hz - inner_hz) > 1e-9 * inner_hz:
+        raise ConfigError("--outer-hz", f"{outer_hz:g}", f"does not divide the inner rate {inner_hz:g}")
+    return Rates(inner_hz, outer_hz, divisor, interval_us)
+
+
+class Distribution(NamedTuple):
+    """Figures of a set of durations, µs."""
+
+    mean_us: float
+    p99_us: float
+    max_us: float
+
+
+NO_DURATIONS = Distribution(0.0, 0.0, 0.0)
+
+
+class Durations:
+    """The last ``WINDOW`` durations: eight seconds at 500 Hz."""
+
+    def __init__(self) -> None:
+        self._values = np.zeros(WINDOW)
+        self._count = 0
+
+    def add(self, nanoseconds: int) -> None:
+        """Record one duration."""
+        self._values[self._count % WINDOW] = nanoseconds
+        self._count += 1
+
+    def figures(self) -> Distribution:
+        """Return the figures of the durations held."""
+        count = min(self._count, WINDOW)
+        if count == 0:
+            return NO_DURATIONS
+        values = self._values[:count] * 1e-3
+        return Distribution(float(values.mean()), float(np.percentile(values, 99)), float(values.max()))
+
+
+class LoopTiming:
+    """Accounts for ticks: execution time, lateness, overruns (longer than a period) and missed deadlines."""
+
+    def __init__(self, period_ns: int) -> None:
+        self.period_ns = period_ns
+        self.execution = Durations()
+        self.lateness = Durations()
+        self.ticks = 0
+        self.overruns = 0
+        self.missed = 0
+
+    def tick(self, began_ns: int, ended_ns: int) -> None:
+        """Record one tick."""
+        took = ended_ns - began_ns
+        self.execution.add(took)
+        self.ticks += 1
+        if took > self.period_ns:
+            self.overruns += 1
+
+
+class DeadlineScheduler:
+    """Releases ticks at fixed absolute deadlines of the monotonic clock, without drift.
+
+    A tick that comes late by whole periods skips the deadlines that have passed (they count as missed)
+    instead of hurrying after them, as a flight controller's loop does.
+    """
+
+    def __init__(
+        self,
+        timing: LoopTiming,
+        now_ns: Callable[[], int] = time.monotonic_ns,
+        sleep_s: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._timing = timing
+        self._now_ns = now_ns
+        self._sleep_s = sleep_s
+        self._deadline_ns = now_ns()
+
+    def wait(self) -> int:
+        """Sleep until the next deadline; return how many periods have passed since the last one (1: on time)."""
+        period = self._timing.period_ns
+        self._deadline_ns += period
+        periods = 1
+        now = self._now_ns()
+        while now < self._deadline_ns:
+            self._sleep_s((self._deadline_ns - now) * 1e-9)
+            now = self._now_ns()
+        late = now - self._deadline_ns
+        self._timing.lateness.add(late)
+        if late >= period:
+            skipped = late // period
+            self._timing.missed += skipped
+            self._deadline_ns += skipped * period
+            periods += skipped
+        return periods

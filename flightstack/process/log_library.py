@@ -1,0 +1,222 @@
+"""The folder of flight logs: the only place that opens log files, and it opens nothing else.
+
+A log is a regular file of this folder whose name ends in ``.ulg``. What leads out of the folder (a path, a symbolic
+link) is no log, whatever a ground station asks for.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import math
+import os
+import stat
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from flightstack.services.logs.log_store import LogInfo
+
+SUFFIX = ".ulg"
+_OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | os.O_CLOEXEC
+MAX_LOGS = 65_535
+"""LOG_ENTRY counts in 16 bits; of more, the newest are shown."""
+LOOK_S = 1.0
+"""Time between two looks at the folder [s]."""
+LATELY_S = 60.0
+"""Files written in the last ``LATELY_S`` are examined at each look, all others once in this time [s]."""
+_LOCK_TRIES, _LOCK_WAIT_S = 100, 1e-3
+
+
+class LogFileReader:
+    """An open log. Its size is what it was when it was opened: the log of this flight goes on growing."""
+
+    def __init__(self, descriptor: int, size: int) -> None:
+        self._descriptor = descriptor
+        self._size = size
+
+    @property
+    def size(self) -> int:
+        """Bytes in the file."""
+        return self._size
+
+    def read(self, offset: int, count: int) -> bytes:
+        """Return up to ``count`` bytes from ``offset``; raise OSError."""
+        return os.pread(self._descriptor, max(0, min(count, self._size - offset)), offset)
+
+    def claim(self) -> bool:
+        """Lock the log against ``create_log_file`` until it is closed; return False if it is being written."""
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:  # some file systems have no locks
+            return error.errno != errno.EWOULDBLOCK
+        return True
+
+    def close(self) -> None:
+        """Close the file; a second call does nothing."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+
+def create_log_file(path: Path, overwrite: bool = False) -> BinaryIO:
+    """Open a new log for writing, unbuffered; raise OSError, FileExistsError for a file unless ``overwrite``.
+
+    A shared lock until the file is closed marks it as being written, for every process and this one too. A log that
+    was erased before it was locked is created again.
+    """
+    is_file = path.is_file() or not path.exists()  # a device or a pipe is written to
+    while True:
+        file = open(path, "xb" if is_file and not overwrite else "wb", buffering=0)  # noqa: SIM115  # its owner closes it
+        _lock(file)
+        if not is_file or _is_at(path, file):
+            return file
+        file.close()
+
+
+def _lock(file: BinaryIO) -> None:
+    """Lock a log that is written, after ``_LOCK_TRIES`` not at all: an erase holds its own lock for microseconds."""
+    for _ in range(_LOCK_TRIES):
+        try:
+            fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(_LOCK_WAIT_S)
+        except OSError:  # some file systems have no locks
+            return
+        else:
+            return
+
+
+def _is_at(path: Path, file: BinaryIO) -> bool:
+    """Return whether ``path`` still names the open file."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(file.fileno()))
+    except FileNotFoundError:
+        return False
+
+
+class _Known(NamedTuple):
+    """A file of the folder as it was when it was last examined."""
+
+    inode: int
+    written_ns: int
+    info: LogInfo | None
+    """None for what is no log, or not examined yet."""
+
+
+class LogLibrary:
+    """The logs in ``folder``, by an index in memory.
+
+    ``own_log`` returns the name of the log that this process is writing, or None. The folder is examined at most once
+    in ``LOOK_S``: new files, those written in the last ``LATELY_S``, and the own log. All files are examined once in
+    ``LATELY_S``, and at once when the own log begins or ends.
+    """
+
+    def __init__(self, folder: Path, own_log: Callable[[], str | None] = lambda: None) -> None:
+        self._folder = folder
+        self._own_log = own_log
+        self._own: str | None = None
+        self._known: dict[str, _Known] = {}
+        self._logs: tuple[LogInfo, ...] = ()
+        self._folder_written_ns = -1
+        self._looked_s = self._looked_at_all_s = -math.inf
+
+    def logs(self) -> tuple[LogInfo, ...]:
+        """Return all logs, the oldest first; none if the folder cannot be read. The same object until they change."""
+        now_s, own = time.time(), self._own_log()
+        if own != self._own:
+            self._own, self._looked_at_all_s = own, -math.inf
+        if self._looked_at_all_s == -math.inf or not 0.0 <= now_s - self._looked_s < LOOK_S:
+            self._look(now_s)
+        return self._logs
+
+    def _look(self, now_s: float) -> None:
+        """Bring the index up to date."""
+        self._looked_s = now_s
+        at_all = not 0.0 <= now_s - self._looked_at_all_s < LATELY_S
+        if at_all:
+            self._looked_at_all_s = now_s
+        lately_ns = int((now_s - LATELY_S) * 1e9)
+        try:
+            written_ns = self._folder.stat().st_mtime_ns
+            listed = self._known if written_ns == self._folder_written_ns else self._listed()
+            is_settled = written_ns < int((now_s - LOOK_S) * 1e9)  # a change in this instant has its own time
+            self._folder_written_ns = written_ns if is_settled else -1
+        except OSError:
+            listed, self._folder_written_ns = {}, -1
+        changed = {
+            name: fresh
+            for name, known in listed.items()
+            if (at_all or known.info is None or known.written_ns > lately_ns or name == self._own)
+            and (fresh := self._examined(name, known.inode)) != known
+        }
+        if changed or listed.keys() != self._known.keys():
+            self._known = {**listed, **changed}
+            logs = sorted((k.written_ns, k.info.name, k.info) for k in self._known.values() if k.info)
+            self._logs = tuple(info for _, _, info in logs[-MAX_LOGS:])
+
+    def _listed(self) -> dict[str, _Known]:
+        """Return the files that are there, as far as they are known; raise OSError."""
+        listed = {}
+        with os.scandir(self._folder) as entries:
+            for entry in entries:
+                known, inode = self._known.get(entry.name), entry.inode()
+                if known is not None and known.inode == inode:
+                    listed[entry.name] = known
+                elif is_log_name(entry.name):
+                    listed[entry.name] = _Known(inode, 0, None)
+        return listed
+
+    def _examined(self, name: str, inode: int) -> _Known:
+        """Return what a file is: a log if it is a regular file."""
+        try:
+            status = os.stat(self._folder / name, follow_symlinks=False)
+        except OSError:  # it just vanished
+            return _Known(inode, 0, None)
+        info = LogInfo(name, status.st_size, max(0, int(status.st_mtime)) & 0xFFFF_FFFF)
+        return _Known(inode, status.st_mtime_ns, info if stat.S_ISREG(status.st_mode) else None)
+
+    def open(self, name: str) -> LogFileReader | None:
+        """Open a log; None if there is none of this name. Raise OSError when it cannot be read."""
+        if not is_log_name(name):
+            return None
+        try:
+            descriptor = os.open(self._folder / name, _OPEN_FLAGS)
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except OSError as error:
+            if error.errno == errno.ELOOP:  # a symbolic link
+                return None
+            raise
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            os.close(descriptor)
+            return None
+        return LogFileReader(descriptor, status.st_size)
+
+    def erase(self) -> int:
+        """Erase all logs but those being written; return how many. Raise OSError at the first that stays."""
+        count = 0
+        self._look(time.time())
+        for log in self._logs:
+            reader = self.open(log.name)
+            if reader is not None and reader.claim():
+                (self._folder / log.name).unlink(missing_ok=True)
+                count += 1
+            if reader is not None:
+                reader.close()
+        self._look(time.time())
+        return count
+
+
+def is_log_name(name: str) -> bool:
+    """Tell whether ``name`` may be a log: one plain part of a path that can be shown and sent."""
+    return (
+        name.endswith(SUFFIX)
+        and not name.startswith(".")
+        and "/" not in name
+        and "\\" not in name
+        and name.isprintable()
+        and len(name.encode(errors="replace")) <= 200
+    )

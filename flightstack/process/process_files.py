@@ -1,0 +1,157 @@
+"""The files of one process: the logs, the parameters and the signing key that its stacks use."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flightstack.firmware.targets import finish_loops
+from flightstack.flight_log.flight_log import FlightLog
+from flightstack.flight_log.log_tail import FileTail
+from flightstack.mavlink.signing import Signing
+from flightstack.params.config import StackConfig
+from flightstack.params.identity import SYSTEM_ID
+from flightstack.params.param_file import save
+from flightstack.process.assembly import Stack, build
+from flightstack.process.console import say
+from flightstack.process.file_saver import FileSaver
+from flightstack.process.log_files import LogFiles
+from flightstack.process.log_library import LogLibrary
+from flightstack.process.plan_file import PLANS_NAME, PlanFile
+from flightstack.process.process_config import ProcessConfig, complain
+from flightstack.process.signing_file import create_key, open_signing, replace_key
+from flightstack.services.logs.log_store import NO_LOGS
+from flightstack.vehicle.snapshot import CRITICAL
+
+
+class ProcessFiles:
+    """Joins a stack to its files; a reboot joins the next one."""
+
+    def __init__(self, process: ProcessConfig) -> None:
+        self._process = process
+        self._logs = LogFiles(process.log, process.overwrite_log)
+        self._stack: Stack | None = None
+        self._params: FileSaver | None = None
+        self._plans = None if process.state is None else PlanFile(process.state / PLANS_NAME)
+        self._signing: Signing | None = None
+
+    def build(self, config: StackConfig) -> Stack:
+        """Build a stack, which ``adopt`` puts in place of the present one; raise ConfigError, TargetError."""
+        if self._params is not None:
+            self._params.flush()  # the new stack reads the file
+        log = self._process.log
+        stack = build(
+            config, self._open_log, NO_LOGS if log is None else LogLibrary(log.parent, self._own_log)
+        )
+        stack.ground.vehicle.open_log_tail = self._open_tail
+        self._use_signing(stack)
+        return stack
+
+    def adopt(self, stack: Stack, config: StackConfig) -> None:
+        """Join ``stack``, built for ``config``, to the files."""
+        self.close_parameters()
+        is_first, self._stack = self._stack is None, stack
+        if config.params_file is not None:
+            self._params = _param_saver(stack, Path(config.params_file))
+        stack.ground.vehicle.logs.logs()  # every log is examined now, and not in flight
+        if self._plans is not None and is_first:
+            self._tell(self._plans.restore(stack))
+
+    def unsaved_parameters(self) -> str | None:
+        """Return the sentence why the newest parameters are not in their file, or None if they are."""
+        return None if self._params is None else self._params.problem()
+
+    def attend(self) -> None:
+        """Save plans that have changed; tell ground stations and user once of a file that cannot be written."""
+        assert self._stack is not None
+        if self._plans is not None:
+            self._plans.watch(self._stack)
+            self._tell(self._plans.take_error())
+        if self._params is not None:
+            self._tell(self._params.take_error())
+        error = self._stack.recorder.take_error()
+        if error is not None:
+            reason = error.strerror or str(error)
+            self._tell(f"the log {self._logs.current} ends early: {reason}", f"Logging stopped: {reason}")
+
+    def _tell(self, sentence: str | None, text: str | None = None) -> None:
+        """Say a sentence, to ground stations perhaps as a shorter ``text``."""
+        if sentence is None:
+            return
+        assert self._stack is not None
+        self._stack.autopilot.say(CRITICAL, text or sentence[0].upper() + sentence[1:])
+        complain(sentence)
+
+    def close_parameters(self) -> None:
+        """Save what has changed; a second call does nothing."""
+        if self._params is not None:
+            self._params.close()
+
+    def close_plans(self) -> None:
+        """Save what has changed; a second call does nothing."""
+        if self._plans is not None:
+            self._plans.close()
+
+    def close_loops(self) -> None:
+        """End the loops; those of a target leave the record of their link beside the log."""
+        if self._stack is None:
+            return
+        try:
+            finish_loops(self._stack.loops, self._process.log)
+        except OSError as error:
+            complain(f"warning: the record of the target's link cannot be written: {error}")
+
+    def close_signing(self) -> None:
+        """Keep the time of the newest signature, and end; nothing is signed after it."""
+        if self._signing is not None:
+            self._signing.close()
+
+    # ------------------------------------------------------------------ logs
+
+    def _open_log(self) -> FlightLog | None:
+        assert self._stack is not None
+        try:
+            return self._logs.open(len(self._stack.vehicle.rotors))
+        except OSError as error:
+            path = self._logs.current
+            self._tell(f"no log can be written to {path}: {error.strerror}")
+            return None
+
+    def _own_log(self) -> str | None:
+        """Return the name of the log that is being written, or None."""
+        assert self._stack is not None
+        path = self._logs.current
+        return path.name if path is not None and self._stack.recorder.is_logging else None
+
+    def _open_tail(self) -> FileTail | None:
+        stack = self._stack
+        assert stack is not None
+        return self._logs.tail(lambda: stack.recorder.is_logging)
+
+    # ------------------------------------------------------------------ signing
+
+    def _use_signing(self, stack: Stack) -> None:
+        """Sign the ground links if there is to be a key; raise ConfigError.
+
+        All stacks of the process share one ``Signing``: a frame heard before a reboot is a replay after it.
+        """
+        path = self._process.signing_key
+        if path is None:
+            return
+        if self._signing is None:
+            if not path.exists():
+                create_key(path)
+                say(f"flightstack: a new signing key is in {path}")
+            role = f"vehicle-{self._process.ports.instance}"
+            self._signing = open_signing(path, role, self._process.allow_unsigned)
+        stack.ground.use_signing(self._signing, lambda key: replace_key(path, key))
+
+
+def _param_saver(stack: Stack, path: Path) -> FileSaver:
+    """Save the parameters of a stack to ``path`` at every change."""
+    system_id = int(stack.params.value(SYSTEM_ID))
+    saver = FileSaver(
+        lambda: save(stack.params, stack.loaded_params, path, system_id),
+        f"the parameters are not saved to {path}",
+    )
+    stack.params.subscribe(lambda *_: saver.change())
+    return saver

@@ -1,0 +1,79 @@
+"""What a command of MAVLink may touch, and how it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol, TypeAlias
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.params.store import ParamStore
+from flightstack.services.commands.command_server import Command
+from flightstack.services.logs.log_store import NO_LOGS, LogStore
+from flightstack.services.logs.log_stream import LogTail
+from flightstack.vehicle.autopilot import Autopilot
+
+ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
+REJECTED = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+DENIED = int(mavlink.MAV_RESULT_DENIED)
+UNSUPPORTED = int(mavlink.MAV_RESULT_UNSUPPORTED)
+FAILED = int(mavlink.MAV_RESULT_FAILED)
+UNSUPPORTED_FRAME = 9
+"""MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, which pymavlink's dialect lacks."""
+RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+ABSOLUTE_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, None)
+"""Of altitudes above home and above the sea; a COMMAND_LONG has no frame."""
+
+
+class Answer(NamedTuple):
+    """Result of a command, and why it was refused."""
+
+    result: int
+    reason: str = ""
+
+
+def answer_to(refusal: str | None) -> Answer:
+    """Return the answer of an event that may be refused for the moment."""
+    return Answer(ACCEPTED) if refusal is None else Answer(REJECTED, refusal)
+
+
+def frame_answer(command: Command) -> Answer | None:
+    """Return the answer to a command whose place is in a frame that is not known here, or None."""
+    if command.frame in RELATIVE_FRAMES or command.frame in ABSOLUTE_FRAMES:
+        return None
+    return Answer(UNSUPPORTED_FRAME, f"frame {command.frame} is not supported")
+
+
+class FailureLink(Protocol):
+    """A simulator that can be asked for failures."""
+
+    @property
+    def has_state(self) -> bool:
+        """Whether it ever sent a state."""
+
+    def ask_for_failure(self, unit: int, failure: int, instance: int) -> None:
+        """Ask for a failure, with the parameters of MAV_CMD_INJECT_FAILURE."""
+
+    def take_failure_result(self) -> int | None:
+        """Return the MAV_RESULT of what was asked for, once; None while there is none."""
+
+
+@dataclass
+class VehicleContext:
+    """The vehicle as its commands see it."""
+
+    autopilot: Autopilot
+    params: ParamStore
+    simulator: FailureLink
+    is_generic: bool = False
+    """Whether the vehicle calls itself a generic autopilot (FS_AUTOPILOT), as it was when it started."""
+    shutdown_requested: bool = False
+    reboot_requested: bool = False
+    prepare_reboot: Callable[[], str | None] = field(default=lambda: None)
+    """Makes ready what a reboot begins with; returns why there can be none, or None."""
+    logs: LogStore = NO_LOGS
+    open_log_tail: Callable[[], LogTail | None] = field(default=lambda: None)
+    """Opens the log that is being written, to stream it; None while there is none."""
+
+
+Handler: TypeAlias = Callable[[VehicleContext, Command], Answer]

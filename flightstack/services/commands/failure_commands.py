@@ -1,0 +1,71 @@
+"""MAV_CMD_INJECT_FAILURE: the vehicle passes it to the simulator, whose answer is the command's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+from flightstack.services.commands.command_server import Command
+from flightstack.services.commands.context import (
+    ACCEPTED,
+    DENIED,
+    FAILED,
+    REJECTED,
+    UNSUPPORTED,
+    Answer,
+    FailureLink,
+)
+
+LONGEST_WAIT_S = 1.5
+"""Silence of the simulator after which the command has failed: MAVSDK asks for 2 s. One answers within a step."""
+_HIGHEST = 255.0
+_REASONS = {
+    DENIED: "the simulator has no such motor or battery",
+    UNSUPPORTED: "the simulator cannot do this failure",
+}
+
+
+class FailureCommands:
+    """Passes on one failure at a time."""
+
+    def __init__(self, simulator: FailureLink, are_allowed: Callable[[], bool]) -> None:
+        """``are_allowed`` tells whether SYS_FAILURE_EN is on."""
+        self._simulator = simulator
+        self._are_allowed = are_allowed
+        self._waiting: tuple[Command, float] | None = None
+
+    def begin(self, command: Command, now_s: float) -> Answer | None:
+        """Ask the simulator for the failure; return the answer if it is known already."""
+        numbers = command.params[:3]
+        if not self._are_allowed():
+            return Answer(DENIED, "failures are not allowed: SYS_FAILURE_EN is 0")
+        if not self._simulator.has_state:
+            return Answer(REJECTED, "no simulator is connected")
+        if not all(0.0 <= number <= _HIGHEST and number == math.floor(number) for number in numbers):
+            return Answer(DENIED, "unit, type and instance of a failure are whole numbers, 0 to 255")
+        if self._waiting is not None:
+            return Answer(REJECTED, "another failure waits for the simulator's answer")
+        self._waiting = (command, now_s)
+        self._simulator.ask_for_failure(*(int(number) for number in numbers))
+        return None
+
+    def poll(self, now_s: float) -> Iterator[tuple[Command, Answer]]:
+        """Yield the command that can be answered now."""
+        if self._waiting is None:
+            return
+        command, asked_s = self._waiting
+        result = self._simulator.take_failure_result()
+        if result is not None:
+            answer = Answer(
+                result, "" if result == ACCEPTED else _REASONS.get(result, "the simulator refused")
+            )
+        elif now_s - asked_s > LONGEST_WAIT_S:
+            answer = Answer(FAILED, "the simulator does not answer")
+        else:
+            return
+        self._waiting = None
+        yield command, answer
+
+    def next_deadline(self) -> float | None:
+        """Return when the simulator has been silent for too long, or None."""
+        return None if self._waiting is None else self._waiting[1] + LONGEST_WAIT_S

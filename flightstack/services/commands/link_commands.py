@@ -1,0 +1,122 @@
+"""Requests that concern one link only: which messages it gets, and how often."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable
+
+from flightstack.mavlink.addressing import Address, is_for
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.services.commands.command_server import Command
+from flightstack.services.commands.context import ACCEPTED, DENIED, REJECTED, UNSUPPORTED, Answer
+from flightstack.services.files.component_metadata import ComponentMetadata
+from flightstack.services.logs.log_stream import LogStream
+from flightstack.services.routing.peer import Peer
+from flightstack.services.telemetry import is_available, messages
+from flightstack.services.telemetry.fields import boot_ms
+from flightstack.services.vehicle_facts import AutopilotFacts
+
+LINK_COMMANDS = frozenset(
+    {
+        mavlink.MAV_CMD_REQUEST_MESSAGE,
+        mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+        mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
+        mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
+        mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION,
+        mavlink.MAV_CMD_GET_HOME_POSITION,
+        mavlink.MAV_CMD_LOGGING_START,
+        mavlink.MAV_CMD_LOGGING_STOP,
+    }
+)
+FORERUNNERS: dict[int, int] = {
+    mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION,
+    mavlink.MAV_CMD_GET_HOME_POSITION: mavlink.MAVLINK_MSG_ID_HOME_POSITION,
+}
+"""Commands from before REQUEST_MESSAGE, and what they ask for."""
+ULOG = 0.0
+"""Format of LOGGING_START."""
+HIGHEST_MESSAGE_ID = 0xFFFFFF
+
+
+def _message_id(value: float) -> int:
+    """Return a message id, or -1 for what is none."""
+    return int(value) if math.isfinite(value) and 0.0 <= value <= HIGHEST_MESSAGE_ID else -1
+
+
+class LinkCommands:
+    """Answers the commands of a link, and REQUEST_DATA_STREAM, their forerunner."""
+
+    handles = frozenset({"REQUEST_DATA_STREAM"})
+
+    def __init__(
+        self,
+        own: Address,
+        facts: AutopilotFacts,
+        peer_at: Callable[[Hashable], Peer],
+        log_stream: LogStream,
+        metadata: ComponentMetadata,
+    ) -> None:
+        self._own = own
+        self._log_stream = log_stream
+        self._metadata = metadata
+        self._facts = facts
+        self._peer_at = peer_at
+
+    def answer(self, peer: Peer, command: Command) -> Answer:
+        """Carry out one of ``LINK_COMMANDS`` for ``peer``."""
+        number, argument = _message_id(command.params[0]), command.params[1]
+        if command.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
+            done = peer.streams.set_interval(number, argument)
+            return Answer(ACCEPTED) if done else Answer(DENIED, "no such message or interval")
+        if command.command == mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
+            return self._send_interval(peer, number)
+        if command.command in (mavlink.MAV_CMD_LOGGING_START, mavlink.MAV_CMD_LOGGING_STOP):
+            return self._stream_log(command)
+        if command.command in FORERUNNERS:
+            return self._send_message(peer, FORERUNNERS[command.command], 0.0)
+        return self._send_message(peer, number, argument)
+
+    def _send_message(self, peer: Peer, number: int, argument: float) -> Answer:
+        if number == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+            return self._send_interval(peer, _message_id(argument))
+        if number == mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA:
+            peer.outbox.append(self._metadata.message(boot_ms(self._facts)))
+            return Answer(ACCEPTED)
+        if number == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
+            peer.streams.add_standard_modes()
+        if not is_available(number):
+            return Answer(DENIED)  # without a text: ground stations ask each vehicle for gimbals and cameras
+        peer.outbox.extend(messages(number, self._facts, argument))
+        return Answer(ACCEPTED)
+
+    def _stream_log(self, command: Command) -> Answer:
+        """LOGGING_START streams the present or the next flight's log (format 0, ULog); LOGGING_STOP ends it."""
+        if command.command == mavlink.MAV_CMD_LOGGING_STOP:
+            self._log_stream.stop()
+            return Answer(ACCEPTED)
+        if command.params[0] != ULOG:
+            return Answer(UNSUPPORTED)
+        refusal = self._log_stream.start(command.peer, command.source)
+        return Answer(ACCEPTED) if refusal is None else Answer(REJECTED, refusal)
+
+    def _send_interval(self, peer: Peer, about: int) -> Answer:
+        if not 0 <= about <= 0xFFFF:
+            return Answer(DENIED, "that message has no place in MESSAGE_INTERVAL")
+        peer.outbox.append(mavlink.MAVLink_message_interval_message(about, peer.streams.interval_us(about)))
+        return Answer(ACCEPTED)
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take REQUEST_DATA_STREAM: set the rate of a group of messages, or stop it."""
+        if is_for(message, self._own):
+            rate_hz = float(message.req_message_rate) if message.start_stop else 0.0
+            self._peer_at(peer).streams.set_group(message.req_stream_id, rate_hz)
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return nothing: answers go into the peer's own outbox."""
+        return []
+
+    def next_deadline(self) -> float | None:
+        """Return None."""
+        return None

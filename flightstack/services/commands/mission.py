@@ -1,0 +1,50 @@
+"""Commands that start a mission and choose its current item."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.services.commands.command_server import Command
+from flightstack.services.commands.context import ACCEPTED, DENIED, Answer, Handler, VehicleContext, answer_to
+
+
+def start_mission(vehicle: VehicleContext, command: Command) -> Answer:
+    """MISSION_START: selects the mode and arms, as PX4 does; parameter 1 is the first item.
+
+    Nothing changes unless all of it can be done.
+    """
+    autopilot = vehicle.autopilot
+    first = command.params[0]
+    begins_there = math.isfinite(first) and first > 0.0
+    refusal = autopilot.item_refusal(int(first)) if begins_there else None
+    if refusal is not None:
+        return Answer(DENIED, refusal)
+    return answer_to(autopilot.start_mission(int(first) if begins_there else None))
+
+
+def set_current(vehicle: VehicleContext, command: Command) -> Answer:
+    """DO_SET_MISSION_CURRENT: parameter 1 is the item (-1: leave it), parameter 2 restarts the mission.
+
+    A command that is denied changes nothing.
+    """
+    autopilot = vehicle.autopilot
+    seq, reset = command.params[0], command.params[1]
+    names_item = not math.isnan(seq) and seq != -1.0
+    if names_item:
+        if not math.isfinite(seq) or seq != int(seq):
+            return Answer(DENIED, "the item is not a whole number")
+        refusal = autopilot.item_refusal(int(seq))
+        if refusal is not None:
+            return Answer(DENIED, refusal)
+    if reset == 1.0:
+        autopilot.restart_mission()
+    if names_item:
+        autopilot.set_current_item(int(seq))
+    return Answer(ACCEPTED)
+
+
+HANDLERS: dict[int, Handler] = {
+    mavlink.MAV_CMD_MISSION_START: start_mission,
+    mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: set_current,
+}

@@ -1,0 +1,44 @@
+"""Commands that select a mode by its number."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack.commander.transitions import Event
+from flightstack.core.modes import MODE_OF_CUSTOM, Mode
+from flightstack.mavlink.dialect import mavlink
+from flightstack.services.commands.command_server import Command
+from flightstack.services.commands.context import DENIED, Answer, Handler, VehicleContext, answer_to
+from flightstack.vehicle.autopilot import Autopilot
+
+SELECT: dict[Mode, Event] = {
+    Mode.HOLD: Event.SELECT_HOLD,
+    Mode.TAKEOFF: Event.SELECT_TAKEOFF,
+    Mode.MISSION: Event.SELECT_MISSION,
+    Mode.RETURN: Event.SELECT_RETURN,
+    Mode.LAND: Event.SELECT_LAND,
+    Mode.POSITION: Event.SELECT_POSITION,
+    Mode.ALTITUDE: Event.SELECT_ALTITUDE,
+    Mode.OFFBOARD: Event.SELECT_OFFBOARD,
+}
+
+
+def set_mode(vehicle: VehicleContext, command: Command) -> Answer:
+    """DO_SET_MODE: base mode with the custom bit, then PX4's main and sub mode."""
+    base, main, sub = command.params[0], command.params[1], command.params[2]
+    if not all(math.isfinite(value) and 0.0 <= value < 256.0 for value in (base, main, sub)):
+        return Answer(DENIED, "mode numbers must be 0 to 255")
+    if not int(base) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        return Answer(DENIED, "only custom modes can be selected")
+    return select_custom_mode(vehicle.autopilot, int(main) << 16 | int(sub) << 24)
+
+
+def select_custom_mode(autopilot: Autopilot, custom_mode: int) -> Answer:
+    """Select a mode by PX4's custom mode number."""
+    mode = MODE_OF_CUSTOM.get(custom_mode)
+    if mode is None or mode not in SELECT:
+        return Answer(DENIED, "this vehicle has no such mode")
+    return answer_to(autopilot.happen(SELECT[mode]))
+
+
+HANDLERS: dict[int, Handler] = {mavlink.MAV_CMD_DO_SET_MODE: set_mode}

@@ -1,0 +1,86 @@
+"""Commands to the vehicle as a system: home, termination, its end."""
+
+from __future__ import annotations
+
+from flightstack.commander.transitions import Need
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint
+from flightstack.mavlink.dialect import mavlink
+from flightstack.services.commands.command_server import Command
+from flightstack.services.commands.context import (
+    ACCEPTED,
+    DENIED,
+    FAILED,
+    RELATIVE_FRAMES,
+    UNSUPPORTED,
+    Answer,
+    Handler,
+    VehicleContext,
+    answer_to,
+    frame_answer,
+)
+from flightstack.vehicle.snapshot import NOTICE
+
+DO_NOTHING, REBOOT, SHUT_DOWN = 0.0, 1.0, 2.0
+
+
+def reboot_or_shut_down(vehicle: VehicleContext, command: Command) -> Answer:
+    """PREFLIGHT_REBOOT_SHUTDOWN: parameter 1 is 1 to reboot, 2 to shut down; neither while flying."""
+    wanted = command.params[0]
+    if wanted == DO_NOTHING:
+        return Answer(ACCEPTED)
+    if wanted not in (REBOOT, SHUT_DOWN):
+        return Answer(UNSUPPORTED)
+    now = vehicle.autopilot.now
+    if now.status.armed and not now.landed:
+        return Answer(DENIED, "the vehicle is in the air")
+    if wanted == REBOOT and not vehicle.reboot_requested:
+        problem = vehicle.prepare_reboot()
+        if problem is not None:
+            return Answer(FAILED, problem)
+    vehicle.shutdown_requested = wanted == SHUT_DOWN
+    vehicle.reboot_requested = wanted == REBOOT
+    return Answer(ACCEPTED)
+
+
+def terminate_flight(vehicle: VehicleContext, command: Command) -> Answer:
+    """DO_FLIGHTTERMINATION: parameter 1 above 0.5 stops the rotors for good, in the air too (PX4's threshold)."""
+    autopilot = vehicle.autopilot
+    if not command.params[0] > 0.5:  # NaN too
+        return Answer(DENIED, "parameter 1 must be 1; a termination cannot be taken back")
+    if not autopilot.now.status.armed:
+        return answer_to(Need.ARMED.value)
+    autopilot.terminate("commanded")
+    return Answer(ACCEPTED)
+
+
+def set_home(vehicle: VehicleContext, command: Command) -> Answer:
+    """DO_SET_HOME: parameter 1 is 1 for the present place, else latitude, longitude and altitude above the sea.
+
+    A named place stays home for all flights to come; the present one follows the vehicle to where it arms next (PX4).
+    """
+    autopilot = vehicle.autopilot
+    if command.params[0] == 1.0:
+        if not autopilot.facts.state_is_valid:
+            return answer_to(Need.STATE.value)
+        position = Vector3(*autopilot.now.state[:3].tolist())
+        refusal = autopilot.set_home(autopilot.places.frame.to_geo(position), chosen=False)
+    else:
+        unsupported = frame_answer(command)
+        if unsupported is not None:
+            return unsupported
+        latitude, longitude, altitude = command.params[4:7]
+        if command.frame in RELATIVE_FRAMES:
+            altitude += autopilot.home.altitude_m
+        refusal = autopilot.set_home(GeoPoint(latitude, longitude, altitude))
+    if refusal is not None:
+        return Answer(DENIED, refusal)
+    autopilot.say(NOTICE, "Home set")
+    return Answer(ACCEPTED)
+
+
+HANDLERS: dict[int, Handler] = {
+    mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: reboot_or_shut_down,
+    mavlink.MAV_CMD_DO_FLIGHTTERMINATION: terminate_flight,
+    mavlink.MAV_CMD_DO_SET_HOME: set_home,
+}

@@ -1,0 +1,1 @@
+"""The log download service."""

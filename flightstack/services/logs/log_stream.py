@@ -1,0 +1,192 @@
+"""Stream the flight's log over MAVLink while it is written: LOGGING_START, LOGGING_DATA, LOGGING_STOP. No I/O.
+
+As PX4 does: what a reader cannot do without (header, formats, subscriptions) goes in LOGGING_DATA_ACKED, one
+message at a time until it is acknowledged; data follows in LOGGING_DATA, unacknowledged. Sequence numbers show
+what was lost, and ``first_message_offset`` where a reader may go on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from typing import Protocol
+
+from flightstack.mavlink.addressing import Address, is_for, sender
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.services.pace import Pace, always_has_room
+
+CHUNK = 249
+NO_MESSAGE_BEGINS = 255
+RESEND_S = 0.25
+GIVE_UP_S = 5.0
+_FILE_HEADER_SIZE = 16
+_MESSAGE_HEADER_SIZE = 3
+_DEFINITIONS = frozenset(b"BFIMPQA")
+"""Types of the messages that describe the log; the first of another type begins its data."""
+
+
+class LogTail(Protocol):
+    """A log that is being written, read from its beginning."""
+
+    def read(self, count: int) -> bytes:
+        """Return the next bytes, at most ``count``; none if nothing new is there."""
+        ...
+
+    @property
+    def ended(self) -> bool:
+        """Whether the log is complete, so that nothing will be added."""
+        ...
+
+    def close(self) -> None:
+        """Stop reading."""
+        ...
+
+
+class _Boundaries:
+    """Follows the messages of a ULog file through chunks of any size."""
+
+    def __init__(self) -> None:
+        self._to_next = _FILE_HEADER_SIZE  # octets until the next message begins
+        self._header = b""
+        self.in_data = False
+        """Whether a message that is no definition has begun."""
+
+    def scan(self, chunk: bytes) -> int:
+        """Take the next chunk; return where in it the first message begins, or 255."""
+        at, first = 0, NO_MESSAGE_BEGINS
+        while at < len(chunk):
+            if self._to_next:
+                step = min(self._to_next, len(chunk) - at)
+                self._to_next -= step
+                at += step
+                continue
+            if not self._header and first == NO_MESSAGE_BEGINS:
+                first = at
+            missing = _MESSAGE_HEADER_SIZE - len(self._header)
+            self._header += chunk[at : at + missing]
+            at += missing
+            if len(self._header) == _MESSAGE_HEADER_SIZE:
+                self.in_data = self.in_data or self._header[2] not in _DEFINITIONS
+                self._to_next = int.from_bytes(self._header[:2], "little")
+                self._header = b""
+        return first
+
+
+class _Stream:
+    """One client's stream."""
+
+    def __init__(self, peer: Hashable, client: Address) -> None:
+        self.peer = peer
+        self.client = client
+        self.tail: LogTail | None = None
+        self.boundaries = _Boundaries()
+        self.sequence = 0
+        self.waiting: Message | None = None
+        self.since_s = self.sent_s = 0.0
+
+
+class LogStream:
+    """Streams the log of the present or the next flight to one client at a time."""
+
+    handles = frozenset({"LOGGING_ACK"})
+
+    def __init__(
+        self,
+        own: Address,
+        open_tail: Callable[[], LogTail | None],
+        has_room: Callable[[Hashable], bool] = always_has_room,
+    ) -> None:
+        """``open_tail`` returns the log that is being written, or None while there is none.
+
+        The stream waits while ``has_room`` is false for its peer.
+        """
+        self._own = own
+        self._open_tail = open_tail
+        self._has_room = has_room
+        self._stream: _Stream | None = None
+        self._pace = Pace()
+
+    def start(self, peer: Hashable, client: Address) -> str | None:
+        """Begin to stream to ``client``; return why not, or None. A client that begins again starts afresh."""
+        stream = self._stream
+        if stream is not None and (stream.peer, stream.client) != (peer, client):
+            return "the log is being streamed to another client"
+        self._end()
+        self._stream = _Stream(peer, client)
+        return None
+
+    def stop(self) -> None:
+        """End the stream; without one, do nothing."""
+        self._end()
+
+    def _end(self) -> None:
+        if self._stream is not None and self._stream.tail is not None:
+            self._stream.tail.close()
+        self._stream = None
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take LOGGING_ACK."""
+        stream = self._stream
+        if stream is None or stream.waiting is None or not is_for(message, self._own):
+            return
+        same_client = (peer, sender(message)) == (stream.peer, stream.client)
+        if same_client and message.sequence == stream.waiting.sequence:
+            stream.waiting = None
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return the pieces of the log that are due."""
+        stream = self._stream
+        if stream is None:
+            return []
+        if stream.tail is None:
+            stream.tail = self._open_tail()
+            if stream.tail is None:
+                return []
+        if stream.waiting is not None:
+            return self._resend(stream, now_s)
+        pieces: list[tuple[Hashable | None, Message]] = []
+        if not self._has_room(stream.peer):
+            return pieces
+        for _ in range(self._pace.allowance(now_s)):
+            message = self._next(stream, now_s)
+            if message is None:
+                break
+            self._pace.take(1)
+            pieces.append((stream.peer, message))
+            if stream.waiting is not None:
+                break
+        if not pieces and stream.tail.ended:
+            self._end()
+        return pieces
+
+    def _resend(self, stream: _Stream, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        if now_s - stream.since_s > GIVE_UP_S:
+            self._end()
+        elif now_s - stream.sent_s >= RESEND_S:
+            stream.sent_s = now_s
+            return [(stream.peer, stream.waiting)]
+        return []
+
+    def _next(self, stream: _Stream, now_s: float) -> Message | None:
+        assert stream.tail is not None
+        chunk = stream.tail.read(CHUNK)
+        if not chunk:
+            return None
+        needs_ack = not stream.boundaries.in_data
+        first = stream.boundaries.scan(chunk)
+        make = (
+            mavlink.MAVLink_logging_data_acked_message if needs_ack else mavlink.MAVLink_logging_data_message
+        )
+        content = list(chunk) + [0] * (CHUNK - len(chunk))
+        message = make(*stream.client, stream.sequence, len(chunk), first, content)
+        stream.sequence = (stream.sequence + 1) % 0x10000
+        if needs_ack:
+            stream.waiting, stream.since_s, stream.sent_s = message, now_s, now_s
+        return message
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next: at once while a stream is open, since its log may have grown."""
+        stream = self._stream
+        if stream is None:
+            return None
+        return stream.sent_s + RESEND_S if stream.waiting is not None else self._pace.ready_s()

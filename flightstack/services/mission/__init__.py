@@ -1,0 +1,1 @@
+"""The mission service: missions, geofences and rally points uploaded, kept and downloaded."""

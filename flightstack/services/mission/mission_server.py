@@ -1,0 +1,238 @@
+"""The vehicle's side of the mission protocol, without I/O: mission, geofence and rally points.
+
+A stored plan is replaced only by a whole one that passed its check. Of each type there is one upload at a time, so
+that plans of different types, or of different clients, never mix; downloads go to any number of clients at once.
+Everything is answered to the peer it came from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Iterable, Mapping
+
+from flightstack.mavlink.addressing import Address, is_for, sender
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.mission_messages import DEFAULT_TIMING, GOES_THERE, PROTOCOL, Timing, ack_message
+from flightstack.plan.rejection import Rejection
+from flightstack.plan.vocabulary import PLAN_NAMES, MissionResult, MissionType
+from flightstack.services.mission.mission_downloads import Downloads
+from flightstack.services.mission.mission_store import (
+    Check,
+    CurrentRequested,
+    Items,
+    MissionEvent,
+    MissionRefused,
+    PlanStore,
+)
+from flightstack.services.mission.mission_upload import Client, Upload
+
+_MAX_ENDED = 32  # a bound on memory: uploads whose acknowledgement can be repeated
+
+
+class MissionServer:
+    """Keeps one plan of each type in ``checks``, and lets clients upload, download and clear it."""
+
+    def __init__(
+        self, own: Address, checks: Mapping[MissionType, Check], timing: Timing = DEFAULT_TIMING
+    ) -> None:
+        self.own = own
+        self.current_seq = 0
+        """The item being flown, for the ``current`` flag of a download; the owner keeps it."""
+        self._timing = timing
+        self._store = PlanStore(checks)
+        self._uploads: dict[int, Upload] = {}
+        self._ended: dict[tuple[int, Client], tuple[int, Message]] = {}
+        self._downloads = Downloads()
+        self._outbox: list[tuple[Hashable, Message]] = []
+        self._events: list[MissionEvent] = []
+
+    def items(self, mission_type: MissionType = MissionType.MISSION) -> Items:
+        """Return the plan in force."""
+        return self._store.items(mission_type)
+
+    def plan_id(self, mission_type: MissionType = MissionType.MISSION) -> int:
+        """Return MAVLink's opaque id of the plan in force, for MISSION_CURRENT; 0 for none."""
+        return self._store.plan_id(mission_type)
+
+    def restore(self, mission_type: MissionType, items: Items) -> Rejection | None:
+        """Put a plan in force that was accepted before; return why it no longer is, or None."""
+        outcome = self._store.replace(mission_type, items)
+        if isinstance(outcome, Rejection):
+            self._refused(outcome.result, outcome.seq, outcome.reason, mission_type)
+            return outcome
+        self._events.append(outcome)
+        return None
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take any message from ``peer``; what is not of this protocol or not for us is ignored."""
+        kind = message.get_type()
+        if kind not in PROTOCOL or not is_for(message, self.own):
+            return
+        client = Client(peer, sender(message))
+        if kind == "MISSION_SET_CURRENT":
+            self._on_set_current(message.seq)
+        elif kind == "MISSION_ACK":
+            self._on_ack(message, client, now_s)
+        elif kind == "MISSION_CLEAR_ALL":
+            self._on_clear(message.mission_type, client)
+        elif not self._store.has(message.mission_type):
+            self._ack(client, MissionResult.UNSUPPORTED, message.mission_type)
+        elif kind == "MISSION_COUNT":
+            self._on_count(message, client, now_s)
+        elif kind == "MISSION_REQUEST_LIST":
+            self._on_list(message, client, now_s)
+        elif kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+            self._on_request(message, client, now_s)
+        elif message.current < GOES_THERE:
+            self._on_item(message, client, now_s)
+
+    def poll(self, now_s: float) -> list[tuple[Hashable, Message]]:
+        """Return the messages to send now, each with the peer it goes to."""
+        for upload in list(self._uploads.values()):
+            if now_s < upload.deadline_s:
+                continue
+            if upload.is_silent(now_s):
+                reason = f"the upload stopped at item {len(upload.items)} of {upload.count}: no answer"
+                self._refuse_upload(upload, Rejection(MissionResult.OPERATION_CANCELLED, None, reason))
+            else:
+                self._send(upload.client, upload.request(now_s))
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        if self._outbox:
+            return -math.inf
+        return min((upload.deadline_s for upload in self._uploads.values()), default=None)
+
+    def events(self) -> list[MissionEvent]:
+        """Return what happened since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    # -- upload
+
+    def _on_count(self, message: Message, client: Client, now_s: float) -> None:
+        kind, count = message.mission_type, message.count
+        if self._is_busy_for(client, [kind], kind):
+            return
+        # the same client begins again: nothing of its first try may mix in
+        self._uploads.pop(kind, None)
+        self._ended.pop((kind, client), None)
+        reason = self._store.too_long(kind, count)
+        if reason is not None:
+            self._ack(client, MissionResult.NO_SPACE, kind)
+            self._refused(MissionResult.NO_SPACE, None, reason, kind)
+        elif count == 0:
+            self._clear([kind])
+            self._ack(client, MissionResult.ACCEPTED, kind)
+        else:
+            self._uploads[kind] = Upload(client, kind, count, self._timing, now_s)
+
+    def _on_item(self, message: Message, client: Client, now_s: float) -> None:
+        kind = message.mission_type
+        upload = self._uploads.get(kind)
+        if upload is None or upload.client != client:
+            # The last item again: our MISSION_ACK got lost.
+            last_seq, ack = self._ended.get((kind, client), (None, None))
+            if ack is not None and last_seq == message.seq:
+                self._send(client, ack)
+        elif upload.accept(message, now_s) and upload.is_complete:
+            self._complete(upload)
+
+    def _complete(self, upload: Upload) -> None:
+        outcome = self._store.replace(upload.mission_type, tuple(upload.items))
+        if isinstance(outcome, Rejection):
+            self._refuse_upload(upload, outcome)
+        else:
+            self._events.append(outcome)
+            self._end(upload, MissionResult.ACCEPTED)
+
+    def _refuse_upload(self, upload: Upload, rejection: Rejection) -> None:
+        self._refused(*rejection, upload.mission_type)
+        self._end(upload, rejection.result)
+
+    def _end(self, upload: Upload, result: MissionResult) -> None:
+        kind = upload.mission_type
+        del self._uploads[kind]
+        ack = self._ack(upload.client, result, kind)
+        # as it was, should it be needed again: the plan in force, and its id, may be another client's by then
+        self._ended.pop((kind, upload.client), None)  # the order of the dictionary is that of the ends
+        self._ended[kind, upload.client] = (upload.count - 1, ack)
+        if len(self._ended) > _MAX_ENDED:
+            del self._ended[next(iter(self._ended))]
+
+    def _is_busy_for(self, client: Client, kinds: Iterable[int], asked: int) -> bool:
+        """Deny ``client`` while another one uploads; the upload goes on unharmed."""
+        for kind in kinds:
+            upload = self._uploads.get(kind)
+            if upload is not None and upload.client != client:
+                self._ack(client, MissionResult.DENIED, asked)
+                name = PLAN_NAMES[MissionType(kind)]
+                reason = f"another ground station is uploading a {name}; try again when it is done"
+                self._refused(MissionResult.DENIED, None, reason, kind)
+                return True
+        return False
+
+    def _on_ack(self, message: Message, client: Client, now_s: float) -> None:
+        """A client ends its download, or calls off its upload: any error does."""
+        kind, result = message.mission_type, message.type
+        self._downloads.end(client, kind)
+        upload = self._uploads.get(kind)
+        if upload is None or upload.client != client:
+            return
+        if result == MissionResult.UNSUPPORTED and upload.change_kind(now_s):
+            return  # it may know the other kind of request: PX4 reads this answer the same way
+        if result != MissionResult.ACCEPTED:
+            del self._uploads[kind]
+
+    # -- the rest
+
+    def _on_list(self, message: Message, client: Client, now_s: float) -> None:
+        kind = message.mission_type
+        count, plan_id = self._downloads.begin(
+            client, kind, self._store.items(kind), self._store.plan_id(kind), now_s
+        )
+        self._send(client, mavlink.MAVLink_mission_count_message(*client.address, count, kind, plan_id))
+
+    def _on_request(self, message: Message, client: Client, now_s: float) -> None:
+        kind = message.mission_type
+        answer = self._downloads.answer(message, client, self._store.items(kind), self.current_seq, now_s)
+        if answer is None:
+            self._ack(client, MissionResult.INVALID_SEQUENCE, kind)
+        else:
+            self._send(client, answer)
+
+    def _on_clear(self, kind: int, client: Client) -> None:
+        kinds = list(self._store.kinds) if kind == MissionType.ALL else [kind]
+        if not all(self._store.has(each) for each in kinds):
+            self._ack(client, MissionResult.UNSUPPORTED, kind)
+        elif not self._is_busy_for(client, kinds, kind):
+            self._clear(kinds)
+            self._ack(client, MissionResult.ACCEPTED, kind)
+
+    def _clear(self, kinds: Iterable[int]) -> None:
+        for kind in kinds:
+            self._uploads.pop(kind, None)
+            self._events.append(self._store.clear(kind))
+
+    def _on_set_current(self, seq: int) -> None:
+        count = len(self.items())
+        if seq < count:
+            self._events.append(CurrentRequested(seq))
+        else:
+            reason = f"item {seq} cannot be made current: the mission has {count} items"
+            self._refused(MissionResult.INVALID_SEQUENCE, seq, reason, MissionType.MISSION)
+
+    def _refused(self, result: MissionResult, seq: int | None, reason: str, kind: int) -> None:
+        self._events.append(MissionRefused(result, seq, reason, MissionType(kind)))
+
+    def _ack(self, client: Client, result: MissionResult, kind: int) -> Message:
+        plan_id = self._store.plan_id(kind) if result == MissionResult.ACCEPTED else 0
+        ack = ack_message(client.address, result, kind, plan_id)
+        self._send(client, ack)
+        return ack
+
+    def _send(self, client: Client, message: Message) -> None:
+        self._outbox.append((client.peer, message))

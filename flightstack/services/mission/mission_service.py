@@ -1,0 +1,113 @@
+"""Mission, fence and rally points: the mission protocol joined to the autopilot."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.mission_messages import PROTOCOL
+from flightstack.plan import PLAN_NAMES, MissionType
+from flightstack.plan.kept_plans import KeptPlans
+from flightstack.services.mission.mission_server import MissionServer
+from flightstack.services.mission.mission_store import (
+    CurrentRequested,
+    MissionCleared,
+    MissionRefused,
+    MissionReplaced,
+)
+from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.snapshot import NOTICE, WARNING
+
+
+class MissionService:
+    """Lets the autopilot follow what clients upload."""
+
+    handles = PROTOCOL
+
+    def __init__(self, own: Address, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+        self._server = MissionServer(
+            own,
+            {
+                MissionType.MISSION: autopilot.check_mission,
+                MissionType.FENCE: autopilot.check_fence,
+                MissionType.RALLY: autopilot.check_rally,
+            },
+        )
+        self._setters = {
+            MissionType.MISSION: autopilot.set_mission,
+            MissionType.FENCE: autopilot.set_fence,
+            MissionType.RALLY: autopilot.set_rally,
+        }
+
+    def plans(self) -> KeptPlans:
+        """Return the plans in force; a mission that was flown to its end begins anew."""
+        mission, fence, rally = (self._server.items(kind) for kind in self._setters)
+        places, progress = self._autopilot.places, self._autopilot.now.progress
+        goes_on = not progress.finished and progress.current < len(mission)
+        home = places.home_point if places.home_is_chosen else None
+        return KeptPlans(mission, fence, rally, progress.current if goes_on else 0, home)
+
+    def restore(self, plans: KeptPlans) -> str | None:
+        """Put plans in force that were before; return the first reason against one of them, or None.
+
+        Home and the geofence come first: the others were checked against them, and are not taken without them.
+        """
+        refusal = None if plans.home is None else self._autopilot.set_home(plans.home)
+        if refusal is not None:
+            return f"home: {refusal}"
+        reasons: list[str] = []
+        for kind in (MissionType.FENCE, MissionType.MISSION, MissionType.RALLY):
+            items = plans.items(kind)
+            rejection = self._server.restore(kind, items) if items else None
+            self._take_events()
+            if rejection is not None:
+                reasons.append(f"{PLAN_NAMES[kind]}: {rejection.reason}")
+                if kind is MissionType.FENCE:
+                    break
+            elif kind is MissionType.MISSION and plans.current:
+                self._autopilot.set_current_item(plans.current)
+        return reasons[0] if reasons else None
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take a message of the mission protocol."""
+        self._server.receive(message, peer, now_s)
+        self._take_events()
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return requests, items and acknowledgements."""
+        self._server.current_seq = self._autopilot.now.progress.current
+        outbox = list(self._server.poll(now_s))
+        self._take_events()
+        return outbox
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next."""
+        return self._server.next_deadline()
+
+    def _take_events(self) -> None:
+        autopilot = self._autopilot
+        events = self._server.events()
+        if not events:  # most of the time: nor have the plans' numbers changed
+            return
+        for event in events:
+            if isinstance(event, MissionReplaced):
+                self._setters[event.mission_type](event.items)
+                autopilot.say(NOTICE, f"{_name(event.mission_type)} loaded, items: {len(event.items)}")
+            elif isinstance(event, MissionCleared):
+                self._setters[event.mission_type](())
+            elif isinstance(event, CurrentRequested):
+                refusal = autopilot.set_current_item(event.seq)
+                if refusal is not None:
+                    autopilot.say(WARNING, f"Mission item: {refusal}")
+            elif isinstance(event, MissionRefused):
+                autopilot.say(WARNING, f"{_name(event.mission_type)} refused: {event.reason}")
+        mission, fence, rally = (self._server.plan_id(kind) for kind in self._setters)
+        autopilot.places.ids = (mission, fence, rally)
+
+
+def _name(kind: MissionType) -> str:
+    """Return "Mission", "Geofence" or "List of rally points"."""
+    name = PLAN_NAMES[kind]
+    return name[0].upper() + name[1:]

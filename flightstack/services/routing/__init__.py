@@ -1,0 +1,1 @@
+"""Peers of the vehicle, routing between them, and signing."""

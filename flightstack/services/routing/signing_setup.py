@@ -1,0 +1,89 @@
+"""SETUP_SIGNING: take a new signing key from a ground station, without I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+
+from flightstack.mavlink.addressing import Address, is_for
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.signing import NO_KEY, Signing
+
+
+class SigningSetup:
+    """Changes the key, if the vehicle is disarmed and the message came over a secure link.
+
+    ``is_secure`` tells so of a peer: whoever listens on the link learns the key. While there is a key, a new one is
+    taken from who has the old one alone, also where unsigned messages are taken else: a router on this machine
+    makes what comes from elsewhere look as if it came from here. Before ``use`` every key is refused. The message
+    has no answer: ``say`` gets a text.
+    """
+
+    handles = frozenset({"SETUP_SIGNING"})
+
+    def __init__(
+        self,
+        own: Address,
+        is_armed: Callable[[], bool],
+        is_secure: Callable[[Hashable], bool],
+        say: Callable[[str], None],
+    ) -> None:
+        self._own = own
+        self._signing: Signing | None = None
+        self._is_armed = is_armed
+        self._is_secure = is_secure
+        self._store: Callable[[bytes], None] = lambda _key: None
+        self._say = say
+
+    def use(self, signing: Signing, store: Callable[[bytes], None]) -> None:
+        """Change the key of ``signing`` from now on, which has checked what ``receive`` gets.
+
+        ``store`` keeps the key for the next start and may raise OSError; then the old one stays.
+        """
+        self._signing = signing
+        self._store = store
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take a SETUP_SIGNING that is meant for this vehicle alone: the key must never be broadcast."""
+        if (
+            message.get_type() not in self.handles
+            or not is_for(message, self._own)
+            or not message.target_system
+        ):
+            return
+        key = bytes(message.secret_key)
+        reason = self._refusal(message, peer) or self._change(key, message.initial_timestamp)
+        if reason:
+            self._say(f"Signing key refused: {reason}")
+        else:
+            self._say("Signing is off" if key == NO_KEY else "Signing is on: a new key is in use")
+
+    def _refusal(self, message: Message, peer: Hashable) -> str:
+        """Return why the message may not change the key; empty if it may."""
+        if self._signing is None:
+            return "flightstack was started without --signing-key"
+        if self._is_armed():
+            return "the vehicle is armed"
+        if not self._is_secure(peer):
+            return "the link is not local"
+        if self._signing.is_on and not message.get_header().incompat_flags & mavlink.MAVLINK_IFLAG_SIGNED:
+            return "the message is not signed with the present key"
+        return ""
+
+    def _change(self, key: bytes, initial_timestamp: int) -> str:
+        """Use the key; return why not, empty if done."""
+        assert self._signing is not None
+        try:
+            self._store(key)
+        except OSError as error:
+            return f"it cannot be kept: {error.strerror or error}"
+        self._signing.set_key(key, 0 if key == NO_KEY else initial_timestamp)
+        return ""
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return nothing: there is no answer."""
+        return []
+
+    def next_deadline(self) -> float | None:
+        """Return None: there is never anything to send."""
+        return None

@@ -1,0 +1,1 @@
+"""What clients stream to the vehicle: setpoints, manual control, time synchronisation."""

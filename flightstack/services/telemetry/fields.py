@@ -1,0 +1,51 @@
+"""Numbers of the vehicle as fields of single precision hold them, and its clock as the 32-bit fields do."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack.core.contract import FloatArray
+from flightstack.services.telemetry.facts import VehicleFacts
+
+NAN = math.nan
+_SINGLE_LIMIT = 1e18
+"""Beyond this a number counts as infinite: single-precision fields, and their products, must hold it."""
+
+
+def floats(array: FloatArray) -> list[float]:
+    """Return the values for fields of single precision, which not every double fits."""
+    return singles(array.tolist())
+
+
+def singles(values: list[float]) -> list[float]:
+    """Return ``values`` with infinity in place of what single precision cannot hold."""
+    for value in values:  # in every message: ``any`` takes twice as long
+        if abs(value) > _SINGLE_LIMIT:
+            return [math.copysign(math.inf, v) if abs(v) > _SINGLE_LIMIT else v for v in values]
+    return values
+
+
+def wrapped(time: int) -> int:
+    """Return a time as a 32-bit field holds it: it wraps."""
+    return time & 0xFFFFFFFF
+
+
+def boot_ms(f: VehicleFacts) -> int:
+    """Return the time since boot as the field ``time_boot_ms``, which wraps after 49.7 days."""
+    return wrapped(f.time_us // 1000)
+
+
+def euler(q: list[float]) -> tuple[float, float, float]:
+    """Roll, pitch, yaw of a quaternion w, x, y, z (plain Python: telemetry needs no compiled code)."""
+    w, x, y, z = q
+    sin_pitch = min(1.0, max(-1.0, 2.0 * (w * y - z * x)))
+    return (
+        math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        math.asin(sin_pitch),
+        math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )
+
+
+def heading_deg(q: list[float]) -> float:
+    """Heading in [0, 360) of a quaternion; 0 for one that is not a number."""
+    return math.degrees(euler(q)[2]) % 360.0 if math.isfinite(q[0]) else 0.0

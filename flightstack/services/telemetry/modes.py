@@ -1,0 +1,63 @@
+"""The vehicle's modes as MAVLink's standard modes service tells them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from flightstack.core.modes import CUSTOM_MODE, Mode
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.services.telemetry.facts import VehicleFacts
+
+ADVANCED, NOT_SELECTABLE, AUTOMATIC = 1, 2, 4
+"""MAV_MODE_PROPERTY."""
+
+
+class ModeEntry(NamedTuple):
+    """A row of the list of modes."""
+
+    mode: Mode
+    name: str
+    standard: int
+    properties: int
+
+
+_S = mavlink
+MODES = (
+    ModeEntry(Mode.HOLD, "Hold", _S.MAV_STANDARD_MODE_NON_STANDARD, AUTOMATIC),
+    ModeEntry(Mode.TAKEOFF, "Takeoff", _S.MAV_STANDARD_MODE_TAKEOFF, AUTOMATIC),
+    ModeEntry(Mode.MISSION, "Mission", _S.MAV_STANDARD_MODE_MISSION, AUTOMATIC),
+    ModeEntry(Mode.RETURN, "Return", _S.MAV_STANDARD_MODE_SAFE_RECOVERY, AUTOMATIC),
+    ModeEntry(Mode.LAND, "Land", _S.MAV_STANDARD_MODE_LAND, AUTOMATIC),
+    ModeEntry(Mode.POSITION, "Position", _S.MAV_STANDARD_MODE_POSITION_HOLD, 0),
+    ModeEntry(Mode.ALTITUDE, "Altitude", _S.MAV_STANDARD_MODE_ALTITUDE_HOLD, 0),
+    ModeEntry(Mode.OFFBOARD, "Offboard", _S.MAV_STANDARD_MODE_NON_STANDARD, ADVANCED),
+    ModeEntry(Mode.TERMINATION, "Termination", _S.MAV_STANDARD_MODE_NON_STANDARD, NOT_SELECTABLE),
+)
+_STANDARD = {entry.mode: entry.standard for entry in MODES}
+
+
+def current_mode(f: VehicleFacts) -> Message:
+    """CURRENT_MODE; a mode is entered at once or not at all, so the intended one is the present one."""
+    number = CUSTOM_MODE[f.mode]
+    return mavlink.MAVLink_current_mode_message(_STANDARD[f.mode], number, number)
+
+
+def available_modes_monitor(_f: VehicleFacts) -> Message:
+    """AVAILABLE_MODES_MONITOR: the list of modes never changes."""
+    return mavlink.MAVLink_available_modes_monitor_message(0)
+
+
+def available_modes(index: float) -> Iterator[Message]:
+    """AVAILABLE_MODES: all of them for index 0, else the one counted from 1; none for what does not exist."""
+    if index == 0.0 or not math.isfinite(index):
+        wanted = range(1, len(MODES) + 1)
+    else:
+        wanted = range(int(index), int(index) + 1) if 1 <= index <= len(MODES) else range(0)
+    for number in wanted:
+        entry = MODES[number - 1]
+        yield mavlink.MAVLink_available_modes_message(
+            len(MODES), number, entry.standard, CUSTOM_MODE[entry.mode], entry.properties, entry.name.encode()
+        )

@@ -1,0 +1,163 @@
+"""Which telemetry one link sends how often. Pure.
+
+Rates count simulated time, and never more than the same rate on the link's own clock: at fifty times real
+time a client gets 50 attitudes a second, not 2 500. At speed 1, and over a memory link, both clocks are one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from typing import TypeAlias
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.services.telemetry import MAKERS, VehicleFacts, messages
+
+M = mavlink
+
+LONGEST_INTERVAL_US = 2**31 - 1
+"""What MESSAGE_INTERVAL can say."""
+
+# messages per second: PX4's defaults on its two links, in simulation, for what this vehicle has. What pymavlink's
+# releases do not know (ESC_STATUS, CURRENT_MODE, AVAILABLE_MODES_MONITOR, our own dialect) is sent on request only:
+# MAVProxy and scripts count each message that they cannot decode as a lost packet.
+GROUND_RATES_HZ: dict[int, float] = {
+    M.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+    M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50.0,
+    M.MAVLINK_MSG_ID_ATTITUDE_TARGET: 50.0,
+    M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50.0,
+    M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 50.0,
+    M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50.0,
+    M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 50.0,
+    M.MAVLINK_MSG_ID_GPS_RAW_INT: 5.0,
+    M.MAVLINK_MSG_ID_VFR_HUD: 4.0,
+    M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
+    M.MAVLINK_MSG_ID_MISSION_CURRENT: 2.0,
+    M.MAVLINK_MSG_ID_ALTITUDE: 1.0,
+    M.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+    M.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    M.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
+    M.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+    M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 0.5,
+}
+STANDARD_MODES_RATES_HZ: dict[int, float] = {
+    M.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
+    M.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 0.3,
+}
+"""For clients that ask for AVAILABLE_MODES: they know the protocol of standard modes."""
+API_RATES_HZ: dict[int, float] = {
+    **GROUND_RATES_HZ,
+    M.MAVLINK_MSG_ID_ATTITUDE: 100.0,
+    M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+    M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 10.0,
+    M.MAVLINK_MSG_ID_ATTITUDE_TARGET: 10.0,
+    M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 10.0,
+    M.MAVLINK_MSG_ID_ODOMETRY: 30.0,
+    M.MAVLINK_MSG_ID_ALTITUDE: 10.0,
+    M.MAVLINK_MSG_ID_VFR_HUD: 10.0,
+    M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5.0,
+    M.MAVLINK_MSG_ID_MISSION_CURRENT: 5.0,
+    M.MAVLINK_MSG_ID_SYS_STATUS: 5.0,
+}
+GROUPS: dict[int, tuple[int, ...]] = {
+    M.MAV_DATA_STREAM_RAW_SENSORS: (M.MAVLINK_MSG_ID_GPS_RAW_INT,),
+    M.MAV_DATA_STREAM_EXTENDED_STATUS: (
+        M.MAVLINK_MSG_ID_SYS_STATUS,
+        M.MAVLINK_MSG_ID_MISSION_CURRENT,
+        M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    ),
+    M.MAV_DATA_STREAM_RC_CHANNELS: (M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,),
+    M.MAV_DATA_STREAM_RAW_CONTROLLER: (M.MAVLINK_MSG_ID_ATTITUDE_TARGET,),
+    M.MAV_DATA_STREAM_POSITION: (
+        M.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    ),
+    M.MAV_DATA_STREAM_EXTRA1: (
+        M.MAVLINK_MSG_ID_ATTITUDE,
+        M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+        M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+    ),
+    M.MAV_DATA_STREAM_EXTRA2: (M.MAVLINK_MSG_ID_VFR_HUD,),
+    M.MAV_DATA_STREAM_EXTRA3: (
+        M.MAVLINK_MSG_ID_SYSTEM_TIME,
+        M.MAVLINK_MSG_ID_BATTERY_STATUS,
+        M.MAVLINK_MSG_ID_ALTITUDE,
+    ),
+}
+"""Messages of the groups of REQUEST_DATA_STREAM, as ArduPilot divides them."""
+
+
+Make: TypeAlias = Callable[[int, VehicleFacts], Iterable[Message]]
+
+
+class _Stream:
+    """A message of a link, due at ``vehicle_s`` on the vehicle's clock and ``link_s`` on the link's."""
+
+    __slots__ = ("interval_s", "link_s", "message_id", "vehicle_s")
+
+    def __init__(self, message_id: int, interval_s: float) -> None:
+        self.message_id = message_id
+        self.interval_s = interval_s
+        self.vehicle_s = self.link_s = -math.inf
+
+    def sent(self, now_s: float, link_now_s: float) -> None:
+        """Set when it is due next: keep the phase, unless a whole interval was missed."""
+        interval_s = self.interval_s
+        upcoming_s = self.vehicle_s + interval_s
+        self.vehicle_s = upcoming_s if upcoming_s > now_s else now_s + interval_s
+        self.link_s = max(self.link_s + interval_s, link_now_s + 0.5 * interval_s)
+
+
+class Streams:
+    """The messages that one link sends by itself."""
+
+    def __init__(self, rates_hz: dict[int, float]) -> None:
+        self._default = rates_hz
+        self._streams = {message_id: _Stream(message_id, 1.0 / rate) for message_id, rate in rates_hz.items()}
+        self._soonest_s = -math.inf
+
+    def interval_us(self, message_id: int) -> int:
+        """Interval of a message; −1 if it is not sent, 0 if it is not known."""
+        if message_id in self._streams:
+            return round(self._streams[message_id].interval_s * 1e6)
+        return -1 if message_id in MAKERS else 0
+
+    def set_interval(self, message_id: int, interval_us: float) -> bool:
+        """Set an interval as SET_MESSAGE_INTERVAL says (−1 stop, 0 default); tell whether it can be done."""
+        if message_id not in MAKERS or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # nor is NaN
+            return False
+        if interval_us == 0 and message_id in self._default:
+            self._streams[message_id] = _Stream(message_id, 1.0 / self._default[message_id])
+        elif interval_us <= 0:
+            self._streams.pop(message_id, None)
+        else:
+            self._streams[message_id] = _Stream(message_id, interval_us * 1e-6)
+        self._soonest_s = -math.inf
+        return True
+
+    def add_standard_modes(self) -> None:
+        """Send the messages of STANDARD_MODES_RATES_HZ, at their rates unless another one was set."""
+        for message_id, rate_hz in STANDARD_MODES_RATES_HZ.items():
+            if message_id not in self._streams:
+                self.set_interval(message_id, 1e6 / rate_hz)
+
+    def set_group(self, group: int, rate_hz: float) -> None:
+        """Set the rate of a MAV_DATA_STREAM group as REQUEST_DATA_STREAM says; 0 stops it."""
+        interval_us = 1e6 / rate_hz if rate_hz > 0.0 else -1.0
+        members = [m for g in GROUPS.values() for m in g] if group == 0 else GROUPS.get(group, ())
+        for message_id in members:
+            self.set_interval(message_id, interval_us)
+
+    def due(self, facts: VehicleFacts, link_now_s: float, make: Make = messages) -> Iterator[Message]:
+        """Yield the messages that are due by the vehicle's time and by the link's, made by ``make``."""
+        now_s = facts.time_us * 1e-6
+        if now_s < self._soonest_s:
+            return
+        soonest_s = math.inf
+        for stream in self._streams.values():
+            if now_s >= stream.vehicle_s and link_now_s >= stream.link_s:
+                stream.sent(now_s, link_now_s)
+                yield from make(stream.message_id, facts)
+            soonest_s = min(soonest_s, stream.vehicle_s)
+        self._soonest_s = soonest_s

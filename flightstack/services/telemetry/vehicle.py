@@ -1,0 +1,205 @@
+"""Messages about the vehicle as a whole: who it is, how it is, and where home is."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack import __version__
+from flightstack.core.contract import Vector3
+from flightstack.core.modes import CUSTOM_MODE, Mode
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.field_numbers import int16, int32, whole
+from flightstack.mavlink.link import Message
+from flightstack.params.vehicle import system_type
+from flightstack.services.telemetry.facts import VehicleFacts
+from flightstack.services.telemetry.fields import NAN, boot_ms
+
+MAVLINK_2 = 200
+NO_MISSION = 0xFFFF
+"""MISSION_CURRENT.total of a vehicle without a mission."""
+NAME_IN_VERSION = list(b"flightst")
+"""In place of a Git hash, eight octets: who reads it sees that this is not PX4."""
+
+_OWN_TARGETS = (Mode.TAKEOFF, Mode.MISSION, Mode.HOLD, Mode.RETURN, Mode.LAND)
+
+
+def heartbeat(f: VehicleFacts, leaving: bool = False) -> Message:
+    """HEARTBEAT, with PX4's custom mode; the base mode's flags are those that PX4 sets in each mode."""
+    base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_HIL_ENABLED
+    base |= mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
+    if f.mode in _OWN_TARGETS:
+        base |= mavlink.MAV_MODE_FLAG_AUTO_ENABLED
+    if f.mode not in (Mode.ALTITUDE, Mode.TERMINATION):
+        base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
+    if f.mode in (Mode.POSITION, Mode.ALTITUDE):
+        base |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+    if f.armed:
+        base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    system = mavlink.MAV_STATE_POWEROFF if leaving else f.system_status
+    autopilot = mavlink.MAV_AUTOPILOT_GENERIC if f.is_generic else mavlink.MAV_AUTOPILOT_PX4
+    return mavlink.MAVLink_heartbeat_message(
+        system_type(f.rotors), autopilot, base, CUSTOM_MODE[f.mode], system, 3
+    )
+
+
+def extended_state(f: VehicleFacts) -> Message:
+    """EXTENDED_SYS_STATE."""
+    landed = mavlink.MAV_LANDED_STATE_IN_AIR
+    if f.landed:
+        landed = mavlink.MAV_LANDED_STATE_ON_GROUND
+    elif f.climbing:
+        landed = mavlink.MAV_LANDED_STATE_TAKEOFF
+    elif f.descending:
+        landed = mavlink.MAV_LANDED_STATE_LANDING
+    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed)
+
+
+def mission_current(f: VehicleFacts) -> Message:
+    """MISSION_CURRENT; the field ``total`` has a number of its own for no mission, and 0 would be "not supported"."""
+    total = f.mission_count or NO_MISSION
+    # a finished mission's current item would be one past its last
+    current = min(f.mission_current, max(0, f.mission_count - 1))
+    mission_mode = 1 if f.mode is Mode.MISSION else 2
+    return mavlink.MAVLink_mission_current_message(current, total, f.mission_state, mission_mode, *f.plan_ids)
+
+
+SENSORS = (
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_GPS
+    | mavlink.MAV_SYS_STATUS_AHRS
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+)
+"""What stands for the true state that the simulator sends: clients count a vehicle without them as ill."""
+
+
+def sys_status(f: VehicleFacts) -> Message:
+    """SYS_STATUS: the health bits by which MAVSDK and QGroundControl judge a vehicle."""
+    present = SENSORS | mavlink.MAV_SYS_STATUS_GEOFENCE | mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    healthy = present if f.state_is_good else 0
+    if not f.can_arm:
+        healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    if f.fence_breached:
+        healthy &= ~mavlink.MAV_SYS_STATUS_GEOFENCE
+    if f.battery.valid:
+        present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+        healthy |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    enabled = present if f.fence_acts else present & ~mavlink.MAV_SYS_STATUS_GEOFENCE
+    return mavlink.MAVLink_sys_status_message(
+        present, enabled, healthy, 0, *_battery_fields(f), 0, 0, 0, 0, 0, 0
+    )
+
+
+def _battery_fields(f: VehicleFacts) -> tuple[int, int, int]:
+    """Voltage [mV], current [cA] and charge [%], or what stands for not known."""
+    b = f.battery
+    if not b.valid:
+        return 0xFFFF, -1, -1
+    voltage = whole(b.voltage_v * 1e3, 0, 0xFFFE) if math.isfinite(b.voltage_v) else 0xFFFF
+    current = int16(b.current_a * 100.0) if math.isfinite(b.current_a) else -1
+    return voltage, current, whole(b.remaining * 100.0, 0, 100) if math.isfinite(b.remaining) else -1
+
+
+CHARGE_STATES = (
+    mavlink.MAV_BATTERY_CHARGE_STATE_OK,
+    mavlink.MAV_BATTERY_CHARGE_STATE_LOW,
+    mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL,
+    mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY,
+)
+"""By the level that arming and failsafes go by."""
+
+
+def battery_status(f: VehicleFacts) -> Message:
+    """BATTERY_STATUS: one pack, its cells not told apart."""
+    voltage, current, remaining = _battery_fields(f)
+    known = f.battery.valid and math.isfinite(f.battery.remaining)
+    charge = CHARGE_STATES[f.battery_level] if known else mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
+    return mavlink.MAVLink_battery_status_message(
+        0, mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_TYPE_LIPO, 0x7FFF,
+        [voltage, *[0xFFFF] * 9], current, -1, -1, remaining, 0, charge,
+    )  # fmt: skip
+
+
+def system_time(f: VehicleFacts) -> Message:
+    """SYSTEM_TIME: time since boot; simulated time knows no date."""
+    return mavlink.MAVLink_system_time_message(0, boot_ms(f))
+
+
+def home_position(f: VehicleFacts) -> Message:
+    """HOME_POSITION."""
+    home = f.home
+    local = f.frame.to_ned(home)
+    return mavlink.MAVLink_home_position_message(
+        int32(home.latitude_deg * 1e7), int32(home.longitude_deg * 1e7), int32(home.altitude_m * 1e3),
+        *local, [1.0, 0.0, 0.0, 0.0], NAN, NAN, NAN, f.time_us,
+    )  # fmt: skip
+
+
+def origin(f: VehicleFacts) -> Message:
+    """GPS_GLOBAL_ORIGIN: where the local frame begins."""
+    point = f.frame.to_geo(Vector3(0.0, 0.0, 0.0))
+    return mavlink.MAVLink_gps_global_origin_message(
+        int32(point.latitude_deg * 1e7), int32(point.longitude_deg * 1e7), int32(point.altitude_m * 1e3),
+        f.time_us,
+    )  # fmt: skip
+
+
+def estimator_status(f: VehicleFacts) -> Message:
+    """ESTIMATOR_STATUS: the true state, so nothing to innovate."""
+    flags = (
+        mavlink.ESTIMATOR_ATTITUDE | mavlink.ESTIMATOR_VELOCITY_HORIZ | mavlink.ESTIMATOR_VELOCITY_VERT
+        | mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS | mavlink.ESTIMATOR_POS_VERT_ABS
+        | mavlink.ESTIMATOR_PRED_POS_HORIZ_REL | mavlink.ESTIMATOR_PRED_POS_HORIZ_ABS
+    )  # fmt: skip
+    return mavlink.MAVLink_estimator_status_message(
+        f.time_us, flags if f.state_is_good else 0, 0.0, 0.0, 0.0, 0.0, NAN, NAN, 0.0, 0.0
+    )
+
+
+def flight_information(f: VehicleFacts) -> Message:
+    """FLIGHT_INFORMATION: arming, takeoff and landing of the present flight, on the vehicle's clock."""
+    times = f.flight
+    return mavlink.MAVLink_flight_information_message(
+        boot_ms(f), times.armed_us, times.takeoff_us, times.armed_us, times.landing_us // 1000
+    )
+
+
+def fence_status(f: VehicleFacts) -> Message:
+    """FENCE_STATUS: whether the fence is broken now; the number of breaches, and kind and time of the latest."""
+    number, latest_us, kind = f.fence_breaches
+    return mavlink.MAVLink_fence_status_message(int(f.fence_breached), number, kind, latest_us // 1000)
+
+
+CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FTP
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FLIGHT_TERMINATION
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+)
+
+
+def autopilot_version(f: VehicleFacts) -> Message:
+    """AUTOPILOT_VERSION: what this vehicle can do, and which version of the stack it runs."""
+    major, minor, patch = (int(part) for part in __version__.split(".")[:3])
+    version = major << 24 | minor << 16 | patch << 8
+    nothing = [0] * 8
+    return mavlink.MAVLink_autopilot_version_message(
+        CAPABILITIES, version, 0, 0, 0, NAME_IN_VERSION, nothing, nothing, 0, 0, f.system_id
+    )
+
+
+def protocol_version(f: VehicleFacts) -> Message:
+    """PROTOCOL_VERSION: MAVLink 2 is spoken, MAVLink 1 understood."""
+    nothing = [0] * 8
+    return mavlink.MAVLink_protocol_version_message(MAVLINK_2, 100, MAVLINK_2, nothing, nothing)

@@ -1,1 +1,0 @@
-"""The only sockets of the flight stack, and links in memory."""

@@ -1,0 +1,1 @@
+"""Sockets and serial lines, and links in memory."""

@@ -1,0 +1,73 @@
+"""A serial port, or a pseudo-terminal, as a line of octets."""
+
+from __future__ import annotations
+
+import errno
+import re
+import select
+
+import serial
+
+from flightstack.transports.byte_link import LineError
+
+_REASONS = {
+    errno.ENOENT: "there is no such device",
+    errno.EACCES: "permission denied: let your user into the group that owns it (dialout or uucp), and log in again",
+    errno.EPERM: "permission denied: let your user into the group that owns it (dialout or uucp), and log in again",
+    errno.EBUSY: "another program uses it",
+    errno.EAGAIN: "another program uses it",
+    errno.EWOULDBLOCK: "another program uses it",
+    errno.ENXIO: "there is no such device",
+    errno.ENOTTY: "is no serial port",
+    errno.EINVAL: "does not take these settings",
+    errno.EISDIR: "is a directory",
+}
+_PIECE = 4096
+
+
+class SerialPort:
+    """An open serial port, 8N1 without flow control; implements ``ByteLink``. Nobody else can open it meanwhile."""
+
+    def __init__(self, device: str, baud: int) -> None:
+        """Open ``device``; raise LineError."""
+        self.name = f"{device} at {baud} baud"
+        try:
+            self._port = serial.Serial(device, baud, timeout=0.0, write_timeout=5.0, exclusive=True)
+            self._port.reset_input_buffer()
+        except (serial.SerialException, OSError, ValueError, OverflowError) as error:
+            raise LineError(f"{device}: {_reason(error)}") from error
+        self._poll = select.poll()
+        self._poll.register(self._port.fileno(), select.POLLIN)
+
+    def write(self, data: bytes) -> None:
+        """Send octets; raise LineError when the line is gone."""
+        try:
+            self._port.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise LineError(f"{self.name}: the line is gone: {_reason(error)}") from error
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return what has come, b"" when nothing does within ``timeout_s``; raise LineError when it is gone."""
+        try:
+            if not self._poll.poll(max(0.0, timeout_s) * 1000.0):
+                return b""
+            data: bytes = self._port.read(_PIECE)
+        except (serial.SerialException, OSError) as error:
+            raise LineError(f"{self.name}: the line is gone: {_reason(error)}") from error
+        if not data:
+            raise LineError(f"{self.name}: the line is gone: its other end closed it")
+        return data
+
+    def close(self) -> None:
+        """Close the line; a second call does nothing."""
+        self._port.close()
+
+
+def _reason(error: Exception) -> str:
+    """Return why, in words; pyserial keeps the system's number in the text alone when it sets a port up."""
+    number = getattr(error, "errno", None)
+    if number is None and (found := re.search(r"\((\d+), ", str(error))):
+        number = int(found[1])
+    if number in _REASONS:
+        return _REASONS[number]
+    return str(error) or type(error).__name__

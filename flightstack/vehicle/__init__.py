@@ -1,0 +1,1 @@
+"""The autopilot: estimation, guidance, control and commander joined in one tick."""

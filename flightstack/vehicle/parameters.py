@@ -1,0 +1,77 @@
+"""The vehicle's parameters, put together: where they come from, and who has to know of a change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from flightstack.control.backend import ControlBackend
+from flightstack.control.controller_loading import controller_error
+from flightstack.flight_log.recorder import FlightRecorder
+from flightstack.params.behaviour import FIELDS, SPECS, Behaviour
+from flightstack.params.config import StackConfig
+from flightstack.params.identity import identity_specs
+from flightstack.params.param_file import NOTHING_LOADED, LoadedParams, load_into
+from flightstack.params.spec import ParamSpec
+from flightstack.params.store import ParamStore, apply_assignments
+from flightstack.vehicle.autopilot import Autopilot
+
+
+class Parameters(NamedTuple):
+    """The parameters of a vehicle that is about to start."""
+
+    store: ParamStore
+    loaded: LoadedParams
+    """What the parameter file held."""
+
+
+def declared(config: StackConfig, backend: ControlBackend) -> list[ParamSpec]:
+    """Return the declarations of all parameters; raise ConfigError when a controller takes a name that has an owner."""
+    specs = {spec.name: spec for spec in (*SPECS.values(), *identity_specs(config.system_id))}
+    for spec in backend.parameter_specs:
+        if specs.setdefault(spec.name, spec) is not spec:
+            problem = f"declares the parameter {spec.name}, which the vehicle has already"
+            raise controller_error(config.controller, problem)
+    return list(specs.values())
+
+
+def load_parameters(config: StackConfig, backend: ControlBackend) -> Parameters:
+    """Make the parameters of a vehicle and give the loops theirs; raise ConfigError.
+
+    Defaults, those of the loops from the gains file; then the parameter file; then what the configuration says
+    (``--param``), which is not saved.
+    """
+    store = ParamStore(declared(config, backend))
+    loaded = NOTHING_LOADED
+    if config.params_file is not None:
+        loaded = load_into(store, Path(config.params_file))
+    for name, value in config.behaviour.by_name().items():
+        if value != SPECS[name].default:
+            store.override(name, value)
+    apply_assignments(store, config.params)
+    for spec in backend.parameter_specs:
+        if store.value(spec.name) != backend.get_parameter(spec.name):
+            backend.set_parameter(spec.name, store.value(spec.name))
+    return Parameters(store, loaded)
+
+
+def behaviour_of(store: ParamStore) -> Behaviour:
+    """Return the behaviour that the parameters describe."""
+    values: dict[str, float] = {field: store.value(name) for name, field in FIELDS.items()}
+    return Behaviour(**values)  # type: ignore[arg-type]  # an integer parameter's value is an int
+
+
+def connect_parameters(
+    store: ParamStore, autopilot: Autopilot, backend: ControlBackend, recorder: FlightRecorder
+) -> None:
+    """Let every change reach guidance and commander, the loops, and the log, before the next tick."""
+    loops = {spec.name for spec in backend.parameter_specs}
+
+    def on_change(name: str, value: float) -> None:
+        if name in SPECS:
+            autopilot.set_behaviour(autopilot.behaviour.updated(name, value))
+        if name in loops:
+            backend.set_parameter(name, value)
+        recorder.parameter(name, value)
+
+    store.subscribe(on_change)

@@ -1,0 +1,1 @@
+"""The client halves of the MAVLink services, without I/O."""

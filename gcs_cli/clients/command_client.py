@@ -1,0 +1,146 @@
+"""Send a command and see it answered: the sender's side of the command protocol, without I/O.
+
+The protocol: https://mavlink.io/en/services/command.html
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from flightstack.mavlink.addressing import Address, is_for, is_from
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.plan.item import as_float32
+
+_ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
+_IN_PROGRESS: int = mavlink.MAV_RESULT_IN_PROGRESS
+
+
+class CommandTiming(NamedTuple):
+    """Waits of the protocol [s of whatever clock drives it]."""
+
+    timeout_s: float = 1.0
+    """Before a command is sent again."""
+    retries: int = 5
+    progress_timeout_s: float = 10.0
+    """Before a command that the vehicle works on counts as lost."""
+
+
+class CommandResult(NamedTuple):
+    """How a command ended."""
+
+    result: int | None
+    """The vehicle's MAV_RESULT; None when it did not answer."""
+    reason: str
+    """One sentence; empty when accepted."""
+
+    @property
+    def accepted(self) -> bool:
+        """Tell whether the vehicle did it."""
+        return self.result == _ACCEPTED
+
+
+class CommandClient:
+    """Sends one command at a time to one vehicle; a new ``send`` replaces the one under way."""
+
+    def __init__(
+        self,
+        vehicle: Address,
+        own: Address,
+        timing: CommandTiming = CommandTiming(),  # noqa: B008  (immutable)
+    ) -> None:
+        self.vehicle = vehicle
+        self.own = own
+        self.result: CommandResult | None = None
+        self.progress_percent: int | None = None
+        """What the vehicle last said of a command that it works on."""
+        self._timing = timing
+        self._command = -1
+        self._request: Message | None = None
+        self._deadline_s: float | None = None
+        self._sends_left = 0
+        self._in_progress = False
+
+    def send(self, command: int, params: Sequence[float], now_s: float) -> None:
+        """Begin a COMMAND_LONG of up to seven parameters; those left out are zero."""
+        values = [as_float32(value) for value in (*params, *[0.0] * (7 - len(params)))]
+        self._begin(command, mavlink.MAVLink_command_long_message(*self.vehicle, command, 0, *values), now_s)
+
+    def send_int(
+        self, command: int, params: Sequence[float], x: int, y: int, z: float, *, frame: int, now_s: float
+    ) -> None:
+        """Begin a COMMAND_INT of four parameters, and x and y as integers (1e-7 deg in a global frame)."""
+        values = [as_float32(value) for value in params]
+        message = mavlink.MAVLink_command_int_message(
+            *self.vehicle, frame, command, 0, 0, *values, x, y, as_float32(z)
+        )
+        self._begin(command, message, now_s)
+
+    def _begin(self, command: int, request: Message, now_s: float) -> None:
+        self.result = None
+        self.progress_percent = None
+        self._command, self._request = command, request
+        self._deadline_s = now_s
+        self._sends_left = self._timing.retries + 1
+        self._in_progress = False
+
+    def receive(self, message: Message, now_s: float) -> None:
+        """Take a message from the vehicle's link; what does not answer the command is ignored."""
+        if self._deadline_s is None or message.get_type() != "COMMAND_ACK":
+            return
+        if not is_from(message, self.vehicle) or not is_for(message, self.own):
+            return
+        if message.command != self._command or self._sends_left > self._timing.retries:  # not yet sent
+            return
+        if message.result == _IN_PROGRESS:
+            self._in_progress = True
+            self.progress_percent = message.progress if message.progress <= 100 else None
+            self._deadline_s = now_s + self._timing.progress_timeout_s
+            return
+        name = _result_name(message.result)
+        reason = "" if message.result == _ACCEPTED else f"the vehicle answered {name}"
+        self._end(CommandResult(message.result, reason))
+
+    def poll(self, now_s: float) -> list[Message]:
+        """Return the messages to send now."""
+        if self._deadline_s is None or now_s < self._deadline_s:
+            return []
+        if self._in_progress or self._sends_left == 0:
+            what = "stopped reporting on" if self._in_progress else "did not answer"
+            name = _command_name(self._command)
+            self._end(CommandResult(None, f"the vehicle (system {self.vehicle.system}) {what} {name}"))
+            return []
+        request = self._request
+        if request is None:
+            return []
+        if request.get_type() == "COMMAND_LONG":  # tells the vehicle a repetition from a new command
+            request = copy.copy(request)
+            request.confirmation = self._timing.retries + 1 - self._sends_left
+        self._sends_left -= 1
+        self._deadline_s = now_s + self._timing.timeout_s
+        return [request]
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next if nothing arrives before; None for never."""
+        return self._deadline_s
+
+    def cancel(self) -> None:
+        """Stop waiting for the answer."""
+        if self._deadline_s is not None:
+            self._end(CommandResult(None, f"waiting for {_command_name(self._command)} was cancelled"))
+
+    def _end(self, result: CommandResult) -> None:
+        self.result = result
+        self._deadline_s = None
+
+
+def _result_name(result: int) -> str:
+    entry = mavlink.enums["MAV_RESULT"].get(result)
+    return entry.name if entry else f"MAV_RESULT {result}"
+
+
+def _command_name(command: int) -> str:
+    entry = mavlink.enums["MAV_CMD"].get(command)
+    return entry.name if entry else f"command {command}"

@@ -1,0 +1,316 @@
+"""The ground station's side of MAVLink FTP, without I/O: fetches files and lists directories.
+
+``start_…`` begins an operation, ``poll`` returns what to send, ``receive`` takes what came, and ``result`` says how it
+ended. A file comes in bursts; single requests fetch what got lost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from flightstack.mavlink.addressing import Address, is_for, is_from
+from flightstack.mavlink.ftp_messages import (
+    ERROR_TEXTS,
+    MAX_DATA,
+    UINT32,
+    FtpError,
+    Opcode,
+    Packet,
+    ftp_message,
+    next_sequence,
+    read_packet,
+)
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.missing import MAX_SIZE, Missing
+from flightstack.mavlink.text import clean
+from flightstack.mavlink.virtual_files import Entry
+
+RETRY_S = 0.3
+"""Silence after which a request is sent again, until answers have shown how long they take."""
+SOONEST_RETRY_S = 0.1
+SILENCE_S = 6.0
+"""How long an operation goes on without any progress."""
+BURST_BYTES = 500 * MAX_DATA
+"""What a burst may bring; more than a tenth of it missing is worth another burst."""
+FEW = 50
+MAX_READS = 16
+"""Single requests under way at once."""
+MAX_ENTRIES = 100_000
+_HALF = 0x8000
+
+
+class FtpDone(NamedTuple):
+    """The operation succeeded."""
+
+    content: bytes = b""
+    """The file, of a download."""
+    entries: tuple[Entry, ...] = ()
+    """What is in the directory, of a list."""
+
+
+class FtpFailed(NamedTuple):
+    """The operation failed."""
+
+    reason: str
+    """One sentence."""
+    error: int | None = None
+    """The FtpError of the vehicle; None when it did not answer."""
+
+
+class FtpClient:
+    """One operation at a time with one vehicle; a new one takes the place of the one under way."""
+
+    def __init__(self, vehicle: Address, own: Address) -> None:
+        self.vehicle = vehicle
+        self.own = own
+        self.result: FtpDone | FtpFailed | None = None
+        self._sequence = 0
+        self._outbox: list[Packet] = []
+        self._request: Packet | None = None
+        """An open or list request that waits for its answer."""
+        self._session: int | None = None
+        self._file: Missing | None = None
+        self._entries: list[Entry] = []
+        self._offset = 0
+        self._burst: Packet | None = None
+        self._reads: dict[int, tuple[int, int, float]] = {}
+        """Sequence number of the answer → offset, count and when it was asked for."""
+        self._path = b""
+        self._retry_s: float | None = None
+        self._progress_s = math.inf
+        self._sent_s: float | None = None
+        """When the request that waits was sent, if once only: then its answer shows how long answers take."""
+        self._patience_s = RETRY_S
+
+    def start_download(self, path: str) -> None:
+        """Fetch the file at ``path``."""
+        self._start(path)
+        self._ask(Opcode.OPEN_FILE_RO)
+
+    def start_list(self, path: str) -> None:
+        """List the directory ``path``."""
+        self._start(path)
+        self._ask(Opcode.LIST_DIRECTORY)
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Bytes that have come, and bytes in all (0 before the size is known)."""
+        return (self._file.size - self._file.left, self._file.size) if self._file else (0, 0)
+
+    # -- what drives it
+
+    def receive(self, message: Message, now_s: float) -> None:
+        """Take a message from the vehicle's link; what is not for this operation is ignored."""
+        if (
+            message.get_type() != "FILE_TRANSFER_PROTOCOL"
+            or not is_from(message, self.vehicle)
+            or not is_for(message, self.own)
+            or self.result is not None
+        ):
+            return
+        packet = read_packet(message)
+        if packet.opcode not in (Opcode.ACK, Opcode.NAK) or packet.size > MAX_DATA:
+            return
+        if self._request is not None:
+            self._on_answer(self._request, packet, now_s)
+        elif self._file is not None and packet.session == self._session:
+            self._on_data(self._file, packet, now_s)
+
+    def poll(self, now_s: float) -> list[Message]:
+        """Return the messages to send now."""
+        if self.result is None and self._retry_s is not None and now_s >= self._retry_s:
+            self._progress_s = min(self._progress_s, now_s)  # counted from the first poll
+            if now_s - self._progress_s >= SILENCE_S:
+                self._end(FtpFailed(f"the vehicle (system {self.vehicle.system}) does not answer"))
+            elif self._request is not None:
+                self._outbox.append(self._request)
+                self._sent_s = now_s if self._retry_s == -math.inf else None
+                self._retry_s = now_s + self._patience_s
+            elif self._file is not None:
+                self._burst = None
+                self._fetch(self._file, now_s)
+        outbox, self._outbox = self._outbox, []
+        return [ftp_message(self.vehicle, packet) for packet in outbox]
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        if self._outbox:
+            return -math.inf
+        return None if self.result is not None else self._retry_s
+
+    # -- open and list
+
+    def _start(self, path: str) -> None:
+        if self.result is None and self._session is not None:
+            self._end(FtpFailed("the operation was cancelled"))
+        self.result, self._file, self._session, self._burst = None, None, None, None
+        self._entries, self._offset, self._reads = [], 0, {}
+        self._path = path.encode()[:MAX_DATA]
+        self._progress_s = math.inf
+
+    def _ask(self, opcode: Opcode) -> None:
+        self._request = self._packet(opcode, size=len(self._path), offset=self._offset, data=self._path)
+        self._retry_s = -math.inf
+
+    def _on_answer(self, request: Packet, packet: Packet, now_s: float) -> None:
+        is_ours = packet.request == request.opcode and packet.sequence == next_sequence(request.sequence)
+        if not is_ours:
+            return
+        self._progress_s = now_s
+        if self._sent_s is not None:
+            self._learn(now_s - self._sent_s)
+        if packet.opcode == Opcode.NAK:
+            self._on_refusal(request, packet)
+        elif request.opcode == Opcode.LIST_DIRECTORY:
+            self._on_entries(packet)
+        else:
+            self._on_opened(packet, now_s)
+
+    def _on_opened(self, packet: Packet, now_s: float) -> None:
+        self._request, self._session = None, packet.session
+        size = UINT32.unpack_from(packet.data)[0] if packet.size >= UINT32.size else None
+        if size is None:
+            self._end(FtpFailed("the vehicle does not tell the size of the file"))
+        elif size > MAX_SIZE:
+            self._end(FtpFailed(f"a file of {size} bytes is too large"))
+        else:
+            if self._file is None or self._file.size != size:
+                self._file = Missing(size)
+            self._fetch(self._file, now_s)
+
+    def _on_refusal(self, request: Packet, packet: Packet) -> None:
+        error = packet.data[0] if packet.data else FtpError.FAIL
+        if error == FtpError.END_OF_FILE and request.opcode == Opcode.LIST_DIRECTORY:
+            self._end(FtpDone(entries=tuple(self._entries)))
+        elif error != FtpError.NO_SESSIONS_AVAILABLE:  # which passes: ask again
+            self._end(_refused(error))
+
+    def _on_entries(self, packet: Packet) -> None:
+        lines = (
+            packet.data.split(b"\x00")[:-1] if packet.data.endswith(b"\x00") else packet.data.split(b"\x00")
+        )
+        lines = [line for line in lines if line]
+        self._entries += _entries(lines)
+        self._offset += len(lines)
+        if not lines or self._offset > MAX_ENTRIES:
+            self._end(FtpDone(entries=tuple(self._entries)))
+        else:
+            self._ask(Opcode.LIST_DIRECTORY)
+
+    # -- data
+
+    def _on_data(self, file: Missing, packet: Packet, now_s: float) -> None:
+        if packet.request == Opcode.BURST_READ_FILE:
+            is_over = self._on_burst(packet)
+            if is_over is None:
+                return
+        elif packet.request == Opcode.READ_FILE and packet.sequence in self._reads:
+            _, _, asked_s = self._reads.pop(packet.sequence)
+            self._learn(now_s - asked_s)
+            is_over = True
+        else:
+            return
+        if packet.opcode == Opcode.NAK:
+            self._on_nak(file, packet)
+            if self.result is not None or self._request is not None:
+                return
+        elif file.fill(packet.offset, packet.data):
+            self._progress_s = now_s
+        if is_over or not file.left:
+            self._fetch(file, now_s)
+        else:
+            self._retry_s = now_s + self._patience_s
+
+    def _on_burst(self, packet: Packet) -> bool | None:
+        """Return whether the burst is over; None when the packet is of an older one, maybe of another file."""
+        burst = self._burst
+        if burst is None or packet.offset < burst.offset:
+            return None
+        if (packet.sequence - next_sequence(burst.sequence)) % (2 * _HALF) >= _HALF:
+            return None
+        if (packet.sequence - self._sequence) % (2 * _HALF) < _HALF:
+            self._sequence = next_sequence(packet.sequence)  # no later request shares numbers with this burst
+        if packet.burst_complete or packet.opcode == Opcode.NAK:
+            self._burst = None
+            return True
+        return False
+
+    def _on_nak(self, file: Missing, packet: Packet) -> None:
+        error = packet.data[0] if packet.data else FtpError.FAIL
+        if error == FtpError.INVALID_SESSION:  # the vehicle has closed it: open it again, keep what came
+            self._reads.clear()
+            self._ask(Opcode.OPEN_FILE_RO)
+        elif error != FtpError.END_OF_FILE:
+            self._end(_refused(error))
+        elif packet.offset < file.size:
+            self._end(FtpFailed("the file became shorter while it was read", error))
+
+    def _fetch(self, file: Missing, now_s: float) -> None:
+        """Ask for what is missing: in a burst if it is much, else piece by piece."""
+        self._retry_s = now_s + self._patience_s
+        if not file.left:
+            self._end(FtpDone(bytes(file.content)))
+        elif self._burst is None:
+            first = file.first
+            if file.within(first, first + BURST_BYTES) > FEW * MAX_DATA:
+                self._reads.clear()
+                self._burst = self._packet(Opcode.BURST_READ_FILE, size=MAX_DATA, offset=first)
+                self._outbox.append(self._burst)
+            else:
+                self._read_pieces(file, now_s)
+
+    def _read_pieces(self, file: Missing, now_s: float) -> None:
+        self._reads = {key: read for key, read in self._reads.items() if now_s < read[2] + self._patience_s}
+        asked = {(offset, count) for offset, count, _ in self._reads.values()}
+        for offset, count in self._wanted(file, asked):
+            read = self._packet(Opcode.READ_FILE, size=count, offset=offset)
+            self._reads[next_sequence(read.sequence)] = (offset, count, now_s)
+            self._outbox.append(read)
+        self._retry_s = (
+            min((asked_s for _, _, asked_s in self._reads.values()), default=now_s) + self._patience_s
+        )
+
+    def _wanted(self, file: Missing, asked: set[tuple[int, int]]) -> Iterator[tuple[int, int]]:
+        room = MAX_READS - len(asked)
+        for piece in file.pieces(MAX_DATA):
+            if room <= 0:
+                return
+            if piece not in asked:
+                room -= 1
+                yield piece
+
+    # -- the rest
+
+    def _learn(self, answer_s: float) -> None:
+        """Wait three times as long as an answer took; what is slower now and then soon counts less."""
+        wanted_s = min(RETRY_S, max(SOONEST_RETRY_S, 3.0 * answer_s))
+        self._patience_s = max(wanted_s, 0.5 * self._patience_s + 0.5 * wanted_s)
+
+    def _packet(self, opcode: Opcode, *, size: int = 0, offset: int = 0, data: bytes = b"") -> Packet:
+        packet = Packet(self._sequence, self._session or 0, opcode, size, offset=offset, data=data)
+        self._sequence = next_sequence(self._sequence)
+        return packet
+
+    def _end(self, result: FtpDone | FtpFailed) -> None:
+        self._outbox.clear()
+        if self._session is not None:
+            self._outbox.append(self._packet(Opcode.TERMINATE_SESSION))
+        self._session, self._request, self._retry_s, self.result = None, None, None, result
+
+
+def _refused(error: int) -> FtpFailed:
+    return FtpFailed(ERROR_TEXTS.get(error, f"it answered with error {error}"), error)
+
+
+def _entries(lines: list[bytes]) -> Iterator[Entry]:
+    """Yield the files and directories among the lines of a list; others count, but are not shown."""
+    for line in lines:
+        kind, text = line[:1], line[1:].decode(errors="replace")
+        if kind == b"D":
+            yield Entry(clean(text), None)
+        elif kind == b"F":
+            fields = text.split("\t")
+            size = fields[1] if len(fields) > 1 else ""
+            yield Entry(clean(fields[0]), int(size) if size.isascii() and size.isdecimal() else 0)

@@ -1,0 +1,188 @@
+"""The ground station's side of the log protocol, without I/O: lists a vehicle's logs and fetches one.
+
+``start_…`` begins an operation, ``poll`` returns what to send, ``receive`` takes what came, and ``result`` says how it
+ended. Works with PX4, which numbers logs from 0, and ArduPilot, which numbers from 1.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import NamedTuple
+
+from flightstack.mavlink.addressing import Address, is_from
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.log_messages import BLOCK
+from flightstack.mavlink.missing import MAX_SIZE, Missing
+
+RETRY_S = 0.4
+"""Silence after which what is missing is asked for again."""
+SILENCE_S = 6.0
+"""How long an operation goes on without any progress."""
+WINDOW = 4000 * BLOCK
+"""What is asked for at once."""
+FEW = 40
+"""Blocks; more than this missing are asked for in one request, with those between them."""
+MAX_REQUESTS = 20
+ALL_LOGS = 0xFFFF
+
+
+class LogEntry(NamedTuple):
+    """One log of the vehicle."""
+
+    log_id: int
+    size: int
+    time_utc_s: int
+    """Seconds since 1970; 0 if the vehicle does not know."""
+
+
+class LogDone(NamedTuple):
+    """The operation succeeded."""
+
+    entries: tuple[LogEntry, ...] = ()
+    content: bytes = b""
+
+
+class LogFailed(NamedTuple):
+    """The operation failed."""
+
+    reason: str
+    """One sentence."""
+    silent: bool = False
+    """Whether the vehicle did not answer."""
+
+
+class LogClient:
+    """One operation at a time with one vehicle."""
+
+    def __init__(self, vehicle: Address) -> None:
+        self.vehicle = vehicle
+        self.result: LogDone | LogFailed | None = None
+        self._outbox: list[Message] = []
+        self._entries: dict[int, LogEntry] = {}
+        self._ids: range | None = None
+        self._log_id: int | None = None
+        self._file: Missing | None = None
+        self._asked_end = 0
+        """Where the newest request ends: its last block asks for the next."""
+        self._retry_s: float | None = None
+        self._progress_s = math.inf
+
+    def start_list(self) -> None:
+        """List all logs."""
+        self._start()
+        self._entries, self._ids = {}, None
+
+    def start_download(self, entry: LogEntry) -> None:
+        """Fetch a log of the list."""
+        self._start()
+        self._log_id, self._file, self._asked_end = entry.log_id, Missing(min(entry.size, MAX_SIZE)), 0
+        if not entry.size:
+            self._end(LogDone())
+        elif entry.size > MAX_SIZE:
+            self._end(LogFailed(f"a log of {entry.size} bytes is too large"))
+
+    def cancel(self) -> None:
+        """Give up the operation under way, and say so to the vehicle."""
+        if self.result is None and self._retry_s is not None:
+            self._end(LogFailed("the operation was cancelled"))
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Bytes that have come and bytes in all, of a download."""
+        return (self._file.size - self._file.left, self._file.size) if self._file else (0, 0)
+
+    # -- what drives it
+
+    def receive(self, message: Message, now_s: float) -> None:
+        """Take a message from the vehicle's link; what is not for this operation is ignored."""
+        if self.result is not None or self._retry_s is None or not is_from(message, self.vehicle):
+            return
+        kind = message.get_type()
+        if kind == "LOG_ENTRY" and self._file is None:
+            self._on_entry(message, now_s)
+        elif kind == "LOG_DATA" and self._file is not None and message.id == self._log_id:
+            self._on_data(self._file, message, now_s)
+
+    def poll(self, now_s: float) -> list[Message]:
+        """Return the messages to send now."""
+        if self.result is None and self._retry_s is not None and now_s >= self._retry_s:
+            self._progress_s = min(self._progress_s, now_s)
+            if now_s - self._progress_s >= SILENCE_S:
+                self._end(
+                    LogFailed(f"the vehicle (system {self.vehicle.system}) does not answer", silent=True)
+                )
+            elif self._file is not None:
+                self._ask_for_data(self._file, now_s)
+            else:
+                self._ask_for_entries(now_s)
+        outbox, self._outbox = self._outbox, []
+        return outbox
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        if self._outbox:
+            return -math.inf
+        return None if self.result is not None else self._retry_s
+
+    # -- list
+
+    def _on_entry(self, message: Message, now_s: float) -> None:
+        if message.num_logs == 0:
+            self._end(LogDone())
+            return
+        # the newest numbers hold: a log may have begun meanwhile; none is below 0, whatever the count says
+        last = message.last_log_num
+        self._ids = range(max(0, last - message.num_logs + 1), last + 1)
+        if message.id not in self._entries:
+            self._progress_s = now_s
+        self._entries[message.id] = LogEntry(message.id, message.size, message.time_utc)
+        self._retry_s = now_s + RETRY_S
+        if all(log_id in self._entries for log_id in self._ids):
+            self._end(LogDone(tuple(self._entries[log_id] for log_id in self._ids)))
+
+    def _ask_for_entries(self, now_s: float) -> None:
+        missing = [log_id for log_id in self._ids or () if log_id not in self._entries]
+        first, last = (missing[0], missing[-1]) if missing else (0, ALL_LOGS)
+        self._outbox.append(mavlink.MAVLink_log_request_list_message(*self.vehicle, first, last))
+        self._retry_s = now_s + RETRY_S
+
+    # -- download
+
+    def _on_data(self, file: Missing, message: Message, now_s: float) -> None:
+        data = bytes(message.data[: min(message.count, BLOCK)])
+        if not data and message.ofs < file.size:
+            self._end(LogFailed("the vehicle cannot read the log, or it became shorter"))
+            return
+        if file.fill(message.ofs, data):
+            self._progress_s = now_s
+        self._retry_s = now_s + RETRY_S
+        if not file.left:
+            self._end(LogDone(content=bytes(file.content)))
+        elif message.ofs + len(data) >= self._asked_end:
+            self._ask_for_data(file, now_s)
+
+    def _ask_for_data(self, file: Missing, now_s: float) -> None:
+        first = file.first
+        end = min(first + WINDOW, file.size)
+        if file.within(first, end) > FEW * BLOCK:
+            pieces = [(first, end - first)]
+        else:
+            pieces = list(itertools.islice(file.pieces(BLOCK), MAX_REQUESTS))
+        self._asked_end = pieces[-1][0] + pieces[-1][1]
+        for offset, count in pieces:
+            request = mavlink.MAVLink_log_request_data_message(*self.vehicle, self._log_id, offset, count)
+            self._outbox.append(request)
+        self._retry_s = now_s + RETRY_S
+
+    # -- the rest
+
+    def _start(self) -> None:
+        self.cancel()
+        self.result, self._file, self._retry_s = None, None, -math.inf
+        self._progress_s = math.inf
+
+    def _end(self, result: LogDone | LogFailed) -> None:
+        self.result, self._retry_s = result, None
+        self._outbox.append(mavlink.MAVLink_log_request_end_message(*self.vehicle))

@@ -1,0 +1,163 @@
+"""The ground station's side of the mission protocol, without I/O.
+
+``start_…`` begins an operation, ``poll`` returns what to send, ``receive`` takes what came, and ``result``
+says how it ended. One operation at a time; a new ``start_…`` cancels the one under way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from flightstack.mavlink.addressing import Address, is_for, is_from
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.mission_messages import DEFAULT_TIMING, Timing
+from flightstack.plan.item import MissionItem
+from flightstack.plan.vocabulary import MissionResult, MissionType
+from gcs_cli.clients.mission_operations import Clear, Done, Failed, Operation, SetCurrent
+from gcs_cli.clients.mission_transfers import Download, Upload
+
+__all__ = ["Done", "Failed", "MissionClient"]
+
+_ADDRESSED = frozenset(
+    {
+        "MISSION_ACK",
+        "MISSION_COUNT",
+        "MISSION_ITEM",
+        "MISSION_ITEM_INT",
+        "MISSION_REQUEST",
+        "MISSION_REQUEST_INT",
+    }
+)
+
+
+class MissionClient:
+    """Uploads, downloads, clears and sets the current item of one mission type on one vehicle."""
+
+    def __init__(
+        self,
+        vehicle: Address,
+        own: Address,
+        mission_type: MissionType = MissionType.MISSION,
+        timing: Timing = DEFAULT_TIMING,
+    ) -> None:
+        self.vehicle = vehicle
+        self.own = own
+        self.mission_type = mission_type
+        self._timing = timing
+        self._operation: Operation | None = None
+        self._outbox: list[Message] = []
+        self._deadline_s: float | None = None
+        self._give_up_s = math.inf
+        self._sends_left = 0
+        self._is_settling = False
+        self._busy_s = -math.inf  # when a message of the protocol was last sent or taken
+
+    def start_upload(self, items: Sequence[MissionItem]) -> None:
+        """Replace the vehicle's mission by ``items``; no items clear it."""
+        self._start(Upload(self.vehicle, self.mission_type, items))
+
+    def start_download(self) -> None:
+        """Fetch the vehicle's mission."""
+        self._start(Download(self.vehicle, self.mission_type))
+
+    def start_clear(self) -> None:
+        """Remove the vehicle's mission."""
+        self._start(Clear(self.vehicle, self.mission_type))
+
+    def start_set_current(self, seq: int) -> None:
+        """Make ``seq`` (0 to 65535) the item that the vehicle flies next."""
+        self._start(SetCurrent(self.vehicle, self.mission_type, seq))
+
+    def cancel(self) -> None:
+        """Give up the operation under way, and say so to the vehicle."""
+        if self._operation is not None and self._operation.result is None:
+            self._outbox.clear()
+            self._give_up(self._operation, "the operation was cancelled")
+
+    @property
+    def result(self) -> Done | Failed | None:
+        """How the operation ended; None while it is under way."""
+        return self._operation.result if self._operation else None
+
+    @property
+    def plan_id(self) -> int:
+        """MAVLink's opaque id of the plan that was uploaded or downloaded; 0 if the vehicle gives none."""
+        return self._operation.plan_id if self._operation else 0
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Items transferred, and items in all (0 before the count is known)."""
+        return self._operation.progress if self._operation else (0, 0)
+
+    def receive(self, message: Message, now_s: float) -> None:
+        """Take a message from the vehicle's link; what is not for this operation is ignored."""
+        operation = self._operation
+        kind = message.get_type()
+        if operation is None or not is_from(message, self.vehicle):
+            return
+        if kind in _ADDRESSED:
+            if not is_for(message, self.own) or message.mission_type != self.mission_type:
+                return
+        elif kind != "MISSION_CURRENT":
+            return
+        self._busy_s = now_s
+        if self._is_settling:
+            self._receive_early(kind, now_s)
+            return
+        self._outbox += operation.receive(message)
+        if operation.result is not None:
+            self._deadline_s = None
+        elif operation.moved:
+            operation.moved = False
+            self._sends_left = self._timing.retries
+            self._wait(operation, now_s)
+            self._give_up_s = now_s + self._timing.silence_s
+
+    def poll(self, now_s: float) -> list[Message]:
+        """Return the messages to send now."""
+        operation = self._operation
+        if operation is not None and self._deadline_s is not None and now_s >= self._deadline_s:
+            is_over = now_s >= self._give_up_s if operation.waits_for_item else self._sends_left == 0
+            if is_over:
+                self._give_up(operation, f"the vehicle (system {self.vehicle.system}) {operation.silence()}")
+            else:
+                self._is_settling = False
+                self._sends_left -= 1
+                self._outbox.append(operation.request)
+                self._wait(operation, now_s)
+        outbox, self._outbox = self._outbox, []
+        if outbox:
+            self._busy_s = now_s
+        return outbox
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        return -math.inf if self._outbox else self._deadline_s
+
+    def _start(self, operation: Operation) -> None:
+        self.cancel()
+        before, self._operation = self._operation, operation
+        self._deadline_s = -math.inf  # the first poll sends the request and starts the clock
+        quiet_s = operation.quiet_after(before, self._timing) if before is not None else 0.0
+        if quiet_s > 0.0:
+            self._deadline_s = self._busy_s + quiet_s
+        self._is_settling = quiet_s > 0.0
+        self._sends_left = self._timing.retries + 1
+
+    def _receive_early(self, kind: str, now_s: float) -> None:
+        """Take a message of the operation before: a vehicle that still asks for items is told to stop."""
+        if self._operation is not None and kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+            self._outbox.append(self._operation.ack(MissionResult.OPERATION_CANCELLED))
+            if self._deadline_s is not None:
+                self._deadline_s = now_s + self._timing.silence_s + self._timing.settle_s
+
+    def _wait(self, operation: Operation, now_s: float) -> None:
+        timing = self._timing
+        self._deadline_s = now_s + (timing.item_timeout_s if operation.waits_for_item else timing.timeout_s)
+
+    def _give_up(self, operation: Operation, reason: str) -> None:
+        if operation.is_transfer:
+            self._outbox.append(operation.ack(MissionResult.OPERATION_CANCELLED))
+        operation.result = Failed(reason, MissionResult.OPERATION_CANCELLED)
+        self._deadline_s = None

@@ -1,0 +1,149 @@
+"""Upload and download, as a mission client does them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.mission_messages import item_from_message, message_from_item
+from flightstack.plan.item import MissionItem
+from flightstack.plan.vocabulary import MissionResult
+from gcs_cli.clients.mission_operations import Done, Failed, Operation
+
+
+class Upload(Operation):
+    """Announces the items, then serves them as the vehicle asks, in any order and as often as it asks."""
+
+    def __init__(self, vehicle: Address, mission_type: int, items: Sequence[MissionItem]) -> None:
+        announced = min(
+            len(items), 0xFFFF
+        )  # of more than the field holds, so many: a vehicle refuses them all
+        count = mavlink.MAVLink_mission_count_message(*vehicle, announced, mission_type)
+        super().__init__(vehicle, mission_type, count)
+        self._items = tuple(items)
+        self._count_message = count
+        self._is_serving = False
+        self._last_sent_seq = -1
+        self.may_be_open = True
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Items transferred, and items in all."""
+        return self._last_sent_seq + 1, len(self._items)
+
+    def silence(self) -> str:
+        """Return what the vehicle failed to do."""
+        done, count = self.progress
+        if not self._is_serving:
+            return "did not answer the announcement of the upload"
+        return f"did not ask for item {done} of {count}" if done < count else "did not confirm the upload"
+
+    def receive(self, message: Message) -> list[Message]:
+        """Take the vehicle's message, and return the answers to it."""
+        kind = message.get_type()
+        if kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+            return self._on_request(message.seq)
+        if kind == "MISSION_ACK" and self.result is None:
+            self._on_ack(message.type, message.opaque_id)
+        return []
+
+    def _on_request(self, seq: int) -> list[Message]:
+        # After success, too: should the acceptance have been a late copy of one before, this still completes.
+        if isinstance(self.result, Failed):
+            return [self.ack(MissionResult.OPERATION_CANCELLED)]
+        if not self._is_serving and (seq != 0 or not self._items):
+            # A request left over from an upload before this one: an item now would mix two missions.
+            return [self._count_message]
+        if seq >= len(self._items):
+            if self.result is None:
+                reason = f"the vehicle asked for item {seq} of a mission of {len(self._items)}"
+                self.result = Failed(reason, MissionResult.INVALID_SEQUENCE, seq)
+            return [self.ack(MissionResult.INVALID_SEQUENCE)]
+        self._is_serving = True
+        self._last_sent_seq = max(self._last_sent_seq, seq)
+        self.may_be_open = self._last_sent_seq < 1
+        # Integers even to the deprecated MISSION_REQUEST, as the specification says. The item is also what is
+        # sent again in silence: a vehicle answers a repeated last item with the MISSION_ACK that got lost.
+        self.request = message_from_item(
+            self._items[seq], seq, self.vehicle, self.mission_type, is_current=seq == 0
+        )
+        self.moved = True
+        return [self.request]
+
+    def _on_ack(self, result: int, plan_id: int) -> None:
+        is_whole = self._last_sent_seq == len(self._items) - 1
+        if result != MissionResult.ACCEPTED:
+            self.refused(result, None if is_whole or not self._is_serving else self._last_sent_seq)
+        elif is_whole:
+            self.plan_id = plan_id
+            self.result = Done(self._items)
+        elif self._is_serving:
+            # The end of an upload before this one: begin again, so that this one ends whole.
+            self._is_serving, self._last_sent_seq = False, -1
+            self.request = self._count_message
+
+
+class Download(Operation):
+    """Asks for the count, then for each item in turn."""
+
+    only_reads = True
+
+    def __init__(self, vehicle: Address, mission_type: int) -> None:
+        request = mavlink.MAVLink_mission_request_list_message(*vehicle, mission_type)
+        super().__init__(vehicle, mission_type, request)
+        self._items: list[MissionItem] = []
+        self._count = 0
+        self._asked_early = False
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Items transferred, and items in all."""
+        return len(self._items), self._count
+
+    def silence(self) -> str:
+        """Return what the vehicle failed to do."""
+        if not self.waits_for_item:
+            return "did not answer the request for its mission"
+        return f"did not send item {len(self._items)} of {self._count}"
+
+    def receive(self, message: Message) -> list[Message]:
+        """Take the vehicle's message, and return the answers to it."""
+        kind = message.get_type()
+        if self.result is not None:
+            return []
+        if kind == "MISSION_COUNT" and self._is_news(message):
+            self._items, self._count = [], message.count
+            self.plan_id = message.opaque_id
+            self.waits_for_item = True
+            return self._ask_next_item()
+        if kind in ("MISSION_ITEM", "MISSION_ITEM_INT") and self.waits_for_item:
+            return self._on_item(message)
+        if kind == "MISSION_ACK" and message.type != MissionResult.ACCEPTED:
+            self.refused(message.type, len(self._items) if self.waits_for_item else None)
+        return []
+
+    def _is_news(self, message: Message) -> bool:
+        """Tell a count from a late copy: another plan than the one half across begins again."""
+        known = (self._count, self.plan_id)
+        return not self.waits_for_item or (message.count, message.opaque_id) != known
+
+    def _on_item(self, message: Message) -> list[Message]:
+        if message.seq == len(self._items):
+            self._items.append(item_from_message(message))
+            return self._ask_next_item()
+        if message.seq > len(self._items) and not self._asked_early:
+            self._asked_early = True  # once only, or duplicates would multiply
+            return [self.request]
+        return []  # a copy of what we have
+
+    def _ask_next_item(self) -> list[Message]:
+        seq = len(self._items)
+        self.moved = True
+        self._asked_early = False
+        if seq == self._count:
+            self.result = Done(tuple(self._items))
+            return [self.ack(MissionResult.ACCEPTED)]
+        self.request = mavlink.MAVLink_mission_request_int_message(*self.vehicle, seq, self.mission_type)
+        return [self.request]

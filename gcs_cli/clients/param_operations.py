@@ -1,0 +1,217 @@
+"""What the client of the parameter protocol can be busy with: one parameter, or all of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol, TypeAlias
+
+from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.param_values import (
+    HASH_NAME,
+    LARGEST_INTEGER,
+    Parameter,
+    parse_value,
+    type_of,
+    wire_value,
+)
+from flightstack.plan.item import as_float32
+
+_REASONS = {
+    1: "the vehicle has no such parameter",
+    2: "the value is outside the parameter's range",
+    3: "the vehicle does not permit it",
+    4: "the vehicle has no such component",
+    5: "the parameter is read-only",
+    6: "the vehicle does not support the type of the value",
+    7: "the type of the value is not the parameter's",
+    8: "the vehicle could not read the parameter",
+}
+"""MAV_PARAM_ERROR in words."""
+
+
+class ParamTiming(NamedTuple):
+    """Waits of the protocol [s of whatever clock drives it]."""
+
+    timeout_s: float = 0.5
+    """Before a request is sent again."""
+    quiet_s: float = 0.2
+    """Silence in a list after which the missing parameters are asked for."""
+    retries: int = 20
+    """Repetitions without any progress."""
+    window: int = 20
+    """Missing parameters asked for at once."""
+
+
+class ParamDone(NamedTuple):
+    """What the vehicle told: the one parameter, or all in the order of their index."""
+
+    parameters: tuple[Parameter, ...]
+
+
+class ParamFailed(NamedTuple):
+    """Why an operation failed, in one sentence."""
+
+    reason: str
+    error: int | None
+    """The vehicle's MAV_PARAM_ERROR; None when it gave none."""
+    silent: bool
+    """Whether the vehicle did not answer."""
+
+
+ParamResult: TypeAlias = ParamDone | ParamFailed
+DEFAULT_TIMING = ParamTiming()
+
+
+class Operation(Protocol):
+    """What an operation does with messages; the client does the waiting."""
+
+    result: ParamResult | None
+
+    @property
+    def wait_s(self) -> float:
+        """How long to wait now for the next message."""
+        ...
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Parameters received, and those in all (0 before that is known)."""
+        ...
+
+    def requests(self) -> list[Message]:
+        """Return what to ask now; each call is an attempt."""
+        ...
+
+    def receive(self, message: Message) -> bool:
+        """Take a PARAM_VALUE or PARAM_ERROR; return whether it brought the operation on."""
+        ...
+
+    def silence(self) -> ParamFailed:
+        """Return how the operation ends when nothing comes any more."""
+        ...
+
+
+class ReadOrSet:
+    """Reads one parameter, and then sets it if there is a value to set."""
+
+    def __init__(self, vehicle: Address, timing: ParamTiming, name: str, wanted: float | None) -> None:
+        self.result: ParamResult | None = None
+        self.wait_s = timing.timeout_s
+        self._timeout_s = timing.timeout_s
+        self._vehicle, self._name, self._wanted = vehicle, name, wanted
+        self._found: Parameter | None = None
+        self._is_asked = False
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Parameters received, and those in all (0 before that is known)."""
+        return int(self.result is not None), 1
+
+    def requests(self) -> list[Message]:
+        """Return what to ask now."""
+        self._is_asked = True
+        self.wait_s = self._timeout_s
+        name = self._name.encode("ascii", errors="replace")[:16]
+        if self._found is None:
+            return [mavlink.MAVLink_param_request_read_message(*self._vehicle, name, -1)]
+        is_integer = self._found.is_integer
+        assert self._wanted is not None  # without a value to set, what was found is the result
+        value = wire_value(as_float32(self._wanted) if not is_integer else self._wanted, is_integer)
+        return [mavlink.MAVLink_param_set_message(*self._vehicle, name, value, type_of(is_integer))]
+
+    def receive(self, message: Message) -> bool:
+        """Take a PARAM_VALUE or PARAM_ERROR; return whether it brought the operation on."""
+        if message.param_id != self._name or not self._is_asked:
+            return False
+        if message.get_type() == "PARAM_ERROR":
+            reason = _REASONS.get(message.error, f"the vehicle answered error {message.error}")
+            self.result = ParamFailed(reason, message.error, False)
+            return True
+        told = parse_value(message)
+        if told is None:
+            self.result = ParamFailed(f"its type {message.param_type} is not supported", None, False)
+        elif self._wanted is None or self._is_confirmed(told):
+            self.result = ParamDone((told,))
+        else:
+            return self._find(told, self._wanted)
+        return True
+
+    def _is_confirmed(self, told: Parameter) -> bool:
+        """Tell whether the parameter has the wanted value. (If it had so before, there is nothing to do.)"""
+        return self._wanted is not None and as_float32(told.value) == as_float32(self._wanted)
+
+    def _find(self, told: Parameter, wanted: float) -> bool:
+        """Note the type. A value that is still another may be an old message: the vehicle is asked again."""
+        is_first, self._found = self._found is None, told
+        if told.is_integer and not (wanted.is_integer() and abs(wanted) <= LARGEST_INTEGER):
+            self.result = ParamFailed("the parameter is an integer", None, False)
+            return True
+        if is_first:
+            self.wait_s = 0.0  # set it at once
+        return is_first
+
+    def silence(self) -> ParamFailed:
+        """Return how the operation ends when nothing comes any more."""
+        if self._found is not None:
+            return ParamFailed(f"the vehicle keeps {self._found.value:g}", None, False)
+        return ParamFailed(
+            f"the vehicle (system {self._vehicle.system}) did not answer about {self._name}", None, True
+        )
+
+
+class ListAll:
+    """Reads all parameters; those that got lost are asked for by index."""
+
+    def __init__(self, vehicle: Address, timing: ParamTiming) -> None:
+        self.result: ParamResult | None = None
+        self._vehicle, self._timing = vehicle, timing
+        self._count = 0
+        self._got: dict[int, Parameter] = {}
+        self._is_asked = False
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Parameters received, and those in all (0 before that is known)."""
+        return len(self._got), self._count
+
+    @property
+    def wait_s(self) -> float:
+        """How long to wait now for the next message."""
+        return self._timing.quiet_s if self._count else self._timing.timeout_s
+
+    def requests(self) -> list[Message]:
+        """Return what to ask now."""
+        self._is_asked = True
+        if not self._count:
+            return [mavlink.MAVLink_param_request_list_message(*self._vehicle)]
+        missing = [index for index in range(self._count) if index not in self._got]
+        return [
+            mavlink.MAVLink_param_request_read_message(*self._vehicle, b"", index)
+            for index in missing[: self._timing.window]
+        ]
+
+    def receive(self, message: Message) -> bool:
+        """Take a PARAM_VALUE or PARAM_ERROR; return whether it brought the operation on."""
+        if message.get_type() != "PARAM_VALUE" or not self._is_asked:
+            return False
+        if message.param_count != self._count:  # the first message, or the vehicle is another one now
+            self._count = message.param_count
+            self._got.clear()
+        told = parse_value(message)
+        if told is None or message.param_id == HASH_NAME or told.place >= self._count:
+            return False
+        is_new = told.place not in self._got
+        self._got[told.place] = told
+        if len(self._got) == self._count:
+            self.result = ParamDone(tuple(self._got[index] for index in range(self._count)))
+        return is_new
+
+    def silence(self) -> ParamFailed:
+        """Return how the operation ends when nothing comes any more."""
+        system = f"the vehicle (system {self._vehicle.system})"
+        if not self._count:
+            return ParamFailed(f"{system} did not send its parameters", None, True)
+        missing = self._count - len(self._got)
+        return ParamFailed(
+            f"{system} did not send {missing} of {self._count} parameters", None, not self._got
+        )

@@ -1,0 +1,1 @@
+"""Experiments that fly plant and loops in one process."""

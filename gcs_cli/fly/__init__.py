@@ -1,0 +1,1 @@
+"""``gcs fly``: simulator and flight stack started, a mission flown and watched."""

@@ -1,0 +1,196 @@
+"""What ``gcs fly`` shows while it flies: a bar on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, Protocol
+
+from rich.console import Console, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.spinner import Spinner
+from rich.table import Table
+from rich.text import Text
+
+from flightstack.process.console import drop
+from gcs_cli.fly.flight import Flight, Phase
+from gcs_cli.tui.watch_lines import text_line
+from gcs_cli.vehicle.view_types import StatusText
+
+_FRAME_S = 0.1
+_WITH_BAR, _WITH_PLACE = 60, 90  # columns of the terminal
+_WARNING = 4  # MAV_SEVERITY_WARNING
+
+
+class FlyConsole(Console):
+    """A console whose broken pipe or full disk does not end the flight: the rest is not printed."""
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print; an output that cannot be written gets no more."""
+        try:
+            super().print(*objects, **options)
+        except OSError:
+            self.on_broken_pipe()
+
+    def on_broken_pipe(self) -> None:
+        """Send what is still to be printed nowhere."""
+        self.quiet = True
+        drop(self.file)
+
+
+class Display(Protocol):
+    """Shows the course of a flight."""
+
+    def update(self, flight: Flight) -> None:
+        """Show how the flight stands."""
+
+    def note(self, line: str) -> None:
+        """Show a warning, or progress, of simulator or flight stack."""
+
+    def close(self) -> None:
+        """Leave the terminal as it was."""
+
+
+def make_display(console: Console) -> Display:
+    """Return the display that fits where ``console`` writes to."""
+    return BarDisplay(console) if draws_bars(console) else LineDisplay(console)
+
+
+def draws_bars(console: Console) -> bool:
+    """Tell whether ``console`` writes to a terminal that can draw a line anew."""
+    return console.is_terminal and not console.is_dumb_terminal
+
+
+class _NewTexts:
+    """Status texts not shown yet; what the vehicle says of being shut down early is of no use to anybody."""
+
+    def __init__(self) -> None:
+        self._seen = 0
+        self._ended = False
+
+    def of(self, flight: Flight) -> tuple[StatusText, ...]:
+        """Return them, once each."""
+        new = () if self._ended else flight.view.texts_since(self._seen)
+        self._seen = flight.view.text_count
+        self._ended = flight.outcome is not None
+        return new
+
+
+class BarDisplay:
+    """One live line: phase, waypoint, position, real-time factor."""
+
+    def __init__(self, console: Console) -> None:
+        self._live = Live(console=console, auto_refresh=False, transient=True)
+        self._live.start()
+        self._spinner = Spinner("dots")
+        self._due_s = 0.0
+        self._texts = _NewTexts()
+
+    def update(self, flight: Flight) -> None:
+        """Redraw, at most ten times a second."""
+        for entry in self._texts.of(flight):
+            if entry.severity <= _WARNING:
+                self._live.console.print(Text(text_line(entry), style="yellow"))
+        now_s = time.monotonic()
+        if now_s >= self._due_s:
+            self._due_s = now_s + _FRAME_S
+            width = self._live.console.width
+            self._live.update(progress(flight, now_s, self._spinner, width), refresh=True)
+
+    def note(self, line: str) -> None:
+        """Print it above the live line."""
+        self._live.console.print(Text(line, style="yellow"), soft_wrap=True)
+
+    def close(self) -> None:
+        """Remove the line."""
+        self._live.stop()
+
+
+class LineDisplay:
+    """A line for each change of phase, mode or item, and for each status text."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._before = ""
+        self._texts = _NewTexts()
+
+    def update(self, flight: Flight) -> None:
+        """Print what is new."""
+        for entry in self._texts.of(flight):
+            self._print(text_line(entry))
+        words = f"{phase_words(flight)}{item_words(flight)}"
+        if words != self._before:
+            self._before = words
+            self._print("  ".join(part for part in (words, place_words(flight), speed_words(flight)) if part))
+
+    def note(self, line: str) -> None:
+        """Print it."""
+        self._print(line)
+
+    def _print(self, text: str) -> None:
+        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+
+def progress(flight: Flight, now_s: float, spinner: Spinner, width: int) -> RenderableType:
+    """Return the live line; a narrow terminal shows the first of its parts, whole."""
+    done, total = _share(flight)
+    bar = ProgressBar(total=max(1, total), completed=done, complete_style="green")
+    item = Text(item_words(flight).strip(), style="bold")
+    parts: list[RenderableType] = [spinner.render(now_s), Text(phase_words(flight), style="bold cyan")]
+    if width >= _WITH_BAR:
+        parts.append(bar)
+    parts.append(item)
+    if width >= _WITH_PLACE:
+        parts.append(Text(place_words(flight)))
+    parts.append(Text(speed_words(flight), style="cyan"))
+    grid = Table.grid(padding=(0, 1), expand=True)
+    for part in parts:
+        grid.add_column(no_wrap=True, ratio=1 if part is bar else None)
+    grid.add_row(*parts)
+    return grid
+
+
+def _share(flight: Flight) -> tuple[float, float]:
+    if flight.phase is Phase.UPLOAD:
+        return flight.upload_progress
+    mission = flight.view.mission
+    total = mission.total or 0
+    if flight.phase is not Phase.FLY:
+        return (total, total) if flight.began_s is not None else (0, total)
+    return (total if mission.complete else mission.current or 0), total
+
+
+def phase_words(flight: Flight) -> str:
+    """Say what is going on: the mode in flight, else the phase."""
+    if flight.over and flight.outcome is not None and not flight.outcome.completed:
+        return "flight ended"
+    return flight.view.mode or "flying" if flight.phase is Phase.FLY else flight.phase.value
+
+
+def item_words(flight: Flight) -> str:
+    """Say which item is flown."""
+    mission = flight.view.mission
+    if flight.phase is not Phase.FLY or mission.current is None or not mission.total or mission.complete:
+        return ""
+    return f"  item {mission.current}/{mission.total - 1}"
+
+
+def place_words(flight: Flight) -> str:
+    """Say where the vehicle is."""
+    position = flight.view.position_ned_m
+    if flight.phase is not Phase.FLY or position is None:
+        return ""
+    north, east, up = (round(value, 1) + 0.0 for value in (position.x, position.y, -position.z))  # no -0.0
+    return f"N {north:+6.1f} E {east:+6.1f} up {up:5.1f} m"
+
+
+def speed_words(flight: Flight) -> str:
+    """Say how long it has flown in simulated time, and how fast that passes."""
+    if flight.phase is not Phase.FLY or flight.flown_s is None:
+        return ""
+    words = f"t {flight.flown_s:6.1f} s"
+    factor = flight.real_time_factor
+    return words if factor is None else f"{words} ×{factor:5.1f}"

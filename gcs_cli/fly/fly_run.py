@@ -1,0 +1,203 @@
+"""A whole flight: ports, directory, children, mission, and what is left of it in files."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from flightstack.core.port_numbers import vehicle_ground_port
+from flightstack.params.vehicle import NO_DRAG_PLANT
+from flightstack.plan import Plan
+from flightstack.process.console import complain
+from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError
+from gcs_cli.fly.flight import Flight
+from gcs_cli.fly.flight_watch import STALL_S
+from gcs_cli.fly.fly_display import Display
+from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_options import (
+    check_ports,
+    flown_vehicle,
+    home_of,
+    longest_flight_s,
+    simulator_arguments,
+    stack_arguments,
+)
+from gcs_cli.fly.interruption import Interruption
+from gcs_cli.fly.processes import Child, Children
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.endpoint import LOOPBACK, Endpoint
+from gcs_cli.link.tlog_file import TlogFile
+from gcs_cli.report.flight_outcome import Code, Outcome
+from gcs_cli.report.run_directory import (
+    LOG_NAME,
+    REPORT_NAME,
+    SIMULATOR,
+    STACK,
+    SUMMARY_NAME,
+    TLOG_NAME,
+    make_run_directory,
+)
+
+_STEP_S = 0.1
+_END_PATIENCE_S = 10.0
+
+
+class Flown(NamedTuple):
+    """A flight that is over."""
+
+    folder: Path
+    outcome: Outcome
+    wall_time_s: float | None
+    overruns: int | None
+    returned_by_us: bool
+
+
+def fly(
+    options: FlyOptions, plan: Plan, out: Path | None, display: Display, overwrite: bool = False
+) -> Flown:
+    """Fly ``plan`` with children of our own; raise CliError when nothing could be started.
+
+    The vehicle calls us at a port of our own, so that other ground stations may hold the usual one.
+    """
+    vehicle = (LOOPBACK, vehicle_ground_port(options.instance))
+    own_port = Endpoint(LOOPBACK, 0, listens=True)
+    with Interruption() as interruption, Connection(own_port, vehicle=vehicle) as connection:
+        check_ports(options)
+        folder = make_run_directory(options.plan_path, out, overwrite=overwrite)
+        flight = Flight(
+            connection.session,
+            plan,
+            connection.now_s,
+            options.timeout_s,
+            longest_flight_s(options, plan),
+            STALL_S / min(1.0, options.speed_factor),
+        )
+        with _recording(connection, folder), Children(folder) as children:
+            home = home_of(options, plan)
+            children.start(SIMULATOR, "sim_bridge", simulator_arguments(options, home))
+            told = stack_arguments(options, home, folder, connection.local_port)
+            children.start(STACK, "flightstack", told)
+            _run(flight, connection, children, interruption, display)
+            if flight.shut_down_accepted:
+                children.wait(_END_PATIENCE_S)
+            _show_notices(children, display)
+    assert flight.outcome is not None
+    wall_time_s = None
+    if flight.began_s is not None and flight.ended_s is not None:
+        wall_time_s = flight.ended_s - flight.began_s
+    timing = flight.view.timing
+    overruns = None if timing is None else timing.overruns
+    return Flown(folder, flight.outcome, wall_time_s, overruns, flight.returned_by_us)
+
+
+@contextmanager
+def _recording(connection: Connection, folder: Path) -> Iterator[None]:
+    """Record the session's frames in the directory of the flight."""
+    with TlogFile(folder / TLOG_NAME) as tlog:
+        connection.session.record = lambda frame: tlog.write(time.time_ns() // 1000, frame)
+        try:
+            yield
+        finally:
+            connection.session.record = None
+            if tlog.error is not None:
+                reason = tlog.error.strerror or tlog.error
+                complain(f"gcs: the telemetry log {folder / TLOG_NAME} ends early: {reason}")
+
+
+def _run(
+    flight: Flight, connection: Connection, children: Children, interruption: Interruption, display: Display
+) -> None:
+    while not flight.over:
+        if flight.outcome is not None and children.wait(0.0):
+            return  # nobody is left who could be shut down
+        now_s = connection.now_s
+        if interruption.reason:
+            flight.abort(Outcome(Code.INTERRUPTED, interruption.reason), now_s)
+        casualty = _casualty(flight, children)
+        if casualty is not None:
+            code = casualty.exit_code if casualty.exit_code in (USAGE, NO_ANSWER) else FAILED
+            gone = any(child.name == STACK for child in children.ended())
+            flight.abort(Outcome(Code.PROCESS_ENDED, casualty.obituary, code), now_s, vehicle_is_gone=gone)
+        _show_notices(children, display)
+        flight.step(now_s)
+        display.update(flight)
+        if not flight.over:
+            connection.step(now_s + _STEP_S)
+
+
+def _show_notices(children: Children, display: Display) -> None:
+    for line in children.notices():
+        display.note(line)
+
+
+def _casualty(flight: Flight, children: Children) -> Child | None:
+    """Return the child that ended first and took the other along, while there is a flight to end.
+
+    Who said goodbye, or lost the other, has that one's exit still to come: it is what tells.
+    """
+    if flight.outcome is not None or not (children.ended() or flight.view.powered_off):
+        return None
+    return children.culprit(_END_PATIENCE_S)
+
+
+def _drag_of(options: FlyOptions) -> tuple[float, float, float]:
+    return (0.0, 0.0, 0.0) if options.plant == NO_DRAG_PLANT else flown_vehicle(options).linear_drag_n_s_m
+
+
+def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:
+    """Write summary and report; return the summary, and the outcome with what writing them showed."""
+    from flightstack.core.errors import ConfigError  # noqa: PLC0415
+    from gcs_cli.report.analysis import read_flight  # noqa: PLC0415
+    from gcs_cli.report.flight_data import Flight as FlightData  # noqa: PLC0415
+    from gcs_cli.report.flight_outcome import with_log  # noqa: PLC0415
+    from gcs_cli.report.page import write_report  # noqa: PLC0415
+    from gcs_cli.report.summary import RunInfo, summarise, write_summary  # noqa: PLC0415
+
+    log, outcome = flown.folder / LOG_NAME, flown.outcome
+    try:
+        data = read_flight(log)
+    except (ConfigError, OSError) as error:
+        data = FlightData()
+        if outcome.completed:
+            outcome = Outcome(Code.NO_LOG, f"the mission was flown, but its log cannot be read: {error}")
+    else:
+        outcome = with_log(outcome, data, plan.items)
+    run = RunInfo(
+        outcome=outcome.code.value,
+        outcome_text=outcome.reason,
+        plan=str(options.plan_path),
+        wall_time_s=flown.wall_time_s,
+        vehicle=options.vehicle,
+        controller=options.controller,
+        gains=options.gains,
+        plant=options.plant,
+        loops=options.loops,
+        seed=options.seed,
+        wind=options.wind,
+        gust=options.gust,
+        drag_n_s_m=_drag_of(options),
+        torque_gust=options.torque_gust,
+        force=options.force,
+        torque=options.torque,
+        battery_start=options.battery_start,
+        battery_capacity=options.battery_capacity,
+        battery_drain=options.battery_drain,
+        faults=tuple(options.faults or ()),
+        ideal_rotors=options.ideal_rotors,
+        params=None if options.params is None else str(options.params),
+        param=tuple(options.param or ()),
+        inner_hz=options.inner_hz,
+        outer_hz=options.outer_rate_hz,
+        overruns=flown.overruns,
+        log_path=log,
+    )
+    summary = summarise(data, plan, run)
+    try:
+        write_summary(flown.folder / SUMMARY_NAME, summary)
+        write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
+    except OSError as error:
+        raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
+    return summary, outcome

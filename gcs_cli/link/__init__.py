@@ -1,0 +1,1 @@
+"""The link to the vehicle: endpoint, session, requests and recording."""

@@ -1,0 +1,181 @@
+"""One request to the vehicle and its answer, with the vehicle's own words when it refuses. Without I/O."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, TypeAlias
+
+from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
+from flightstack.plan import MissionItem, MissionResult, MissionType
+from gcs_cli.clients.command_client import CommandClient, CommandResult
+from gcs_cli.clients.mission_client import Done, Failed, MissionClient
+from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID, Session
+
+TEXT_WAIT_S = 0.3
+"""How long to wait for the text that explains a refusal: it comes right after the answer."""
+
+_WARNING = 4  # MAV_SEVERITY_WARNING; lower is worse
+_PREFIXES = (
+    "Command refused: ",
+    "Mission refused: ",
+    "Geofence refused: ",
+    "List of rally points refused: ",
+)
+
+
+class Answer(NamedTuple):
+    """How a request ended."""
+
+    accepted: bool
+    reason: str = ""
+    """Why not, in the vehicle's words if it gave any."""
+    silent: bool = False
+    """Whether the vehicle did not answer at all."""
+    cancelled: bool = False
+    """Whether the ground station ended it."""
+    items: tuple[MissionItem, ...] = ()
+    """The plan, of a download."""
+    result: int = MissionResult.ACCEPTED
+    """The MAV_MISSION_RESULT of a transfer."""
+
+
+class Request(Protocol):
+    """A request under way, or several in a row."""
+
+    def answer(self, now_s: float) -> Answer | None:
+        """Return the answer once it is known."""
+
+
+class Call:
+    """A request under way. It takes over the session's service until it is answered."""
+
+    def __init__(self, session: Session, client: CommandClient | MissionClient) -> None:
+        self._session = session
+        self._client = client
+        self._texts_before = session.view.text_count
+        self._text_due_s: float | None = None
+        session.use(client)
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Items transferred and in all, of a mission transfer."""
+        return self._client.progress if isinstance(self._client, MissionClient) else (0, 0)
+
+    def answer(self, now_s: float) -> Answer | None:
+        """Return the answer once it is known."""
+        result = self._client.result
+        if result is None:
+            return None
+        if isinstance(result, Done):
+            return Answer(True, items=result.items)
+        if isinstance(result, CommandResult) and result.accepted:
+            return Answer(True)
+        silent = result.result is None or (
+            isinstance(result, Failed) and result.result == MissionResult.OPERATION_CANCELLED
+        )
+        if silent:
+            return Answer(False, result.reason, silent=True)
+        code = result.result if isinstance(result, Failed) else MissionResult.ACCEPTED
+        text = self._explanation()
+        if text:
+            return Answer(False, text, result=code)
+        if self._text_due_s is None:
+            self._text_due_s = now_s + TEXT_WAIT_S
+        return Answer(False, result.reason, result=code) if now_s >= self._text_due_s else None
+
+    def _explanation(self) -> str:
+        texts = [
+            entry.text
+            for entry in self._session.view.texts_since(self._texts_before)
+            if entry.severity <= _WARNING
+        ]
+        text = texts[-1] if texts else ""
+        for prefix in _PREFIXES:
+            text = text.removeprefix(prefix)
+        return text
+
+
+def command(session: Session, number: int, params: Sequence[float], now_s: float) -> Call:
+    """Begin a command; parameters left out are zero."""
+    client = CommandClient(_vehicle(session), Address(SYSTEM_ID, COMPONENT_ID))
+    client.send(number, params, now_s)
+    return Call(session, client)
+
+
+def upload(session: Session, items: Sequence[MissionItem], kind: MissionType = MissionType.MISSION) -> Call:
+    """Begin to upload a mission, geofence or rally points; without items they are cleared."""
+    client = mission_client(session, kind)
+    client.start_upload(items)
+    return Call(session, client)
+
+
+def download(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
+    """Begin to download the mission, geofence or rally points."""
+    client = mission_client(session, kind)
+    client.start_download()
+    return Call(session, client)
+
+
+def clear(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
+    """Begin to clear the mission, geofence, rally points or all."""
+    client = mission_client(session, kind)
+    client.start_clear()
+    return Call(session, client)
+
+
+def mission_client(session: Session, kind: MissionType) -> MissionClient:
+    """Return a client that transfers one type of plan."""
+    return MissionClient(_vehicle(session), Address(SYSTEM_ID, COMPONENT_ID), kind)
+
+
+def _vehicle(session: Session) -> Address:
+    return Address(*session.target)
+
+
+Command: TypeAlias = tuple[int, Sequence[float]]
+"""A MAV_CMD and its parameters."""
+
+NAN = math.nan
+ARM: Command = (int(mavlink.MAV_CMD_COMPONENT_ARM_DISARM), (1.0,))
+DISARM: Command = (int(mavlink.MAV_CMD_COMPONENT_ARM_DISARM), (0.0,))
+FORCE_DISARM: Command = (int(mavlink.MAV_CMD_COMPONENT_ARM_DISARM), (0.0, 21196.0))  # MAVLink's magic number
+LAND: Command = (int(mavlink.MAV_CMD_NAV_LAND), (0.0, 0.0, 0.0, NAN, NAN, NAN, NAN))
+RETURN: Command = (int(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH), ())
+START_MISSION: Command = (int(mavlink.MAV_CMD_MISSION_START), ())
+REBOOT: Command = (int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), (1.0,))
+SHUT_DOWN: Command = (int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), (2.0,))
+_REQUEST = int(mavlink.MAV_CMD_REQUEST_MESSAGE)
+REQUEST_MISSION_CURRENT: Command = (_REQUEST, (float(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT),))
+REQUEST_LOOP_TIMING: Command = (_REQUEST, (float(FS_LOOP_TIMING_ID),))
+REQUEST_SYS_STATUS: Command = (_REQUEST, (float(mavlink.MAVLINK_MSG_ID_SYS_STATUS),))
+
+
+def takeoff_command(altitude_amsl_m: float = NAN) -> Command:
+    """Return the command to take off to an altitude above sea level; NaN: as high as the vehicle likes."""
+    return int(mavlink.MAV_CMD_NAV_TAKEOFF), (0.0, 0.0, 0.0, NAN, NAN, NAN, altitude_amsl_m)
+
+
+def goto_command(latitude_deg: float, longitude_deg: float, altitude_amsl_m: float = NAN) -> Command:
+    """Return the command to hold at another place; an altitude that is NaN stays as it is."""
+    change_mode = float(mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
+    params = (-1.0, change_mode, 0.0, NAN, latitude_deg, longitude_deg, altitude_amsl_m)
+    return int(mavlink.MAV_CMD_DO_REPOSITION), params
+
+
+def speed_command(speed_m_s: float) -> Command:
+    """Return the command to fly at another ground speed."""
+    return int(mavlink.MAV_CMD_DO_CHANGE_SPEED), (1.0, speed_m_s, -1.0)
+
+
+def home_command(place: tuple[float, float, float] | None) -> Command:
+    """Return the command to move home to latitude, longitude, altitude above the sea; None: here."""
+    number = int(mavlink.MAV_CMD_DO_SET_HOME)
+    return (number, (1.0,)) if place is None else (number, (0.0, 0.0, 0.0, NAN, *place))
+
+
+def mode_command(main: int, sub: int) -> Command:
+    """Return the command that selects a PX4 mode."""
+    base = float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
+    return int(mavlink.MAV_CMD_DO_SET_MODE), (base, float(main), float(sub))

@@ -1,0 +1,157 @@
+"""One vehicle over one link, without I/O: datagrams in and out, heartbeats, the view and a service."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.signing import LinkSigning, without_signature
+from flightstack.transports.udp import Address
+from gcs_cli.link.subscription import Subscription
+from gcs_cli.vehicle.vehicle_view import update
+from gcs_cli.vehicle.view_types import VehicleView
+
+SYSTEM_ID = 255
+COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, the custom of ground stations
+HEARTBEAT_PERIOD_S = 1.0
+_ANYONE = 0
+_MOST_PEERS = 32
+
+
+class Service(Protocol):
+    """A client side of a MAVLink service: a state machine without I/O."""
+
+    def receive(self, message: Message, now_s: float) -> None:
+        """Take a message from the vehicle."""
+
+    def poll(self, now_s: float) -> list[Message]:
+        """Return what is to be sent now."""
+
+    def next_deadline(self) -> float | None:
+        """Return when ``poll`` has something to do at the latest."""
+
+
+class Session:
+    """The ground station's side of a link.
+
+    The first peer from which an autopilot's heartbeat comes is the vehicle; datagrams of others are dropped
+    unless that one has fallen silent. With ``peer``, only what comes from there is taken, and with ``system_id``,
+    only that vehicle. ``record`` gets every frame, sent and received, without its signature.
+    """
+
+    def __init__(
+        self,
+        peer: Address | None = None,
+        record: Callable[[bytes], None] | None = None,
+        signing: LinkSigning | None = None,
+        system_id: int | None = None,
+    ) -> None:
+        self.view = VehicleView()
+        self.peer = peer
+        self.foreign_systems: set[int] = set()
+        """System ids of vehicles that were heard and are not ours."""
+        self._only_peer = peer
+        self._system_id = system_id
+        self.bad = 0
+        self._links: dict[Address, Link] = {}
+        self._signing = signing
+        self._out = Link(SYSTEM_ID, COMPONENT_ID, signing=signing)
+        self.record = record
+        self._service: Service | None = None
+        self._heartbeat_due_s = 0.0
+
+    @property
+    def target(self) -> tuple[int, int]:
+        """System and component of the vehicle; (0, 0), everyone, before one is heard."""
+        identity = self.view.identity
+        return (_ANYONE, _ANYONE) if identity is None else (identity.system_id, identity.component_id)
+
+    def subscribe(self, rates_hz: Mapping[int, float]) -> None:
+        """Ask the vehicle for messages, id -> rate [Hz], until another service is used."""
+        self.use(Subscription(lambda: self.target, rates_hz))
+
+    def keep_vehicle(self) -> None:
+        """Take no other system for the vehicle from now on, however long this one is silent."""
+        assert self.view.identity is not None
+        self._system_id = self.view.identity.system_id
+
+    def use(self, service: Service | None) -> None:
+        """Let ``service`` talk to the vehicle from now on, in place of the one before."""
+        self._service = service
+
+    def receive(self, data: bytes, peer: Address, now_s: float) -> None:
+        """Take a datagram."""
+        if self._only_peer not in (None, peer):
+            return
+        heard = self.view.identity is not None and not self.view.lost(now_s)
+        if heard and peer != self.peer:
+            return
+        if len(self._links) > _MOST_PEERS:
+            self._links.clear()
+        link = self._links.setdefault(peer, Link(SYSTEM_ID, COMPONENT_ID, signing=self._signing))
+        bad_before = link.bad
+        for message in link.decode(data):
+            if link.is_authentic(message) and (heard or self._is_vehicle(message, peer, now_s)):
+                self._take(message, now_s)
+        self.bad += link.bad - bad_before
+
+    def _is_vehicle(self, message: Message, peer: Address, now_s: float) -> bool:
+        """Tell whether this is from our vehicle; while there is none, the heartbeat of a new one decides."""
+        if self.view.identity is not None and peer == self.peer and not self._is_other_system(message):
+            return True
+        candidate = VehicleView() if self._is_other_system(message) else self.view
+        if update(candidate, message, now_s).last_heartbeat_s != now_s:
+            return False
+        if self._system_id not in (None, message.get_srcSystem()):
+            self.foreign_systems.add(message.get_srcSystem())
+            return False
+        self.view, self.peer = candidate, peer
+        self._heartbeat_due_s = now_s
+        return True
+
+    def _is_other_system(self, message: Message) -> bool:
+        return (message.get_srcSystem(), message.get_srcComponent()) != self.target
+
+    def _take(self, message: Message, now_s: float) -> None:
+        if self.record is not None:
+            self.record(without_signature(bytes(message.get_msgbuf()), message.crc_extra))
+        self.view = update(self.view, message, now_s)
+        if self._service is not None and not self._is_other_system(message):
+            self._service.receive(message, now_s)
+
+    def poll(self, now_s: float) -> list[bytes]:
+        """Return the datagrams to send now to ``peer``."""
+        if self.peer is None:
+            return []
+        frames = []
+        if now_s >= self._heartbeat_due_s:
+            frames.append(self._encode(_heartbeat(mavlink.MAV_STATE_ACTIVE)))
+            self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
+        if self._service is not None:
+            frames += [self._encode(message) for message in self._service.poll(now_s)]
+        return frames
+
+    def next_deadline(self) -> float | None:
+        """Return when ``poll`` has something to do at the latest; None before there is anyone to talk to."""
+        if self.peer is None:
+            return None
+        service = None if self._service is None else self._service.next_deadline()
+        return self._heartbeat_due_s if service is None else min(self._heartbeat_due_s, service)
+
+    def farewell(self) -> list[bytes]:
+        """Return the datagrams that say that this ground station leaves in order."""
+        return [] if self.peer is None else [self._encode(_heartbeat(mavlink.MAV_STATE_POWEROFF))]
+
+    def _encode(self, message: Message) -> bytes:
+        frame = self._out.encode(message)
+        if self.record is not None:
+            self.record(without_signature(frame, message.crc_extra))
+        return frame
+
+
+def _heartbeat(state: int) -> Message:
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, state, 3
+    )

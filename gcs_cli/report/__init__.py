@@ -1,0 +1,1 @@
+"""The review of a flight: data, summary, charts and the page."""

@@ -1,0 +1,161 @@
+"""Read a flight's log (ULog) for the summary and the report."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import struct
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from pyulog import ULog, ULogException
+
+from flightstack.core.contract import MAX_ROTORS, FloatArray
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
+from flightstack.core.geometry_bulk import euler_from_quaternions
+from gcs_cli.report.flight_data import (
+    Flight,
+    LoopTiming,
+    MissionProgress,
+    Series,
+    Status,
+    Text,
+    empty_series,
+    loop_timing,
+    series,
+)
+from gcs_cli.report.log_damage import is_whole
+
+__all__ = ["Flight", "read_flight"]
+
+_ARMED = 2  # vehicle_status.arming_state
+_TIMING_FIELDS = LoopTiming._fields[2:8]  # execution and lateness
+_DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
+_TOPICS = [
+    "vehicle_local_position",
+    "trajectory_setpoint",
+    "vehicle_attitude",
+    "vehicle_attitude_setpoint",
+    "rotor_speeds",
+    "wrench",
+    "vehicle_status",
+    "vehicle_land_detected",
+    "mission_result",
+    "home_position",
+    "loop_timing",
+]
+
+
+def read_flight(path: Path) -> Flight:
+    """Read a ULog file, complete or cut off; raise ConfigError when it is none."""
+    try:
+        # pyulog reports damage on stdout, which belongs to the command's own output
+        content = path.read_bytes()
+        with contextlib.redirect_stdout(io.StringIO()):
+            log = ULog(io.BytesIO(content), _TOPICS)
+        return replace(_Reader(log).flight(), damaged=log.file_corruption or not is_whole(content))
+    except OSError as error:
+        raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
+    except _DAMAGE as error:
+        raise ConfigError(path, "", f"is not a readable flight log: {error}") from error
+
+
+class _Reader:
+    """Takes a flight out of a parsed log; topics that are not there give empty series."""
+
+    def __init__(self, log: Any) -> None:
+        self._log = log
+        self._start_us = log.start_timestamp
+        self._data: dict[str, dict[str, Any]] = {item.name: item.data for item in log.data_list}
+
+    def flight(self) -> Flight:
+        log = self._log
+        rotors = self._rotor_count()
+        return Flight(
+            start_s=self._start_us * 1e-6,
+            duration_s=(log.last_timestamp - self._start_us) * 1e-6,
+            info=MappingProxyType(dict(log.msg_info_dict)),
+            parameters=MappingProxyType(dict(log.initial_parameters)),
+            home=self._home(),
+            local_origin=self._origin(),
+            position=self._series("vehicle_local_position", ["x", "y", "z"]),
+            velocity=self._series("vehicle_local_position", ["vx", "vy", "vz"]),
+            position_setpoint=self._series("trajectory_setpoint", _elements("position", 3)),
+            attitude=self._euler("vehicle_attitude", "q"),
+            attitude_target=self._euler("vehicle_attitude_setpoint", "q_d"),
+            rotor_speed=self._series("rotor_speeds", _elements("speed_rad_s", rotors)),
+            rotor_command=self._series("rotor_speeds", _elements("command_rad_s", rotors)),
+            torque=self._series("wrench", _elements("torque_n_m", 3)),
+            statuses=tuple(
+                Status(time_s, int(state), arming == _ARMED, bool(failsafe))
+                for time_s, state, arming, failsafe in self._rows(
+                    "vehicle_status", "nav_state", "arming_state", "failsafe"
+                )
+            ),
+            landed=tuple(
+                (time_s, bool(landed)) for time_s, landed in self._rows("vehicle_land_detected", "landed")
+            ),
+            mission=tuple(
+                MissionProgress(time_s, int(current), int(reached), int(total), bool(finished))
+                for time_s, current, reached, total, finished in self._rows(
+                    "mission_result", "seq_current", "seq_reached", "seq_total", "finished"
+                )
+            ),
+            texts=tuple(
+                Text((item.timestamp - self._start_us) * 1e-6, item.log_level - ord("0"), item.message)
+                for item in log.logged_messages
+            ),
+            overruns=self._overruns(),
+            loop_timing=tuple(
+                loop_timing(time_s, inner_hz, figures, int(clock))
+                for time_s, inner_hz, clock, *figures in self._rows(
+                    "loop_timing", "inner_hz", "clock", *_TIMING_FIELDS
+                )
+                if math.isfinite(figures[0])  # in lockstep the log has only counts
+            ),
+        )
+
+    def _time_s(self, data: dict[str, Any]) -> FloatArray:
+        return (data["timestamp"].astype(np.int64) - self._start_us) * 1e-6  # type: ignore[no-any-return]
+
+    def _rotor_count(self) -> int:
+        data = self._data.get("rotor_speeds", {})
+        return sum(name in data for name in _elements("speed_rad_s", MAX_ROTORS))
+
+    def _series(self, topic: str, fields: list[str]) -> Series:
+        data = self._data.get(topic)
+        if data is None or any(name not in data for name in fields):
+            return empty_series(len(fields))
+        values = np.column_stack([data[name].astype(np.float64) for name in fields])
+        return series(self._time_s(data), values)
+
+    def _euler(self, topic: str, quaternion: str) -> Series:
+        time_s, q = self._series(topic, _elements(quaternion, 4))
+        return series(time_s.copy(), euler_from_quaternions(q))
+
+    def _rows(self, topic: str, *fields: str) -> list[tuple[float, ...]]:
+        data = self._data.get(topic)
+        if data is None or any(name not in data for name in fields):
+            return []
+        return list(zip(self._time_s(data).tolist(), *(data[name].tolist() for name in fields), strict=True))
+
+    def _home(self) -> GeoPoint | None:
+        rows = self._rows("home_position", "lat", "lon", "alt")
+        return GeoPoint(*rows[-1][1:]) if rows else None
+
+    def _origin(self) -> GeoPoint | None:
+        rows = self._rows("vehicle_local_position", "ref_lat", "ref_lon", "ref_alt")
+        return GeoPoint(*rows[0][1:]) if rows else None
+
+    def _overruns(self) -> int | None:
+        rows = self._rows("loop_timing", "overruns")
+        return int(rows[-1][1]) if rows else None
+
+
+def _elements(name: str, count: int) -> list[str]:
+    return [f"{name}[{index}]" for index in range(count)]

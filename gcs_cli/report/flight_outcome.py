@@ -1,0 +1,128 @@
+"""How a flight ended: a code, a sentence and an exit code, from what the ground has heard and what the log holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
+from typing import TYPE_CHECKING, NamedTuple
+
+from flightstack.core.modes import NAVIGATION_STATE, Mode
+from flightstack.plan import NAV_COMMANDS, Command, MissionItem
+from gcs_cli.errors import DONE, FAILED
+from gcs_cli.vehicle.view_types import VehicleView
+
+if TYPE_CHECKING:
+    from gcs_cli.report.flight_data import Flight
+
+_ON_GROUND = 1  # MAV_LANDED_STATE
+_WARNING = 4  # MAV_SEVERITY_WARNING
+GROUND_ENDS = (Command.NAV_LAND, Command.NAV_RETURN_TO_LAUNCH)
+_TERMINATED = NAVIGATION_STATE[Mode.TERMINATION]
+_MOST_WARNINGS = 3
+
+
+class Code(StrEnum):
+    """``outcome`` of summary.json; docs/summary.md says what each means."""
+
+    COMPLETED = "completed"
+    FAILSAFE = "failsafe"
+    LOST_CONTROL = "lost_control"
+    INCOMPLETE = "incomplete"
+    REFUSED = "refused"
+    TIMEOUT = "timeout"
+    NO_VEHICLE = "no_vehicle"
+    VEHICLE_LOST = "vehicle_lost"
+    STALLED = "stalled"
+    PROCESS_ENDED = "process_ended"
+    INTERRUPTED = "interrupted"
+    NO_LOG = "no_log"
+
+
+class Outcome(NamedTuple):
+    """How the flight ended."""
+
+    code: Code
+    reason: str
+    exit_code: int = FAILED
+
+    @property
+    def completed(self) -> bool:
+        """Whether the mission was flown to its end."""
+        return self.code is Code.COMPLETED
+
+
+COMPLETED = Outcome(Code.COMPLETED, "the mission was flown to its end", DONE)
+
+
+def last_flown(items: Sequence[MissionItem]) -> int:
+    """Return the number of the last item that is flown to."""
+    return max((seq for seq, item in enumerate(items) if item.command in NAV_COMMANDS), default=0)
+
+
+def ends_in_air(items: Sequence[MissionItem]) -> bool:
+    """Tell whether a mission ends without a landing or a return."""
+    return bool(items) and items[last_flown(items)].command not in GROUND_ENDS
+
+
+def judged(view: VehicleView, items: Sequence[MissionItem]) -> Outcome:
+    """Judge a vehicle that has disarmed: did it fly its mission?
+
+    Any message may have been lost, so that each of three signs is enough.
+    """
+    mission, last = view.mission, last_flown(items)
+    reached_end = mission.reached is not None and mission.reached >= last
+    landed_at_end = (
+        mission.current is not None
+        and mission.current >= last
+        and not ends_in_air(items)
+        and view.landed_state == _ON_GROUND
+    )
+    if mission.complete or reached_end or landed_at_end:
+        return COMPLETED
+    return Outcome(
+        Code.INCOMPLETE,
+        f"the vehicle disarmed{_item(view, items)}, before the mission was done{_warnings(view)}",
+    )
+
+
+def too_late(view: VehicleView, items: Sequence[MissionItem], limit_s: float) -> Outcome:
+    """Return the outcome of a flight that was ended after ``limit_s`` of simulated time."""
+    late = f"the mission was not done after {limit_s:g} s of simulated time (--limit)"
+    return Outcome(Code.TIMEOUT, f"{late}{_item(view, items)}{_warnings(view)}")
+
+
+def _item(view: VehicleView, items: Sequence[MissionItem]) -> str:
+    current = view.mission.current
+    return "" if current is None else f" at item {current} of {len(items)}"
+
+
+def _warnings(view: VehicleView) -> str:
+    """Return the newest warnings of the vehicle, to stand at the end of a sentence."""
+    warnings = [entry.text for entry in view.texts if entry.severity <= _WARNING]
+    return f": {'; '.join(warnings[-_MOST_WARNINGS:])}" if warnings else ""
+
+
+def with_log(outcome: Outcome, flight: Flight, items: Sequence[MissionItem]) -> Outcome:
+    """Return the outcome with what the log adds: the cause of an early end, a crash, items that were not reached."""
+    if outcome.code not in (Code.COMPLETED, Code.INCOMPLETE):
+        return outcome
+    failed = outcome.reason.replace(COMPLETED.reason, "the vehicle crashed at the end of the mission")
+    if any(status.nav_state == _TERMINATED for status in flight.statuses) or flight.disarmed_in_air:
+        return Outcome(Code.LOST_CONTROL, failed)
+    failsafe = any(status.failsafe for status in flight.statuses)
+    if not outcome.completed:
+        return outcome._replace(code=Code.FAILSAFE) if failsafe else outcome
+    notes = [_unreached(flight, items), "a failsafe acted on the way" if failsafe else ""]
+    return outcome._replace(reason="; ".join([outcome.reason, *(note for note in notes if note)]))
+
+
+def _unreached(flight: Flight, items: Sequence[MissionItem]) -> str:
+    """Say which items of a completed mission were not reached, and why."""
+    reached = {progress.reached for progress in flight.mission}
+    flown = {progress.current for progress in flight.mission}
+    missing = [seq for seq, item in enumerate(items) if item.command in NAV_COMMANDS and seq not in reached]
+    if not missing or not flight.mission:
+        return ""
+    skipped = not flown.intersection(missing) and any(item.command == Command.DO_JUMP for item in items)
+    what = f"item{'s' if len(missing) > 1 else ''} {', '.join(map(str, missing))}"
+    return f"{what} skipped by DO_JUMP" if skipped else f"{what} not reached"

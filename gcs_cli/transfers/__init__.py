@@ -1,0 +1,1 @@
+"""Parameters, logs and plans transferred between files and the vehicle."""

@@ -1,0 +1,115 @@
+"""Requests about the vehicle's logs, each run to its end on a connection."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeAlias
+
+from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.text import REPLACEMENT
+from flightstack.mavlink.virtual_files import Entry
+from gcs_cli.clients.ftp_client import FtpClient, FtpDone
+from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
+from gcs_cli.errors import FAILED, NO_ANSWER, CliError
+from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID
+
+if TYPE_CHECKING:
+    from gcs_cli.link.connection import Connection
+
+LOG_FOLDER = "@MAV_LOG"
+"""Where a vehicle shows its logs over MAVLink FTP, if it does."""
+FTP_WAIT_S = 1.5
+"""How long a vehicle may take to show them; many never answer."""
+_STEP_S = 0.1
+
+Progress: TypeAlias = Callable[[int, int], None]
+"""Called with the bytes that have come, and bytes in all."""
+
+
+def fetch_list(connection: Connection) -> tuple[LogEntry, ...]:
+    """Return all logs of the vehicle; raise CliError."""
+    client = LogClient(_vehicle(connection))
+    client.start_list()
+    _run(connection, client, "log list")
+    if isinstance(client.result, LogDone):
+        return client.result.entries
+    raise _error(client.result, "log list")
+
+
+def fetch_files(connection: Connection) -> tuple[Entry, ...]:
+    """Return the logs that the vehicle shows over MAVLink FTP; none when it does not know how."""
+    client = _ftp_client(connection)
+    client.start_list(LOG_FOLDER)
+    _run(connection, client, "log list", patience_s=FTP_WAIT_S)
+    if not isinstance(client.result, FtpDone):
+        return ()
+    return tuple(entry for entry in client.result.entries if is_plain_name(entry.name))
+
+
+def file_of(log: LogEntry, logs: tuple[LogEntry, ...], files: tuple[Entry, ...]) -> Entry | None:
+    """Return the file that holds ``log``: numbers and names are only joined by a size that is there once."""
+    if [entry.size for entry in logs].count(log.size) != 1:
+        return None
+    found = [file for file in files if file.size == log.size]
+    return found[0] if len(found) == 1 else None
+
+
+def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: Progress) -> bytes:
+    """Return the bytes of ``log``, as the file over MAVLink FTP if it is known, which is faster; raise CliError."""
+    name = f"log {log.log_id}"
+    if file is not None:
+        over_ftp = _ftp_client(connection)
+        over_ftp.start_download(f"{LOG_FOLDER}/{file.name}")
+        _run(connection, over_ftp, name, show)
+        if isinstance(over_ftp.result, FtpDone):
+            return over_ftp.result.content
+    client = LogClient(_vehicle(connection))
+    client.start_download(log)
+    _run(connection, client, name, show)
+    if isinstance(client.result, LogDone):
+        return client.result.content
+    raise _error(client.result, name)
+
+
+def is_plain_name(name: str) -> bool:
+    """Tell whether a name from the vehicle may name a file here: no path, nothing hidden, nothing replaced."""
+    return (
+        bool(name)
+        and name.isprintable()
+        and not name.startswith(".")
+        and not set(name) & {*"/\\:", REPLACEMENT}
+    )
+
+
+def _run(
+    connection: Connection,
+    client: LogClient | FtpClient,
+    name: str,
+    show: Progress | None = None,
+    patience_s: float | None = None,
+) -> None:
+    """Let ``client`` talk until it has a result; raise CliError when the vehicle goes away meanwhile."""
+    session = connection.session
+    session.use(client)
+    end_s = None if patience_s is None else connection.now_s + patience_s
+    while client.result is None and (end_s is None or connection.now_s < end_s):
+        if session.view.powered_off or session.view.lost(connection.now_s):
+            raise CliError(f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}")
+        connection.step(connection.now_s + _STEP_S)
+        if show is not None:
+            show(*client.progress)
+    session.use(None)
+
+
+def _error(result: object, name: str) -> CliError:
+    if isinstance(result, LogFailed):
+        return CliError(f"{name}: {result.reason}", NO_ANSWER if result.silent else FAILED)
+    return CliError(f"{name}: the vehicle did not answer", NO_ANSWER)
+
+
+def _ftp_client(connection: Connection) -> FtpClient:
+    return FtpClient(_vehicle(connection), Address(SYSTEM_ID, COMPONENT_ID))
+
+
+def _vehicle(connection: Connection) -> Address:
+    return Address(*connection.session.target)

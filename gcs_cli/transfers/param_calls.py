@@ -1,0 +1,109 @@
+"""Requests about parameters, each run to its end on a connection."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.param_values import Parameter
+from gcs_cli.clients.ftp_client import FtpClient, FtpDone
+from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed, ParamTiming
+from gcs_cli.errors import FAILED, NO_ANSWER, CliError
+from gcs_cli.link.calls import TEXT_WAIT_S
+from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID
+from gcs_cli.vehicle.param_info import METADATA_PATH, ParamInfo, number_text, parse_metadata
+
+if TYPE_CHECKING:
+    from gcs_cli.link.connection import Connection
+
+METADATA_WAIT_S = 3.0
+"""How long a vehicle may take to send what it knows of its parameters; many know nothing."""
+TIMING = ParamTiming()
+_STEP_S = 0.25
+_WARNING = 4  # MAV_SEVERITY_WARNING; lower is worse
+
+_Client: TypeAlias = ParamClient | FtpClient
+
+
+def fetch_all(connection: Connection) -> tuple[Parameter, ...]:
+    """Return all parameters, sorted by name; raise CliError."""
+    client = _param_client(connection)
+    client.start_list()
+    _run(connection, client, "the parameter list")
+    if isinstance(client.result, ParamDone):
+        return tuple(sorted(client.result.parameters))
+    raise _error(client.result, "parameters")
+
+
+def fetch(connection: Connection, name: str) -> Parameter:
+    """Return one parameter; raise CliError."""
+    client = _param_client(connection)
+    client.start_get(name)
+    _run(connection, client, name)
+    if isinstance(client.result, ParamDone):
+        return client.result.parameters[0]
+    raise _error(client.result, name)
+
+
+def change(connection: Connection, name: str, value: float) -> Parameter:
+    """Set a parameter and return it as the vehicle confirmed it; raise CliError with the vehicle's reason."""
+    texts_before = connection.session.view.text_count
+    client = _param_client(connection)
+    client.start_set(name, value)
+    _run(connection, client, name)
+    result = client.result
+    if isinstance(result, ParamDone):
+        return result.parameters[0]
+    if isinstance(result, ParamFailed) and not result.silent:
+        said = _explanation(connection, name, texts_before)
+        result = result if said is None else result._replace(reason=said)
+    raise _error(result, f"{name} = {number_text(value)}")
+
+
+def fetch_metadata(connection: Connection) -> dict[str, ParamInfo]:
+    """Return what the vehicle knows of its parameters, by name; nothing when it does not say."""
+    client = FtpClient(_vehicle(connection), Address(SYSTEM_ID, COMPONENT_ID))
+    client.start_download(METADATA_PATH)
+    _run(connection, client, "parameter metadata", METADATA_WAIT_S)
+    return parse_metadata(client.result.content) if isinstance(client.result, FtpDone) else {}
+
+
+def _run(connection: Connection, client: _Client, name: str, patience_s: float | None = None) -> None:
+    """Let ``client`` talk until it has a result; raise CliError when the vehicle goes away meanwhile."""
+    session = connection.session
+    session.use(client)
+    end_s = None if patience_s is None else connection.now_s + patience_s
+    while client.result is None and (end_s is None or connection.now_s < end_s):
+        if session.view.powered_off or session.view.lost(connection.now_s):
+            raise CliError(f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}")
+        connection.step(connection.now_s + _STEP_S)
+    session.use(None)
+
+
+def _explanation(connection: Connection, name: str, texts_before: int) -> str | None:
+    """Return the vehicle's own words for refusing ``name``, which come right after the answer."""
+    prefix = f"Parameter {name} refused: "
+
+    def said() -> str | None:
+        texts = connection.session.view.texts_since(texts_before)
+        found = [text.text for text in texts if text.severity <= _WARNING and text.text.startswith(prefix)]
+        return found[-1].removeprefix(prefix) if found else None
+
+    connection.wait_for(lambda: said() is not None, TEXT_WAIT_S)
+    return said()
+
+
+def _error(result: object, what: str) -> CliError:
+    if not isinstance(result, ParamFailed):
+        return CliError(f"{what}: the vehicle did not answer", NO_ANSWER)
+    if result.silent:
+        return CliError(f"{what}: {result.reason}", NO_ANSWER)
+    return CliError(f"{what} refused: {result.reason}", FAILED)
+
+
+def _param_client(connection: Connection) -> ParamClient:
+    return ParamClient(_vehicle(connection), Address(SYSTEM_ID, COMPONENT_ID), TIMING)
+
+
+def _vehicle(connection: Connection) -> Address:
+    return Address(*connection.session.target)

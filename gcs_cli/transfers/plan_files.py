@@ -1,0 +1,48 @@
+"""Which file a plan on the command line is: a path, or the bare name of a plan that comes with the program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gcs_cli.errors import USAGE, CliError
+
+DEFAULT_PLAN = "square"
+
+
+def example_plans() -> dict[str, Path]:
+    """Return the plans that come with the program, by name: in the package where it is installed, else beside it."""
+    here = Path(__file__).resolve().parents[1]
+    packaged = here / "missions"
+    folder = packaged if packaged.is_dir() else here.parent / "missions"
+    return {path.stem: path for path in sorted(folder.glob("*")) if path.suffix in (".plan", ".waypoints")}
+
+
+def plan_file(given: str | Path) -> Path:
+    """Return the file of a plan; a name without folder and suffix is an example's. Raise CliError (usage)."""
+    text = str(given)
+    if not text or set(text) & {"/", "\\", "."}:
+        return Path(text)
+    examples = example_plans()
+    if text not in examples:
+        raise CliError(
+            f"{text}: there is no example plan of that name; there are {', '.join(examples)}; "
+            f"a file in this folder is ./{text}",
+            USAGE,
+        )
+    return examples[text]
+
+
+def _complete(incomplete: str) -> list[str]:
+    return [name for name in example_plans() if name.startswith(incomplete)]
+
+
+PLAN_ARGUMENT = typer.Argument(
+    metavar="PLAN",
+    parser=plan_file,
+    autocompletion=_complete,
+    help=f"A .plan or .waypoints file, or the name of an example: {', '.join(example_plans())}.",
+)
+PlanArgument = Annotated[Path, PLAN_ARGUMENT]

@@ -1,0 +1,238 @@
+"""The three plans of a file or a vehicle - mission, geofence, rally points - and their upload as one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from typing import NamedTuple
+
+from flightstack.core.geodesy import GeoPoint
+from flightstack.plan import (
+    PLAN_NAMES,
+    MissionItem,
+    MissionResult,
+    MissionType,
+    Plan,
+    check_fence,
+    check_mission,
+    check_rally,
+    fence_shape,
+)
+from gcs_cli.clients.mission_client import MissionClient
+from gcs_cli.link import calls
+from gcs_cli.link.calls import Answer, Call
+from gcs_cli.link.session import Session
+
+RESTORE_PATIENCE_S = 30.0
+"""How long restoring the former plans may take after an interrupt."""
+_FORMER, _NEW, _UNKNOWN = "former", "new", "unknown"
+
+
+class PlanPart(NamedTuple):
+    """One of the three plans in a file or on a vehicle."""
+
+    kind: MissionType
+    name: str
+    items: Sequence[MissionItem]
+
+
+def plan_parts(plan: Plan) -> list[PlanPart]:
+    """Return mission, geofence and rally points, in the order in which ground stations send them."""
+    items = (plan.items, plan.fence, plan.rally)
+    return [PlanPart(kind, name, part) for (kind, name), part in zip(PLAN_NAMES.items(), items, strict=True)]
+
+
+def plan_problem(plan: Plan, home: GeoPoint) -> str | None:
+    """Return what the vehicle would say against the parts of a plan, the geofence first: the others obey it."""
+    fence = fence_shape(plan.fence, home)
+    checks = (
+        ("geofence", check_fence(plan.fence, home)),
+        ("mission", check_mission(plan.items, home, fence=fence) if plan.items else None),
+        ("list of rally points", check_rally(plan.rally, home, fence=fence)),
+    )
+    return next((f"{name}: {rejection.reason}" for name, rejection in checks if rejection is not None), None)
+
+
+def parts_to_send(plan: Plan) -> list[PlanPart]:
+    """Return the parts of a plan in the order of their upload.
+
+    The vehicle checks mission and rally points against the geofence that it holds, so that the new geofence goes
+    first. The mission goes last, even without items; other parts without items stay as they are on the vehicle.
+    """
+    mission, *others = plan_parts(plan)
+    return [part for part in others if part.items] + [mission]
+
+
+class Uploads:
+    """Sends the parts of a plan to a vehicle: all of them, or none.
+
+    With ``restores``, the parts that the vehicle holds are downloaded first, and uploaded again if one is not
+    accepted. Without, a vehicle that has accepted some of the parts keeps them. ``interrupted`` returns a reason to
+    end early, or nothing: the former plans are then restored too, for RESTORE_PATIENCE_S at most.
+    """
+
+    def __init__(
+        self, session: Session, plan: Plan, *, restores: bool, interrupted: Callable[[], str] = str
+    ) -> None:
+        self._session = session
+        self._parts = parts_to_send(plan)
+        self._others = [part for part in plan_parts(plan) if part not in self._parts]
+        self._clients: dict[MissionType, MissionClient] = {}
+        self._restores = restores
+        self._interrupted = interrupted
+        self._steps = self._run()
+        self._call: Call | None = None
+        self._answer: Answer | None = None
+        self._sent = 0
+        self._holds = {part.kind: _FORMER for part in self._parts}
+        self._under_way: MissionType | None = None
+        self._is_restoring = False
+        self._restore_due_s: float | None = None
+        self._now_s = 0.0
+        self.name = self._parts[0].name
+        """The part that is being sent, or was not accepted."""
+        self.kept: list[PlanPart] = []
+        """Parts that are not in the plan and stay on the vehicle; known after an upload with ``restores``."""
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Items sent and in all."""
+        is_sending = self._under_way is not None and not self._is_restoring
+        under_way = self._call.progress[0] if self._call and is_sending else 0
+        return self._sent + under_way, sum(len(part.items) for part in self._parts)
+
+    @property
+    def state(self) -> str:
+        """What the vehicle holds now, in words."""
+        holds = dict(self._holds)
+        if self._under_way is not None and self._is_all_sent:
+            holds[self._under_way] = _UNKNOWN
+        if set(holds.values()) == {_FORMER}:
+            return "the vehicle holds its former plans"
+        return "the vehicle holds: " + ", ".join(f"{part.name} {holds[part.kind]}" for part in self._parts)
+
+    @property
+    def _is_all_sent(self) -> bool:
+        """Whether the vehicle may have accepted the part under way: it replaces a part with the last item."""
+        sent, count = self._call.progress if self._call else (0, 0)
+        return sent >= count
+
+    def answer(self, now_s: float) -> Answer | None:
+        """Go on as far as possible; return the answer once all is sent, or the first that is not an acceptance."""
+        self._now_s = now_s
+        if self._call is None:
+            self._call = next(self._steps)
+        while self._answer is None:
+            answer = self._call.answer(now_s) or self._interruption()
+            if answer is None:
+                break
+            try:
+                self._call = self._steps.send(answer)
+            except StopIteration as end:
+                self._answer = end.value
+        return self._answer
+
+    def _interruption(self) -> Answer | None:
+        """Return the answer of a transfer that an interrupt ends: the one under way, or a restore that takes long."""
+        reason = self._interrupted()
+        if not reason:
+            return None
+        if self._restore_due_s is None:
+            self._restore_due_s = self._now_s + RESTORE_PATIENCE_S
+            return None if self._is_restoring else Answer(False, reason, cancelled=True)
+        if self._now_s >= self._restore_due_s:
+            return Answer(False, f"not done within {RESTORE_PATIENCE_S:g} s", cancelled=True)
+        return None
+
+    def _run(self) -> Generator[Call, Answer, Answer]:
+        before: list[PlanPart] = []
+        if self._restores and len(self._parts) > 1:  # the vehicle replaces one part whole or not at all
+            for part in self._parts:
+                self.name = part.name
+                answer = yield self._transfer(part.kind)
+                if answer.result == MissionResult.UNSUPPORTED:
+                    continue
+                if not answer.accepted:
+                    return answer._replace(reason=f"{answer.reason}; nothing was changed")
+                before.append(part._replace(items=answer.items))
+            if self._session.view.mission.current is None:
+                yield calls.command(self._session, *calls.REQUEST_MISSION_CURRENT, self._now_s)
+        current = self._session.view.mission.current or 0
+        for part in self._parts:
+            self.name = part.name
+            answer = yield from self._send(part, _NEW)
+            if not answer.accepted:
+                if self._restores:
+                    answer = yield from self._undone(part, answer, before, current)
+                return answer
+            self._sent += len(part.items)
+        if self._restores:
+            yield from self._find_kept()
+        return answer
+
+    def _undone(
+        self, part: PlanPart, answer: Answer, before: Sequence[PlanPart], current: int
+    ) -> Generator[Call, Answer, Answer]:
+        """Restore the parts ``before``; return the answer with what the vehicle holds then."""
+        reasons = [answer.reason]
+        is_refused = not (answer.silent or answer.cancelled)
+        if is_refused and part.kind != MissionType.FENCE and "fence" in answer.reason.lower():
+            yield from self._find_kept()
+            reasons += [
+                f"the vehicle keeps its geofence of {len(kept.items)} items, which is not in the file: "
+                "remove it with `gcs mission clear --type fence`"
+                for kept in self.kept
+                if kept.kind == MissionType.FENCE
+            ]
+        if before:
+            reasons.append((yield from self._restore(before, current)))
+        elif not is_refused:
+            self._clients[part.kind].cancel()
+            reasons.append(self.state)
+        return answer._replace(reason="; ".join(reasons))
+
+    def _restore(self, before: Sequence[PlanPart], current: int) -> Generator[Call, Answer, str]:
+        """Upload the former parts that were replaced; return what the vehicle holds now, in words."""
+        self._is_restoring = True
+        for part in before:
+            if self._holds[part.kind] == _FORMER:
+                continue
+            answer = yield from self._send(part, _FORMER)
+            if not answer.accepted:
+                return f"the former {part.name} could not be restored: {answer.reason}; {self.state}"
+            if part.kind == MissionType.MISSION and 0 < current < len(part.items):
+                self._clients[part.kind].start_set_current(current)
+                answer = yield Call(self._session, self._clients[part.kind])
+                if not answer.accepted:
+                    return f"{self.state}, but item {current} is no longer current: {answer.reason}"
+        return self.state
+
+    def _find_kept(self) -> Generator[Call, Answer, None]:
+        """Download the parts that are not in the plan; those of a vehicle that does not answer stay unknown."""
+        for part in self._others:
+            answer = yield self._transfer(part.kind)
+            if answer.silent or answer.cancelled:
+                return
+            if answer.items:
+                self.kept.append(part._replace(items=answer.items))
+
+    def _send(self, part: PlanPart, which: str) -> Generator[Call, Answer, Answer]:
+        """Upload a part, and note which one the vehicle holds then."""
+        self._under_way = part.kind
+        answer = yield self._transfer(part.kind, part.items)
+        if answer.accepted:
+            self._holds[part.kind] = which
+        elif (answer.silent or answer.cancelled) and self._is_all_sent:
+            self._holds[part.kind] = _UNKNOWN
+        self._under_way = None
+        return answer
+
+    def _transfer(self, kind: MissionType, items: Sequence[MissionItem] | None = None) -> Call:
+        """Begin to upload ``items``, or to download; one client a kind, which keeps late messages apart."""
+        if kind not in self._clients:
+            self._clients[kind] = calls.mission_client(self._session, kind)
+        client = self._clients[kind]
+        if items is None:
+            client.start_download()
+        else:
+            client.start_upload(items)
+        return Call(self._session, client)

@@ -1,0 +1,1 @@
+"""What is known of the vehicle: its state, modes, texts and parameters."""

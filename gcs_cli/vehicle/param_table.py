@@ -1,0 +1,104 @@
+"""Parameters as a table. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from flightstack.mavlink.param_values import Parameter
+from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, number_text
+
+Infos = Mapping[str, ParamInfo]
+
+
+def matching(parameters: Sequence[Parameter], pattern: str) -> list[Parameter]:
+    """Return the parameters whose name matches: with ``*`` and ``?`` as a whole, else in any part."""
+    wanted = pattern.upper()
+    if not set(wanted) & set("*?["):
+        wanted = f"*{wanted}*"
+    return [told for told in parameters if fnmatchcase(told.name.upper(), wanted)]
+
+
+def is_changed(told: Parameter, infos: Infos) -> bool:
+    """Tell whether a parameter is known to have another value than its default."""
+    default = infos.get(told.name, UNKNOWN).default
+    return default is not None and number_text(default) != number_text(told.value)
+
+
+def facts(told: Parameter, infos: Infos) -> dict[str, Any]:
+    """Return what ``--json`` prints of a parameter; null for what the vehicle does not say."""
+    info = infos.get(told.name, UNKNOWN)
+    return {
+        "name": told.name,
+        "value": int(told.value) if told.is_integer else told.value,
+        "default": info.default,
+        "min": info.low,
+        "max": info.high,
+        "unit": info.unit or None,
+        "help": info.help or None,
+        "choices": {number_text(value): text for value, text in info.choices} or None,
+    }
+
+
+def parameter_table(parameters: Sequence[Parameter], infos: Infos, compared: str = "default") -> Table:
+    """Return name, value, range and help; a value that is not the default stands out, beside its default.
+
+    ``compared`` is the heading of the values that are taken for the defaults.
+    """
+    table = Table(
+        box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold"
+    )
+    table.add_column("name", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    if infos:
+        if any(is_changed(told, infos) for told in parameters):
+            table.add_column(compared, justify="right", no_wrap=True, style="bright_black")
+        table.add_column("range", no_wrap=True, style="bright_black", max_width=16, overflow="ellipsis")
+        table.add_column("help", overflow="fold")
+    for told in parameters:
+        info = infos.get(told.name, UNKNOWN)
+        changed = is_changed(told, infos)
+        cells = [
+            Text(told.name, style="bold yellow" if changed else ""),
+            Text(number_text(told.value), style="bold yellow" if changed else ""),
+            Text(info.unit, style="bright_black"),
+        ]
+        if len(table.columns) == 6:
+            cells.append(Text(number_text(info.default) if changed and info.default is not None else ""))
+        cells += [Text(info.range_text), Text(info.help)]
+        table.add_row(*cells[: len(table.columns)])
+    return table
+
+
+def description(told: Parameter, info: ParamInfo) -> str:
+    """Return one parameter with all that is known of it, on as many lines as it takes."""
+    lines = [f"{told.name} = {number_text(told.value)}{_unit(info)}"]
+    if info.help:
+        lines.append(f"  {info.help}")
+    limits = [
+        f"default {number_text(info.default)}" if info.default is not None else "",
+        f"range {info.range_text}" if info.range_text and not info.choices else "",
+        "takes effect after a restart" if info.reboot_required else "",
+    ]
+    if any(limits):
+        lines.append("  " + ", ".join(limit for limit in limits if limit))
+    lines += [f"  {number_text(value)}: {text}" for value, text in info.choices]
+    return "\n".join(lines)
+
+
+def change_line(name: str, before: float, after: float, info: ParamInfo) -> str:
+    """Return what a change did, on one line."""
+    later = "; it takes effect after a restart" if info.reboot_required else ""
+    if number_text(before) == number_text(after):
+        return f"{name} is {number_text(after)}{_unit(info)} already"
+    return f"{name} = {number_text(after)}{_unit(info)} (was {number_text(before)}){later}"
+
+
+def _unit(info: ParamInfo) -> str:
+    return f" {info.unit}" if info.unit else ""

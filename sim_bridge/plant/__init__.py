@@ -1,0 +1,1 @@
+"""The equations of motion: body, rotors, battery, ground contact, wind and faults."""

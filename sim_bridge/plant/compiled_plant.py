@@ -1,0 +1,102 @@
+"""The plants whose equations are compiled functions over one record."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack.core.compiled import direct
+from flightstack.core.contract import FloatArray, Quaternion, Vector3
+from flightstack.core.geometry import quaternion_from_euler, rotate
+from flightstack.core.portable_math import distance
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.plant.ground import Ground, ground_contact
+from sim_bridge.plant.integrator import advance_kernel, slope_kernel
+from sim_bridge.plant.plant import InitialState, PlantOptions
+from sim_bridge.plant.record_plant import DEFAULT_STEP_S, RecordPlant
+
+
+class CompiledPlant(RecordPlant):
+    """A plant whose equations are compiled functions over the record ``MEMORY``."""
+
+    def __init__(self, vehicle: Vehicle, name: str, options: PlantOptions) -> None:
+        super().__init__(vehicle, options)
+        self._paper = name == "paper"
+        self._kernel = self._call = advance_kernel(name)
+        self._met: FloatArray | None = None
+        self._bound: FloatArray | None = None
+        self._slope = slope_kernel(name)
+        self.set_step(DEFAULT_STEP_S)
+        self._set_state(options.initial)
+
+    def _set_state(self, initial: InitialState) -> None:
+        body = self._memory[0]["body"]
+        body[0:3], body[3:6] = initial.position_ned_m, initial.velocity_ned_m_s
+        if self._paper:
+            body[6:9], body[9:12] = initial.euler_rad, initial.rates_frd_rad_s
+        else:
+            body[6:10], body[10:13] = quaternion_from_euler(*initial.euler_rad), initial.rates_frd_rad_s
+        # each friction spring starts relaxed: its anchor lies straight below or above its contact point
+        m = self._memory[0]
+        attitude = quaternion_from_euler(*initial.euler_rad)
+        for index in range(int(m["point_count"])):
+            arm = rotate(attitude, Vector3(*m["point"][index, :3].tolist()))
+            m["anchor"][index] = (body[0] + arm.x, body[1] + arm.y, initial.euler_rad.z)
+
+    def _set_ground(self, ground: Ground) -> None:
+        m = self._memory[0]
+        count = len(ground.points)
+        m["point_count"] = count
+        m["point"][:count] = ground.points
+        m["ground_z"] = ground.foot_z_m - ground.rest_depth_m
+        m["reach"] = max(distance(*point) for point in ground.points[:, :3].tolist())
+        m["stiffness"], m["damping"] = ground.stiffness_n_m, ground.damping_n_s_m
+        m["ramp"] = ground.rest_depth_m
+        arms = [distance(*rotor.position_frd_m[:2]) for rotor in self._vehicle.rotors]
+        m["lever"] = math.fsum(arms) / len(arms)
+
+    def set_step(self, step_s: float) -> None:
+        """Choose the fixed step of the integration [s]."""
+        super().set_step(step_s)
+        self._set_ground(ground_contact(self._vehicle, step_s, single_point=self._paper))
+
+    def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
+        if command_rad_s is not self._bound:
+            self._meet(command_rad_s)
+        return self._call(self._memory, command_rad_s, flags, steps, self.output)
+
+    def _meet(self, command_rad_s: FloatArray) -> None:
+        """Take the kernel for any array, and at the second meeting with the same one that made for its type."""
+        self._call, self._bound = self._kernel, None
+        if command_rad_s is self._met:
+            self._call = direct(self._kernel, self._memory, command_rad_s, 0, 1, self.output)
+            self._bound = command_rad_s
+        self._met = command_rad_s
+
+    def show(self) -> int:
+        """Write the present state to ``output``; returns as ``advance``."""
+        return self._kernel(self._memory, self._memory[0]["command"], 0, 0, self.output)
+
+    def acceleration_ned_m_s2(self) -> Vector3:
+        """Acceleration at the present state."""
+        self._slope(self._memory)
+        x, y, z = self._memory[0]["slope"][0, 3:6].tolist()
+        return Vector3(x, y, z)
+
+    @property
+    def ground_softness_m(self) -> float:
+        """How far the ground gives way under the vehicle's weight; more with longer steps."""
+        return float(self._memory[0]["ramp"])
+
+    def buried_m(self) -> float:
+        """How far the lowest contact point lies below the ground (negative above it) in the state shown."""
+        m, state = self._memory[0], self.output[0]["state"].tolist()
+        points = m["point"][: int(m["point_count"]), :3].tolist()
+        lowest = max(rotate(Quaternion(*state[6:10]), Vector3(*point)).z for point in points)
+        return float(state[2] + lowest - m["ground_z"] - m["ramp"])
+
+    def euler_rad(self) -> Vector3 | None:
+        """Roll, pitch, yaw where they are states of the plant, else None."""
+        if not self._paper:
+            return None
+        roll, pitch, yaw = self._memory[0]["body"][6:9].tolist()
+        return Vector3(roll, pitch, yaw)

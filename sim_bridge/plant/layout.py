@@ -1,0 +1,83 @@
+"""Memory of a compiled plant: one NumPy record, so that a call passes one argument and copies nothing."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from flightstack.core.contract import MAX_ROTORS, STATE_SIZE
+from flightstack.params.battery import MAX_CURVE_POINTS
+
+Record: TypeAlias = Any
+"""One element of an array of ``MEMORY`` or ``OUTPUT``, indexed by the names of its fields."""
+
+RecordArray: TypeAlias = np.ndarray[Any, np.dtype[np.void]]
+
+MAX_POINTS = 2 * MAX_ROTORS
+NOISE_ROWS = 1024
+
+CONTACT = 1  # result bits of ``advance``
+DIVERGED = 2
+
+# columns of "rotor"
+THRUST, ROLL, PITCH, DRAG, MOMENTUM, LAG_RATE, LOWEST, HIGHEST, HALF_STEP_DECAY, MOST_TORQUE = range(10)
+
+MEMORY = np.dtype(
+    [
+        # what changes
+        ("body", "f8", STATE_SIZE),  # each plant's own state vector
+        ("stage", "f8", STATE_SIZE),  # Runge-Kutta: state of a stage
+        ("slope", "f8", (4, STATE_SIZE)),  # Runge-Kutta: derivatives
+        ("rotor_speed", "f8", MAX_ROTORS),  # rad/s
+        ("command", "f8", MAX_ROTORS),  # last good command after the limits, rad/s
+        ("bad_commands", "i8"),
+        ("anchor", "f8", (MAX_POINTS, 3)),  # where the friction spring of each contact point is fastened
+        ("gust", "f8", 3),  # m/s NED
+        ("torque_gust", "f8", 3),  # N m FRD
+        ("torque", "f8", 3),  # external, steady and gusty, N m FRD
+        ("noise", "f8", (NOISE_ROWS, 3)),  # unit normal deviates of the wind, one row for each step
+        ("torque_noise", "f8", (NOISE_ROWS, 3)),  # and of the torque
+        ("noise_row", "i8"),
+        ("charge", "f8"),  # of the battery, share of the capacity
+        ("voltage", "f8"),  # of the battery, V
+        ("current", "f8"),  # A
+        ("consumed", "f8"),  # A s since the start
+        ("energy", "f8"),  # J since the start
+        # what is fixed
+        ("step_s", "f8"),
+        ("rotor_count", "i8"),
+        ("rotor", "f8", (MAX_ROTORS, 10)),
+        ("mass", "f8"),  # kg
+        ("weight", "f8"),  # N
+        ("inertia", "f8", 3),  # kg m²
+        ("drag", "f8", 3),  # N s/m, body axes
+        ("force", "f8", 3),  # external, N NED
+        ("steady_torque", "f8", 3),  # external, N m FRD
+        ("curve_count", "i8"),  # 0 without a battery
+        ("curve", "f8", MAX_CURVE_POINTS),  # V, open circuit, at equal steps of charge from empty to full
+        ("resistance", "f8"),  # ohm
+        ("capacity", "f8"),  # A s
+        ("drain", "f8"),  # the charge falls so many times as fast as the current says
+        ("inverse_efficiency", "f8"),  # electric over mechanical power of the rotors
+        ("avionics", "f8"),  # W
+        ("wind", "f8", 3),  # steady, m/s NED
+        ("gust_decay", "f8"),  # over one step
+        ("gust_scale", "f8", 3),  # m/s, zero without gusts
+        ("torque_gust_decay", "f8"),  # over one step
+        ("torque_gust_scale", "f8", 3),  # N m, zero without a gusty torque
+        ("ground", "i8"),  # whether there is a ground
+        ("ground_z", "f8"),  # m, where the contact springs are relaxed
+        ("reach", "f8"),  # m, farthest contact point from the body origin
+        ("point_count", "i8"),
+        ("point", "f8", (MAX_POINTS, 4)),  # position FRD m, share of the stiffness
+        ("stiffness", "f8"),  # N/m, all feet together
+        ("damping", "f8"),  # N s/m, all feet together
+        ("ramp", "f8"),  # m, depth at which the damping is complete
+        ("lever", "f8"),  # m, mean distance of the feet from the vertical axis
+    ],
+    align=True,
+)
+
+OUTPUT = np.dtype([("state", "f8", STATE_SIZE), ("rotor_speed", "f4", MAX_ROTORS)])
+"""What a plant shows, laid out as in FS_PLANT_STATE: array form of ``VehicleState``, rotor speeds."""

@@ -1,0 +1,136 @@
+"""What all plants share that keep their numbers in one record: rotors and their faults, battery, disturbances."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from flightstack.core.contract import FloatArray
+from flightstack.core.portable_math import distance, exp
+from flightstack.params.vehicle import Vehicle
+from sim_bridge.plant.battery import BatteryState, battery_state, set_battery
+from sim_bridge.plant.layout import (
+    DRAG,
+    HALF_STEP_DECAY,
+    HIGHEST,
+    LOWEST,
+    MEMORY,
+    OUTPUT,
+    THRUST,
+    RecordArray,
+)
+from sim_bridge.plant.plant import PlantOptions
+from sim_bridge.plant.turbulence import Turbulence
+
+DEFAULT_STEP_S = 1e-3
+
+
+class RecordPlant(ABC):
+    """The common part of a plant over the record ``MEMORY``; see ``Plant`` for its methods."""
+
+    def __init__(self, vehicle: Vehicle, options: PlantOptions) -> None:
+        self.output: RecordArray = np.zeros(1, OUTPUT)
+        self._vehicle = vehicle
+        self._memory: RecordArray = np.zeros(1, MEMORY)
+        m = self._memory[0]
+        disturbance = options.disturbance
+        m["wind"], m["force"] = disturbance.wind_ned_m_s, disturbance.force_ned_n
+        m["steady_torque"] = m["torque"] = disturbance.torque_frd_n_m
+        self._turbulence = Turbulence(m, disturbance, options.seed)
+        m["ground"] = options.ground
+        m["mass"], m["weight"] = vehicle.mass_kg, vehicle.weight_n
+        m["inertia"], m["drag"] = vehicle.inertia_kg_m2, vehicle.linear_drag_n_s_m
+        self._set_rotors(options.limits)
+        self._has_battery = vehicle.battery is not None and options.battery is not None
+        if vehicle.battery is not None and options.battery is not None:
+            set_battery(m, vehicle.battery, options.battery)
+
+    def _set_rotors(self, limits: bool) -> None:
+        m = self._memory[0]
+        m["rotor_count"] = len(self._vehicle.rotors)
+        for index, rotor in enumerate(self._vehicle.rotors):
+            x, y, _ = rotor.position_frd_m
+            b = rotor.thrust_coefficient_n_s2
+            m["rotor"][index] = (
+                b,
+                -y * b,
+                x * b,
+                -rotor.spin * rotor.torque_coefficient_n_m_s2,
+                rotor.spin * rotor.inertia_kg_m2,
+                1.0 / rotor.lag_s if rotor.lag_s > 0.0 else math.inf,
+                rotor.min_speed_rad_s if limits else -math.inf,
+                rotor.max_speed_rad_s if limits else math.inf,
+                0.0,  # set with the step
+                # speeds that are imposed need no torque
+                rotor.max_drive_torque_n_m if rotor.lag_s > 0.0 and rotor.inertia_kg_m2 > 0.0 else math.inf,
+            )
+        self._healthy: FloatArray = m["rotor"].copy()
+
+    def set_rotor_fault(self, rotor: int, share: float = 1.0, speed_rad_s: float | None = None) -> None:
+        """Let a rotor give a share of its thrust and torque, and turn at one speed only; see ``Plant``."""
+        m, healthy = self._memory[0], self._healthy[rotor]
+        row = m["rotor"][rotor]
+        row[THRUST : DRAG + 1] = share * healthy[THRUST : DRAG + 1]
+        row[LOWEST], row[HIGHEST] = healthy[LOWEST], healthy[HIGHEST]
+        if speed_rad_s is not None:
+            row[LOWEST] = row[HIGHEST] = speed_rad_s
+            m["command"][rotor] = speed_rad_s  # also where the next command is not a number
+
+    @property
+    def battery(self) -> BatteryState | None:
+        """The battery; None for a vehicle without one."""
+        return battery_state(self._memory[0]) if self._has_battery else None
+
+    def set_charge(self, share: float) -> None:
+        """Set the charge of the battery."""
+        self._memory[0]["charge"] = share
+
+    @property
+    def bad_commands(self) -> int:
+        """Commands that were not a number and were replaced by the last good one."""
+        return int(self._memory[0]["bad_commands"])
+
+    def set_step(self, step_s: float) -> None:
+        """Choose the fixed step of the integration [s]."""
+        m = self._memory[0]
+        m["step_s"] = step_s
+        for index, rotor in enumerate(self._vehicle.rotors):
+            m["rotor"][index, HALF_STEP_DECAY] = (
+                exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
+            )
+        self._turbulence.set_step(step_s)
+
+    def rotor_speeds_rad_s(self) -> list[float]:
+        """Rotor speeds in full precision, in the order of the vehicle file."""
+        speeds: list[float] = self._memory[0]["rotor_speed"][: len(self._vehicle.rotors)].tolist()
+        return speeds
+
+    def set_rotor_speeds(self, speeds_rad_s: tuple[float, ...]) -> None:
+        """Put the rotors at once at these speeds."""
+        self._memory[0]["rotor_speed"][: len(speeds_rad_s)] = speeds_rad_s
+
+    @abstractmethod
+    def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
+        """Advance by steps for which there is noise; returns as ``advance``."""
+
+    def advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
+        """Advance by ``steps`` steps with the commands (shape (8,), rad/s) held; see ``Plant``."""
+        if not self._turbulence.active:
+            return self._advance(command_rad_s, flags, steps)
+        result = 0
+        while steps > 0:
+            count = min(steps, self._turbulence.rows_left())
+            result = self._advance(command_rad_s, flags, count)
+            steps -= count
+        return result
+
+    def airspeed_m_s(self) -> float:
+        """Speed relative to the air."""
+        m = self._memory[0]
+        return distance(*(m["body"][3:6] - m["wind"] - m["gust"]).tolist())
+
+    def about(self) -> str | None:
+        """Tell what the user should know of how the plant was made, if anything."""
+        return None

@@ -1,0 +1,105 @@
+"""Seeded noise for the gusts of a compiled plant.
+
+Wind and torque draw from streams of their own: turning one on or off leaves the other as it was. A step takes
+one row of each, whatever the number of steps in a call.
+
+Normal deviates are made here from the integers of PCG64, by Box and Muller's method: NumPy's own come from libm's
+functions, whose last bits depend on the processor, and may change with its version.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from flightstack.core.compiled import compiled
+from flightstack.core.contract import FloatArray
+from flightstack.core.portable_math import exp, log, sin_cos
+from sim_bridge.plant.disturbance import (
+    GUST_DOWN_RATIO,
+    GUST_TIME_S,
+    TORQUE_GUST_TIME_S,
+    TORQUE_GUST_YAW_RATIO,
+    Disturbance,
+)
+from sim_bridge.plant.layout import NOISE_ROWS, Record
+
+
+@compiled
+def _box_muller(shares: FloatArray) -> None:
+    """Turn pairs of numbers in [0, 1), shape (n, 2), into pairs of independent normal deviates, in place."""
+    for i in range(len(shares)):
+        radius = math.sqrt(-2.0 * log(1.0 - shares[i, 0]))
+        sine, cosine = sin_cos(2.0 * math.pi * shares[i, 1])
+        shares[i, 0], shares[i, 1] = radius * cosine, radius * sine
+
+
+def normal_deviates(bits: np.random.PCG64, count: int) -> FloatArray:
+    """Return the next ``count`` standard normal deviates, from two integers of 64 bits for each pair."""
+    pairs = (count + 1) // 2
+    shares = (bits.random_raw(2 * pairs) >> np.uint64(11)).astype(np.float64) / 2**53
+    _box_muller(shares.reshape(pairs, 2))
+    return shares[:count]
+
+
+class _Gust:
+    """One Gauss-Markov process of three components; ``name`` and ``noise`` are its fields in the record."""
+
+    def __init__(
+        self, record: Record, name: str, noise: str, spread: FloatArray, time_s: float, bits: np.random.PCG64
+    ) -> None:
+        self.active = bool(spread.any())
+        self._record, self._name = record, name
+        self._noise: FloatArray = record[noise]
+        self._spread, self._time_s = spread, time_s
+        self._bits = bits
+        if self.active:
+            record[name] = spread * normal_deviates(bits, 3)
+            self.refill()
+
+    def refill(self) -> None:
+        """Draw new noise."""
+        if self.active:
+            self._noise[:] = normal_deviates(self._bits, self._noise.size).reshape(self._noise.shape)
+
+    def set_step(self, step_s: float) -> None:
+        """Set decay and noise of one step so that spread and correlation time do not depend on it."""
+        decay = exp(-step_s / self._time_s)
+        self._record[f"{self._name}_decay"] = decay
+        self._record[f"{self._name}_scale"] = self._spread * math.sqrt(1.0 - decay * decay)
+
+
+class Turbulence:
+    """The gusts of wind and torque of one plant, whose record of ``MEMORY`` it fills."""
+
+    def __init__(self, record: Record, disturbance: Disturbance, seed: int) -> None:
+        wind = np.array([1.0, 1.0, GUST_DOWN_RATIO]) * disturbance.gust_m_s
+        torque = np.array([1.0, 1.0, TORQUE_GUST_YAW_RATIO]) * disturbance.torque_gust_n_m
+        self._record = record
+        self._gusts = (
+            _Gust(record, "gust", "noise", wind, GUST_TIME_S, np.random.PCG64(seed)),
+            _Gust(
+                record,
+                "torque_gust",
+                "torque_noise",
+                torque,
+                TORQUE_GUST_TIME_S,
+                np.random.PCG64(seed).jumped(),
+            ),
+        )
+        record["torque"] = record["steady_torque"] + record["torque_gust"]
+        self.active = any(gust.active for gust in self._gusts)
+
+    def set_step(self, step_s: float) -> None:
+        """Fit the processes to the plant's step [s]."""
+        for gust in self._gusts:
+            gust.set_step(step_s)
+
+    def rows_left(self) -> int:
+        """Return for how many steps there is noise, at least one; draws new noise when it is used up."""
+        if int(self._record["noise_row"]) == NOISE_ROWS:
+            for gust in self._gusts:
+                gust.refill()
+            self._record["noise_row"] = 0
+        return NOISE_ROWS - int(self._record["noise_row"])

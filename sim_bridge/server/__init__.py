@@ -1,0 +1,1 @@
+"""The connection to the flight stack, in lockstep or paced."""

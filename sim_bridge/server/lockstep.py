@@ -1,0 +1,201 @@
+"""The simulator's side of the simulator link, without I/O: bytes in, bytes out, and when a step is due.
+
+The flight stack asks for a message and an interval with SET_MESSAGE_INTERVAL: FS_PLANT_STATE, answered by
+FS_ACTUATORS, or the standard HIL_STATE_QUATERNION, answered by HIL_ACTUATOR_CONTROLS. In lockstep each state
+is answered by actuators of the same time. Actuators without the lockstep flag say that the flight stack runs
+on its own clock: then the simulator does so too and uses the newest commands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, TypeAlias
+
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.mavlink.dialect import FS_ACTUATORS_ID, FS_PLANT_STATE_ID, mavlink
+from flightstack.mavlink.frame_finder import FrameFinder
+from flightstack.mavlink.link import Link, Message
+from flightstack.params.vehicle import Vehicle
+from flightstack.simulator_link.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame
+from sim_bridge.plant.faults import Kind
+from sim_bridge.server.failure_command import inject_failure
+from sim_bridge.server.hil import HilControls, hil_state
+from sim_bridge.simulator import (
+    DEFAULT_INTERVAL_US,
+    LONGEST_INTERVAL_US,
+    SHORTEST_INTERVAL_US,
+    SIMULATOR_COMPONENT,
+    Simulator,
+)
+
+Bytes: TypeAlias = bytes | bytearray | memoryview
+
+HIL_STATE_QUATERNION_ID = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
+HIL_ACTUATOR_CONTROLS_ID = mavlink.MAVLINK_MSG_ID_HIL_ACTUATOR_CONTROLS
+_INJECT_FAILURE = mavlink.MAV_CMD_INJECT_FAILURE
+_SET_INTERVAL = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+
+
+class SimulatorLink:
+    """One client's session. ``vehicle`` is the vehicle with its limits, for the HIL controls."""
+
+    def __init__(self, simulator: Simulator, vehicle: Vehicle, home: GeoPoint, system_id: int = 1) -> None:
+        self.simulator = simulator
+        self.actuators = ActuatorsFrame()
+        self._spare = ActuatorsFrame()
+        self.answered = False  # in lockstep: the actuators for the present state have come
+        self.free_running = False  # the flight stack runs on its own clock
+        self.ready = False  # the flight stack has asked for a state message
+        self.said_goodbye = False
+        self.fault: str | None = None
+        self.stale = 0
+        self._link = Link(system_id, SIMULATOR_COMPONENT)
+        self._frame = LocalFrame(home)
+        self._controls = HilControls(vehicle)
+        self._rotor_count = len(vehicle.rotors)
+        self._requested = 0  # id of the message asked for
+        self._finder = FrameFinder()
+        self._replies: list[bytes] = []
+        self._may_drop = False  # in lockstep: looked through the faults for one that it cannot do
+
+    @property
+    def bad(self) -> int:
+        """Frames that were no message, and stretches of bytes that were no frame."""
+        return self._link.bad + self._finder.junk
+
+    def receive(self, data: memoryview) -> None:
+        """Take in what arrived: any bytes, cut anywhere.
+
+        Whole actuators are taken at once, whatever came before them: in lockstep lost ones would be the last.
+        """
+        if self.actuators.open(data):
+            self._take_actuators()
+            return
+        for frame in self._finder.find(data):
+            if self._is_answered():
+                if self._spare.open(frame):
+                    self.stale += 1
+                    continue
+            elif self.actuators.open(frame):
+                self._take_actuators()
+                continue
+            for message in self._link.decode(frame):
+                self._take(message)
+
+    def _is_answered(self) -> bool:
+        """Whether further actuators would replace an answer that still has to be applied."""
+        return self.answered and not self.free_running
+
+    def replies(self) -> Sequence[bytes]:
+        """Return the frames to send besides the state, once."""
+        if not self._replies:
+            return ()
+        replies, self._replies = self._replies, []
+        return replies
+
+    def state(self) -> Bytes:
+        """Return the bytes to send for the present state; it awaits its answer from now on.
+
+        Nothing but a due BATTERY_STATUS while the fault ``state:drop`` is active.
+        """
+        self.answered = False
+        simulator = self.simulator
+        if self._requested == FS_PLANT_STATE_ID:
+            return simulator.outgoing()
+        battery = simulator.battery_frame()
+        return (
+            battery
+            if simulator.drops_state
+            else battery + self._link.encode(hil_state(simulator, self._frame))
+        )
+
+    def step(self) -> None:
+        """Advance the plant with the newest commands; raise PlantDivergedError."""
+        self.simulator.apply(self.actuators)
+
+    def goodbye(self) -> bytes:
+        """Return the heartbeat that says that the simulator ends in order."""
+        heartbeat = mavlink.MAVLink_heartbeat_message(
+            mavlink.MAV_TYPE_GENERIC,
+            mavlink.MAV_AUTOPILOT_INVALID,
+            0,
+            0,
+            mavlink.MAV_STATE_POWEROFF,
+            3,
+        )
+        return self._link.encode(heartbeat)
+
+    def _take_actuators(self) -> None:
+        actuators = self.actuators
+        if actuators.rotor_count != self._rotor_count:
+            self.fault = (
+                f"the flight stack commands {actuators.rotor_count} rotors, the simulated vehicle has "
+                f"{self._rotor_count}: start both with the same --vehicle"
+            )
+        self.free_running = not actuators.flags & LOCKSTEP_FLAG
+        if not self.free_running and not self._may_drop:
+            self._refuse_drops()
+        if self.ready and actuators.time_us == self.simulator.time_us:
+            self.answered = True
+        elif not self.free_running:
+            self.stale += 1
+
+    def _refuse_drops(self) -> None:
+        """End the session when a fault asks for what lockstep cannot do; looked at once after each new fault."""
+        self._may_drop = True
+        if any(fault.kind is Kind.STATE_DROP for fault in self.simulator.faults):
+            self.fault = (
+                "state:drop needs a flight stack on its own clock (--clock realtime): in lockstep it would wait "
+                "for the state for ever; use state:freeze or state:nan"
+            )
+
+    def _take(self, message: Message) -> None:
+        kind, by = message.get_msgId(), message.get_srcSystem()
+        is_actuators = kind in (FS_ACTUATORS_ID, HIL_ACTUATOR_CONTROLS_ID)
+        if is_actuators and self._is_answered():
+            self.stale += 1
+        elif kind == FS_ACTUATORS_ID:  # signed or cut short
+            self.actuators.rotor_speed_rad_s[:] = message.rotor_speed_rad_s
+            self.actuators.set_rotor_count(message.rotor_count)
+            self.actuators.seal(message.time_us, message.flags)
+            self._take_actuators()
+        elif kind == HIL_ACTUATOR_CONTROLS_ID:
+            self._controls.write(message, self.actuators)
+            self._take_actuators()
+        elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            self.said_goodbye = message.system_status == mavlink.MAV_STATE_POWEROFF
+        elif kind in (mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT):
+            result = self._command(message)
+            self._replies.append(
+                self._link.encode(
+                    mavlink.MAVLink_command_ack_message(
+                        message.command, result, 0, 0, by, message.get_srcComponent()
+                    )
+                )
+            )
+
+    def _command(self, message: Any) -> int:
+        """Carry out SET_MESSAGE_INTERVAL and INJECT_FAILURE; return the MAV_RESULT of any command."""
+        if message.command == _INJECT_FAILURE:
+            return inject_failure(self.simulator, message.param1, message.param2, message.param3)
+        if message.command != _SET_INTERVAL:
+            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+        return self._set_interval(message.param1, message.param2)
+
+    def _set_interval(self, kind: float, interval: float) -> int:
+        if kind not in (FS_PLANT_STATE_ID, HIL_STATE_QUATERNION_ID):
+            return int(mavlink.MAV_RESULT_DENIED)
+        if kind != FS_PLANT_STATE_ID and self._requested == FS_PLANT_STATE_ID:
+            return int(mavlink.MAV_RESULT_DENIED)  # one state message; who asks for both gets the exact one
+        if interval == -1.0:  # MAVLink: no longer
+            self.ready, self._requested = False, 0
+            return int(mavlink.MAV_RESULT_ACCEPTED)
+        if interval == 0.0:  # MAVLink: the default rate
+            interval = DEFAULT_INTERVAL_US
+        if not math.isfinite(interval) or not SHORTEST_INTERVAL_US <= round(interval) <= LONGEST_INTERVAL_US:
+            return int(mavlink.MAV_RESULT_DENIED)
+        self.simulator.set_interval_us(round(interval))
+        self._requested = int(kind)
+        self.ready = True
+        return int(mavlink.MAV_RESULT_ACCEPTED)

@@ -1,0 +1,148 @@
+"""The simulator as a process: one client over TCP, in lockstep or on the wall clock."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import math
+import select
+import socket
+from typing import NamedTuple
+
+from flightstack.core.geodesy import GeoPoint
+from flightstack.params.vehicle import Vehicle
+from flightstack.process.clock import ask_for_punctual_sleeps
+from flightstack.process.compile_notice import announce_compilation
+from sim_bridge.errors import PlantDivergedError
+from sim_bridge.output import complain, say
+from sim_bridge.plant.faults import Fault
+from sim_bridge.plant.plant import PlantOptions
+from sim_bridge.plants import kernels_of
+from sim_bridge.render.live_view import LiveView
+from sim_bridge.server.connection import (
+    Connection,
+    PeerClosedError,
+    PeerSilentError,
+    StoppedError,
+    StopSignal,
+    listen,
+)
+from sim_bridge.server.lockstep import SimulatorLink
+from sim_bridge.server.session import Session
+from sim_bridge.simulator import Simulator
+
+DONE, FAILED, USAGE, NO_PEER = 0, 1, 2, 3
+DEFAULT_TIMEOUT_S = 30.0
+
+
+class ServerOptions(NamedTuple):
+    """Everything a run of the simulator needs."""
+
+    vehicle: Vehicle
+    plant: str
+    plant_options: PlantOptions
+    home: GeoPoint
+    speed: float  # math.inf: as fast as it goes
+    host: str
+    port: int
+    system_id: int
+    ideal_rotors: bool
+    physics_hz: float
+    timeout_s: float | None  # None: wait for a client for ever
+    faults: tuple[Fault, ...] = ()
+    view: LiveView | None = None
+
+
+def serve(options: ServerOptions) -> int:
+    """Run the simulator for one client; return the exit code."""
+    try:
+        listener = listen(options.host, options.port)
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or error
+        port_is_bad = getattr(error, "errno", None) in (errno.EADDRINUSE, errno.EACCES)
+        remedy = "choose another --port or --instance" if port_is_bad else "check --host"
+        complain(f"cannot listen on {options.host}:{options.port}: {reason}; {remedy}")
+        return USAGE
+    with listener:
+        stop = StopSignal()
+        _introduce(options, listener.getsockname()[1])
+        announce_compilation("sim-bridge", kernels_of(options.plant))
+        simulator = _simulator(options)  # compiles where nothing is cached; a client may connect meanwhile
+        try:
+            client = _await_client(listener, stop, options.timeout_s)
+        except StoppedError:
+            return DONE
+        except PeerSilentError:
+            host, port = listener.getsockname()[:2]
+            complain(f"waited {options.timeout_s:g} s for a flight stack to connect to {host}:{port}")
+            return NO_PEER
+    ask_for_punctual_sleeps()
+    timeout_s = DEFAULT_TIMEOUT_S if options.timeout_s is None else options.timeout_s
+    link = SimulatorLink(simulator, options.vehicle, options.home, options.system_id)
+    watching = contextlib.nullcontext() if options.view is None else options.view.watching(simulator)
+    with client, watching:
+        connection = Connection(client, stop, timeout_s)
+        return _fly(Session(link, connection, options.speed, stop), connection, timeout_s)
+
+
+def _introduce(options: ServerOptions, port: int) -> None:
+    speed = "max" if math.isinf(options.speed) else f"{options.speed:g}"
+    say(
+        f"{options.vehicle.name}, {options.plant} plant, {options.host}:{port}, speed {speed}, "
+        f"seed {options.plant_options.seed}"
+    )
+
+
+def _await_client(listener: socket.socket, stop: StopSignal, timeout_s: float | None) -> socket.socket:
+    """Return the first client; raise StoppedError, or PeerSilentError after the timeout."""
+    waiter = stop.waiter(listener, select.POLLIN)
+    while True:
+        waiter.wait(timeout_s)
+        try:
+            return listener.accept()[0]
+        except OSError:  # it went away before we came
+            continue
+
+
+def _simulator(options: ServerOptions) -> Simulator:
+    vehicle = options.vehicle.with_ideal_rotors() if options.ideal_rotors else options.vehicle
+    simulator = Simulator(
+        vehicle,
+        options.plant,
+        options.plant_options,
+        physics_hz=options.physics_hz,
+        system_id=options.system_id,
+    )
+    about = simulator.plant.about()
+    if about:
+        say(about)
+    for fault in options.faults:
+        simulator.inject(fault)
+    return simulator
+
+
+def _fly(session: Session, connection: Connection, timeout_s: float) -> int:
+    link = session.link
+    problem = ""
+    try:
+        session.run()
+        problem = link.fault or ""
+    except StoppedError:
+        connection.send_last(link.goodbye())
+    except PeerClosedError:
+        if not link.said_goodbye:
+            problem = (
+                f"flight stack lost at t={link.simulator.time_us * 1e-6:.3f} s: it closed the connection"
+            )
+    except PeerSilentError:
+        at = link.simulator.time_us * 1e-6
+        problem = f"the flight stack did not answer for {timeout_s:g} s (lost at t={at:.3f} s)"
+    except PlantDivergedError as error:
+        problem = str(error)
+        connection.send_last(link.goodbye())
+    for line in session.report():
+        say(line)
+    if problem:
+        complain(problem)
+        return FAILED
+    return DONE
