@@ -1,4 +1,4 @@
-# make fly: set up and fly the square.  make test: set up and run every test.  make check: what CI runs.
+# make fly: set up and fly the square.  make test: set up and run the quick tests.  make test-all: every test.  make check: what CI runs.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -10,9 +10,11 @@ export PYTHONDONTWRITEBYTECODE :=
 INSTALL := $(BIN)/python -m pip install -q --no-compile --disable-pip-version-check -e
 # test processes side by side: one more than cores, because flights in real time wait most of theirs
 WORKERS ?= 3
+# files in order: those of firmware, interop and processes, which take longest, come first
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 .DEFAULT_GOAL := help
 
-.PHONY: help setup fly test stress check lint types imports generated generate bench fuzz fuzz-firmware firmware-check mutation clean
+.PHONY: help setup fly test test-all stress check lint types imports generated generate bench fuzz fuzz-firmware firmware-check mutation clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -38,13 +40,16 @@ $(READY): $(FLY_READY)
 fly: $(FLY_READY) ## Fly missions/square.plan: simulator, flight stack and ground station as three processes
 	@$(BIN)/gcs fly missions/square.plan
 
-test: $(READY) ## Run every test
-	@$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --durations 15
+test: $(READY) ## Run the tests that a developer runs all day: unit, protocol, flights, C against Python, one real flight
+	@$(PYTEST) -m "unit or protocol or flight or parity or smoke"
+
+test-all: $(READY) ## Run every test
+	@$(PYTEST) --durations 15
 
 stress: $(READY) ## Run every test beside a program that keeps each core busy
-	@$(BIN)/python tools/beside_load.py $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+	@$(BIN)/python tools/beside_load.py $(PYTEST)
 
-check: lint types imports generated test ## Everything that CI checks
+check: lint types imports generated test-all ## Everything that CI checks
 
 lint: $(READY)
 	$(BIN)/ruff check .

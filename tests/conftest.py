@@ -20,6 +20,27 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 HANGS_AFTER_S = 600.0
 
+TIERS = {
+    "unit": "unit",
+    "protocol": "protocol",
+    "scenarios": "flight",
+    "parity": "parity",
+    "processes": "process",
+    "interop": "interop",
+    "firmware": "firmware",
+    "mutation": "firmware",
+    "fuzz": "fuzz",
+}
+"""Marker of the tests in each folder; ``make test`` runs some of them, ``make test-all`` all."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark each test with its tier."""
+    for item in items:
+        folder, name = item.path.parent.name, item.path.name
+        tier = "paper" if name.startswith("test_paper") else TIERS[folder]
+        item.add_marker(getattr(pytest.mark, tier))
+
 
 @pytest.fixture(autouse=True)
 def _never_hangs() -> Iterator[None]:

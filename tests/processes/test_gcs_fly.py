@@ -107,6 +107,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
     return out, run(out, *flags)
 
 
+@pytest.mark.smoke
 def test_a_mission_is_flown_from_plan_to_report(
     flown: tuple[Path, Ended],
 ) -> None:
