@@ -1,4 +1,4 @@
-"""Vehicles and clients live as long as the tests of this package: to start and to find each other takes seconds."""
+"""A vehicle and its clients live as long as tests of a file want the same speed: to find each other takes seconds."""
 
 from __future__ import annotations
 
@@ -11,40 +11,51 @@ from tests.interop.stack import RealVehicle
 
 
 class Fleet:
-    """One vehicle for each speed, one client for each vehicle and link; a failed test costs its vehicle."""
+    """One vehicle at a time, and one client of it for each link; a failed test costs its vehicle.
+
+    At ten times real time a vehicle that waits takes half of a processor, so that none is kept for later.
+    """
 
     def __init__(self, start: Callable[[float], RealVehicle]) -> None:
         self._start = start
-        self._vehicles: dict[float, RealVehicle] = {}
-        self._clients: dict[tuple[float, str], Client] = {}
+        self._vehicle: RealVehicle | None = None
+        self._clients: dict[str, Client] = {}
 
     def vehicle(self, speed: float) -> RealVehicle:
-        if speed not in self._vehicles:
-            self._vehicles[speed] = self._start(speed)
-        return self._vehicles[speed]
+        if self._vehicle is None or self._vehicle.speed != speed:
+            self.stop()
+            self._vehicle = self._start(speed)
+        return self._vehicle
 
     def client(self, speed: float, link: str) -> Client:
         vehicle = self.vehicle(speed)
-        if (speed, link) not in self._clients:
-            self._clients[speed, link] = Client(vehicle, link)
-        return self._clients[speed, link]
+        if link not in self._clients:
+            self._clients[link] = Client(vehicle, link)
+        return self._clients[link]
 
-    def discard(self, speed: float) -> None:
-        """Forget a vehicle that a failed test left in nobody knows what state."""
-        for key in [key for key in self._clients if key[0] == speed]:
-            self._clients.pop(key).kill()
-        if (vehicle := self._vehicles.pop(speed, None)) is not None:
+    def discard(self) -> None:
+        """End a vehicle that a failed test left in an unknown state."""
+        vehicle, clients = self._forget()
+        for client in clients:
+            client.kill()
+        if vehicle is not None:
             vehicle.kill()
 
     def stop(self) -> None:
         """End all in order."""
-        for client in self._clients.values():
+        vehicle, clients = self._forget()
+        for client in clients:
             client.stop()
-        for vehicle in self._vehicles.values():
+        if vehicle is not None:
             vehicle.stop()
 
+    def _forget(self) -> tuple[RealVehicle | None, list[Client]]:
+        vehicle, clients = self._vehicle, list(self._clients.values())
+        self._vehicle, self._clients = None, {}
+        return vehicle, clients
 
-@pytest.fixture(scope="package")
+
+@pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fleet]:
     fleet = Fleet(lambda speed: RealVehicle(tmp_path_factory.mktemp(f"vehicle-{speed:g}x-"), speed))
     yield fleet
@@ -58,10 +69,10 @@ def client(request: pytest.FixtureRequest, fleet: Fleet) -> Iterator[Client]:
     failed = request.session.testsfailed
     yield fleet.client(speed, link)
     if request.session.testsfailed > failed:
-        fleet.discard(speed)
+        fleet.discard()
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def station_vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RealVehicle]:
     """A vehicle at ten times real time for ground stations that bind its UDP ports themselves."""
     vehicle = RealVehicle(tmp_path_factory.mktemp("station-vehicle"), 10.0)

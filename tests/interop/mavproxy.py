@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from tests.interop.needs import needs
@@ -32,6 +33,7 @@ class MavProxy:
         """Start it on ``master`` ("tcp:HOST:PORT", "udpin:HOST:PORT") and wait until it has seen the vehicle."""
         self.vehicle = vehicle
         self._lines: int | None = None  # that it had said when it was to end
+        self.lost_at_start = 0
         self._process = Process(
             "MAVProxy.mavproxy", "--master", master, "--state-basedir", str(directory), *options, listens=True
         )
@@ -46,6 +48,11 @@ class MavProxy:
         """Type a command and wait until it has said each of ``answers``."""
         self._process.tell(command)
         self.until(*answers)
+
+    def lost(self) -> int:
+        """Ask how many packets its link has lost."""
+        self.tell("link", " lost, ")
+        return int(re.findall(r"(\d+) lost, ", self.said)[-1])
 
     @property
     def said(self) -> str:

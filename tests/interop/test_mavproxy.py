@@ -38,6 +38,9 @@ def proxy(station_vehicle: RealVehicle, tmp_path_factory: pytest.TempPathFactory
     master = f"tcp:{HOST}:{station_vehicle.tcp_port}"
     proxy = MavProxy(station_vehicle, master, tmp_path_factory.mktemp("mavproxy"))
     proxy.until("parameters (ftp)")
+    # on a loaded machine it was once seen to count one packet as lost while it connected
+    proxy.lost_at_start = proxy.lost()
+    assert proxy.lost_at_start <= 1
     yield proxy
     proxy.stop()
 
@@ -181,4 +184,4 @@ def test_it_reads_parameters_one_by_one_over_udp(station_vehicle: RealVehicle, t
 
 def test_it_counts_no_packet_as_lost(proxy: MavProxy) -> None:
     """It counts each message that it cannot decode."""
-    proxy.tell("link", " 0 lost, 0.0% loss")
+    assert proxy.lost() == proxy.lost_at_start

@@ -42,5 +42,5 @@ def test_one_flies_and_the_other_calls_the_vehicle_home(fleet: Fleet, pilot: str
         first.run(fly)
         second.finish()
     except AssertionError:
-        fleet.discard(SPEED)
+        fleet.discard()
         raise
