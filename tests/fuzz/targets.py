@@ -57,7 +57,7 @@ def hub(script: bytes) -> int:
     if options & SIGNED:
         ground.use_signing(Signing(KEY, lambda: 1.75e9), lambda _key: None)
         link = Link(250, 190, signing=LinkSigning(Signing(KEY, lambda: 1.75e9), 9))
-    now_s, sent, arrivals = world._link_now_s(), 0, 0
+    now_s, sent, arrivals = world.link_now_s(), 0, 0
     for step in steps(script[1:]):
         now_s += step.pause_s
         for piece in step.pieces:
@@ -65,7 +65,7 @@ def hub(script: bytes) -> int:
             arrivals += 1
         sent += sum(1 for _ in ground.poll(now_s))
     assert sent < MOST_SENT
-    world._held_s = now_s - world.time_s
+    world.held_s = now_s - world.time_s
     world.sends_heartbeats = False
     world.tick()
     check_vehicle(world)
@@ -95,7 +95,7 @@ def answers(world: World, link: Link) -> set[str]:
         world.stack.ground._own.system, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 148, 0, 0, 0, 0, 0, 0
     )
     address = PeerAddress(GROUND, "192.0.2.99", 99)
-    now_s = world._link_now_s() + 100.0  # transactions of others have timed out
+    now_s = world.link_now_s() + 100.0  # transactions of others have timed out
     kinds: set[str] = set()
     for _ in range(20):
         for message in (mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), request):

@@ -16,7 +16,7 @@ from flightstack.process.reboot import carry_over
 from flightstack.services.routing.hub import FORWARDED_A_POLL, KEPT_TEXTS, MAX_PEERS, PEER_FORGOTTEN_S
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.vehicle.snapshot import NOTICE
-from tests.unit.test_ground_hub import ALICE, BOB, Net
+from tests.support.hub_net import ALICE, BOB, Net
 
 CAMERA = PeerAddress("tcp", "camera", 3)
 
