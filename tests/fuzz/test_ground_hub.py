@@ -64,8 +64,8 @@ def test_nothing_raises_memory_stays_bounded_and_the_vehicle_still_answers(flyin
     throw(world, inputs, MESSAGES)
     assert len(inputs.drawn) == len(KINDS)
     hub = world.stack.ground
-    assert sum(not peer.permanent for peer in hub._peers.values()) <= MAX_PEERS
-    assert len(hub._to_forward) <= MAX_TO_FORWARD
+    assert sum(not permanent for _, permanent in hub.addresses()) <= MAX_PEERS
+    assert hub.forward_backlog <= MAX_TO_FORWARD
     assert np.isfinite(world.simulator.frame.state).all()
     world.run(0.5)
     assert held(hub) < MOST_HELD

@@ -136,11 +136,11 @@ def test_inputs_leave_the_vehicle_sound(name: str) -> None:
         plans += guard.plan_changes
         parameters += guard.parameter_changes
         most_held = max(most_held, held(hub))
-        assert len(hub._to_forward) <= MAX_TO_FORWARD
-        assert sum(not peer.permanent for peer in hub._peers.values()) <= MAX_PEERS
-        if hub._signing is not None:
-            assert len(hub._signing._streams) <= MAX_STREAMS
-            counts = hub._signing.counts
+        assert hub.forward_backlog <= MAX_TO_FORWARD
+        assert sum(not permanent for _, permanent in hub.addresses()) <= MAX_PEERS
+        if hub.signing is not None:
+            assert hub.signing.stream_count <= MAX_STREAMS
+            counts = hub.signing.counts
             assert min(counts.good, counts.unsigned_refused, counts.bad_signature) > 100
         check_vehicle(world)
         assert "AUTOPILOT_VERSION" in answers(world, client)

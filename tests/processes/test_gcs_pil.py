@@ -62,7 +62,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def here_as_before(flown: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     """Take the hop's MIL and SIL from ``flown``: the same options give the same logs. The parameter is PIL's speed."""
-    flights, fly_stage = result_of(flown)["flights"], pil_run._fly
+    flights, fly_stage = result_of(flown)["flights"], pil_run.fly_stage
 
     def fly(stage: str, options: FlyOptions, *rest: Any) -> tuple[Flown, CliError | None]:
         if stage == "PIL":
@@ -74,7 +74,7 @@ def here_as_before(flown: Path, monkeypatch: pytest.MonkeyPatch, request: pytest
         }
         return Flown("completed", read_samples(there / "flight.ulg"), facts), None
 
-    monkeypatch.setattr(pil_run, "_fly", fly)
+    monkeypatch.setattr(pil_run, "fly_stage", fly)
 
 
 def test_three_flights_are_flown_compared_and_reported(flown: Path) -> None:

@@ -132,7 +132,7 @@ def test_a_cleared_mission_is_no_users_choice() -> None:
     until_breach(world, fly_mission)
     world.upload([])
     assert world.mode is Mode.HOLD
-    assert not any(entry.overridden for entry in world.stack.autopilot.supervisor._memory.entries.values())
+    assert world.stack.autopilot.supervisor.overridden == ()
     assert Failsafe.FENCE in world.stack.autopilot.failsafes
 
 

@@ -58,13 +58,13 @@ def lose_states(world: World) -> None:
 
 def tip_over(world: World) -> None:
     """Turn the vehicle by 100° about its roll axis, at once."""
-    world.simulator.plant._memory[0]["body"][6:10] = math.cos(0.87), math.sin(0.87), 0.0, 0.0  # type: ignore[attr-defined]
+    world.simulator.plant.memory[0]["body"][6:10] = math.cos(0.87), math.sin(0.87), 0.0, 0.0  # type: ignore[attr-defined]
     world.run(0.004)
 
 
 def blow_away(world: World) -> None:
     """Put the vehicle 30 m to the east, at once."""
-    world.simulator.plant._memory[0]["body"][1] += 30.0  # type: ignore[attr-defined]
+    world.simulator.plant.memory[0]["body"][1] += 30.0  # type: ignore[attr-defined]
 
 
 def inject(fault: str) -> Callable[[World], None]:

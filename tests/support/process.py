@@ -101,6 +101,10 @@ class Process:
         self._popen.kill()
         self.end()
 
+    @property
+    def is_running(self) -> bool:
+        return self._popen.poll() is None
+
     def interrupt(self) -> None:
         self._popen.send_signal(signal.SIGINT)
 

@@ -126,7 +126,7 @@ def test_an_unknown_sender_of_junk_gets_nothing_and_is_forgotten(net: Net) -> No
     net.hub.receive(junk, b"\xfd\x00junk", net.now_s)
     net.run(2.0)
     assert net.strangers == []
-    assert net.hub._peers == {}
+    assert net.hub.addresses() == []
 
 
 def test_silent_peers_are_forgotten_and_permanent_ones_fall_back_to_heartbeats(net: Net) -> None:
@@ -152,7 +152,7 @@ def test_silent_peers_are_forgotten_and_permanent_ones_fall_back_to_heartbeats(n
 def test_no_more_peers_than_there_is_room_for(net: Net) -> None:
     for index in range(MAX_PEERS + 8):
         net.join(PeerAddress(GROUND, "host", index))
-    assert len(net.hub._peers) == MAX_PEERS
+    assert len(net.hub.addresses()) == MAX_PEERS
     net.run(0.1)
     assert not net.stations[PeerAddress(GROUND, "host", MAX_PEERS + 1)].inbox
 
