@@ -44,7 +44,7 @@ class BenchWorld(World):
             if self.time_s >= self._heartbeat_due_s:
                 self._heartbeat_due_s = self.time_s + 1.0
                 self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-            for _ in self.stack.ground.poll(self._link_now_s()):
+            for _ in self.stack.ground.poll(self.link_now_s()):
                 pass
 
 

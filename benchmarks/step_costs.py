@@ -135,7 +135,7 @@ def parts() -> list[Part]:
     world = _flying()
     stack, simulator = world.stack, world.simulator
     autopilot, link = stack.autopilot, stack.simulator
-    backend, navigator, now = autopilot._backend, autopilot._navigator, autopilot.now
+    backend, navigator, now = autopilot.backend, autopilot.navigator, autopilot.now
     state, speeds = autopilot._state.copy(), autopilot._rotor_speed.copy()
     row = np.zeros(LoopRow.SIZE)
     hover = np.zeros(MAX_ROTORS)

@@ -93,6 +93,12 @@ class Supervisor:
         return active(self._memory)
 
     @property
+    def overridden(self) -> tuple[Failsafe, ...]:
+        """Active failsafes that a user has overridden."""
+        entries = self._memory.entries
+        return tuple(failsafe for failsafe in active(self._memory) if entries[failsafe].overridden)
+
+    @property
     def decision(self) -> Decision:
         """What the failsafes ask for, and the cause."""
         return self._memory.decision

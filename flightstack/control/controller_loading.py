@@ -40,7 +40,7 @@ def load_controller(name: str) -> AttitudeController:
         controller = points[0].load()
     except Exception as error:  # a user's package may fail in any way: report it as theirs
         raise controller_error(name, f"{points[0].value} cannot be loaded: {_reason(error)}") from error
-    problem = _form_problem(name, controller)
+    problem = form_problem(name, controller)
     if problem is not None:
         raise controller_error(name, f"{points[0].value} {problem}")
     assert isinstance(controller, AttitudeController)
@@ -51,7 +51,8 @@ def _owner(point: EntryPoint) -> str:
     return point.value if point.dist is None else point.dist.name
 
 
-def _form_problem(name: str, controller: object) -> str | None:
+def form_problem(name: str, controller: object) -> str | None:
+    """Return why ``controller`` cannot be used as the controller ``name``, as the end of a sentence, or None."""
     if not isinstance(controller, AttitudeController):
         return "is not an AttitudeController"
     if controller.name != name:

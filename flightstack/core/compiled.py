@@ -41,7 +41,8 @@ _import_without_scipy()
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_specialised: dict[tuple[Callable[..., Any], str], Callable[..., Any]] = {}
+specialised: dict[tuple[Callable[..., Any], str], Callable[..., Any]] = {}
+"""The kernels that ``specialise`` made in this process, by template and key."""
 
 for _function in portable_math.FUNCTIONS:
     register_jitable(error_model="numpy")(_function)
@@ -84,15 +85,15 @@ def specialise(template: Callable[..., Any], key: str, **names: Any) -> Callable
     a process the same template and key are the same kernel, read from the disk once.
     """
     assert isinstance(template, FunctionType)
-    known = _specialised.get((template, key))
+    known = specialised.get((template, key))
     if known is not None:
         return known
     copy = FunctionType(template.__code__, {**template.__globals__, **names}, f"{template.__name__}__{key}")
     copy.__qualname__ = copy.__name__
     copy.__module__ = template.__module__
     modules = {getattr(value, "__module__", None) or template.__module__ for value in names.values()}
-    _specialised[template, key] = _compile(copy, frozenset(filter(is_own, {copy.__module__, *modules})))
-    return _specialised[template, key]
+    specialised[template, key] = _compile(copy, frozenset(filter(is_own, {copy.__module__, *modules})))
+    return specialised[template, key]
 
 
 def as_tuple(array: Any, count: int) -> Any:

@@ -56,7 +56,8 @@ def _imports(text: str) -> set[str]:
 
 
 @cache
-def _read(path: Path) -> tuple[bytes, frozenset[str]]:
+def read_source(path: Path) -> tuple[bytes, frozenset[str]]:
+    """Return the content of a source file and the names that it imports; read once in a process."""
     content = path.read_bytes()
     return content, frozenset(_imports(content.decode("utf-8", "replace")))
 
@@ -69,7 +70,7 @@ def sources(top: Path, module_names: Iterable[str]) -> list[Path]:
         path = _path(top, name)
         if path is not None and path not in found:
             found.add(path)
-            waiting.extend(_read(path)[1])
+            waiting.extend(read_source(path)[1])
             waiting.extend(parent for parent in (name.rpartition(".")[0],) if parent)
     return sorted(found)
 
@@ -79,7 +80,7 @@ def digest(top: Path, module_names: Iterable[str], version: str) -> str:
     result = hashlib.sha256(version.encode())
     for path in sources(top, module_names):
         result.update(str(path.relative_to(top)).encode())
-        result.update(_read(path)[0])
+        result.update(read_source(path)[0])
     return result.hexdigest()[:16]
 
 

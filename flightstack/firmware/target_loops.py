@@ -12,7 +12,7 @@ import numpy as np
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlags
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
 from flightstack.firmware.errors import TargetError, WrongFirmwareError
-from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilTiming
+from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
 from flightstack.firmware.pil_operations import PilReport, carried
 from flightstack.firmware.pil_record import COST_UNITS, PilRecord
 from flightstack.firmware.sources import source_hash
@@ -120,6 +120,11 @@ class TargetLoops:
         self.record.write(log, self._client.counters, texts, self.ending)
 
     # ------------------------------------------------------------------ the line
+
+    @property
+    def counters(self) -> PilCounters:
+        """What happened on the line so far: frames sent again, lost, damaged."""
+        return self._client.counters
 
     @property
     def _now_s(self) -> float:

@@ -25,6 +25,11 @@ class FrameFinder:
         self.junk = 0
         """Stretches of bytes that were no frame."""
 
+    @property
+    def partial_size(self) -> int:
+        """Bytes kept of a frame whose rest has not come; less than one frame."""
+        return len(self._held)
+
     def find(self, data: bytes | memoryview) -> list[bytes]:
         """Take ``data`` and return the frames that are complete now."""
         stream = self._held + bytes(data)

@@ -44,6 +44,11 @@ class FrameReader:
         """Runs of octets that are no frame."""
 
     @property
+    def partial_size(self) -> int:
+        """Bytes kept of a frame whose rest has not come; less than one frame."""
+        return len(self._rest)
+
+    @property
     def has_partial(self) -> bool:
         """Tell whether the beginning of a frame is held."""
         return bool(self._rest)

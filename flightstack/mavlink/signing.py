@@ -89,6 +89,11 @@ class Signing:
         return self._key != NO_KEY
 
     @property
+    def stream_count(self) -> int:
+        """Streams whose timestamps are remembered, at most MAX_STREAMS."""
+        return len(self._streams)
+
+    @property
     def timestamp(self) -> int:
         """The latest timestamp that was used or heard."""
         return self._timestamp

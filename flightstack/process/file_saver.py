@@ -34,11 +34,12 @@ class FileSaver:
             self._changed.wait()
             closing = self._closing  # before the changes are taken: none comes after it
             self._changed.clear()
-            self._save()
+            self.save()
             if closing:
                 return
 
-    def _save(self) -> None:
+    def save(self) -> None:
+        """Write the file now, in this thread; an error is kept for ``take_error`` and ``problem``."""
         try:
             self._write()
         except Exception as error:  # a saver that ends loses every later change

@@ -86,7 +86,8 @@ class SimulatorLink:
         self.steps = StateSteps(interval_us)
         self._interval_us = interval_us
         self.battery = NO_BATTERY
-        self._finder = FrameFinder()
+        self.finder = FrameFinder()
+        """Cuts what is received into frames."""
         self._state_us = 0  # the newest state's own time
         self.has_arrived = False
         """Whether a state of a new time has come since ``freshness`` was last asked for."""
@@ -161,7 +162,7 @@ class SimulatorLink:
     def _receive_any(self, data: memoryview) -> bool:
         fresh = False
         battery: BatteryReport | None = None
-        for frame in self._finder.find(data):
+        for frame in self.finder.find(data):
             if self._plant.open(frame):
                 self._take_time(self._plant.time_us)
                 self._speaks_hil = False

@@ -56,7 +56,8 @@ class LossyEnd:
     """One end of a ``LossyLink``."""
 
     def __init__(self, conditions: Conditions, seed: str) -> None:
-        self._conditions = conditions
+        self.conditions = conditions
+        """Of what is sent from now on."""
         self._random = random.Random(seed)
         self._in_flight: list[tuple[float, int, bytes]] = []
         self._sent = 0
@@ -64,7 +65,7 @@ class LossyEnd:
 
     def send(self, data: bytes, now_s: float) -> None:
         """Send a datagram at ``now_s``."""
-        conditions, chance = self._conditions, self._random.random
+        conditions, chance = self.conditions, self._random.random
         if chance() < conditions.loss:
             return
         for _ in range(2 if chance() < conditions.duplication else 1):

@@ -75,6 +75,14 @@ class TcpServer:
         host, port = self._listener.getsockname()[:2]
         return str(host), int(port)
 
+    def addresses(self) -> list[Address]:
+        """Return the addresses of the present clients."""
+        return list(self._clients)
+
+    def unsent(self, address: Address) -> int:
+        """Return how many bytes wait for a client, at most MAX_UNSENT."""
+        return len(self._clients[address].unsent)
+
     def __len__(self) -> int:
         return len(self._clients)
 

@@ -51,7 +51,8 @@ class Autopilot(FlightRequests):
         self._behaviour = behaviour
         self.supervisor = Supervisor(vehicle, behaviour, outer_hz, divisor, state, source)
         self._divisor = divisor
-        self._backend = backend
+        self.backend = backend
+        """The control loops; their parameters and memory are theirs."""
         self._recorder = recorder
         self._navigator = Navigator(guidance_params(behaviour, vehicle.weight_n), outer_hz)
         self._max_thrust_n = 2.0 * vehicle.weight_n if vehicle.ideal_rotors else vehicle.max_thrust_n
@@ -73,6 +74,11 @@ class Autopilot(FlightRequests):
         return self.supervisor.links
 
     @property
+    def navigator(self) -> Navigator:
+        """Guidance: its parameters, setpoint and contact with the ground; read only."""
+        return self._navigator
+
+    @property
     def failsafes(self) -> tuple[Failsafe, ...]:
         """Active failsafes in order of priority."""
         return self.supervisor.failsafes
@@ -90,14 +96,14 @@ class Autopilot(FlightRequests):
             self._guide()
         row, flags = self._recorder.inner_row(time_us), 0
         if self._rests or not self._flying:
-            self._backend.idle(self._state, self._rotor_speed, now.status.armed, row)
+            self.backend.idle(self._state, self._rotor_speed, now.status.armed, row)
             supervisor.follow_rotors(row)
         elif supervisor.states.holds_rotors:
             row[:] = self._good_row
             row[LoopRow.STATUS] = LoopStatus.INPUT_STALE
         else:
             aims = outer_due and not self._target_is_given
-            self._backend.step(self._state, now.setpoint, self._rotor_speed, aims, row)
+            self.backend.step(self._state, now.setpoint, self._rotor_speed, aims, row)
             supervisor.follow_rotors(row)
             flags = _OUTER_DUE if aims else _SET_TARGET
             if self._loops_begin:
@@ -128,14 +134,14 @@ class Autopilot(FlightRequests):
         touches = flying and navigator.touches_ground and not flies_attitude
         self._rests = touches and navigator.rests
         if rested or self._rests or (touches and not touched):  # what the loops remember is of the ground
-            self._backend.reset(self._state)
+            self.backend.reset(self._state)
             self._loops_begin = True
         if flying and flies_attitude:
             target = navigator.attitude_target
         elif touches and not self._rests:
             target = navigator.levelling_target(now.attitude_target)
         if target is not None:
-            self._backend.set_attitude_target(target)
+            self.backend.set_attitude_target(target)
         self._target_is_given = target is not None
 
     # ------------------------------------------------------------------ events of the flight

@@ -17,7 +17,7 @@ from flightstack.vehicle.snapshot import CRITICAL, NOTICE, WARNING, Text
 class ModeKeeper(PlanKeeper):
     """The part of the autopilot that applies events, as the table of ``commander.transitions`` says."""
 
-    _backend: ControlBackend
+    backend: ControlBackend
     _takeoff_altitude_m: float
     """Of the next takeoff, above the origin of the local frame."""
     has_state: bool
@@ -193,7 +193,7 @@ class ModeKeeper(PlanKeeper):
         flying = status.armed and (not self.now.landed or self._rises())
         starting = flying and not self._flying
         if starting:
-            self._backend.reset(self._state)
+            self.backend.reset(self._state)
             self._loops_begin = True
             self._navigator.rest_at(self._state)
         if entering:

@@ -70,7 +70,7 @@ def run(
     for stage, loops in ((MIL, PYTHON), (SIL, C), (PIL, target)):
         console.print(f"[bold]{stage}[/]  loops {loops}", highlight=False)
         flown = dataclasses.replace(options, loops=loops)
-        flights[stage], problem = _fly(stage, flown, plan, folder, console, overwrite)
+        flights[stage], problem = fly_stage(stage, flown, plan, folder, console, overwrite)
         console.print(f"     {_words(flights[stage])}", markup=False, highlight=False, soft_wrap=True)
         if problem is not None:
             break
@@ -107,9 +107,10 @@ def make_pil_directory(name: str, out: Path | None, overwrite: bool = False) -> 
     return out
 
 
-def _fly(
+def fly_stage(
     stage: str, options: FlyOptions, plan: Plan, folder: Path, console: Console, overwrite: bool
 ) -> tuple[Flown, CliError | None]:
+    """Fly a stage; return its results, and the error of a flight that was not completed."""
     display: Display = BarDisplay(console) if draws_bars(console) else NoticeDisplay(console)
     place = stage.lower()
     try:

@@ -49,21 +49,22 @@ class MultibodyPlant(RecordPlant):
         super().__init__(vehicle, options)
         self.assembly = assemble(vehicle)
         self._model = _compiled(vehicle)
-        self._data = mujoco.MjData(self._model)
+        self.data = mujoco.MjData(self._model)
+        """MuJoCo's state, forces and accelerations, in its own frames; read only."""
         self._softness_m = 0.0
         self._watched = NEAR
         first = 1 + mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
-        self._on_rotors: FloatArray = self._data.xfrc_applied[first:]
+        self._on_rotors: FloatArray = self.data.xfrc_applied[first:]
         self._views()
         self._drive: RecordArray = np.zeros(1, rotor_drive.DRIVE)
         self._set_drive(len(vehicle.rotors))
-        self._memory[0]["ground_z"], self._memory[0]["reach"] = foot_z_m(vehicle), self._reach_m()
+        self.memory[0]["ground_z"], self.memory[0]["reach"] = foot_z_m(vehicle), self._reach_m()
         self._set_state(options.initial)
         self.set_step(DEFAULT_STEP_S)
 
     def _views(self) -> None:
         """Keep MuJoCo's arrays at hand: looking them up takes as long as a kernel."""
-        data = self._data
+        data = self.data
         self._qpos: FloatArray = data.qpos
         self._qvel: FloatArray = data.qvel
         self._qacc: FloatArray = data.qacc
@@ -74,7 +75,7 @@ class MultibodyPlant(RecordPlant):
 
     def _set_drive(self, rotors: int) -> None:
         """Read the constants of the drives out of MuJoCo's mass matrix at the level attitude."""
-        model, data, d = self._model, self._data, self._drive[0]
+        model, data, d = self._model, self.data, self._drive[0]
         mujoco.mj_forward(model, data)
         columns = np.eye(model.nv)
         mass = np.zeros((model.nv, model.nv))
@@ -89,11 +90,11 @@ class MultibodyPlant(RecordPlant):
     def _reach_m(self) -> float:
         """Distance from the origin to the farthest point that may touch the ground."""
         geoms = [index for index in range(self._model.ngeom) if self._model.geom_contype[index]]
-        away = np.linalg.norm(self._data.geom_xpos[geoms] - self._data.qpos[:3], axis=1)
+        away = np.linalg.norm(self.data.geom_xpos[geoms] - self.data.qpos[:3], axis=1)
         return float((away + self._model.geom_rbound[geoms]).max(initial=0.0))
 
     def _set_state(self, initial: InitialState) -> None:
-        body = self._memory[0]["body"]
+        body = self.memory[0]["body"]
         body[0:3], body[3:6] = initial.position_ned_m, initial.velocity_ned_m_s
         body[6:10], body[10:13] = quaternion_from_euler(*initial.euler_rad), initial.rates_frd_rad_s
 
@@ -109,7 +110,7 @@ class MultibodyPlant(RecordPlant):
 
     def _rest_depth_m(self) -> float:
         """How deep a level vehicle stands in the ground, by a secant step: the force is linear in the depth."""
-        if not self._memory[0]["ground"]:
+        if not self.memory[0]["ground"]:
             return 0.0
         model = self._model
         data = mujoco.MjData(model)
@@ -124,7 +125,7 @@ class MultibodyPlant(RecordPlant):
         return (1.0 - falls[0] / rise) * _FIRST_DEPTH_M if rise > 0.0 else 0.0
 
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
-        rotor_drive.hold_commands(self._memory, command_rad_s, flags)
+        rotor_drive.hold_commands(self.memory, command_rad_s, flags)
         where = rotor_drive.FLYING
         for _ in range(steps):
             where = self._step()
@@ -134,7 +135,7 @@ class MultibodyPlant(RecordPlant):
 
     def _step(self) -> int:
         """Advance by one step; return where the vehicle is."""
-        memory, drive, qpos, qvel = self._memory, self._drive, self._qpos, self._qvel
+        memory, drive, qpos, qvel = self.memory, self._drive, self._qpos, self._qvel
         where = rotor_drive.begin_step(memory, drive, qpos, qvel)
         self._watch_ground(where)
         for stage in _STAGES:
@@ -157,10 +158,10 @@ class MultibodyPlant(RecordPlant):
 
     def _accelerations(self, stage: int) -> None:
         """Let MuJoCo compute the accelerations of the state that was written to it."""
-        model, data = self._model, self._data
+        model, data = self._model, self.data
         mujoco.mj_step1(model, data)
         rotor_drive.apply_forces(
-            self._memory, self._drive, stage, self._bias, self._held, self._applied, self._on_rotors
+            self.memory, self._drive, stage, self._bias, self._held, self._applied, self._on_rotors
         )
         mujoco.mj_forwardSkip(model, data, _AFTER_VELOCITY, 1)
 
@@ -168,17 +169,17 @@ class MultibodyPlant(RecordPlant):
 
     def show(self) -> int:
         """Write the present state to ``output``; returns as ``advance``."""
-        where = rotor_drive.show_pose(self._memory, self._drive, self._qpos, self._qvel)
+        where = rotor_drive.show_pose(self.memory, self._drive, self._qpos, self._qvel)
         touches = 0
         if where == NEAR:
             self._watch_ground(where)
-            mujoco.mj_fwdPosition(self._model, self._data)
-            touches = int(self._data.ncon > 0)
-        return rotor_drive.show_state(self._memory, self.output, touches)
+            mujoco.mj_fwdPosition(self._model, self.data)
+            touches = int(self.data.ncon > 0)
+        return rotor_drive.show_state(self.memory, self.output, touches)
 
     def acceleration_ned_m_s2(self) -> Vector3:
         """Acceleration at the present state; asking changes nothing of the flight that follows."""
-        where = rotor_drive.show_pose(self._memory, self._drive, self._qpos, self._qvel)
+        where = rotor_drive.show_pose(self.memory, self._drive, self._qpos, self._qvel)
         if where == LOST:
             return Vector3(0.0, 0.0, 0.0)
         self._watch_ground(where)
@@ -196,9 +197,9 @@ class MultibodyPlant(RecordPlant):
 
     def buried_m(self) -> float:
         """How far the vehicle reaches into the ground in the state shown; 0 above it."""
-        if self.show() & DIVERGED or not self._data.ncon:
+        if self.show() & DIVERGED or not self.data.ncon:
             return 0.0
-        return max(0.0, -float(self._data.contact.dist.min()) - self._softness_m)
+        return max(0.0, -float(self.data.contact.dist.min()) - self._softness_m)
 
     def about(self) -> str | None:
         """Tell how well the assembly meets the vehicle file."""

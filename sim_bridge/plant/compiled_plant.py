@@ -29,21 +29,21 @@ class CompiledPlant(RecordPlant):
         self._set_state(options.initial)
 
     def _set_state(self, initial: InitialState) -> None:
-        body = self._memory[0]["body"]
+        body = self.memory[0]["body"]
         body[0:3], body[3:6] = initial.position_ned_m, initial.velocity_ned_m_s
         if self._paper:
             body[6:9], body[9:12] = initial.euler_rad, initial.rates_frd_rad_s
         else:
             body[6:10], body[10:13] = quaternion_from_euler(*initial.euler_rad), initial.rates_frd_rad_s
         # each friction spring starts relaxed: its anchor lies straight below or above its contact point
-        m = self._memory[0]
+        m = self.memory[0]
         attitude = quaternion_from_euler(*initial.euler_rad)
         for index in range(int(m["point_count"])):
             arm = rotate(attitude, Vector3(*m["point"][index, :3].tolist()))
             m["anchor"][index] = (body[0] + arm.x, body[1] + arm.y, initial.euler_rad.z)
 
     def _set_ground(self, ground: Ground) -> None:
-        m = self._memory[0]
+        m = self.memory[0]
         count = len(ground.points)
         m["point_count"] = count
         m["point"][:count] = ground.points
@@ -62,34 +62,34 @@ class CompiledPlant(RecordPlant):
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         if command_rad_s is not self._bound:
             self._meet(command_rad_s)
-        return self._call(self._memory, command_rad_s, flags, steps, self.output)
+        return self._call(self.memory, command_rad_s, flags, steps, self.output)
 
     def _meet(self, command_rad_s: FloatArray) -> None:
         """Take the kernel for any array, and at the second meeting with the same one that made for its type."""
         self._call, self._bound = self._kernel, None
         if command_rad_s is self._met:
-            self._call = direct(self._kernel, self._memory, command_rad_s, 0, 1, self.output)
+            self._call = direct(self._kernel, self.memory, command_rad_s, 0, 1, self.output)
             self._bound = command_rad_s
         self._met = command_rad_s
 
     def show(self) -> int:
         """Write the present state to ``output``; returns as ``advance``."""
-        return self._kernel(self._memory, self._memory[0]["command"], 0, 0, self.output)
+        return self._kernel(self.memory, self.memory[0]["command"], 0, 0, self.output)
 
     def acceleration_ned_m_s2(self) -> Vector3:
         """Acceleration at the present state."""
-        self._slope(self._memory)
-        x, y, z = self._memory[0]["slope"][0, 3:6].tolist()
+        self._slope(self.memory)
+        x, y, z = self.memory[0]["slope"][0, 3:6].tolist()
         return Vector3(x, y, z)
 
     @property
     def ground_softness_m(self) -> float:
         """How far the ground gives way under the vehicle's weight; more with longer steps."""
-        return float(self._memory[0]["ramp"])
+        return float(self.memory[0]["ramp"])
 
     def buried_m(self) -> float:
         """How far the lowest contact point lies below the ground (negative above it) in the state shown."""
-        m, state = self._memory[0], self.output[0]["state"].tolist()
+        m, state = self.memory[0], self.output[0]["state"].tolist()
         points = m["point"][: int(m["point_count"]), :3].tolist()
         lowest = max(rotate(Quaternion(*state[6:10]), Vector3(*point)).z for point in points)
         return float(state[2] + lowest - m["ground_z"] - m["ramp"])
@@ -98,5 +98,5 @@ class CompiledPlant(RecordPlant):
         """Roll, pitch, yaw where they are states of the plant, else None."""
         if not self._paper:
             return None
-        roll, pitch, yaw = self._memory[0]["body"][6:9].tolist()
+        roll, pitch, yaw = self.memory[0]["body"][6:9].tolist()
         return Vector3(roll, pitch, yaw)

@@ -33,8 +33,9 @@ class RecordPlant(ABC):
     def __init__(self, vehicle: Vehicle, options: PlantOptions) -> None:
         self.output: RecordArray = np.zeros(1, OUTPUT)
         self._vehicle = vehicle
-        self._memory: RecordArray = np.zeros(1, MEMORY)
-        m = self._memory[0]
+        self.memory: RecordArray = np.zeros(1, MEMORY)
+        """All numbers of the plant, of dtype ``MEMORY`` and shape (1,): state, rotors, faults, disturbances."""
+        m = self.memory[0]
         disturbance = options.disturbance
         m["wind"], m["force"] = disturbance.wind_ned_m_s, disturbance.force_ned_n
         m["steady_torque"] = m["torque"] = disturbance.torque_frd_n_m
@@ -48,7 +49,7 @@ class RecordPlant(ABC):
             set_battery(m, vehicle.battery, options.battery)
 
     def _set_rotors(self, limits: bool) -> None:
-        m = self._memory[0]
+        m = self.memory[0]
         m["rotor_count"] = len(self._vehicle.rotors)
         for index, rotor in enumerate(self._vehicle.rotors):
             x, y, _ = rotor.position_frd_m
@@ -70,7 +71,7 @@ class RecordPlant(ABC):
 
     def set_rotor_fault(self, rotor: int, share: float = 1.0, speed_rad_s: float | None = None) -> None:
         """Let a rotor give a share of its thrust and torque, and turn at one speed only; see ``Plant``."""
-        m, healthy = self._memory[0], self._healthy[rotor]
+        m, healthy = self.memory[0], self._healthy[rotor]
         row = m["rotor"][rotor]
         row[THRUST : DRAG + 1] = share * healthy[THRUST : DRAG + 1]
         row[LOWEST], row[HIGHEST] = healthy[LOWEST], healthy[HIGHEST]
@@ -81,20 +82,20 @@ class RecordPlant(ABC):
     @property
     def battery(self) -> BatteryState | None:
         """The battery; None for a vehicle without one."""
-        return battery_state(self._memory[0]) if self._has_battery else None
+        return battery_state(self.memory[0]) if self._has_battery else None
 
     def set_charge(self, share: float) -> None:
         """Set the charge of the battery."""
-        self._memory[0]["charge"] = share
+        self.memory[0]["charge"] = share
 
     @property
     def bad_commands(self) -> int:
         """Commands that were not a number and were replaced by the last good one."""
-        return int(self._memory[0]["bad_commands"])
+        return int(self.memory[0]["bad_commands"])
 
     def set_step(self, step_s: float) -> None:
         """Choose the fixed step of the integration [s]."""
-        m = self._memory[0]
+        m = self.memory[0]
         m["step_s"] = step_s
         for index, rotor in enumerate(self._vehicle.rotors):
             m["rotor"][index, HALF_STEP_DECAY] = (
@@ -104,12 +105,12 @@ class RecordPlant(ABC):
 
     def rotor_speeds_rad_s(self) -> list[float]:
         """Rotor speeds in full precision, in the order of the vehicle file."""
-        speeds: list[float] = self._memory[0]["rotor_speed"][: len(self._vehicle.rotors)].tolist()
+        speeds: list[float] = self.memory[0]["rotor_speed"][: len(self._vehicle.rotors)].tolist()
         return speeds
 
     def set_rotor_speeds(self, speeds_rad_s: tuple[float, ...]) -> None:
         """Put the rotors at once at these speeds."""
-        self._memory[0]["rotor_speed"][: len(speeds_rad_s)] = speeds_rad_s
+        self.memory[0]["rotor_speed"][: len(speeds_rad_s)] = speeds_rad_s
 
     @abstractmethod
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
@@ -128,7 +129,7 @@ class RecordPlant(ABC):
 
     def airspeed_m_s(self) -> float:
         """Speed relative to the air."""
-        m = self._memory[0]
+        m = self.memory[0]
         return distance(*(m["body"][3:6] - m["wind"] - m["gust"]).tolist())
 
     def about(self) -> str | None:

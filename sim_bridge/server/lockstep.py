@@ -55,14 +55,15 @@ class SimulatorLink:
         self._controls = HilControls(vehicle)
         self._rotor_count = len(vehicle.rotors)
         self._requested = 0  # id of the message asked for
-        self._finder = FrameFinder()
+        self.finder = FrameFinder()
+        """Cuts what is received into frames."""
         self._replies: list[bytes] = []
         self._may_drop = False  # in lockstep: looked through the faults for one that it cannot do
 
     @property
     def bad(self) -> int:
         """Frames that were no message, and stretches of bytes that were no frame."""
-        return self._link.bad + self._finder.junk
+        return self._link.bad + self.finder.junk
 
     def receive(self, data: memoryview) -> None:
         """Take in what arrived: any bytes, cut anywhere.
@@ -72,7 +73,7 @@ class SimulatorLink:
         if self.actuators.open(data):
             self._take_actuators()
             return
-        for frame in self._finder.find(data):
+        for frame in self.finder.find(data):
             if self._is_answered():
                 if self._spare.open(frame):
                     self.stale += 1

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.firmware.both_loops import FLOWN, both, run_python
 from tests.firmware.core_samples import Sequence, sequence
 from tests.firmware.core_support import CORE, DRIVER, ROW_SIZE, Core, same_bits, sources
 from tests.firmware.core_support import EXACT as EXACT_CORE
 from tests.firmware.step_machines import C, aarch64, first_difference, on_aarch64, on_host, run, tool
 from tests.firmware.step_streams import flown_steps, random_steps
-from tests.firmware.test_core_loops import FLOWN, both, run_python
 
 RANDOM_STEPS = 20_000
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -26,33 +24,10 @@ from tests.firmware.core_support import (
     sources,
 )
 from tests.firmware.core_workout import workout
+from tests.firmware.core_works import assert_equal, made_here, of_real, work_out
 from tests.support.tools import missing
 
 REALS = ("float", "double")
-
-
-def of_real(real: str) -> list[str]:
-    return ["-DFS_DOUBLE"] if real == "double" else []
-
-
-@functools.cache
-def made_here(real: str) -> dict[str, np.ndarray]:
-    """What the plain build makes of the workout."""
-    return workout(Core(real))
-
-
-def work_out(real: str, library: Path, out: Path, **environment: str) -> dict[str, np.ndarray]:
-    """Run the workout on a library in a process of its own."""
-    command = [PYTHON, "-m", "tests.firmware.core_workout", real, library, out]
-    run_tool(command, cwd=ROOT, env={**os.environ, **environment})
-    with np.load(out) as made:
-        return dict(made)
-
-
-def assert_equal(made: dict[str, np.ndarray], expected: dict[str, np.ndarray]) -> None:
-    assert made.keys() == expected.keys()
-    for name, values in made.items():
-        assert np.array_equal(values, expected[name], equal_nan=values.dtype.kind == "f"), name
 
 
 @pytest.mark.parametrize("name", ["gcc", "clang"])

@@ -8,7 +8,7 @@ import shutil
 from pathlib import Path
 
 from tests.firmware.core_support import CORE, DRIVER, EXACT, run_tool, sources
-from tests.firmware.test_core_builds import assert_equal, made_here, of_real, work_out
+from tests.firmware.core_works import assert_equal, made_here, of_real, work_out
 from tests.support.tools import missing
 
 

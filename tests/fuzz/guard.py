@@ -17,7 +17,7 @@ class Guard:
 
     def __init__(self, world: World) -> None:
         self._autopilot, self._params = world.stack.autopilot, world.stack.params
-        self._hub, self._loops = world.stack.ground, world.stack.autopilot._backend
+        self._world, self._loops = world, world.stack.autopilot.backend
         self.plan_changes = self.parameter_changes = 0
         self.after_tick()
 
@@ -37,7 +37,7 @@ class Guard:
         if now[1] != before[1]:
             self.plan_changes += 1
             assert kinds & _CHANGES_PLANS, kinds
-            assert any(m.get_type() == "MISSION_ACK" and m.type == 0 for m in self._waiting(peer))
+            assert any(m.get_type() == "MISSION_ACK" and m.type == 0 for m in self._answers(peer))
         if now[2] != before[2]:
             self.parameter_changes += 1
             assert kinds & _CHANGES_PARAMETERS, kinds
@@ -48,12 +48,10 @@ class Guard:
         plans = (autopilot.places.ids, autopilot.items)
         return memory, plans, self._params.values()
 
-    def _waiting(self, peer: PeerAddress) -> list[Message]:
-        """Return what the services have to say to ``peer``."""
-        outbox = self._hub._peers[peer].outbox
-        for service in self._hub._services:
-            self._hub._collect(service.poll(self._hub._peers[peer].heard_s))
-        return outbox
+    def _answers(self, peer: PeerAddress) -> list[Message]:
+        """Return what is sent to ``peer`` now."""
+        polled = self._world.stack.ground.poll(self._world.link_now_s())
+        return [message for address, data in polled if address == peer for message in messages_in(data)]
 
 
 def messages_in(data: bytes) -> list[Message]:

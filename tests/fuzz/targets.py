@@ -51,13 +51,14 @@ def hub(script: bytes) -> int:
     world = World(flight_logs=MemoryLogs(0, 300, 5_000))
     ground = world.stack.ground
     link = Link(250, 190)
+    keys = [KEY]
     if options & FLYING:
         assert world.arm() == 0
         assert world.takeoff(5.0) == 0
     if options & SIGNED:
-        ground.use_signing(Signing(KEY, lambda: 1.75e9), lambda _key: None)
+        ground.use_signing(Signing(KEY, lambda: 1.75e9), keys.append)
         link = Link(250, 190, signing=LinkSigning(Signing(KEY, lambda: 1.75e9), 9))
-    now_s, sent, arrivals = world._link_now_s(), 0, 0
+    now_s, sent, arrivals = world.link_now_s(), 0, 0
     for step in steps(script[1:]):
         now_s += step.pause_s
         for piece in step.pieces:
@@ -65,12 +66,12 @@ def hub(script: bytes) -> int:
             arrivals += 1
         sent += sum(1 for _ in ground.poll(now_s))
     assert sent < MOST_SENT
-    world._held_s = now_s - world.time_s
+    world.held_s = now_s - world.time_s
     world.sends_heartbeats = False
     world.tick()
     check_vehicle(world)
     # whoever is left in charge of the key, a client that has it gets its answer
-    if options & SIGNED and ground._signing is not None and ground._signing._key != KEY:
+    if keys[-1] != KEY:
         return arrivals
     assert "AUTOPILOT_VERSION" in answers(world, link)
     return arrivals
@@ -80,10 +81,10 @@ def check_vehicle(world: World) -> None:
     """What holds of a vehicle, whatever it was told."""
     autopilot, params = world.stack.autopilot, world.stack.params
     assert np.isfinite(world.simulator.frame.state).all()
-    assert np.isfinite(autopilot._navigator.setpoint).all()
+    assert np.isfinite(autopilot.now.setpoint).all()
     for name, value in params.values().items():
         assert params.specs[name].accepted(value) == value
-    assert len(world.stack.ground._to_forward) <= MAX_TO_FORWARD
+    assert world.stack.ground.forward_backlog <= MAX_TO_FORWARD
     places = autopilot.places
     assert all(math.isfinite(number) for number in places.home_point)
     assert autopilot.now.progress.current <= len(autopilot.items)
@@ -92,10 +93,10 @@ def check_vehicle(world: World) -> None:
 def answers(world: World, link: Link) -> set[str]:
     """Return what a proper client is sent when it asks for AUTOPILOT_VERSION."""
     request = mavlink.MAVLink_command_long_message(
-        world.stack.ground._own.system, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 148, 0, 0, 0, 0, 0, 0
+        world.config.system_id, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 148, 0, 0, 0, 0, 0, 0
     )
     address = PeerAddress(GROUND, "192.0.2.99", 99)
-    now_s = world._link_now_s() + 100.0  # transactions of others have timed out
+    now_s = world.link_now_s() + 100.0  # transactions of others have timed out
     kinds: set[str] = set()
     for _ in range(20):
         for message in (mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), request):
@@ -117,7 +118,7 @@ def simulator(script: bytes) -> int:
         for piece in step.pieces:
             stack.receive(memoryview(piece))
             arrivals += 1
-            assert len(stack._finder._held) <= LARGEST_FRAME
+            assert stack.finder.partial_size <= LARGEST_FRAME
             assert stack.freshness(stack.time_us).age_us >= 0
             if stack.has_state:
                 assert len(bytes(stack.answer(commands, armed=True))) <= LARGEST_FRAME
@@ -132,7 +133,7 @@ def bridge(script: bytes) -> int:
         for piece in step.pieces:
             end.receive(memoryview(piece))
             arrivals += 1
-            assert len(end._finder._held) <= LARGEST_FRAME
+            assert end.finder.partial_size <= LARGEST_FRAME
             assert len(end.replies()) <= MOST_STEPS
         end.state()
         try:

@@ -35,11 +35,11 @@ def throw(world: World, inputs: Inputs, messages: int, peers: int = 80) -> None:
     for number in range(messages):
         peer = address(inputs.random.randrange(peers))
         for piece in inputs.pieces(inputs.datagram()):
-            hub.receive(peer, piece, world._link_now_s())
+            hub.receive(peer, piece, world.link_now_s())
         if number % TICK_EVERY == 0:
-            world._held_s += 0.01
+            world.held_s += 0.01
             world.tick()
-            for _ in hub.poll(world._link_now_s()):
+            for _ in hub.poll(world.link_now_s()):
                 pass
 
 
@@ -64,8 +64,8 @@ def test_nothing_raises_memory_stays_bounded_and_the_vehicle_still_answers(flyin
     throw(world, inputs, MESSAGES)
     assert len(inputs.drawn) == len(KINDS)
     hub = world.stack.ground
-    assert sum(not peer.permanent for peer in hub._peers.values()) <= MAX_PEERS
-    assert len(hub._to_forward) <= MAX_TO_FORWARD
+    assert sum(not permanent for _, permanent in hub.addresses()) <= MAX_PEERS
+    assert hub.forward_backlog <= MAX_TO_FORWARD
     assert np.isfinite(world.simulator.frame.state).all()
     world.run(0.5)
     assert held(hub) < MOST_HELD
@@ -115,7 +115,7 @@ def test_what_is_not_for_the_vehicle_or_not_signed_changes_no_bit_of_its_flight(
             world.run(0.05)
         for _ in range(100):
             data = inputs.datagram() if signed else noise_for_others(inputs)
-            noisy.stack.ground.receive(address(inputs.random.randrange(9)), data, noisy._link_now_s())
+            noisy.stack.ground.receive(address(inputs.random.randrange(9)), data, noisy.link_now_s())
     assert quiet.altitude > 1.0
     if signed:
         assert noisy.stack.ground.addresses() == quiet.stack.ground.addresses()
@@ -161,8 +161,8 @@ def test_mutated_sessions_of_a_real_client() -> None:
     for story in range(300):
         frames = [link.encode(message) for message in messages]
         for frame in inputs.mutated(frames):
-            world.stack.ground.receive(address(story % 3), frame, world._link_now_s())
-        world._held_s += 0.3
+            world.stack.ground.receive(address(story % 3), frame, world.link_now_s())
+        world.held_s += 0.3
         world.run(0.01)
     assert isinstance(world.download(), tuple)
     assert held(world.stack.ground) < MOST_HELD

@@ -55,7 +55,7 @@ def test_the_vehicle_s_end_takes_anything_and_then_an_exact_state() -> None:
     commands = np.full(8, 100.0)
     for piece in arrivals(61, MESSAGES):
         stack.receive(memoryview(piece))
-        assert len(stack._finder._held) <= LARGEST_FRAME
+        assert stack.finder.partial_size <= LARGEST_FRAME
         if stack.has_state:
             assert len(bytes(stack.answer(commands, armed=True))) <= LARGEST_FRAME
         assert stack.freshness(stack.time_us).age_us >= 0
@@ -75,9 +75,10 @@ def simulator_end() -> SimulatorEnd:
 def test_the_simulator_s_end_takes_anything_and_then_a_request_and_actuators() -> None:
     """The plant is stepped on the way; that it refuses to go on with impossible commands is its right."""
     end = simulator_end()
+    before = held(end)
     for number, piece in enumerate(arrivals(71, MESSAGES)):
         end.receive(memoryview(piece))
-        assert len(end._finder._held) <= LARGEST_FRAME
+        assert end.finder.partial_size <= LARGEST_FRAME
         assert SHORTEST_INTERVAL_US <= end.simulator.interval_us <= LONGEST_INTERVAL_US
         if number % 20 == 0:
             assert len(end.replies()) <= 60
@@ -87,7 +88,8 @@ def test_the_simulator_s_end_takes_anything_and_then_a_request_and_actuators() -
             except PlantDivergedError:
                 end.simulator = Simulator(VEHICLE, "rigid", PlantOptions())
     end.replies()
-    assert held(end._link, end._finder, end._replies) < 4_000
+    end.simulator = Simulator(VEHICLE, "rigid", PlantOptions())
+    assert held(end) < before + 4_000
 
     for number in (-1, 1):  # the standard message may have been asked for: stop it, then ask for ours
         client = Link(1, 1)

@@ -110,14 +110,14 @@ def throw(name: str, world: World, inputs: Inputs, signatures: Signatures) -> tu
                 data, may_change = signatures.signed(data)
             cuts = sorted(draw.randrange(len(data) + 1) for _ in range(3)) if name == "stream" else []
             for start, end in zip([0, *cuts], [*cuts, len(data)], strict=True):
-                hub.receive(peer, data[start:end], world._link_now_s())
+                hub.receive(peer, data[start:end], world.link_now_s())
             guard.after(last[peer] + data, peer, may_change)
             last[peer] = (last[peer] + data)[
                 -LARGEST_FRAME:
             ]  # a beginning is held until it is whole, or too long
-        world._held_s += 0.02
+        world.held_s += 0.02
         world.tick()
-        assert sum(1 for _ in hub.poll(world._link_now_s())) < MOST_OF_A_POLL
+        assert sum(1 for _ in hub.poll(world.link_now_s())) < MOST_OF_A_POLL
         guard.after_tick()
     return A_WORLD, guard
 
@@ -136,11 +136,11 @@ def test_inputs_leave_the_vehicle_sound(name: str) -> None:
         plans += guard.plan_changes
         parameters += guard.parameter_changes
         most_held = max(most_held, held(hub))
-        assert len(hub._to_forward) <= MAX_TO_FORWARD
-        assert sum(not peer.permanent for peer in hub._peers.values()) <= MAX_PEERS
-        if hub._signing is not None:
-            assert len(hub._signing._streams) <= MAX_STREAMS
-            counts = hub._signing.counts
+        assert hub.forward_backlog <= MAX_TO_FORWARD
+        assert sum(not permanent for _, permanent in hub.addresses()) <= MAX_PEERS
+        if hub.signing is not None:
+            assert hub.signing.stream_count <= MAX_STREAMS
+            counts = hub.signing.counts
             assert min(counts.good, counts.unsigned_refused, counts.bad_signature) > 100
         check_vehicle(world)
         assert "AUTOPILOT_VERSION" in answers(world, client)

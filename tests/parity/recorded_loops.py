@@ -83,10 +83,10 @@ def record(plan: str, **config: Any) -> Recording:
     """Fly a plan of ``missions/`` to its end with Python's loops."""
     world = World(**config)
     stack = world.stack
-    loops = stack.autopilot._backend
+    loops = stack.autopilot.backend
     assert isinstance(loops, PythonLoops)
     recorder = RecordingLoops(loops)
-    stack.autopilot._backend = recorder
+    stack.autopilot.backend = recorder
     world.upload(plan)
     world.start_mission()
     world.until_disarmed()

@@ -197,16 +197,16 @@ def test_an_interrupted_upload_says_what_the_vehicle_holds(signals: int) -> None
     """One signal as the mission begins; the second as the former geofence, the first part, is restored."""
     vehicle = FakeVehicle()
     assert told(vehicle, "mission", "upload", "fenced_square").returncode == 0
-    before, ask = contents(vehicle), vehicle._ask_next_item
+    before, ask = contents(vehicle), vehicle.ask_next_item
     kinds = [0, 1][:signals]
 
     def interrupt() -> None:
         ask()
-        if kinds and vehicle._type == kinds[0]:
+        if kinds and vehicle.plan_type == kinds[0]:
             os.kill(os.getpid(), signal.SIGTERM)
             kinds.pop(0)
 
-    vehicle._ask_next_item = interrupt  # type: ignore[method-assign]
+    vehicle.ask_next_item = interrupt  # type: ignore[method-assign]
     result = told(vehicle, "mission", "upload", "fenced_square")
     assert result.returncode == 1
     if signals == 1:

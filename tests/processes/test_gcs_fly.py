@@ -21,6 +21,7 @@ from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.processes import Child, Children
 from tests.support.commands import Ended, gcs
 from tests.support.free_instance import free_instance
+from tests.support.process import children_of
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -36,22 +37,6 @@ def command(out: Path, *flags: str, plan: str = "hop.plan") -> list[str]:
 def run(out: Path, *flags: str, plan: str = "hop.plan") -> Ended:
     """Fly within the test; simulator and flight stack are processes."""
     return gcs(*command(out, *flags, plan=plan)[3:])
-
-
-def children_of(pid: int) -> dict[str, int]:
-    """Name and process id of the children of a process, from /proc."""
-    found = {}
-    for entry in Path("/proc").iterdir():
-        if not entry.name.isdigit():
-            continue
-        try:
-            parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
-            arguments = (entry / "cmdline").read_text().split("\0")
-        except (OSError, IndexError):  # it ended meanwhile
-            continue
-        if parent == pid and "-m" in arguments:
-            found[arguments[arguments.index("-m") + 1]] = int(entry.name)
-    return found
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:

@@ -204,7 +204,7 @@ def test_an_interrupted_film_leaves_the_old_one(poses: Path, tmp_path: Path) -> 
     while not begun.wait(0.02):  # the film under way has a name of its own
         if len(list(tmp_path.iterdir())) > 1:
             begun.set()
-        assert process._popen.poll() is None, process.output
+        assert process.is_running, process.output
     process.interrupt()
     assert process.end() == 1
     assert "interrupted" in process.output

@@ -29,7 +29,7 @@ class Dialogue:
 
     def tell(self, packet: Packet, source: Address = GCS, target: Address = VEHICLE) -> None:
         message = ftp_message(target, packet)
-        message._header.srcSystem, message._header.srcComponent = source
+        message.get_header().srcSystem, message.get_header().srcComponent = source
         self.server.receive(message, source, self.now_s)
 
     def answers(self, polls: int = 1) -> list[Packet]:
@@ -249,7 +249,7 @@ def test_a_silent_client_loses_its_files() -> None:
 
 def test_the_checksum_of_a_file() -> None:
     dialogue = Dialogue()
-    dialogue.server._files = FileTree({"large": fixed(bytes(1_000_000) + BIG)}, {})
+    dialogue.server = FtpServer(VEHICLE, FileTree({"large": fixed(bytes(1_000_000) + BIG)}, {}))
     dialogue.tell(Packet(3, 0, Opcode.CALC_FILE_CRC32, 5, data=b"large"))
     dialogue.tell(
         Packet(3, 0, Opcode.CALC_FILE_CRC32, 5, data=b"large")
@@ -298,4 +298,4 @@ def test_a_flood_of_requests_is_bounded() -> None:
     for n in range(5000):
         dialogue.tell(Packet(n, 0, Opcode.LIST_DIRECTORY, 1, data=b"/"), Address(n % 250 + 1, 190))
     assert len(dialogue.answers()) == 256
-    assert len(dialogue.server._clients) == MAX_CLIENTS
+    assert dialogue.server.client_count == MAX_CLIENTS

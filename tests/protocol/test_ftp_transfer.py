@@ -93,7 +93,7 @@ def test_the_link_breaks_in_the_middle_of_a_download() -> None:
     station = Station(client)
     ether = Ether(FtpServer(VEHICLE, tree()), station)
     ether.run(lambda: client.progress[0] > 50_000)
-    station.wire.two._conditions = Conditions(loss=1.0)
+    station.wire.two.conditions = Conditions(loss=1.0)
     took_s = ether.run(lambda: client.result is not None)
     assert isinstance(client.result, FtpFailed)
     assert 5.0 < took_s < 8.0

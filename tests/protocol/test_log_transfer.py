@@ -29,7 +29,7 @@ class Vehicle:
 
     def tell(self, message: Message, now_s: float = 0.0, source: Address = GCS) -> None:
         """Let a message of ``source`` arrive."""
-        message._header.srcSystem, message._header.srcComponent = source
+        message.get_header().srcSystem, message.get_header().srcComponent = source
         self.server.receive(message, source, now_s)
 
     def answers(self, polls: int = 50) -> list[Message]:
@@ -193,7 +193,7 @@ def test_log_data_waits_for_a_congested_peer_and_not_for_others() -> None:
     )
     for source in (GCS, other):
         request = mavlink.MAVLink_log_request_data_message(1, 1, 0, 0, 180)
-        request._header.srcSystem, request._header.srcComponent = source
+        request.get_header().srcSystem, request.get_header().srcComponent = source
         server.receive(request, source, 0.0)
     assert [peer for peer, _ in server.poll(0.0)] == [other, other]
     for second in range(60):
@@ -208,6 +208,6 @@ def test_the_client_takes_numbers_from_one_as_ardupilot_gives_them() -> None:
     client.poll(0.0)
     for number in (2, 1, 3):
         message = mavlink.MAVLink_log_entry_message(number, 3, 3, 5, 100 * number)
-        message._header.srcSystem, message._header.srcComponent = VEHICLE
+        message.get_header().srcSystem, message.get_header().srcComponent = VEHICLE
         client.receive(message, 0.1)
     assert client.result == LogDone(tuple(LogEntry(n, 100 * n, 5) for n in (1, 2, 3)))

@@ -110,7 +110,7 @@ def test_whatever_the_line_does_the_target_computes_what_c_does_here(device, nam
     assert line.is_closed
     computer = loops.computer
     assert isinstance(computer, TargetLoops)
-    counters, steps = computer._client.counters, computer.record.steps
+    counters, steps = computer.counters, computer.record.steps
     assert steps["step"].tolist() == list(range(1000))  # none skipped, none twice
     status = computer.record.status
     assert status is not None
@@ -139,7 +139,7 @@ def test_the_same_seed_gives_the_same_link(device) -> None:
         drive(loops, 300)
         computer = loops.computer
         assert isinstance(computer, TargetLoops)
-        counted.append(computer._client.counters)
+        counted.append(computer.counters)
         target.close()
     assert counted[0] == counted[1]
     assert counted[0].resent > 0

@@ -73,7 +73,7 @@ def shared() -> World:
 @pytest.fixture
 def vehicle(shared: World) -> SignedVehicle:
     """The vehicle on the ground, with a key and no peers."""
-    for address in list(shared.stack.ground._peers):
+    for address, _ in shared.stack.ground.addresses():
         shared.stack.ground.drop_peer(address)
     signed = SignedVehicle(shared, Signing(KEY, lambda: NOW_S), [], shared.stack.ground.last_heard_s)
     shared.stack.ground.use_signing(signed.signing, signed.stored.append)
@@ -84,7 +84,7 @@ def test_the_parameter_list_comes_signed_to_who_signs(vehicle: SignedVehicle) ->
     values = of_type(Station(vehicle, KEY).ask(REQUEST_LIST), "PARAM_VALUE")
     store = vehicle.world.stack.params
     assert [value.param_id for value in values] == ["_HASH_CHECK", *store.specs]
-    assert all(value._signed for value in values)
+    assert all(value.get_signed() for value in values)
     assert {value.get_link_id() for value in values} == {0}
 
 

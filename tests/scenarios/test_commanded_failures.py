@@ -91,7 +91,7 @@ def test_without_a_simulator_there_is_nothing_to_fail() -> None:
 def test_a_simulator_that_does_not_answer_makes_the_command_fail() -> None:
     world = World(params=ALLOWED)
     world.stack.simulator.take_requests = bytes  # type: ignore[method-assign]  # they get lost on the way
-    began_s = world._held_s
+    began_s = world.held_s
     assert fail(world, MOTOR, OFF, 1) == FAILED
-    assert world._held_s - began_s == pytest.approx(LONGEST_WAIT_S, abs=0.05)
+    assert world.held_s - began_s == pytest.approx(LONGEST_WAIT_S, abs=0.05)
     assert said(world, "the simulator does not answer")

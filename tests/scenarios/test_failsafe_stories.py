@@ -12,7 +12,9 @@ from pyulog import ULog
 from flightstack.commander.failsafe import Action, Failsafe
 from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
-from tests.scenarios.test_failsafes import QUICK, blow_away, breach_fence, hold, landing, mission, sticks
+from tests.support.failsafe_faults import blow_away, breach_fence
+from tests.support.failsafe_phases import QUICK, hold, landing, mission
+from tests.support.streams import sticks
 from tests.support.world import World, item
 
 

@@ -9,7 +9,8 @@ from flightstack.commander.failsafe import Action, Failsafe
 from flightstack.core.modes import Mode
 from flightstack.plan import MissionType
 from gcs_cli.clients.mission_client import Done
-from tests.scenarios.test_failsafe_fence import (
+from tests.support.failsafe_faults import blow_away, inject, tip_over
+from tests.support.fence_breaches import (
     BRAKING,
     RADIUS,
     farthest_until,
@@ -20,11 +21,8 @@ from tests.scenarios.test_failsafe_fence import (
     hovering,
     until_breach,
 )
-from tests.scenarios.test_failsafes import blow_away, inject, tip_over
-from tests.scenarios.test_guided import go_to
-from tests.scenarios.test_safe_places import upload
 from tests.support.fences import circle
-from tests.support.streams import select
+from tests.support.streams import go_to, select
 from tests.support.world import World, item
 
 ACCEPTED, REJECTED = 0, 1
@@ -66,7 +64,7 @@ def test_a_program_that_repeats_its_goto_does_not_undo_the_fence() -> None:
     assert go_to(world, 60.0, 0.0, 6.0) == ACCEPTED
     world.run(1.0)
     wall = [circle((30.0, 0.0), 10.0, inclusion=False)]
-    assert isinstance(upload(world, MissionType.FENCE, wall), Done)
+    assert isinstance(world.upload(wall, MissionType.FENCE), Done)
     for _ in range(30):
         go_to(world, 60.0, 0.0, 6.0)
         world.run(1.0)
@@ -134,7 +132,7 @@ def test_a_cleared_mission_is_no_users_choice() -> None:
     until_breach(world, fly_mission)
     world.upload([])
     assert world.mode is Mode.HOLD
-    assert not any(entry.overridden for entry in world.stack.autopilot.supervisor._memory.entries.values())
+    assert world.stack.autopilot.supervisor.overridden == ()
     assert Failsafe.FENCE in world.stack.autopilot.failsafes
 
 
@@ -239,7 +237,7 @@ def test_arming_forgets_what_was_taken() -> None:
     insist(world, 2.0)
     world.streams.clear()
     world.until_disarmed(40.0)
-    assert isinstance(upload(world, MissionType.FENCE, []), Done)
+    assert isinstance(world.upload([], MissionType.FENCE), Done)
     assert world.arm() == ACCEPTED, world.texts
     assert world.takeoff(6.0) == ACCEPTED
     world.until(lambda: world.mode is Mode.HOLD, 15.0)

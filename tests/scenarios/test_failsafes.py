@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -10,215 +9,25 @@ import numpy as np
 import pytest
 
 from flightstack.commander.failsafe import Failsafe, Phase
-from flightstack.core.contract import Vector3
-from flightstack.core.geodesy import LocalFrame
-from flightstack.core.modes import CUSTOM_MODE, Mode
-from flightstack.guidance.fence import Fence
-from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
-from tests.support.world import World, item
+from flightstack.core.modes import Mode
+from tests.support.failsafe_faults import (
+    begin_setpoints,
+    begin_sticks,
+    blow_away,
+    breach_fence,
+    inject,
+    lose_states,
+    nothing,
+    stop_heartbeats,
+    stop_stream,
+    tip_over,
+)
+from tests.support.failsafe_phases import ENTER, MODE_IN, QUICK
+from tests.support.world import World
 
 F, P = Failsafe, Phase
-QUICK = (
-    "MPC_Z_VEL_MAX_UP=5",
-    "MPC_Z_VEL_MAX_DN=3",
-    "MPC_LAND_SPEED=1.5",
-    "MPC_LAND_ALT2=2",
-    "MPC_TKO_SPEED=3",
-    "RTL_RETURN_ALT=8",
-    "RTL_MIN_DIST=1",
-    "COM_FAIL_ACT_T=0.5",
-)
-HEIGHT = 6.0
-
-# ---------------------------------------------------------------------- phases
-
-
-def _select(world: World, mode: Mode) -> None:
-    number = CUSTOM_MODE[mode]
-    result = world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, number >> 16 & 0xFF, number >> 24)
-    assert result == 0, (mode, world.texts)
-    assert world.mode is mode
-
-
-def _hover(world: World) -> None:
-    """Hover at ``HEIGHT``, some metres north of home."""
-    world.upload([item(22, z=HEIGHT), item(16, north=8.0, z=HEIGHT)])
-    assert world.start_mission() == 0, world.texts
-    world.until(lambda: world.mode is Mode.HOLD, 30.0)
-
-
-def sticks(climb: int = 500) -> Message:
-    return mavlink.MAVLink_manual_control_message(1, 0, 0, climb, 0, 0)
-
-
-def setpoint(world: World) -> Callable[[], Message]:
-    """Stay where the vehicle is now."""
-    north, east, down = world.position.tolist()
-    stay = mavlink.MAVLink_set_position_target_local_ned_message(
-        0, 1, 1, 1, 0b110111111000, north, east, down, 0, 0, 0, 0, 0, 0, 0, 0
-    )
-    return lambda: stay
-
-
-def disarmed(world: World, before: Callable[[], None]) -> None:
-    world.run(0.1)
-    before()
-
-
-def standing(world: World, before: Callable[[], None]) -> None:
-    before()
-    assert world.arm() == 0, world.texts
-    world.run(0.1)
-
-
-def takeoff(world: World, before: Callable[[], None]) -> None:
-    assert world.arm() == 0, world.texts
-    assert world.takeoff(30.0) == 0
-    world.until(lambda: world.altitude > 1.0, 5.0)
-    before()
-
-
-def mission(world: World, before: Callable[[], None]) -> None:
-    world.upload([item(22, z=HEIGHT), item(16, north=200.0, z=HEIGHT)])
-    assert world.start_mission() == 0, world.texts
-    world.until(lambda: world.position[0] > 1.0, 20.0)
-    before()
-
-
-def hold(world: World, before: Callable[[], None]) -> None:
-    _hover(world)
-    before()
-    world.run(0.2)
-
-
-def goto(world: World, before: Callable[[], None]) -> None:
-    _hover(world)
-    before()
-    place = LocalFrame(world.config.home).to_geo(Vector3(200.0, 0.0, -HEIGHT))
-    reposition = mavlink.MAV_CMD_DO_REPOSITION
-    assert world.command(reposition, -1, 1, 0, math.nan, *place) == 0, world.texts
-    world.run(0.3)
-    assert world.velocity[0] > 0.1
-
-
-def manual(world: World, before: Callable[[], None]) -> None:
-    _hover(world)
-    world.streams["sticks"] = sticks
-    world.run(0.1)
-    before()
-    _select(world, Mode.POSITION)
-    world.run(0.3)
-
-
-def offboard(world: World, before: Callable[[], None]) -> None:
-    _hover(world)
-    world.streams["setpoint"] = setpoint(world)
-    world.run(0.1)
-    before()
-    _select(world, Mode.OFFBOARD)
-    world.run(0.3)
-
-
-def returning(world: World, before: Callable[[], None]) -> None:
-    _hover(world)
-    before()
-    assert world.return_home() == 0
-    world.run(0.3)
-
-
-def landing(world: World, before: Callable[[], None]) -> None:
-    _hover(world)
-    before()
-    assert world.land() == 0
-    world.run(0.3)
-
-
-ENTER: dict[Phase, Callable[[World, Callable[[], None]], None]] = {
-    P.DISARMED: disarmed,
-    P.STANDING: standing,
-    P.TAKEOFF: takeoff,
-    P.MISSION: mission,
-    P.HOLD: hold,
-    P.GOTO: goto,
-    P.MANUAL: manual,
-    P.OFFBOARD: offboard,
-    P.RETURN: returning,
-    P.LAND: landing,
-}
-MODE_IN: dict[Phase, Mode] = {
-    P.TAKEOFF: Mode.TAKEOFF,
-    P.MISSION: Mode.MISSION,
-    P.HOLD: Mode.HOLD,
-    P.GOTO: Mode.HOLD,
-    P.MANUAL: Mode.POSITION,
-    P.OFFBOARD: Mode.OFFBOARD,
-    P.RETURN: Mode.RETURN,
-    P.LAND: Mode.LAND,
-}
 
 # ---------------------------------------------------------------------- faults
-
-
-def nothing(world: World) -> None:
-    """Nothing is to be done before the phase, or at the fault."""
-
-
-def stop_heartbeats(world: World) -> None:
-    world.run(0.1)
-    world.sends_heartbeats = False
-    world.run(4.5)  # of the 5 s that a ground station may be silent
-
-
-def stop_stream(name: str) -> Callable[[World], None]:
-    return lambda world: world.streams.pop(name) and None
-
-
-def begin_setpoints(world: World) -> None:
-    """Let setpoints come in every phase; on the ground the mode must be selected for them to matter."""
-    world.streams["setpoint"] = setpoint(world)
-    world.run(0.1)
-    if world.altitude < 0.1:
-        _select(world, Mode.OFFBOARD)
-
-
-def begin_sticks(world: World) -> None:
-    world.streams["sticks"] = sticks
-    world.run(0.1)
-    if world.altitude < 0.1:
-        _select(world, Mode.POSITION)
-
-
-def breach_fence(world: World) -> None:
-    """Fence in a place where the vehicle is not; home is inside, unless the vehicle is there."""
-    north = float(world.position[0]) - 20.5 if world.position[0] > 0.9 else -100.0
-    far = item(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, north=north, p1=20.0)
-    frame = LocalFrame(world.config.home)
-    world.stack.autopilot.supervisor.set_fence(Fence.from_items([far], frame))
-
-
-def lose_states(world: World) -> None:
-    world.loses_states = True
-    world.run(0.1)
-
-
-def tip_over(world: World) -> None:
-    """Turn the vehicle by 100° about its roll axis, at once."""
-    world.simulator.plant._memory[0]["body"][6:10] = math.cos(0.87), math.sin(0.87), 0.0, 0.0  # type: ignore[attr-defined]
-    world.run(0.004)
-
-
-def blow_away(world: World) -> None:
-    """Put the vehicle 30 m to the east, at once."""
-    world.simulator.plant._memory[0]["body"][1] += 30.0  # type: ignore[attr-defined]
-
-
-def inject(fault: str) -> Callable[[World], None]:
-    def begin(world: World) -> None:
-        world.inject(fault)
-        world.run(0.2)
-
-    return begin
 
 
 class Case(NamedTuple):

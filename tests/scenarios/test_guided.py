@@ -13,13 +13,12 @@ from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
 from tests.support.fences import circle
-from tests.support.streams import select, sticks, stream
+from tests.support.streams import go_to, select, sticks, stream
 from tests.support.world import World
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED_FRAME = 0, 1, 2, 9
 NAN = math.nan
 ALTITUDE, POSITION = 2, 3
-CHANGE_MODE = 1.0
 
 
 @pytest.fixture
@@ -30,22 +29,6 @@ def hovering() -> World:
     world.until(lambda: world.mode is Mode.HOLD)
     world.run(4.0)
     return world
-
-
-def go_to(
-    world: World,
-    north: float = NAN,
-    east: float = NAN,
-    altitude: float = NAN,
-    yaw: float = NAN,
-    speed: float = -1.0,
-    flags: float = CHANGE_MODE,
-) -> int | None:
-    """DO_REPOSITION as a COMMAND_LONG: altitude above sea level from one above home."""
-    place = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, 0.0))
-    latitude, longitude = place.latitude_deg, place.longitude_deg
-    altitude += DEFAULT_HOME.altitude_m
-    return world.command(mavlink.MAV_CMD_DO_REPOSITION, speed, flags, 0.0, yaw, latitude, longitude, altitude)
 
 
 def heading(world: World) -> float:

@@ -10,14 +10,13 @@ import pytest
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.core.modes import Mode
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import MissionItem, MissionType
-from gcs_cli.clients.mission_client import Done, MissionClient
+from gcs_cli.clients.mission_client import Done
 from tests.support.fences import polygon, rally_point, square
 from tests.support.streams import select, sticks
-from tests.support.world import GCS, World, item
+from tests.support.world import World, item
 
 ACCEPTED, DENIED, UNSUPPORTED_FRAME = 0, 2, 9
 FRAME = LocalFrame(DEFAULT_HOME)
@@ -27,9 +26,7 @@ POSITION = 3
 
 def upload(world: World, kind: MissionType, items: list[MissionItem]) -> None:
     """Upload a plan of any type."""
-    before, world._missions = world._missions, MissionClient(Address(1, 1), GCS, kind)
-    assert isinstance(world.upload(items), Done)
-    world._missions = before
+    assert isinstance(world.upload(items, kind), Done)
 
 
 def hover(altitude_m: float = 5.0, params: tuple[str, ...] = ()) -> World:

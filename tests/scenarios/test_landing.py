@@ -208,7 +208,7 @@ FAST = ("MPC_TKO_SPEED=5", "MPC_Z_VEL_MAX_UP=8", "MPC_ACC_UP_MAX=5")
 
 def watch_flight(world: World, seconds: float) -> None:
     """Fly on; no contact may be found in the air."""
-    navigator = world.stack.autopilot._navigator
+    navigator = world.stack.autopilot.navigator
     for _ in range(round(seconds * world.stack.rates.inner_hz)):
         world.tick()
         assert not world.landed

@@ -61,8 +61,8 @@ def test_the_vehicle_shows_its_parameters_as_a_file_to_a_second_ground_station()
     client.start_download("@PARAM/param.pck")
     chance = random.Random(1)
     for _ in range(2000):
-        world._held_s += 0.01
-        now_s = world._link_now_s()
+        world.held_s += 0.01
+        now_s = world.link_now_s()
         for message in client.poll(now_s):
             if chance.random() > 0.3:
                 world.stack.ground.receive(other, link.encode(message), now_s)

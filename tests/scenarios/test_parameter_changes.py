@@ -75,7 +75,7 @@ def test_a_ground_station_changes_a_gain_in_flight_and_is_told() -> None:
     world = cruising()
     world.send(mavlink.MAVLink_param_set_message(1, 1, b"POS_XY_P", 6.1, mavlink.MAV_PARAM_TYPE_REAL32))
     world.run(0.1)
-    assert world.stack.autopilot._backend.get_parameter("POS_XY_P") == 6.1
+    assert world.stack.autopilot.backend.get_parameter("POS_XY_P") == 6.1
     assert world.received["PARAM_VALUE"].param_id == "POS_XY_P"
     assert world.received["PARAM_VALUE"].param_value == pytest.approx(6.1)
     world.send(mavlink.MAVLink_param_set_message(1, 1, b"POS_XY_P", math.nan, mavlink.MAV_PARAM_TYPE_REAL32))
@@ -133,7 +133,7 @@ def test_a_change_that_is_taken_back_leaves_no_trace() -> None:
     """Every parameter of the loops to an end of its range and back: the same numbers, bit for bit."""
     flights = [World(), World()]
     params = flights[1].stack.params
-    backend = flights[1].stack.autopilot._backend
+    backend = flights[1].stack.autopilot.backend
     for spec in backend.parameter_specs:
         assert params.set(spec.name, spec.high) is None
         assert backend.get_parameter(spec.name) == pytest.approx(spec.high, rel=1e-12)

@@ -155,7 +155,7 @@ class SentTwice(OtherClock):
         first = bytes(answer)
         super().take_answer(answer)
         link = self.stack.simulator
-        assert link.receive(memoryview(bytes(link._plant.frame)))
+        assert link.receive(memoryview(bytes(self._state.frame)))
         again = bytes(link.answer(self._lockstep.tick(0), self.armed))
         assert again[10:-2] == first[10:-2]  # but for the sequence number and the checksum
 

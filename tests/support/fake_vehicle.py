@@ -52,7 +52,7 @@ class FakeVehicle:
         self.codec.robust_parsing = True
         self.plans: dict[int, list[Any]] = {0: [], 1: [], 2: []}
         self.uploaded: list[int] = []
-        self._type = 0
+        self.plan_type = 0
         self.commands: list[tuple[int, tuple[float, ...]]] = []
         self.heard: list[str] = []
         self.asked: set[int] = set()
@@ -88,13 +88,13 @@ class FakeVehicle:
         self.commands.append((command, params))
         if command in self.refusals:
             self._ack(command, REJECTED)
-            self._say(self.refusals[command])
+            self.say(self.refusals[command])
         elif command == REQUEST:
             self._answer_request(int(params[0]))
         else:
-            self._ack(command, self._execute(command, params))
+            self._ack(command, self.execute(command, params))
 
-    def _execute(self, command: int, params: tuple[float, ...]) -> int:
+    def execute(self, command: int, params: tuple[float, ...]) -> int:
         if command == ARM:
             self._become(armed=params[0] == 1.0)
         elif command == START:
@@ -122,27 +122,27 @@ class FakeVehicle:
         self._ack(REQUEST, ACCEPTED if number in makers else UNSUPPORTED)
 
     def _on_mission_count(self, message: Any) -> None:
-        self._type = message.mission_type
+        self.plan_type = message.mission_type
         self._uploading, self._expected = [], message.count
-        self._ask_next_item()
+        self.ask_next_item()
 
     def _on_mission_item_int(self, message: Any) -> None:
         if message.seq == len(self._uploading):
             self._uploading.append(message)
-            self._ask_next_item()
+            self.ask_next_item()
 
-    def _ask_next_item(self) -> None:
+    def ask_next_item(self) -> None:
         seq = len(self._uploading)
         if seq < self._expected:
-            self._out.append(mavlink.MAVLink_mission_request_int_message(255, 190, seq, self._type))
+            self._out.append(mavlink.MAVLink_mission_request_int_message(255, 190, seq, self.plan_type))
             return
-        result = DENIED if self._type == self.refused_type else self.mission_result
-        self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, result, self._type))
+        result = DENIED if self.plan_type == self.refused_type else self.mission_result
+        self._out.append(mavlink.MAVLink_mission_ack_message(255, 190, result, self.plan_type))
         if result == ACCEPTED:
-            self.plans[self._type] = self._uploading
-            self.uploaded.append(self._type)
+            self.plans[self.plan_type] = self._uploading
+            self.uploaded.append(self.plan_type)
         elif self.mission_refusal:
-            self._say(self.mission_refusal)
+            self.say(self.mission_refusal)
 
     def _on_mission_request_list(self, message: Any) -> None:
         kind = message.mission_type
@@ -209,7 +209,7 @@ class FakeVehicle:
 
     def _stop(self) -> None:
         if self.at_stop == "disarm":
-            self._say("Rotor 3 is gone", severity=2)
+            self.say("Rotor 3 is gone", severity=2)
             self._become(armed=False)
         elif self.at_stop == "silence":
             self.silent = True
@@ -224,7 +224,7 @@ class FakeVehicle:
     def _ack(self, command: int, result: int) -> None:
         self._out.append(mavlink.MAVLink_command_ack_message(command, result, 0, 0, 255, 190))
 
-    def _say(self, text: str, severity: int = 4) -> None:
+    def say(self, text: str, severity: int = 4) -> None:
         data = text.encode()
         for index in range(0, len(data), 50):
             number = len(data) if len(data) > 50 else 0

@@ -86,11 +86,11 @@ class ParamVehicle(FakeVehicle):
             self.values[name] = value
         else:
             self._out.append(mavlink.MAVLink_param_error_message(255, 190, name.encode(), -1, 2))
-            self._say(f"Parameter {name} refused: {value:g} is outside {about['min']:g} to {about['max']:g}")
+            self.say(f"Parameter {name} refused: {value:g} is outside {about['min']:g} to {about['max']:g}")
         self._tell(name)
 
-    def _execute(self, command: int, params: tuple[float, ...]) -> int:
+    def execute(self, command: int, params: tuple[float, ...]) -> int:
         if (command, params[0]) != (STORAGE, RESET_ALL):
-            return super()._execute(command, params)
+            return super().execute(command, params)
         self.values = {name: about["default"] for name, about in self._about.items()}
         return ACCEPTED

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
+from pathlib import Path
 from queue import Empty, Queue
 
 from tests.support.programs import PROGRAMS, Program
@@ -29,6 +30,22 @@ def start(module: str, arguments: Sequence[str], listens: bool) -> Program | sub
         stdin=subprocess.PIPE if listens else subprocess.DEVNULL,
         text=True,
     )
+
+
+def children_of(pid: int) -> dict[str, int]:
+    """Name and process id of the children of a process, from /proc."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        if not entry.name.isdigit():
+            continue
+        try:
+            parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+            arguments = (entry / "cmdline").read_text().split("\0")
+        except (OSError, IndexError):  # it ended meanwhile
+            continue
+        if parent == pid and "-m" in arguments:
+            found[arguments[arguments.index("-m") + 1]] = int(entry.name)
+    return found
 
 
 class Process:
@@ -83,6 +100,10 @@ class Process:
     def kill(self) -> None:
         self._popen.kill()
         self.end()
+
+    @property
+    def is_running(self) -> bool:
+        return self._popen.poll() is None
 
     def interrupt(self) -> None:
         self._popen.send_signal(signal.SIGINT)

@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
+from flightstack.params.config import DEFAULT_HOME
 from tests.support.world import World
 
 NOTHING_GIVEN = 0b1101_1111_1111
 """A type mask that ignores everything."""
 RATE_S = 0.02
+CHANGE_MODE = 1.0
+"""The flag of DO_REPOSITION by which the vehicle goes to HOLD."""
 
 Triple = tuple[float, float, float]
 
@@ -68,6 +73,22 @@ def stream(world: World, message: Message | Callable[[float], Message], seconds:
 def select(world: World, main: int) -> int | None:
     """Select PX4's main mode: 2 altitude, 3 position, 6 offboard."""
     return world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, main, 0)
+
+
+def go_to(
+    world: World,
+    north: float = math.nan,
+    east: float = math.nan,
+    altitude: float = math.nan,
+    yaw: float = math.nan,
+    speed: float = -1.0,
+    flags: float = CHANGE_MODE,
+) -> int | None:
+    """DO_REPOSITION as a COMMAND_LONG: altitude above sea level from one above home."""
+    place = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, 0.0))
+    latitude, longitude = place.latitude_deg, place.longitude_deg
+    altitude += DEFAULT_HOME.altitude_m
+    return world.command(mavlink.MAV_CMD_DO_REPOSITION, speed, flags, 0.0, yaw, latitude, longitude, altitude)
 
 
 def level(yaw_rad: float = 0.0) -> tuple[float, float, float, float]:

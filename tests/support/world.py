@@ -27,7 +27,7 @@ from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.config import DEFAULT_HOME, StackConfig
-from flightstack.plan import MissionItem, load_plan
+from flightstack.plan import MissionItem, MissionType, load_plan
 from flightstack.process.assembly import Stack, build
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.routing.peer import PeerAddress
@@ -93,7 +93,8 @@ class World:
         """Time of the machine that flies, for a simulator whose clock stands still."""
         self.actuators = ActuatorsFrame()
         self._simulator_codec = Link(1, SIMULATOR_COMPONENT)
-        self._held_s = 0.0
+        self.held_s = 0.0
+        """How long messages were exchanged while simulated time stood still."""
         self._link = Link(*GCS)
         autopilot = Address(self.config.system_id, 1)
         self._missions = MissionClient(autopilot, GCS)
@@ -157,8 +158,9 @@ class World:
 
     # ------------------------------------------------------------------ time
 
-    def _link_now_s(self) -> float:
-        return self.time_s + self._held_s
+    def link_now_s(self) -> float:
+        """Time of the link: simulated time, and the time that exchanges took while it stood still."""
+        return self.time_s + self.held_s
 
     def tick(self) -> None:
         """One exchange: state to the stack, actuators back, all as bytes."""
@@ -222,7 +224,7 @@ class World:
 
     def exchange_with_ground(self) -> None:
         """Carry what both sides have to say, once."""
-        now_s = self._link_now_s()
+        now_s = self.link_now_s()
         ground = self.stack.ground
         kind = mavlink.MAV_TYPE_GCS if self.sends_heartbeats else mavlink.MAV_TYPE_ONBOARD_CONTROLLER
         if now_s >= self._heartbeat_due_s or kind != self._heartbeat_kind:
@@ -245,7 +247,7 @@ class World:
 
     def send(self, message: Message) -> None:
         """Send a message of the ground station's."""
-        self.stack.ground.receive(PEER, self._link.encode(message), self._link_now_s())
+        self.stack.ground.receive(PEER, self._link.encode(message), self.link_now_s())
 
     def _take(self, message: Message, now_s: float) -> None:
         kind = message.get_type()
@@ -263,20 +265,28 @@ class World:
 
     def _serve(self, done: Callable[[], bool]) -> None:
         """Exchange messages while simulated time stands still, until ``done``."""
-        began_s = self._held_s
+        began_s = self.held_s
         while not done():
-            self._held_s += HELD_STEP_S
+            self.held_s += HELD_STEP_S
             self.exchange_with_ground()
-            if self._held_s - began_s > SERVICE_LIMIT_S:
+            if self.held_s - began_s > SERVICE_LIMIT_S:
                 raise TookTooLongError("no answer from the vehicle")
 
-    def upload(self, plan: str | Sequence[MissionItem]) -> Done | Failed:
-        """Upload a mission file of ``missions/`` or a list of items; return how it ended."""
+    def upload(
+        self, plan: str | Sequence[MissionItem], kind: MissionType = MissionType.MISSION
+    ) -> Done | Failed:
+        """Upload a mission file of ``missions/`` or a list of items of a plan type; return how it ended."""
         items = load_plan(MISSIONS / plan).items if isinstance(plan, str) else plan
-        self._missions.start_upload(items)
-        self._serve(lambda: self._missions.result is not None)
-        assert self._missions.result is not None
-        return self._missions.result
+        missions = self._missions
+        if kind is not MissionType.MISSION:
+            self._missions = MissionClient(Address(self.config.system_id, 1), GCS, kind)
+        try:
+            self._missions.start_upload(items)
+            self._serve(lambda: self._missions.result is not None)
+            assert self._missions.result is not None
+            return self._missions.result
+        finally:
+            self._missions = missions
 
     def download(self) -> tuple[MissionItem, ...]:
         """Download the mission."""
@@ -287,7 +297,7 @@ class World:
 
     def command(self, command: int, *params: float) -> int | None:
         """Send a command; return its MAV_RESULT."""
-        self._commands.send(command, params, self._link_now_s())
+        self._commands.send(command, params, self.link_now_s())
         self._serve(lambda: self._commands.result is not None)
         assert self._commands.result is not None
         return self._commands.result.result

@@ -30,7 +30,7 @@ import sim_bridge.simulator
 def report(name):
     found = {id(value): value for module_name, module in list(sys.modules.items())
              if module_name.partition(".")[0] in ("flightstack", "sim_bridge")
-             for value in [*vars(module).values(), *getattr(module, "_specialised", {}).values()]
+             for value in [*vars(module).values(), *getattr(module, "specialised", {}).values()]
              if isinstance(value, Dispatcher)}
     used = [kernel for kernel in found.values() if kernel.overloads]
     compiled = any(sum(kernel.stats.cache_misses.values()) for kernel in used)

@@ -94,8 +94,8 @@ def test_only_our_own_functions_are_cached_by_themselves() -> None:
     assert is_own("sim_bridge.plant.rigid")
     assert not is_own("lqr_controller")
     assert not is_own("flightstack_extras.law")
-    assert Path(mix._cache.cache_path).is_dir()
-    assert double._cache.cache_path is None
+    assert Path(mix.stats.cache_path).is_dir()
+    assert double.stats.cache_path is None
 
 
 def write_sources(top: Path, texts: dict[str, str]) -> None:
@@ -106,7 +106,7 @@ def write_sources(top: Path, texts: dict[str, str]) -> None:
 
 
 def digest_of(top: Path, *modules: str) -> str:
-    kernel_cache._read.cache_clear()
+    kernel_cache.read_source.cache_clear()
     return kernel_cache.digest(top, modules, "1")
 
 
@@ -116,7 +116,7 @@ def test_the_digest_covers_direct_and_indirect_imports(tmp_path: Path) -> None:
         "from flightstack.core.geometry import (  # frames\n    wrap,\n)\n",
         "control/helper.py": "import flightstack.deep as d\n",
         "control/__init__.py": "",
-        "geometry.py": "x = 1\n",
+        "core/geometry.py": "x = 1\n",
         "deep.py": "x = 1\n",
     }
     write_sources(tmp_path, {**used, "elsewhere.py": "", "control/law_2.py": ""})
@@ -131,7 +131,7 @@ def test_the_digest_covers_direct_and_indirect_imports(tmp_path: Path) -> None:
 
 def test_no_module_that_compiled_code_names_escapes_the_digest() -> None:
     """Compare the imports found in the text with what the running modules really hold."""
-    top = Path(module.__file__).parent.parent
+    top = Path(module.__file__).parents[2]
     for name in ("flightstack.control.loops", "flightstack.guidance.kernels", "sim_bridge.plant.integrator"):
         covered = set(kernel_cache.sources(top, [name]))
         for value in vars(importlib.import_module(name)).values():
@@ -141,13 +141,13 @@ def test_no_module_that_compiled_code_names_escapes_the_digest() -> None:
 
 
 def test_a_specialised_kernel_is_cached_by_the_sources_of_all_its_parts() -> None:
-    top = Path(module.__file__).parent.parent
+    top = Path(module.__file__).parents[2]
     made_of = ("sim_bridge.plant.integrator", "sim_bridge.plant.paper")
     joined = ("flightstack.control.loops", "flightstack.control.attitude_backstepping")
     assert digest_of(top, *joined) != digest_of(top, *joined[:1])
     expected = kernel_cache.digest(top, made_of, numba.__version__)
     if "NUMBA_DISABLE_JIT" not in os.environ:
-        assert Path(advance_kernel("paper")._cache.cache_path).parent.name == expected
+        assert Path(advance_kernel("paper").stats.cache_path).parent.name == expected
 
 
 def cache_directory(**variables: str) -> Path:
@@ -155,7 +155,7 @@ def cache_directory(**variables: str) -> Path:
     environment = {
         key: text for key, text in os.environ.items() if key not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
     }
-    code = "from flightstack.control.mixer import mix; print(mix._cache.cache_path)"
+    code = "from flightstack.control.mixer import mix; print(mix.stats.cache_path)"
     done = subprocess.run(
         [sys.executable, "-c", code],
         env={**environment, **variables},

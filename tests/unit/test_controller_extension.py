@@ -17,7 +17,7 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 from flightstack.control.attitude_pid import CONTROLLER as PID
-from flightstack.control.controller_loading import _form_problem, controller_names, load_controller
+from flightstack.control.controller_loading import controller_names, form_problem, load_controller
 from flightstack.core.contract import LoopRow
 from flightstack.core.errors import ConfigError
 from flightstack.params.config import StackConfig
@@ -161,7 +161,7 @@ def test_without_a_declaration_every_field_is_a_parameter(installed: Path) -> No
     assert (spec.default, spec.low, spec.high, spec.group) == (
         pytest.approx(200.0), -1e6, 1e6, "Attitude Controller lqr",
     )  # fmt: skip
-    assert world.stack.autopilot._backend.get_parameter("LQR_ANGLE_ROLL") == 250.0
+    assert world.stack.autopilot.backend.get_parameter("LQR_ANGLE_ROLL") == 250.0
     world.arm()
     world.takeoff(2.0)
     world.run(1.0)
@@ -211,7 +211,7 @@ BAD_DECLARATIONS = {
 @pytest.mark.parametrize("name", BAD_DECLARATIONS)
 def test_a_declaration_that_cannot_be(name: str) -> None:
     tunables, sentence = BAD_DECLARATIONS[name]
-    assert _form_problem("pid", PID._replace(tunables=tunables)) == sentence
+    assert form_problem("pid", PID._replace(tunables=tunables)) == sentence
 
 
 def test_a_name_that_the_vehicle_has_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,7 +66,7 @@ def random_start(random: np.random.Generator) -> tuple[InitialState, tuple[float
 def slopes(plant: CompiledPlant) -> np.ndarray:
     """Return the state vector's derivative as the plant itself computes it."""
     plant.acceleration_ned_m_s2()
-    slope: np.ndarray = plant._memory[0]["slope"][0]
+    slope: np.ndarray = plant.memory[0]["slope"][0]
     return slope.copy()
 
 
@@ -133,10 +133,10 @@ def test_rigid_plant_is_newton_euler_with_full_kinematics() -> None:
         start, speeds = random_start(np.random.default_rng(seed))
         plant = CompiledPlant(ideal, "rigid", PlantOptions(initial=start, ground=False, limits=False))
         plant.set_rotor_speeds(speeds)
-        plant._memory[0]["command"][:4] = speeds
+        plant.memory[0]["command"][:4] = speeds
         slope, at = slopes(plant), values(start, speeds)
         assert np.allclose(slope[3:6], equation_7()[0](at), rtol=1e-12, atol=1e-11), seed
-        sign = math.copysign(1.0, float(turned(at) @ plant._memory[0]["body"][6:10]))
+        sign = math.copysign(1.0, float(turned(at) @ plant.memory[0]["body"][6:10]))
         assert np.allclose(slope[6:10], sign * kinematics(at), rtol=1e-11, atol=1e-11), seed
         assert np.allclose(slope[10:13], rates(at), rtol=1e-12, atol=1e-11), seed
 
@@ -149,7 +149,7 @@ def test_rigid_plant_feels_its_rotors_spin_up() -> None:
     for wanted in (speeds, command):
         plant = CompiledPlant(PAPER, "rigid", PlantOptions(initial=start, ground=False, limits=False))
         plant.set_rotor_speeds(speeds)
-        plant._memory[0]["command"][:4] = wanted
+        plant.memory[0]["command"][:4] = wanted
         found.append(slopes(plant))
     h_dot = sum(
         rotor.spin * rotor.inertia_kg_m2 * 0.1 * speed / rotor.lag_s

@@ -96,7 +96,7 @@ def test_the_actuators_do_to_the_model_what_the_plant_does(vehicle: str) -> None
     command[:4] = np.add(speeds, (40.0, -20.0, 10.0, 30.0))
     plant.advance(command, ARMED_FLAG, 3)
     plant.acceleration_ned_m_s2()
-    flown = plant._data
+    flown = plant.data
     model = mujoco.MjModel.from_xml_string(model_xml(loaded))
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = flown.qpos, flown.qvel

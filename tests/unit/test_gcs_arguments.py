@@ -39,8 +39,8 @@ from gcs_cli.report.replay import Run
 from gcs_cli.report.run_directory import LOG_NAME, make_run_directory
 from sim_bridge.__main__ import run as sim_bridge_run
 from tests.support.fake_vehicle import SHUT_DOWN, FakeVehicle
+from tests.support.flight_story import Story
 from tests.support.free_instance import free_instance
-from tests.unit.test_gcs_flight import Story
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 HOP = MISSIONS / "hop.plan"

@@ -158,7 +158,7 @@ def test_a_refusal_without_a_text_names_the_result() -> None:
 def test_texts_of_before_explain_nothing() -> None:
     vehicle = FakeVehicle(mute={"COMMAND_ACK"})
     session = met(Session(), vehicle)
-    vehicle._say("Battery is low")
+    vehicle.say("Battery is low")
     met(session, vehicle)
     vehicle.mute = {"STATUSTEXT"}
     vehicle.refusals = {ARM: "?"}

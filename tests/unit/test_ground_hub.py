@@ -13,82 +13,12 @@ from flightstack.core.modes import Mode
 from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.link import Link
-from flightstack.params.config import StackConfig
-from flightstack.process.assembly import build
 from flightstack.services.routing.hub import MAX_PEERS
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.vehicle.snapshot import NOTICE
+from tests.support.hub_net import ACCEPTED, ALICE, BOB, DENIED, NAN, REJECTED, UNSUPPORTED, Net
 
-ALICE, BOB = PeerAddress(GROUND, "alice", 1), PeerAddress("api", "bob", 2)
-ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
 COMMAND = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
-NAN = math.nan
-
-
-class Station:
-    """One ground station's end of its link."""
-
-    def __init__(self, net: Net, address: PeerAddress, system: int = 255, component: int = 190) -> None:
-        self.net, self.address = net, address
-        self.codec = Link(system, component)
-        self.frames: list[bytes] = []
-        self.inbox: list = []
-
-    def send(self, message) -> None:
-        self.net.hub.receive(self.address, self.codec.encode(message), self.net.now_s)
-
-    def heartbeat(self) -> None:
-        self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-
-    def command(self, number: int, *params: float, system: int = 7, component: int = 1) -> None:
-        values = [*params, *[0.0] * (7 - len(params))]
-        self.send(mavlink.MAVLink_command_long_message(system, component, number, 0, *values))
-
-    def take(self, kind: str) -> list:
-        """The messages of a kind that came since the last call."""
-        found = [message for message in self.inbox if message.get_type() == kind]
-        self.inbox = [message for message in self.inbox if message.get_type() != kind]
-        return found
-
-    def ask(self, number: int, *params: float, **where: int) -> int:
-        """Send a command and return the result of its acknowledgement."""
-        self.command(number, *params, **where)
-        self.net.poll()
-        (ack,) = self.take("COMMAND_ACK")
-        assert ack.command == number
-        return ack.result
-
-
-class Net:
-    """A hub without a process, on a clock of its own, with which vehicle time moves unless told otherwise."""
-
-    def __init__(self) -> None:
-        stack = build(StackConfig(system_id=7), lambda: None)
-        self.autopilot, self.hub = stack.autopilot, stack.ground
-        self.autopilot.has_state = True
-        self.now_s = 50.0
-        self.stations: dict[PeerAddress, Station] = {}
-        self.strangers: list[PeerAddress] = []
-
-    def join(self, address: PeerAddress, heard: bool = True, **ids: int) -> Station:
-        station = self.stations[address] = Station(self, address, **ids)
-        if heard:
-            station.heartbeat()
-        return station
-
-    def poll(self) -> None:
-        for address, data in self.hub.poll(self.now_s):
-            if address in self.stations:
-                self.stations[address].frames.append(data)
-                self.stations[address].inbox += self.stations[address].codec.decode(data)
-            else:
-                self.strangers.append(address)
-
-    def run(self, seconds: float, vehicle_rate: float = 1.0, step_s: float = 0.01) -> None:
-        for _ in range(round(seconds / step_s)):
-            self.now_s += step_s
-            self.autopilot.now.time_us += round(step_s * vehicle_rate * 1e6)
-            self.poll()
 
 
 @pytest.fixture
@@ -196,7 +126,7 @@ def test_an_unknown_sender_of_junk_gets_nothing_and_is_forgotten(net: Net) -> No
     net.hub.receive(junk, b"\xfd\x00junk", net.now_s)
     net.run(2.0)
     assert net.strangers == []
-    assert net.hub._peers == {}
+    assert net.hub.addresses() == []
 
 
 def test_silent_peers_are_forgotten_and_permanent_ones_fall_back_to_heartbeats(net: Net) -> None:
@@ -222,7 +152,7 @@ def test_silent_peers_are_forgotten_and_permanent_ones_fall_back_to_heartbeats(n
 def test_no_more_peers_than_there_is_room_for(net: Net) -> None:
     for index in range(MAX_PEERS + 8):
         net.join(PeerAddress(GROUND, "host", index))
-    assert len(net.hub._peers) == MAX_PEERS
+    assert len(net.hub.addresses()) == MAX_PEERS
     net.run(0.1)
     assert not net.stations[PeerAddress(GROUND, "host", MAX_PEERS + 1)].inbox
 

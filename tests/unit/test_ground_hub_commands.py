@@ -9,7 +9,7 @@ import pytest
 from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
-from tests.unit.test_ground_hub import ACCEPTED, ALICE, BOB, DENIED, NAN, REJECTED, UNSUPPORTED, Net, Station
+from tests.support.hub_net import ACCEPTED, ALICE, BOB, DENIED, NAN, REJECTED, UNSUPPORTED, Net, Station
 
 SET_HOME, GET_HOME = mavlink.MAV_CMD_DO_SET_HOME, mavlink.MAV_CMD_GET_HOME_POSITION
 START, STOP = mavlink.MAV_CMD_LOGGING_START, mavlink.MAV_CMD_LOGGING_STOP

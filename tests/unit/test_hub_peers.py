@@ -16,7 +16,7 @@ from flightstack.process.reboot import carry_over
 from flightstack.services.routing.hub import FORWARDED_A_POLL, KEPT_TEXTS, MAX_PEERS, PEER_FORGOTTEN_S
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.vehicle.snapshot import NOTICE
-from tests.unit.test_ground_hub import ALICE, BOB, Net
+from tests.support.hub_net import ALICE, BOB, Net
 
 CAMERA = PeerAddress("tcp", "camera", 3)
 
@@ -73,7 +73,7 @@ def test_what_is_passed_on_is_limited_in_a_poll_and_in_all(net: Net) -> None:
     talker = net.stations[address(0)]
     for _ in range(1000):
         talker.heartbeat()
-    assert len(net.hub._to_forward) <= 4096
+    assert net.hub.forward_backlog <= 4096
     sent = [frame for _, frame in net.hub.poll(net.now_s) if frame[5] == 255]
     assert len(sent) == FORWARDED_A_POLL
 
@@ -82,7 +82,7 @@ def test_noise_takes_no_place(net: Net) -> None:
     chance = random.Random(5)
     for number in range(500):
         net.hub.receive(address(number), chance.randbytes(280), net.now_s)
-    assert net.hub._peers == {}
+    assert net.hub.addresses() == []
 
 
 def test_new_peers_take_the_place_of_silent_ones_and_never_of_one_that_is_heard(net: Net) -> None:
@@ -95,7 +95,7 @@ def test_new_peers_take_the_place_of_silent_ones_and_never_of_one_that_is_heard(
         net.join(address(number))
     assert net.hub.heard_s(ALICE) > -math.inf
     assert net.hub.heard_s(address(1000)) > -math.inf
-    assert len(net.hub._peers) == MAX_PEERS
+    assert len(net.hub.addresses()) == MAX_PEERS
 
 
 def test_a_silent_peer_gets_heartbeats_only(net: Net) -> None:
@@ -234,7 +234,7 @@ def test_who_is_forgotten_or_has_gone_was_heard_nevertheless(net: Net) -> None:
     net.join(ALICE)
     heard_s = net.now_s
     net.run(2.0 * PEER_FORGOTTEN_S, step_s=0.1)
-    assert net.hub._peers == {}
+    assert net.hub.addresses() == []
     assert net.hub.last_heard_s == heard_s
     net.hub.receive(BOB, b"noise", net.now_s)
     assert net.hub.last_heard_s == heard_s

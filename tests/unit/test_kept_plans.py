@@ -14,15 +14,20 @@ from hypothesis import strategies as st
 from flightstack.core import atomic_file
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
+from flightstack.core.port_numbers import GROUND
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link
 from flightstack.mavlink.mission_messages import mission_id
 from flightstack.params.config import DEFAULT_HOME, StackConfig
-from flightstack.plan import MissionItem, load_plan
+from flightstack.plan import MissionItem, MissionType, load_plan
 from flightstack.plan.item import UNSET_E7
 from flightstack.plan.kept_plans import KeptPlans, plans_from_text, plans_to_text
 from flightstack.process.assembly import Stack, build
 from flightstack.process.plan_file import PlanFile
+from flightstack.services.routing.peer import PeerAddress
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
+PEER = PeerAddress(GROUND, "127.0.0.1", 5000)
 NEAR_HOME = DEFAULT_HOME._replace(altitude_m=489.0)
 
 numbers = st.floats(width=32)
@@ -128,9 +133,9 @@ def test_a_cleared_plan_stays_cleared(tmp_path: Path) -> None:
     give(stack, "square.plan")
     save(stack, file)
     stack, file, _ = stack_with(path)
-    missions = stack.ground._missions()
-    missions._server._clear([0])
-    missions._take_events()
+    clear = mavlink.MAVLink_mission_clear_all_message(1, 1, MissionType.MISSION)
+    stack.ground.receive(PEER, Link(255, 190).encode(clear), 0.0)
+    assert list(stack.ground.poll(0.0))
     save(stack, file)
     assert stack_with(path)[0].ground.plans().mission == ()
 

@@ -29,7 +29,7 @@ from sim_bridge.plant.battery import BatteryState, battery_report
 from sim_bridge.server.hil import hil_state
 from sim_bridge.simulator import Simulator
 from tests.support.synthetic_flight import HOME, KeptBytes
-from tests.unit.test_telemetry import facts
+from tests.support.telemetry_facts import facts
 
 KINDS = sorted((kind for kind in mavlink.mavlink_map.values() if kind.id >= 0), key=lambda kind: kind.id)
 DAY_US = 86_400_000_000

@@ -213,7 +213,7 @@ def test_what_the_drives_of_the_model_work_is_what_the_energy_grows_by() -> None
         else:  # a step of no length takes the commands
             plant.advance(free.flight.command, ARMED_FLAG, 0)
         plant.acceleration_ned_m_s2()
-        power.append(float(plant._data.qfrc_applied[6:] @ plant._data.qvel[6:]))
+        power.append(float(plant.data.qfrc_applied[6:] @ plant.data.qvel[6:]))
     _, now_energy = free.momentum_and_energy()
     weights = np.array([1.0, *[4.0, 2.0] * 499, 4.0, 1.0])
     work = 1e-4 / 3.0 * float(weights @ power)
@@ -274,7 +274,7 @@ def test_the_hinges_accelerate_as_the_lag_wants() -> None:
     flight.plant.acceleration_ned_m_s2()
     wanted = (flight.command[:4] - flight.plant.rotor_speeds_rad_s()) / conditions.vehicle.rotors[0].lag_s
     assert wanted.min() > 1e3
-    assert np.allclose(flight.plant._data.qacc[6:], wanted, rtol=1e-10)
+    assert np.allclose(flight.plant.data.qacc[6:], wanted, rtol=1e-10)
 
 
 def test_spin_up_turns_the_vehicle_the_other_way() -> None:

@@ -14,7 +14,7 @@ from gcs_cli.experiments.paper.report_axes import BOTTOM, LEFT, RIGHT, TOP, Axis
 from gcs_cli.experiments.paper.report_curves import Mark
 from gcs_cli.experiments.paper.report_space import Path, space_chart
 from gcs_cli.report.chart import Line
-from tests.unit.test_report import parsed
+from tests.support.parsed_page import parsed
 
 SIZE = (480, 250)
 UNIT = Axis("unit", 0.0, 1.0)

@@ -21,7 +21,7 @@ from gcs_cli.pil.histogram_chart import histogram_chart
 from gcs_cli.pil.profile import StageProfile
 from gcs_cli.report.chart import Line
 from tests.support.paper_flights import linear_part, onset_part
-from tests.unit.test_report import parsed
+from tests.support.parsed_page import parsed
 
 TIME = np.linspace(0.0, 1.0, 101)
 

@@ -29,7 +29,7 @@ from gcs_cli.experiments.paper.report_sentences import sentences
 from gcs_cli.experiments.paper.report_steps import yaw_authority, yaw_note
 from gcs_cli.experiments.paper.report_tables import plain
 from tests.support.paper_flights import linear_part, onset_part, pil_part, small_flights, small_results
-from tests.unit.test_report import parsed
+from tests.support.parsed_page import parsed
 
 PIXEL = "data:image/png;base64," + base64.b64encode(b"no picture, but nobody looks").decode()
 

@@ -240,7 +240,7 @@ def test_a_row_of_failed_saves_is_one_sentence() -> None:
     saver = FileSaver(write, "not saved")
     said = []
     for _ in range(4):
-        saver._save()
+        saver.save()
         said.append(saver.take_error())
     assert said == ["not saved: full", None, None, "not saved: broken"]
 
@@ -275,11 +275,11 @@ def test_order_of_precedence(tmp_path: Path) -> None:
     path = tmp_path / "my.params"
     path.write_text("1\t1\tPOS_XY_P\t6.5\t9\n1\t1\tMPC_XY_CRUISE\t5.0\t9\n1\t1\tMAV_SYS_ID\t42\t6\n")
     stack = build(StackConfig(params_file=str(path), params=("MPC_XY_CRUISE=3",)), lambda: None)
-    backend = stack.autopilot._backend
+    backend = stack.autopilot.backend
     assert backend.get_parameter("POS_XY_P") == 6.5
     assert backend.get_parameter("POS_XY_I") == 3.125  # tuned.toml
     assert stack.autopilot.behaviour.cruise_speed_m_s == 3.0
-    assert stack.autopilot._navigator.params.cruise_speed_m_s == 3.0
+    assert stack.autopilot.navigator.params.cruise_speed_m_s == 3.0
     assert stack.autopilot.behaviour.climb_speed_m_s == 2.5
     stack.ground.add_peer(PEER, permanent=True)
     frames = [data for _, data in stack.ground.poll(0.0)]

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from gcs_cli.pil.histogram_chart import histogram_chart
 from gcs_cli.pil.profile import StageProfile, stage_profiles
-from tests.unit.test_report import parsed
+from tests.support.parsed_page import parsed
 
 costs = st.lists(st.integers(1, 2**32 - 1), min_size=1, max_size=300)
 

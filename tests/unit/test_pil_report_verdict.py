@@ -14,8 +14,8 @@ from gcs_cli.pil.result import COMPLETED, WALL_TIME, Flown, Outcome, closed_loop
 from gcs_cli.pil.signals import SIGNALS, STAGES
 from gcs_cli.pil.target_record import TargetRecord, record_of
 from gcs_cli.pil.verdict import CLOSED_LOOP_ULPS, OPEN_LOOP_ULPS, Check, all_passed
-from tests.unit.test_pil_report_compare import changed, flight
-from tests.unit.test_report import parsed
+from tests.support.flight_samples import changed, flight
+from tests.support.parsed_page import parsed
 
 ULP = 2.0**-23
 IDENTITY = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import pytest
@@ -24,9 +25,9 @@ PEER = PeerAddress(GROUND, "127.0.0.1", 5000)
 REBOOT = mavlink.MAVLink_command_long_message(1, 1, 246, 0, 1, 0, 0, 0, 0, 0, 0)
 
 
-def process_files(folder: Path) -> ProcessFiles:
+def process_files(folder: Path, signs: bool = True) -> ProcessFiles:
     ports = PortsConfig(0, (), ("127.0.0.1", 1), "127.0.0.1", 0)
-    key = folder / "key"
+    key = folder / "key" if signs else None
     return ProcessFiles(ProcessConfig("127.0.0.1", 1, 1.0, ports, None, False, None, key))
 
 
@@ -34,9 +35,7 @@ def test_a_recorded_signed_reboot_is_a_replay_after_the_reboot(tmp_path: Path) -
     files, config = process_files(tmp_path), StackConfig()
     old = files.build(config)
     files.adopt(old, config)
-    now_s = 1.79e9
-    station = Link(255, 190, signing=LinkSigning(Signing(load_key(tmp_path / "key"), lambda: now_s), 0))
-    files._signing._clock = lambda: now_s
+    station = Link(255, 190, signing=LinkSigning(Signing(load_key(tmp_path / "key"), time.time), 0))
     recorded = station.encode(REBOOT)
     old.ground.receive(PEER, recorded, 0.0)
     assert old.ground.vehicle.reboot_requested
@@ -88,8 +87,7 @@ def test_a_stack_that_cannot_be_built_leaves_the_present_one_joined(tmp_path: Pa
 
 
 def test_a_reboot_that_cannot_be_prepared_is_refused_with_the_reason(tmp_path: Path) -> None:
-    files, config = process_files(tmp_path), StackConfig()
-    files._process = ProcessConfig("127.0.0.1", 1, 1.0, files._process.ports, None, False, None)
+    files, config = process_files(tmp_path, signs=False), StackConfig()
     stack = files.build(config)
     stack.ground.vehicle.prepare_reboot = lambda: "the parameter file cannot be read"
     station = Link(255, 190)

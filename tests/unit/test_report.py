@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -26,45 +25,9 @@ from gcs_cli.report.plots import mode_bands, plots
 from gcs_cli.report.summary import RunInfo, summarise
 from gcs_cli.report.svg import nice_ticks, tick_text
 from gcs_cli.report.timing import read_loop_timing
+from tests.support.parsed_page import parsed
 from tests.support.square_plan import square_plan
 from tests.support.synthetic_flight import synthetic_flight_bytes
-
-VOID = {"meta", "wbr", "br", "hr", "img", "link", "input"}
-
-
-class Checker(HTMLParser):
-    """Fails on tags that do not match; collects text and attributes."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.tags: list[str] = []
-        self.attributes: list[tuple[str, str]] = []
-        self.text = ""
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        self.attributes.extend((name, value or "") for name, value in attrs)
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        self.attributes.extend((name, value or "") for name, value in attrs)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.text += data
-
-
-def parsed(html: str) -> Checker:
-    checker = Checker()
-    checker.feed(html)
-    checker.close()
-    assert checker.open == []
-    return checker
 
 
 @pytest.fixture(scope="module")

@@ -131,6 +131,6 @@ def test_a_liar_about_its_address_fills_no_memory_and_displaces_nobody() -> None
     for number in range(3000):
         source = Address(10 + number % 200, 1 + number // 200)
         net.router.route(net.received(HEARTBEAT, source), "liar", 10.0)
-    assert len(net.router._heard["liar"]) == MAX_ADDRESSES
-    assert len(net.router._passed) == MAX_REMEMBERED
+    assert len(net.router.addresses_of("liar")) == MAX_ADDRESSES
+    assert net.router.remembered == MAX_REMEMBERED
     assert net.send(ping(CAMERA), "udp a", GCS).forward == ("tcp b",)

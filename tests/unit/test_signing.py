@@ -86,7 +86,7 @@ def test_pymavlink_takes_what_we_sign() -> None:
     sender = link(own)
     for index in range(300):
         (message,) = receiver.parse_buffer(sender.encode(text(f"number {index}")))
-        assert (message.text, message._signed, message.get_link_id()) == (f"number {index}", True, 7)
+        assert (message.text, message.get_signed(), message.get_link_id()) == (f"number {index}", True, 7)
     assert receiver.signing.goodsig_count == 300
     assert receiver.signing.timestamp == own.timestamp
 
@@ -96,7 +96,7 @@ def test_pymavlink_takes_shared_payloads_that_we_sign() -> None:
     first, second = link(signing()), link(signing())
     first.encode_shared(message)
     (received,) = receiver.parse_buffer(second.encode_shared(message))
-    assert (received.text, received._signed) == ("to all", True)
+    assert (received.text, received.get_signed()) == ("to all", True)
 
 
 def test_we_take_what_pymavlink_signs() -> None:
@@ -123,7 +123,7 @@ def test_mavutils_setup_signing_talks_to_us() -> None:
     for _ in range(20):
         assert taken(us, packed(connection.mav)) == 1
         (message,) = connection.mav.parse_buffer(us.encode(heartbeat()))
-        assert message._signed
+        assert message.get_signed()
     assert own.counts.refused == 0
 
 

@@ -199,7 +199,7 @@ class Setup:
     ) -> list[str]:
         self.said.clear()
         message = mavlink.MAVLink_setup_signing_message(*target, list(key), timestamp)
-        message._header.incompat_flags = mavlink.MAVLINK_IFLAG_SIGNED if signed else 0
+        message.get_header().incompat_flags = mavlink.MAVLINK_IFLAG_SIGNED if signed else 0
         self.service.receive(message, peer, 0.0)
         assert self.service.poll(0.0) == []
         assert self.service.next_deadline() is None

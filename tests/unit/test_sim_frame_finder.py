@@ -49,4 +49,4 @@ def test_less_than_a_frame_is_kept(pieces: list[bytes]) -> None:
     finder = FrameFinder()
     for piece in pieces:
         finder.find(piece)
-        assert len(finder._held) < LARGEST_FRAME
+        assert finder.partial_size < LARGEST_FRAME

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, FsActuators, mavlink
 from flightstack.mavlink.link import Link
+from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from sim_bridge.errors import PlantDivergedError
@@ -134,8 +135,7 @@ def test_frames_may_be_cut_anywhere(client: Client, cut: int) -> None:
 def test_truncated_and_general_frames_are_understood(client: Client) -> None:
     client.request(FS_PLANT_STATE_ID, 2000)
     client.sim.state()
-    client.codec._codec.signing.secret_key = b"k" * 32
-    client.codec._codec.signing.sign_outgoing = True
+    client.codec = Link(1, 1, signing=LinkSigning(Signing(b"k" * 32, lambda: 1.8e9), 0))
     client.send(FsActuators(0, [250.0] * 4 + [0.0] * 4, 4, ARMED_FLAG | LOCKSTEP_FLAG | 1))
     assert client.sim.answered
     assert client.sim.actuators.rotor_speed_rad_s[3] == 250.0
@@ -289,7 +289,7 @@ def test_nothing_that_arrives_raises_or_piles_up(seed: int) -> None:
                 raised_by += 1
                 client = Client()
         assert len(client.sim.simulator.faults) <= 4
-        assert len(client.sim._finder._held) < 280
+        assert client.sim.finder.partial_size < 280
         client.codec = Link(1, 1)
         assert client.request(FS_PLANT_STATE_ID, 2000) == 0
         time_us = client.state().time_us

@@ -13,6 +13,7 @@ from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, FsPlantState, mavlink
 from flightstack.mavlink.link import Link
+from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.endpoint import SimulatorLink
 from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
@@ -144,9 +145,7 @@ def test_no_bytes_raise(chunks: list[bytes]) -> None:
 
 def test_a_state_that_takes_the_general_way_is_taken_too() -> None:
     """Legal MAVLink that no hot frame is: signed, or with its trailing zeros cut."""
-    codec = Link(1, 1)
-    codec._codec.signing.secret_key = b"k" * 32
-    codec._codec.signing.sign_outgoing = True
+    codec = Link(1, 1, signing=LinkSigning(Signing(b"k" * 32, lambda: 1.8e9), 0))
     message = FsPlantState(8000, STATE[:3], STATE[3:6], STATE[6:10], STATE[10:], [150.0] * 8, 4, 1)
     stack = booted()
     assert receive(stack, codec.encode(message))

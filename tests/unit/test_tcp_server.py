@@ -7,6 +7,7 @@ import select
 import socket
 import struct
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 
 import pytest
 
@@ -91,7 +92,7 @@ def test_a_client_that_never_reads_neither_blocks_nor_fills_memory_nor_gets_half
         server.tcp.send(address, FRAME)
         server.tcp.flush()
         count += 1
-        assert len(server.tcp._clients[address].unsent) <= MAX_UNSENT
+        assert server.tcp.unsent(address) <= MAX_UNSENT
     kept = count - server.tcp.dropped
     client.settimeout(10.0)
     reader, frames = FrameReader(), 0
@@ -186,7 +187,10 @@ def test_a_thousand_connections_leave_nothing_behind(server: Server) -> None:
     while not all_ended() and server.poller.poll(1000):
         server.step()
     assert count[0] == count[1] >= 660
-    assert len(server.tcp) == len(server.tcp._by_fileno) == 0
+    assert len(server.tcp) == 0
+    watched: list[int] = []
+    server.tcp.register(SimpleNamespace(register=lambda fileno, _: watched.append(fileno)))  # type: ignore[arg-type]
+    assert len(watched) == 1  # the port itself
 
 
 def test_a_client_that_never_spoke_mavlink_gives_way_to_a_new_one(server: Server) -> None:
@@ -199,7 +203,7 @@ def test_a_client_that_never_spoke_mavlink_gives_way_to_a_new_one(server: Server
         client.sendall(b"x")
         others.append(address)
     latest = server.connect()
-    server.until(lambda: latest.getsockname() in server.tcp._clients)
+    server.until(lambda: latest.getsockname() in server.tcp.addresses())
     assert server.tcp.closed() == [others[0]]
     assert len(server.tcp) == MAX_CLIENTS
     speaker.sendall(FRAME)
@@ -213,7 +217,7 @@ def test_the_client_silent_for_longest_gives_way_to_a_new_one(server: Server) ->
     server.heard_s[addresses[7]] = 0.1
     server.heard_s[addresses[9]] = 0.2
     latest = server.connect()
-    server.until(lambda: latest.getsockname() in server.tcp._clients)
+    server.until(lambda: latest.getsockname() in server.tcp.addresses())
     assert server.tcp.closed() == [addresses[7]]
 
 
@@ -233,7 +237,7 @@ def test_a_hundred_idle_connections_do_not_lock_out_a_client(server: Server) -> 
         server.connect().sendall(b"\xfd")
         server.step(WAIT_MS)
     client = server.connect()
-    server.until(lambda: client.getsockname() in server.tcp._clients)
+    server.until(lambda: client.getsockname() in server.tcp.addresses())
     assert len(server.tcp) == MAX_CLIENTS
 
 

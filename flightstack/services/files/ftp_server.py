@@ -94,6 +94,11 @@ class FtpServer:
             Opcode.CALC_FILE_CRC32: self._begin_checksum,
         }
 
+    @property
+    def client_count(self) -> int:
+        """Clients that are remembered, at most MAX_CLIENTS."""
+        return len(self._clients)
+
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take any message from ``peer``; what is no request to us is ignored."""
         if message.get_type() not in self.handles or not is_for(message, self.own):

@@ -90,6 +90,10 @@ class LogServer:
         self._clients: dict[tuple[Hashable, Address], _Client] = {}
         self._turn = 0
 
+    def backlog(self) -> list[int]:
+        """Return how many requested ranges wait for each client, at most MAX_RANGES."""
+        return [len(client.ranges) for client in self._clients.values()]
+
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take any message from ``peer``; what is not of this protocol or not for us is ignored."""
         kind = message.get_type()

@@ -58,7 +58,8 @@ class GroundHub:
                 self._by_type.setdefault(kind, []).append(service)
         self._shown = (facts.armed, facts.mode)
         self._home = facts.home
-        self._signing: Signing | None = None
+        self.signing: Signing | None = None
+        """What peers are signed with; set by ``use_signing``."""
         self._router: Router[PeerAddress] = Router(self._own)
         self._to_forward: deque[tuple[PeerAddress, bytes]] = deque(maxlen=MAX_TO_FORWARD)
         self._forget_due_s = -math.inf
@@ -71,7 +72,7 @@ class GroundHub:
 
         A new key that a ground station of this machine sends is kept by ``store``, which may raise OSError.
         """
-        self._signing = signing
+        self.signing = signing
         self._setup.use(signing, store)
 
     # ------------------------------------------------------------------ peers
@@ -79,12 +80,17 @@ class GroundHub:
     def add_peer(self, address: PeerAddress, permanent: bool = False) -> Peer:
         """Begin to talk to ``address``; a permanent one gets heartbeats before it was ever heard."""
         rates = API_RATES_HZ if address.channel == API else GROUND_RATES_HZ
-        signing = link_signing(self._signing, address)
+        signing = link_signing(self.signing, address)
         link = Link(*self._own, keeps_unknown=True, signing=signing)
         signed = signing is not None and signing.requires_signature
         peer = Peer(link, Streams(rates), permanent, address.channel == TCP, signed)
         self._peers[address] = peer
         return peer
+
+    @property
+    def forward_backlog(self) -> int:
+        """Frames that wait to be passed on to peers, at most MAX_TO_FORWARD."""
+        return len(self._to_forward)
 
     def addresses(self) -> list[tuple[PeerAddress, bool]]:
         """Return every peer's address, and whether it is permanent."""
@@ -139,7 +145,7 @@ class GroundHub:
 
     def _admit(self, address: PeerAddress, data: bytes, now_s: float) -> Peer | None:
         """Add the sender of a valid frame, signed where a signature is required, if there is room."""
-        signing = link_signing(self._signing, address)
+        signing = link_signing(self.signing, address)
         frames = [frame.data for frame in FrameReader().feed(data) if frame.known]
         if not any(signing is None or signing.authenticates(frame) for frame in frames):
             return None

@@ -77,6 +77,15 @@ class Router(Generic[Peer]):
             if len(addresses) > MAX_ADDRESSES:
                 addresses.popitem(last=False)
 
+    def addresses_of(self, peer: Peer) -> list[Address]:
+        """Return the addresses that were heard from ``peer``, at most MAX_ADDRESSES."""
+        return list(self._heard.get(peer, ()))
+
+    @property
+    def remembered(self) -> int:
+        """Frames that are remembered, so that none is passed on twice; at most MAX_REMEMBERED."""
+        return len(self._passed)
+
     def _others(self, peer: Peer) -> tuple[Peer, ...]:
         return tuple(other for other in self._heard if other != peer)
 

@@ -1,0 +1,75 @@
+"""Faults that provoke failsafes of a world in flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from flightstack.core.geodesy import LocalFrame
+from flightstack.core.modes import Mode
+from flightstack.guidance.fence import Fence
+from flightstack.mavlink.dialect import mavlink
+from tests.support.failsafe_phases import select_mode, setpoint
+from tests.support.streams import sticks
+from tests.support.world import World, item
+
+
+def nothing(world: World) -> None:
+    """Nothing is to be done before the phase, or at the fault."""
+
+
+def stop_heartbeats(world: World) -> None:
+    world.run(0.1)
+    world.sends_heartbeats = False
+    world.run(4.5)  # of the 5 s that a ground station may be silent
+
+
+def stop_stream(name: str) -> Callable[[World], None]:
+    return lambda world: world.streams.pop(name) and None
+
+
+def begin_setpoints(world: World) -> None:
+    """Let setpoints come in every phase; on the ground the mode must be selected for them to matter."""
+    world.streams["setpoint"] = setpoint(world)
+    world.run(0.1)
+    if world.altitude < 0.1:
+        select_mode(world, Mode.OFFBOARD)
+
+
+def begin_sticks(world: World) -> None:
+    world.streams["sticks"] = sticks
+    world.run(0.1)
+    if world.altitude < 0.1:
+        select_mode(world, Mode.POSITION)
+
+
+def breach_fence(world: World) -> None:
+    """Fence in a place where the vehicle is not; home is inside, unless the vehicle is there."""
+    north = float(world.position[0]) - 20.5 if world.position[0] > 0.9 else -100.0
+    far = item(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, north=north, p1=20.0)
+    frame = LocalFrame(world.config.home)
+    world.stack.autopilot.supervisor.set_fence(Fence.from_items([far], frame))
+
+
+def lose_states(world: World) -> None:
+    world.loses_states = True
+    world.run(0.1)
+
+
+def tip_over(world: World) -> None:
+    """Turn the vehicle by 100° about its roll axis, at once."""
+    world.simulator.plant.memory[0]["body"][6:10] = math.cos(0.87), math.sin(0.87), 0.0, 0.0  # type: ignore[attr-defined]
+    world.run(0.004)
+
+
+def blow_away(world: World) -> None:
+    """Put the vehicle 30 m to the east, at once."""
+    world.simulator.plant.memory[0]["body"][1] += 30.0  # type: ignore[attr-defined]
+
+
+def inject(fault: str) -> Callable[[World], None]:
+    def begin(world: World) -> None:
+        world.inject(fault)
+        world.run(0.2)
+
+    return begin
