@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, TypeAlias
+from typing import Any
 
 import numba
 import numpy as np
@@ -38,6 +38,7 @@ from flightstack.core.contract import (
     FloatArray,
     LoopRow,
     LoopStatus,
+    RecordArray,
     Vector3,
     Wrench,
 )
@@ -45,8 +46,6 @@ from flightstack.core.geometry import blend, conjugate, quaternion_product, rota
 from flightstack.core.portable_math import LARGEST_ANGLE_RAD
 from flightstack.params.toml_reader import Table
 from flightstack.params.vehicle import Vehicle
-
-RecordArray: TypeAlias = np.ndarray[Any, np.dtype[np.void]]
 
 POSITION_MEMORY_SIZE = 3
 POSITION_PARAMS_SIZE = 12

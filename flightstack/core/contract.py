@@ -13,6 +13,9 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 FloatArray: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
+RecordArray: TypeAlias = np.ndarray[Any, np.dtype[np.void]]
+Record: TypeAlias = Any
+"""One element of a ``RecordArray``, indexed by the names of its fields."""
 
 MAX_ROTORS = 8
 STATE_SIZE = 13

@@ -8,16 +8,25 @@ import numpy as np
 
 from flightstack.core.arrays import (
     attitude_target,
+    position_setpoint,
     store_attitude_target,
     store_position_setpoint,
     vehicle_state,
 )
 from flightstack.core.compiled import as_tuple, compiled, store
-from flightstack.core.contract import AttitudeTarget, FloatArray, Quaternion, VehicleState
+from flightstack.core.contract import (
+    AttitudeTarget,
+    FloatArray,
+    PositionSetpoint,
+    Quaternion,
+    RecordArray,
+    Vector3,
+    VehicleState,
+)
 from flightstack.core.geometry import blend, euler_from_quaternion
 from flightstack.core.modes import Mode
 from flightstack.core.portable_math import sin_cos
-from flightstack.guidance.aim import A_START_X, A_START_Y, RETURN, advance_return, aim_goal
+from flightstack.guidance.aim import RETURN, advance_return, aim_goal
 from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
 from flightstack.guidance.mission import into_ground, mission_goal, mission_step
@@ -30,11 +39,8 @@ from flightstack.params.vehicle import GRAVITY_M_S2
 MISSION, OFFBOARD, POSITION = int(Mode.MISSION), int(Mode.OFFBOARD), int(Mode.POSITION)
 
 TRAJECTORY_SIZE = 11
-T_YAW = 9
 GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
 LAND_MEMORY_SIZE = 4
-THRUST_AT = 4  # of the attitude target's array form
-ACCELERATION_Z = 8  # of the setpoint's and of the trajectory's
 LEAD_M = 0.5
 """How far below a vehicle that does not sink the reference sinks."""
 PRESS_1_S, PRESSED_LIFT = 7.0, 0.45
@@ -69,6 +75,7 @@ def _press_m_s2(reference: Trajectory, state: VehicleState, spare_m_s2: float) -
 
 @compiled
 def _finish(
+    last: Trajectory,
     reference: Trajectory,
     state: VehicleState,
     trajectory: FloatArray,
@@ -79,11 +86,12 @@ def _finish(
     setpoint: FloatArray,
 ) -> None:
     """Keep the reference, write the setpoint, and let the land detector see both."""
-    pressed_m_s2 = setpoint[ACCELERATION_Z] - trajectory[ACCELERATION_Z]
+    pressed_m_s2 = position_setpoint(setpoint).acceleration_ned_m_s2.z - last.az
     spare_m_s2 = pressed_m_s2 + (lift - PRESSED_LIFT) * GRAVITY_M_S2
     store(trajectory, reference)
-    store_position_setpoint(setpoint, setpoint_of(reference))
-    setpoint[ACCELERATION_Z] += _press_m_s2(reference, state, spare_m_s2)
+    p, v, a, yaw_rad, yaw_rate_rad_s = setpoint_of(reference)
+    pressed = Vector3(a.x, a.y, a.z + _press_m_s2(reference, state, spare_m_s2))
+    store_position_setpoint(setpoint, PositionSetpoint(p, v, pressed, yaw_rad, yaw_rate_rad_s))
     memory = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE))
     store(land, land_detector_step(memory, state, lift, descent_m_s, dt_s))
 
@@ -120,12 +128,12 @@ def goal_kernel(
     mode: int,
     state_array: FloatArray,
     trajectory: FloatArray,
-    mission: FloatArray,
-    plan: FloatArray,
+    mission: RecordArray,
+    plan: RecordArray,
     jumps_left: FloatArray,
-    aim: FloatArray,
+    aim: RecordArray,
     land: FloatArray,
-    attitude_target: FloatArray,
+    last_target: FloatArray,
     params_array: FloatArray,
     dt_s: float,
     setpoint: FloatArray,
@@ -139,18 +147,20 @@ def goal_kernel(
             return
     state = vehicle_state(state_array)
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
+    last = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE))
+    m, a = mission[0], aim[0]
     if mode == MISSION:
-        mission_step(mission, plan, jumps_left, state, trajectory[T_YAW], land[0] > 0.0, params, dt_s)
-        goal = mission_goal(mission, plan, aim[A_START_X], aim[A_START_Y], params)
+        landed = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE)).landed > 0.0
+        mission_step(m, plan, jumps_left, state, last.yaw_rad, landed, params, dt_s)
+        goal = mission_goal(m, plan, a["start_x"], a["start_y"], params)
     else:
         if mode == RETURN:
-            advance_return(aim, state, params)
-        goal = aim_goal(mode, aim, params)
+            advance_return(a, state, params)
+        goal = aim_goal(mode, a, params)
     goal = into_ground(goal, state.position_ned_m.z, params)
-    last = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE))
-    lift = lift_share(state, attitude_target[THRUST_AT], params.weight_n)
+    lift = lift_share(state, attitude_target(last_target).thrust_n, params.weight_n)
     reference = _waiting(last, trajectory_step(last, goal, _limits(params), dt_s), state)
-    _finish(reference, state, trajectory, land, lift, reference.vz, dt_s, setpoint)
+    _finish(last, reference, state, trajectory, land, lift, reference.vz, dt_s, setpoint)
 
 
 @compiled
@@ -160,7 +170,7 @@ def stream_kernel(
     trajectory: FloatArray,
     stream: FloatArray,
     land: FloatArray,
-    attitude_target: FloatArray,
+    last_target: FloatArray,
     params_array: FloatArray,
     dt_s: float,
     setpoint: FloatArray,
@@ -176,9 +186,9 @@ def stream_kernel(
     state = vehicle_state(state_array)
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     last, limits = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE)), _limits(params)
-    lift = lift_share(state, attitude_target[THRUST_AT], params.weight_n)
+    lift = lift_share(state, attitude_target(last_target).thrust_n, params.weight_n)
     if mode == OFFBOARD and stream[S_KIND] >= ATTITUDE:
-        reference = attitude_step(stream, attitude_target, state, params, limits, dt_s, target)
+        reference = attitude_step(stream, last_target, state, params, limits, dt_s, target)
         descent_m_s = math.inf
     else:
         if mode == OFFBOARD:
@@ -187,4 +197,4 @@ def stream_kernel(
             reference = manual_step(last, stream, state, mode == POSITION, params, limits, dt_s)
         reference = _waiting(last, reference, state)
         descent_m_s = reference.vz
-    _finish(reference, state, trajectory, land, lift, descent_m_s, dt_s, setpoint)
+    _finish(last, reference, state, trajectory, land, lift, descent_m_s, dt_s, setpoint)

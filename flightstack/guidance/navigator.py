@@ -8,26 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.core.compiled import direct
-from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
+from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray, RecordArray
 from flightstack.core.modes import STREAM_MODES, Mode
 from flightstack.core.portable_math import atan2, distance
-from flightstack.guidance.aim import (
-    A_HOME_X,
-    A_HOME_Y,
-    A_HOME_Z,
-    A_PHASE,
-    A_SPEED,
-    A_START_X,
-    A_START_Y,
-    A_X,
-    A_Y,
-    A_YAW,
-    A_Z,
-    AIM_SIZE,
-    CLIMBING,
-)
+from flightstack.guidance.aim import AIM, CLIMBING
 from flightstack.guidance.kernels import (
-    T_YAW,
     TRAJECTORY_SIZE,
     goal_kernel,
     levelling_kernel,
@@ -37,26 +22,11 @@ from flightstack.guidance.kernels import (
 from flightstack.guidance.land_detector import CLIMB_M, CONTACT_M_S, LEVELLING_LIFT, REST_M_S, LandMemory
 from flightstack.guidance.manual import TAKEOFF_STICK, shaped
 from flightstack.guidance.mission import (
-    COMMAND,
     CONDITION_YAW,
     LOG_SIZE,
-    M_CURRENT,
-    M_FINISHED,
-    M_LOG,
-    M_LOG_COUNT,
-    M_PROGRESS,
-    M_REACHED,
-    M_SPEED,
-    M_WANTS_RETURN,
-    M_X,
-    M_Y,
-    M_YAW,
-    M_YAW_IS_SET,
-    M_YAW_RATE,
-    M_Z,
-    MISSION_MEMORY_SIZE,
+    MISSION,
     NAV_DELAY,
-    PLAN_COLUMNS,
+    PLAN_ITEM,
     mission_start,
 )
 from flightstack.guidance.mission import LAND as LAND_ITEM
@@ -76,7 +46,7 @@ from flightstack.guidance.setpoints import (
     store_setpoint,
 )
 from flightstack.guidance.speeds import SpeedOverrides
-from flightstack.guidance.trajectory import BRAKING
+from flightstack.guidance.trajectory import BRAKING, Trajectory
 
 LEVEL_S = 0.1
 """Time constant with which a vehicle that touches the ground is levelled: a step would make it hop."""
@@ -107,18 +77,20 @@ class Navigator:
         self._dt_s = 1.0 / outer_hz
         self.setpoint = np.zeros(SETPOINT_SIZE)
         self._trajectory = np.zeros(TRAJECTORY_SIZE)
-        self._mission = np.zeros(MISSION_MEMORY_SIZE)
-        self._progress = self._mission[M_PROGRESS]
-        self._progress_seen = b""
+        self._mission: RecordArray = np.zeros(1, MISSION)
+        # a field is read ten times as fast through a memoryview of it
+        views = (self._mission[name].data for name in MissionProgress._fields)
+        self._current, self._reached, self._finished, self._wants_return = views
+        self._progress_seen: MissionProgress | None = None
         self._reported = 0
         self._repositions = False
-        self._aim = np.zeros(AIM_SIZE)
+        self._aim: RecordArray = np.zeros(1, AIM)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0, 0.0))
         self._land_now = self._land.data  # a number of an array takes four times as long to read
         self._stream = empty_stream()
         self.attitude_target = np.eye(1, ATTITUDE_TARGET_SIZE)[0]
         """What the loops fly in place of the outer loop's target while ``flies_attitude``; array form."""
-        self._plan = np.zeros((0, PLAN_COLUMNS))
+        self._plan: RecordArray = np.zeros(0, PLAN_ITEM)
         self._jumps_left = np.zeros(0)
         self.set_plan(self._plan, self._jumps_left)
         state, target = np.zeros(STATE_SIZE), np.zeros(ATTITUDE_TARGET_SIZE)
@@ -146,11 +118,11 @@ class Navigator:
         )
         before, self.params = self.params, self._speeds.applied_to(self._given_params)
         self._params_array[:] = self.params
-        m = self._mission
-        if m[M_SPEED] == before.cruise_speed_m_s:
-            m[M_SPEED] = self.params.cruise_speed_m_s
-        if m[M_YAW_RATE] == before.yaw_rate_rad_s:
-            m[M_YAW_RATE] = self.params.yaw_rate_rad_s
+        m = self._mission[0]
+        if m["speed"] == before.cruise_speed_m_s:
+            m["speed"] = self.params.cruise_speed_m_s
+        if m["yaw_rate"] == before.yaw_rate_rad_s:
+            m["yaw_rate"] = self.params.yaw_rate_rad_s
 
     def set_speed(self, speeds: SpeedOverrides) -> None:
         """Fly at other speeds than the parameters' until the end of the flight."""
@@ -158,7 +130,7 @@ class Navigator:
             return
         self._speeds = speeds
         self.set_params(self._given_params)
-        self._mission[M_SPEED] = self.params.cruise_speed_m_s
+        self._mission[0]["speed"] = self.params.cruise_speed_m_s
 
     def set_bounds(self, ground_down_m: float, ceiling_down_m: float) -> None:
         """Take the ground to be there, and climb no higher than the ceiling, where no plan asks for it [m NED]."""
@@ -201,38 +173,38 @@ class Navigator:
     @property
     def progress(self) -> MissionProgress:
         """Progress of the mission."""
-        m = self._mission
         return MissionProgress(
-            int(m[M_CURRENT]), int(m[M_REACHED]), bool(m[M_FINISHED]), bool(m[M_WANTS_RETURN])
+            self._current[0], self._reached[0], bool(self._finished[0]), bool(self._wants_return[0])
         )
 
     def progress_changed(self) -> bool:
         """Tell whether ``progress`` is another one than at the last call."""
-        seen, self._progress_seen = self._progress_seen, self._progress.tobytes()
+        seen, self._progress_seen = self._progress_seen, self.progress
         return seen != self._progress_seen
 
     @property
     def mission_flies(self) -> bool:
         """Whether the current item needs the vehicle in the air; a standing one waits for the others."""
-        current = int(self._mission[M_CURRENT])
-        if self._mission[M_FINISHED] > 0.0 or current >= len(self._plan):
+        current = self._current[0]
+        if self._finished[0] or current >= len(self._plan):
             return False
-        return self._plan[current, COMMAND] not in (LAND_ITEM, NAV_DELAY, CONDITION_YAW)
+        return self._plan[current]["command"] not in (LAND_ITEM, NAV_DELAY, CONDITION_YAW)
 
     def reached_items(self) -> list[int]:
         """Return the items reached since the last call, in order."""
-        count = int(self._mission[M_LOG_COUNT])
+        m = self._mission[0]
+        count = int(m["log_count"])
         fresh = range(max(self._reported, count - LOG_SIZE), count)
         self._reported = count
-        return [int(self._mission[M_LOG + index % LOG_SIZE]) for index in fresh]
+        return [int(m["log"][index % LOG_SIZE]) for index in fresh]
 
-    def set_plan(self, plan: FloatArray, jumps: FloatArray) -> None:
+    def set_plan(self, plan: RecordArray, jumps: FloatArray) -> None:
         """Take a new plan, to be flown from its first item; ``jumps`` are the repeats of its DO_JUMPs."""
         self._plan = np.ascontiguousarray(plan)
         self._jumps = np.ascontiguousarray(jumps)
         self.restart_plan()
 
-    def change_plan(self, plan: FloatArray, jumps: FloatArray) -> None:
+    def change_plan(self, plan: RecordArray, jumps: FloatArray) -> None:
         """Take the same plan with other numbers in it; the mission goes on where it is, its jumps as counted."""
         self._plan = np.ascontiguousarray(plan)
         self._jumps = np.ascontiguousarray(jumps)
@@ -244,9 +216,13 @@ class Navigator:
 
     def set_current(self, index: int) -> None:
         """Make ``index`` the mission's current item."""
-        t = self._trajectory
-        mission_start(self._mission, float(index), t[0], t[1], t[2], t[T_YAW], self.params)
-        self._aim[A_START_X], self._aim[A_START_Y] = t[0], t[1]
+        t, aim = self._reference(), self._aim[0]
+        mission_start(self._mission[0], index, t, self.params)
+        aim["start_x"], aim["start_y"] = t.x, t.y
+
+    def _reference(self) -> Trajectory:
+        """Return the state of the reference point."""
+        return Trajectory(*self._trajectory.tolist())
 
     def rest_at(self, state: FloatArray) -> None:
         """Put the reference at the vehicle's position, at rest, before it leaves the ground; not at a state of NaNs."""
@@ -261,16 +237,16 @@ class Navigator:
 
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
         """Aim for ``mode`` from where the reference is now."""
-        t, aim, p = self._trajectory, self._aim, self.params
+        t, aim, p = self._reference(), self._aim[0], self.params
         self._repositions = False
-        aim[A_X], aim[A_Y], aim[A_Z], aim[A_YAW], aim[A_SPEED] = t[0], t[1], t[2], t[T_YAW], 0.0
+        aim["x"], aim["y"], aim["z"], aim["yaw"], aim["speed"] = t.x, t.y, t.z, t.yaw_rad, 0.0
         if mode == Mode.TAKEOFF:
-            aim[A_Z] = -takeoff_altitude_m
+            aim["z"] = -takeoff_altitude_m
         elif mode == Mode.HOLD:  # where the reference comes to rest
-            speed = distance(t[3], t[4])
+            speed = distance(t.vx, t.vy)
             ahead_s = speed / (2.0 * BRAKING * p.acceleration_m_s2)
-            aim[A_X], aim[A_Y] = t[0] + t[3] * ahead_s, t[1] + t[4] * ahead_s
-            aim[A_Z] = t[2] + t[5] * abs(t[5]) / (2.0 * BRAKING * p.vertical_acceleration_m_s2)
+            aim["x"], aim["y"] = t.x + t.vx * ahead_s, t.y + t.vy * ahead_s
+            aim["z"] = t.z + t.vz * abs(t.vz) / (2.0 * BRAKING * p.vertical_acceleration_m_s2)
         elif mode == Mode.RETURN:
             self._enter_return()
         elif mode == Mode.MISSION:
@@ -281,15 +257,16 @@ class Navigator:
 
         The ceiling comes first: a return does not break the fence that it may have been called by.
         """
-        t, aim, p = self._trajectory, self._aim, self.params
-        aim[A_PHASE] = CLIMBING
-        if distance(t[0] - aim[A_HOME_X], t[1] - aim[A_HOME_Y]) > p.return_min_distance_m:
-            aim[A_Z] = min(t[2], aim[A_HOME_Z] - p.return_altitude_m)
-        aim[A_Z] = max(aim[A_Z], p.ceiling_down_m)
+        t, aim, p = self._reference(), self._aim[0], self.params
+        aim["phase"] = CLIMBING
+        if distance(t.x - aim["home_x"], t.y - aim["home_y"]) > p.return_min_distance_m:
+            aim["z"] = min(t.z, aim["home_z"] - p.return_altitude_m)
+        aim["z"] = max(aim["z"], p.ceiling_down_m)
 
     def return_to(self, north_m: float, east_m: float, ground_down_m: float) -> None:
         """Let the next return end at this place [m NED]: home, or a rally point."""
-        self._aim[A_HOME_X], self._aim[A_HOME_Y], self._aim[A_HOME_Z] = north_m, east_m, ground_down_m
+        aim = self._aim[0]
+        aim["home_x"], aim["home_y"], aim["home_z"] = north_m, east_m, ground_down_m
 
     def reposition(
         self, north_m: float, east_m: float, down_m: float, yaw_rad: float, speed_m_s: float = math.nan
@@ -298,45 +275,47 @@ class Navigator:
 
         Call it after entering HOLD.
         """
-        t, aim = self._trajectory, self._aim
+        t, aim = self._reference(), self._aim[0]
         self._repositions = True
         if math.isfinite(north_m) and math.isfinite(east_m):
-            aim[A_X], aim[A_Y] = north_m, east_m
-            away_m = distance(north_m - t[0], east_m - t[1])
+            aim["x"], aim["y"] = north_m, east_m
+            away_m = distance(north_m - t.x, east_m - t.y)
             if math.isnan(yaw_rad) and self.params.yaw_mode < 0.5 and away_m > 1.0:
-                yaw_rad = atan2(east_m - t[1], north_m - t[0])
+                yaw_rad = atan2(east_m - t.y, north_m - t.x)
         if math.isfinite(down_m):
-            aim[A_Z] = down_m
+            aim["z"] = down_m
         if math.isfinite(yaw_rad):
-            aim[A_YAW] = yaw_rad
+            aim["yaw"] = yaw_rad
         if speed_m_s > 0.0:
-            aim[A_SPEED] = min(speed_m_s, self.params.max_speed_m_s)
+            aim["speed"] = min(speed_m_s, self.params.max_speed_m_s)
 
     @property
     def goes_elsewhere(self) -> bool:
         """Whether HOLD is on its way to a place that ``reposition`` named."""
-        t, aim = self._trajectory, self._aim
-        return self._repositions and distance(t[0] - aim[A_X], t[1] - aim[A_Y], t[2] - aim[A_Z]) > ARRIVED_M
+        if not self._repositions:
+            return False
+        t, aim = self._reference(), self._aim[0]
+        return distance(t.x - aim["x"], t.y - aim["y"], t.z - aim["z"]) > ARRIVED_M
 
     def _enter_mission(self) -> None:
         """Begin the current item anew from here, at the speed and with the heading set by those before it.
 
         A finished mission begins with its first item.
         """
-        m = self._mission
-        if m[M_FINISHED] > 0.0:
+        m = self._mission[0]
+        if m["finished"]:
             self.restart_plan()
             return
-        reached, speed, yaw_is_set, yaw = m[M_REACHED], m[M_SPEED], m[M_YAW_IS_SET], m[M_YAW]
-        self.set_current(int(m[M_CURRENT]))
-        m[M_REACHED], m[M_SPEED], m[M_YAW_IS_SET] = reached, speed, yaw_is_set
-        if yaw_is_set > 0.0:
-            m[M_YAW] = yaw
+        reached, speed, yaw_is_set, yaw = m["reached"], m["speed"], m["yaw_is_set"], m["yaw"]
+        self.set_current(int(m["current"]))
+        m["reached"], m["speed"], m["yaw_is_set"] = reached, speed, yaw_is_set
+        if yaw_is_set:
+            m["yaw"] = yaw
 
     def hold_at_last_item(self) -> None:
         """Hold where the mission that has just ended was going to; a takeoff's goal needs no such step."""
-        m = self._mission
-        self._aim[A_X], self._aim[A_Y], self._aim[A_Z], self._aim[A_YAW] = m[M_X], m[M_Y], m[M_Z], m[M_YAW]
+        m, aim = self._mission[0], self._aim[0]
+        aim["x"], aim["y"], aim["z"], aim["yaw"] = m["x"], m["y"], m["z"], m["yaw"]
 
     # ------------------------------------------------------------------ streams
 

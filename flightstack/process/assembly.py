@@ -33,7 +33,7 @@ from flightstack.vehicle.autopilot import Autopilot
 from flightstack.vehicle.parameters import behaviour_of, connect_parameters, load_parameters
 
 _KERNELS = (
-    "inner_kernel", "store_outer_row", "outer_heading", "follow_rotors", "detect", "mission_start", "rest_kernel",
+    "inner_kernel", "store_outer_row", "outer_heading", "follow_rotors", "detect", "rest_kernel",
     "levelling_kernel", "stream_kernel", "goal_kernel", "outer_kernel", "fence_step",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")

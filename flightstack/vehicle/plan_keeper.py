@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from flightstack.commander.supervisor import Supervisor
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.modes import Mode
 from flightstack.core.portable_math import distance
@@ -158,7 +158,7 @@ class PlanKeeper:
         above_home_m = place.altitude_m - self.places.home.altitude_m
         return self.supervisor.fence.refusal(place.north_m, place.east_m, above_home_m) is None
 
-    def _plan_table(self) -> tuple[FloatArray, FloatArray]:
+    def _plan_table(self) -> tuple[RecordArray, FloatArray]:
         return plan_table(self.items, self.places.frame, self.home.altitude_m)
 
     def _mission_refusal(self) -> str | None:

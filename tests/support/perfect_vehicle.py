@@ -9,6 +9,7 @@ import numpy as np
 
 from flightstack.core.modes import Mode
 from flightstack.guidance.land_detector import LandMemory
+from flightstack.guidance.mission import PLAN_ITEM
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.params.behaviour import Behaviour
@@ -56,7 +57,7 @@ class PerfectVehicle:
         repeats = np.zeros(len(rows))
         for index, count in (jumps or {}).items():
             repeats[index] = count
-        self.navigator.set_plan(table, repeats)
+        self.navigator.set_plan(table.view(PLAN_ITEM)[:, 0], repeats)
 
     def enter(self, mode: Mode, altitude_m: float = 0.0) -> None:
         self.mode = mode

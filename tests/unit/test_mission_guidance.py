@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from numpy.lib.recfunctions import structured_to_unstructured
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.modes import Mode
@@ -300,7 +301,8 @@ def test_plan_table_places_items_around_home_and_leaves_open_what_they_do() -> N
         MissionItem(16, 6, 0.0, 0.0, 0.0, NAN, 474010000, 85020000, NAN),
         MissionItem(177, 2, 1.0, 5.0),
     ]
-    plan, jumps = plan_table(items, LocalFrame(home), home.altitude_m)
+    table, jumps = plan_table(items, LocalFrame(home), home.altitude_m)
+    plan = structured_to_unstructured(table)
     place = frame.to_ned(GeoPoint(47.401, 8.502, 488.0))
     assert plan[0].tolist()[:4] == [22.0, 0.0, 0.0, 0.0]
     assert np.isnan(plan[0, 4:7]).all()

@@ -114,7 +114,7 @@ def test_nothing_moves_while_the_state_is_not_finite(mode: Mode, bad: float) -> 
     for _ in range(10):
         n.step(mode, state, np.array([1.0, 0.0, 0.0, 0.0, 10.0]))
     for memory, kept in zip(memories, before, strict=True):
-        assert memory.tolist() == kept.tolist()
+        assert memory.tobytes() == kept.tobytes()
 
 
 def test_only_items_that_need_the_air_fly() -> None:
