@@ -7,6 +7,8 @@ import sys
 
 HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich")
 LIGHT = (
+    "flightstack.core",
+    "flightstack.process",
     "flightstack.process.command_line",
     "flightstack.process.console",
     "flightstack.process.options",
