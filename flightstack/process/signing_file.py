@@ -90,7 +90,7 @@ def open_shared_signing(path: Path, role: str) -> LinkSigning:
 class _TimestampFile:
     """The latest timestamp that any process of a role has used: it never goes back.
 
-    A disk that is full must not end a flight: it is told once, and the flight goes on.
+    A full disk does not end a flight: it is reported once.
     """
 
     def __init__(self, key_path: Path, role: str, is_shared: bool = False) -> None:

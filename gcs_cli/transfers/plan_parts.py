@@ -102,7 +102,7 @@ class Uploads:
 
     @property
     def state(self) -> str:
-        """What the vehicle holds now, in words."""
+        """Description of what the vehicle holds now."""
         holds = dict(self._holds)
         if self._under_way is not None and self._is_all_sent:
             holds[self._under_way] = _UNKNOWN
@@ -191,7 +191,7 @@ class Uploads:
         return answer._replace(reason="; ".join(reasons))
 
     def _restore(self, before: Sequence[PlanPart], current: int) -> Generator[Call, Answer, str]:
-        """Upload the former parts that were replaced; return what the vehicle holds now, in words."""
+        """Upload the former parts that were replaced; return a description of what the vehicle holds now."""
         self._is_restoring = True
         for part in before:
             if self._holds[part.kind] == _FORMER:
