@@ -14,8 +14,8 @@ from flightstack.core.contract import MAX_ROTORS, LoopRow, Vector3
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import Vehicle
-from flightstack.services.telemetry import MAKERS
 from flightstack.services.telemetry.streams import GROUND_RATES_HZ
+from flightstack.services.telemetry.telemetry import MAKERS
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.plant import InitialState, PlantOptions
@@ -96,10 +96,10 @@ def _pymavlink_codec() -> Call:
 
 def _telemetry(world: BenchWorld) -> tuple[Call, Call, Call]:
     """Make, encode and decode the mix of messages of one second, message by message in turns."""
-    facts = world.stack.ground._facts
+    status = world.stack.status()
     turns = [number for number, rate in GROUND_RATES_HZ.items() for _ in range(max(1, round(rate)))]
     makers = [MAKERS[number] for number in turns]
-    messages = [make(facts) for make in makers]
+    messages = [make(status) for make in makers]
     link, station = Link(1, 1), Link(255, 190)
     frames = [link.encode(message) for message in messages]
     at = [0]
@@ -109,7 +109,7 @@ def _telemetry(world: BenchWorld) -> tuple[Call, Call, Call]:
         return at[0]
 
     return (
-        lambda: makers[turn()](facts),
+        lambda: makers[turn()](status),
         lambda: link.encode(messages[turn()]),
         lambda: list(station.decode(frames[turn()])),
     )
@@ -117,9 +117,9 @@ def _telemetry(world: BenchWorld) -> tuple[Call, Call, Call]:
 
 def _log(world: BenchWorld) -> Call:
     """Write five inner rows and one outer row, with their share of making bytes of them."""
-    recorder, autopilot = world.stack.recorder, world.stack.autopilot
+    recorder, now = world.stack.recorder, world.stack.now
     state, target = np.ones(13), np.ones(5)
-    setpoint, times = autopilot.now.setpoint, [autopilot.now.time_us]
+    setpoint, times = now.setpoint, [now.time_us]
 
     def five() -> None:
         for _ in range(5):
@@ -134,16 +134,15 @@ def parts() -> list[Part]:
     """Return the parts of a step, simulator first."""
     world = _flying()
     stack, simulator = world.stack, world.simulator
-    autopilot, link = stack.autopilot, stack.simulator
-    backend, navigator, now = autopilot.backend, autopilot.navigator, autopilot.now
-    state, speeds = autopilot._state.copy(), autopilot._rotor_speed.copy()
+    link, backend, navigator, now = stack.simulator, stack.loops, stack.parts.navigator, stack.now
+    state, speeds = now.state.copy(), now.rotor_speed.copy()
     row = np.zeros(LoopRow.SIZE)
     hover = np.zeros(MAX_ROTORS)
     hover[: len(stack.vehicle.rotors)] = _hover_rad_s(stack.vehicle)
     actuators_bytes = memoryview(bytearray(link.answer(hover, True)))
     state_bytes = memoryview(bytearray(simulator.state_frame()))
     hovering = _hovering(stack.vehicle)
-    sim_link = SimulatorLink(hovering, stack.vehicle, autopilot.home)
+    sim_link = SimulatorLink(hovering, stack.vehicle, stack.area.home)
     sim_link.receive(memoryview(link.hello(stack.rates.interval_us)))
     make, encode, decode = _telemetry(world)
     messages_per_step = sum(GROUND_RATES_HZ.values()) / 500.0

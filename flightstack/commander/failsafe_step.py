@@ -24,9 +24,8 @@ from flightstack.commander.failsafe import (
     action_of,
     decide,
 )
+from flightstack.core.severity import Severity
 from flightstack.params.behaviour import Behaviour
-
-EMERGENCY, _ALERT, CRITICAL, _ERROR, WARNING, NOTICE = range(6)
 
 CAN_WAIT = (Phase.TAKEOFF, Phase.MISSION, Phase.HOLD, Phase.GOTO, Phase.MANUAL, Phase.OFFBOARD)
 """Phases in which a person or a plan flies, and may be given time to react."""
@@ -93,7 +92,7 @@ def failsafe_step(
     kept = {failsafe: entry for failsafe, entry in memory.entries.items() if failsafe in conditions}
     for failsafe in memory.entries:
         if failsafe not in conditions:
-            said.append(Announcement(NOTICE, RULE_OF[failsafe].ends))
+            said.append(Announcement(Severity.NOTICE, RULE_OF[failsafe].ends))
     begun = [rule.failsafe for rule in RULES if rule.failsafe in conditions and rule.failsafe not in kept]
     begun = [f for f in begun if action_of(f, behaviour) > Action.NONE and phase in RULE_OF[f].phases]
     entries = kept | {failsafe: Entry(time_us) for failsafe in begun}
@@ -106,7 +105,7 @@ def failsafe_step(
     escalates = decision.action > max(Action.WARN, memory.decision.action)
     for failsafe in begun:
         if not (escalates and failsafe is decision.cause):
-            said.append(Announcement(WARNING, RULE_OF[failsafe].begins))
+            said.append(Announcement(Severity.WARNING, RULE_OF[failsafe].begins))
     if escalates:
         waited_s = (time_us - entries[decision.cause].since_us) * 1e-6 if decision.cause else 0.0
         said.append(_announce(decision, begun, waited_s, behaviour))
@@ -140,7 +139,7 @@ def _announce(
         verb += f", {VERB[later]} in {behaviour.failsafe_delay_s - waited_s:.0f} s"
     first = decision.cause in begun
     text = f"{begins}: {verb}" if first else f"Failsafe: {verb} ({begins[0].lower()}{begins[1:]})"
-    return Announcement(EMERGENCY if decision.action >= Action.BLIND else CRITICAL, text)
+    return Announcement(Severity.EMERGENCY if decision.action >= Action.BLIND else Severity.CRITICAL, text)
 
 
 def override(memory: Memory, overridden: Collection[Failsafe]) -> Memory:

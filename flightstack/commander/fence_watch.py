@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from flightstack.core.contract import FloatArray
-from flightstack.guidance.fence import NO_FENCE, Fence, FenceMonitor
+from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceMonitor
 from flightstack.params.behaviour import Behaviour
 
 BREACH_GROWS_M = 5.0
 """So much farther out, a fence that a user has overridden acts again."""
+
+
+class FenceBreaches(NamedTuple):
+    """Breaches since the vehicle booted."""
+
+    number: int = 0
+    latest_us: int = 0
+    """Vehicle time at which the latest one began."""
+    flags: FenceBreach = FenceBreach(0)
+    """Limits that the latest one broke last."""
 
 
 class FenceWatch(FenceMonitor):
@@ -21,6 +32,7 @@ class FenceWatch(FenceMonitor):
         self._behaviour = behaviour
         self._home_ned_m = (0.0, 0.0, 0.0)
         self._overridden_margin_m = math.inf
+        self.breaches = FenceBreaches()
         self._set_up()
 
     def warm_up(self, state: FloatArray) -> None:
@@ -50,6 +62,17 @@ class FenceWatch(FenceMonitor):
         self.configure(
             self._fence_areas, b.fence_max_distance_m, b.fence_max_altitude_m, self._home_ned_m, brakes
         )
+
+    def update(self, state: FloatArray, time_us: int) -> bool:
+        """Evaluate ``state`` (13,) once per outer tick and count breaches; return True if a limit is broken."""
+        before = self.flags
+        flags = self.step(state)
+        if flags != before and flags:
+            number, latest_us, _ = self.breaches
+            if not before:
+                number, latest_us = number + 1, time_us
+            self.breaches = FenceBreaches(number, latest_us, FenceBreach(flags))
+        return flags != 0
 
     def note_override(self) -> None:
         """A user flies on outside the fence: remember how far out that was."""

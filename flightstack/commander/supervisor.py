@@ -179,7 +179,7 @@ class Supervisor:
             return None
         if not states.holds_rotors:
             faults.look(setpoint, row, self.position_is_controlled, self.on_ground)
-        breached = self.fence.step(self._state) != 0
+        breached = self.fence.update(self._state, time_us)
         entries = self._memory.entries
         if (
             faults.is_quiet

@@ -200,7 +200,7 @@ class FlightLog:
         self._size += written
 
 
-def vehicle_info(vehicle: Vehicle) -> dict[str, str | int | float]:
+def vehicle_fields(vehicle: Vehicle) -> dict[str, str | int | float]:
     """Return the info entries of a vehicle that reports need; without limits, ideal rotors have none."""
     info: dict[str, str | int | float] = {
         "vehicle": vehicle.name,

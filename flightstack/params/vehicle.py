@@ -84,6 +84,11 @@ class Vehicle:
         )
 
     @property
+    def full_thrust_n(self) -> float:
+        """Thrust that the share 1 of a setpoint stands for; ideal rotors have no limit and get twice the weight."""
+        return 2.0 * self.weight_n if self.ideal_rotors else self.max_thrust_n
+
+    @property
     def mean_rotor_inertia_kg_m2(self) -> float:
         """Mean inertia of the rotors about their axes."""
         return math.fsum(r.inertia_kg_m2 for r in self.rotors) / len(self.rotors)

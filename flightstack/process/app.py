@@ -12,6 +12,7 @@ from types import FrameType
 
 from flightstack.core.errors import ConfigError
 from flightstack.core.modes import Mode
+from flightstack.core.severity import Severity
 from flightstack.firmware.choice import PYTHON, SERIAL, parse_loops
 from flightstack.firmware.errors import TargetError
 from flightstack.params.config import StackConfig
@@ -34,7 +35,6 @@ from flightstack.process.simulator_end import check_deadline, connect, wait_for_
 from flightstack.transports.processor import Follower
 from flightstack.transports.tcp import LinkClosedError, TcpClient
 from flightstack.vehicle.lockstep import Lockstep
-from flightstack.vehicle.snapshot import NOTICE
 
 GROUND_POLL_NS = 500_000
 GROUND_IDLE_NS = 2_000_000
@@ -154,14 +154,14 @@ class App:
         self._ground.join(new.ground)
         self._next_log_us = 0
         carry_over(old, new)
-        new.autopilot.say(NOTICE, "Rebooted")
+        new.journal.say(Severity.NOTICE, "Rebooted")
         complain("rebooted")
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._stop_signal = number
 
     def _simulator_gone(self) -> int:
-        now = self.stack.autopilot.now
+        now = self.stack.now
         if self._stop_signal:
             return EXIT_OK
         at = f"at t={now.time_us * 1e-6:.3f} s"
@@ -187,7 +187,7 @@ class App:
         if simulator is not None:
             if orderly:
                 with contextlib.suppress(LinkClosedError):
-                    armed = self.stack.autopilot.now.status.armed
+                    armed = self.stack.now.status.armed
                     simulator.send(self.stack.simulator.heartbeat(armed, leaving=True))
             simulator.close()
         self._ground.close()
@@ -199,7 +199,7 @@ class App:
         poller = select.poll()
         poller.register(simulator, select.POLLIN)
         self._ground.register(poller)
-        now = self.stack.autopilot.now
+        now = self.stack.now
         next_sign_s = 0.0
         while not (now.status.armed and now.status.mode is Mode.MISSION):
             self._meanwhile()
@@ -270,7 +270,7 @@ class App:
 
     def _between_ticks(self, simulator: TcpClient) -> None:
         """Do what is due between two ticks: ground links, timing report, reasons to stop."""
-        time_us = self.stack.autopilot.now.time_us
+        time_us = self.stack.now.time_us
         if time_us >= self._next_log_us:
             self._next_log_us = time_us + 1_000_000
             fields = self.stack.report.log_fields(time_us // self.stack.rates.interval_us)
@@ -290,9 +290,9 @@ class App:
 
     def _pass_notices(self) -> None:
         """Tell the operator what is wrong with the simulator's steps; do not begin a mission that cannot be flown."""
-        link, now = self.stack.simulator, self.stack.autopilot.now
+        link, now = self.stack.simulator, self.stack.now
         for severity, text in link.steps.take_notices():
-            self.stack.autopilot.say(severity, text)
+            self.stack.journal.say(severity, text)
             complain(text[0].lower() + text[1:])
             if self._process.wait_for_start and now.landed and (refusal := link.step_refusal):
                 raise Ended(EXIT_USAGE, refusal)
@@ -308,7 +308,7 @@ class App:
         now_s = time.monotonic()
         if now_s >= self._next_report_s:
             self._next_report_s = now_s + REPORT_S
-            self.stack.report.update(self.stack.autopilot.now.time_us, now_s)
+            self.stack.report.update(self.stack.now.time_us, now_s)
         heard = self._ground.serve(now_s)
         self._files.attend()
         return heard

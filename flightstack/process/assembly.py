@@ -6,7 +6,8 @@ The process (``app``) and the tests that fly in one process build the same stack
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
 
 from flightstack import __version__
 from flightstack.control.backend import ControlBackend
@@ -14,8 +15,9 @@ from flightstack.control.controller_loading import load_controller
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON
 from flightstack.firmware.targets import make_loops
-from flightstack.flight_log.flight_log import vehicle_info
+from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
+from flightstack.guidance.safe_places import SafePlaces
 from flightstack.params.config import StackConfig
 from flightstack.params.gains_file import open_gains
 from flightstack.params.identity import AUTOPILOT, GENERIC, SYSTEM_ID
@@ -27,10 +29,15 @@ from flightstack.process.timing_report import TimingReport
 from flightstack.services.commands import VehicleContext
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.routing.hub import GroundHub
-from flightstack.services.vehicle_facts import AutopilotFacts
+from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.vehicle.area import FlightArea
+from flightstack.vehicle.assembly import VehicleParts, assemble
 from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.flight_state import FlightState
+from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.parameters import behaviour_of, connect_parameters, load_parameters
+from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_status
 
 _KERNELS = (
     "inner_kernel", "store_outer_row", "outer_heading", "follow_rotors", "detect", "rest_kernel",
@@ -39,13 +46,16 @@ _KERNELS = (
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
 
 
+LoopsMaker: TypeAlias = Callable[[str, LoopsSetup, bool], ControlBackend]
+
+
 class Stack(NamedTuple):
     """The parts that a process or a test drives."""
 
     vehicle: Vehicle
     rates: Rates
     simulator: SimulatorLink
-    autopilot: Autopilot
+    parts: VehicleParts
     ground: GroundHub
     recorder: FlightRecorder
     timing: LoopTiming
@@ -54,6 +64,33 @@ class Stack(NamedTuple):
     loaded_params: LoadedParams
     """What the parameter file held at the start."""
     loops: ControlBackend
+    status: Callable[[], VehicleStatus]
+    """Returns the status of now."""
+
+    @property
+    def autopilot(self) -> Autopilot:
+        """The part that runs the ticks."""
+        return self.parts.autopilot
+
+    @property
+    def now(self) -> FlightState:
+        """The newest values of the flight."""
+        return self.parts.now
+
+    @property
+    def journal(self) -> Journal:
+        """Events for telemetry and the log."""
+        return self.parts.journal
+
+    @property
+    def places(self) -> SafePlaces:
+        """Home, geofence and rally points."""
+        return self.parts.places
+
+    @property
+    def area(self) -> FlightArea:
+        """Where the vehicle may fly."""
+        return self.parts.area
 
 
 def vehicle_of(config: StackConfig) -> Vehicle:
@@ -68,8 +105,10 @@ def kernels_of(config: StackConfig) -> tuple[str, ...]:
     return tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
 
 
-def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> Stack:
-    """Build a stack, which shows ``logs`` to its ground stations.
+def build(
+    config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS, make: LoopsMaker = make_loops
+) -> Stack:
+    """Build a stack that serves ``logs`` to ground stations and flies the loops that ``make`` returns.
 
     Raise ConfigError for anything in the configuration that cannot fly.
     """
@@ -84,7 +123,7 @@ def build(config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS) -> S
         pace.outer_hz,
         pace.divisor,
     )
-    backend = make_loops(config.loops, setup, config.lockstep)
+    backend = make(config.loops, setup, config.lockstep)
     try:
         return _join(config, vehicle, pace, backend, open_log, logs)
     except BaseException:
@@ -100,10 +139,10 @@ def _join(
     open_log: OpenLog,
     logs: LogStore,
 ) -> Stack:
-    info: dict[str, str | int | float] = {
+    log_info: dict[str, str | int | float] = {
         "sys_name": "flightstack",
         "ver_sw": __version__,
-        **vehicle_info(vehicle),
+        **vehicle_fields(vehicle),
         "controller": config.controller,
         "gains": config.gains,
         "loops": config.loops,
@@ -113,9 +152,9 @@ def _join(
     }
     params, loaded = load_parameters(config, backend)
     behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
-    recorder = FlightRecorder(open_log, info, params.values, config.home)
+    recorder = FlightRecorder(open_log, log_info, params.values, config.home)
     simulator = SimulatorLink(vehicle, config.home, config.lockstep, system_id, pace.interval_us)
-    autopilot = Autopilot(
+    parts = assemble(
         vehicle,
         backend,
         behaviour,
@@ -127,14 +166,19 @@ def _join(
         simulator.rotor_speed_rad_s,
         simulator,
     )
-    backend.warm_up(simulator.state, autopilot.now.setpoint, simulator.rotor_speed_rad_s)
-    autopilot.supervisor.warm_up()
-    connect_parameters(params, autopilot, backend, recorder)
+    parts.warm_up()
+    connect_parameters(params, parts, recorder)
     timing = LoopTiming(round(1e9 / pace.inner_hz))
     report = TimingReport(timing, pace, config.lockstep)
     generic = params.value(AUTOPILOT) == GENERIC
-    facts = AutopilotFacts(autopilot, vehicle, system_id, generic, report.message, lambda: simulator.battery)
-    ground = GroundHub(VehicleContext(autopilot, params, simulator, generic, logs=logs), facts, system_id)
+    info = vehicle_info(vehicle, system_id, generic, parts.places.frame)
+
+    def status() -> VehicleStatus:
+        return vehicle_status(info, parts, simulator.battery)
+
+    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message)
+    context = VehicleContext.of(parts, params, simulator, generic, logs)
+    ground = GroundHub(context, parts, telemetry, info)
     return Stack(
-        vehicle, pace, simulator, autopilot, ground, recorder, timing, report, params, loaded, backend
+        vehicle, pace, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status
     )

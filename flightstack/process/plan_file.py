@@ -91,6 +91,6 @@ def _read(path: Path) -> str:
 
 def _key(stack: Stack) -> object:
     """Return what differs whenever the plans do."""
-    places, progress = stack.autopilot.places, stack.autopilot.now.progress
+    places, progress = stack.places, stack.now.progress
     home = places.home_point if places.home_is_chosen else None
     return places.ids, progress.current, progress.finished, home

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flightstack.core.severity import Severity
 from flightstack.firmware.targets import finish_loops
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.flight_log.log_tail import FileTail
@@ -20,7 +21,6 @@ from flightstack.process.plan_file import PLANS_NAME, PlanFile
 from flightstack.process.process_config import ProcessConfig, complain
 from flightstack.process.signing_file import create_key, open_signing, replace_key
 from flightstack.services.logs.log_store import NO_LOGS
-from flightstack.vehicle.snapshot import CRITICAL
 
 
 class ProcessFiles:
@@ -78,7 +78,7 @@ class ProcessFiles:
         if sentence is None:
             return
         assert self._stack is not None
-        self._stack.autopilot.say(CRITICAL, text or sentence[0].upper() + sentence[1:])
+        self._stack.journal.say(Severity.CRITICAL, text or sentence[0].upper() + sentence[1:])
         complain(sentence)
 
     def close_parameters(self) -> None:

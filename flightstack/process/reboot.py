@@ -25,8 +25,8 @@ def carry_over(old: Stack, new: Stack) -> None:
     """
     for address, permanent in old.ground.addresses():
         new.ground.add_peer(address, permanent)
-    new.autopilot.set_home(old.autopilot.home, old.autopilot.places.home_is_chosen)
+    new.area.set_home(old.area.home, old.places.home_is_chosen)
     new.ground.adopt_plans(old.ground)
     new.ground.last_heard_s = old.ground.last_heard_s
     new.simulator.resume(old.simulator)
-    new.autopilot.has_state = old.autopilot.has_state
+    new.now.has_state = old.now.has_state

@@ -5,10 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from flightstack.core.severity import Severity
 from flightstack.process.assembly import Stack
 from flightstack.process.process_config import EXIT_LOST, EXIT_TIMEOUT, Ended, ProcessConfig, complain
 from flightstack.transports.tcp import TcpClient
-from flightstack.vehicle.snapshot import WARNING
 
 SECOND_HELLO_S = 1.0
 """Silence after which a simulator is asked for the standard message."""
@@ -49,13 +49,13 @@ def wait_for_state(
             told = True
             _tell_silent(stack, process)
         check_deadline(began_s + process.simulator_timeout_s, stack, process)
-    stack.autopilot.has_state = True
+    stack.now.has_state = True
 
 
 def _tell_silent(stack: Stack, process: ProcessConfig) -> None:
     where = f"{process.simulator_host}:{process.simulator_port}"
     sentence = f"the simulator at {where} is connected but sends no state"
-    stack.autopilot.say(WARNING, f"Waiting: {sentence}")
+    stack.journal.say(Severity.WARNING, f"Waiting: {sentence}")
     complain(
         f"warning: {sentence} for {SIMULATOR_NOTICE_S:g} s; it hangs, or compiles; waiting up to "
         f"{process.simulator_timeout_s:g} s"
@@ -65,6 +65,6 @@ def _tell_silent(stack: Stack, process: ProcessConfig) -> None:
 def check_deadline(deadline_s: float, stack: Stack, process: ProcessConfig) -> None:
     """Raise Ended when the simulator has been silent past ``deadline_s`` of the machine's clock."""
     if time.monotonic() > deadline_s:
-        at = f"t={stack.autopilot.now.time_us * 1e-6:.3f} s"
+        at = f"t={stack.now.time_us * 1e-6:.3f} s"
         timeout_s = process.simulator_timeout_s
         raise Ended(EXIT_LOST, f"simulator lost at {at}: no state for {timeout_s:g} s")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 
 from flightstack import __version__
+from flightstack.core.severity import Severity
 from flightstack.mavlink.addressing import Address
 from flightstack.params.metadata import parameters_json
 from flightstack.services.commands import VehicleContext
@@ -22,8 +23,9 @@ from flightstack.services.routing.peer import Peer
 from flightstack.services.service import Service
 from flightstack.services.streams.stream_services import stream_services
 from flightstack.services.streams.timesync import TimeService
-from flightstack.services.vehicle_facts import AutopilotFacts
-from flightstack.vehicle.snapshot import WARNING
+from flightstack.services.telemetry.telemetry import Telemetry
+from flightstack.vehicle.assembly import VehicleParts
+from flightstack.vehicle.status import VehicleInfo
 
 VENDOR = "flightstack"
 
@@ -31,7 +33,9 @@ VENDOR = "flightstack"
 def make_services(
     own: Address,
     vehicle: VehicleContext,
-    facts: AutopilotFacts,
+    parts: VehicleParts,
+    telemetry: Telemetry,
+    info: VehicleInfo,
     peer_at: Callable[[Hashable], Peer],
     has_room: Callable[[Hashable], bool],
 ) -> list[Service]:
@@ -40,20 +44,20 @@ def make_services(
     ``peer_at`` finds a known peer; ``has_room`` is False for a peer that reads more slowly than it is sent to.
     """
     metadata = ComponentMetadata(
-        parameters_json(vehicle.params.specs.values()), VENDOR, facts.model, __version__
+        parameters_json(vehicle.params.specs.values()), VENDOR, info.model, __version__
     )
     log_stream = LogStream(own, lambda: vehicle.open_log_tail(), has_room)  # noqa: PLW0108  # the process sets it later
-    link_commands = LinkCommands(own, facts, peer_at, log_stream, metadata)
-    failures = FailureCommands(vehicle.simulator, lambda: vehicle.autopilot.behaviour.failures_allowed != 0)
+    link_commands = LinkCommands(own, telemetry, peer_at, log_stream, metadata)
+    failures = FailureCommands(vehicle.simulator, lambda: parts.now.behaviour.failures_allowed != 0)
     return [
-        MissionService(own, vehicle.autopilot),
+        MissionService(own, parts),
         GuidedItems(own, vehicle),
         CommandService(own, vehicle, peer_at, link_commands.answer, failures),
         link_commands,
-        *stream_services(own, vehicle.autopilot),
-        LinkLossService(vehicle.autopilot),
-        TimeService(lambda: facts.time_us),
-        ParamServer(own, vehicle.params, lambda text: vehicle.autopilot.say(WARNING, text)),
+        *stream_services(own, parts, info),
+        LinkLossService(parts.now, parts.supervisor.links),
+        TimeService(lambda: parts.now.time_us),
+        ParamServer(own, vehicle.params, lambda text: parts.journal.say(Severity.WARNING, text)),
         *file_services(own, vehicle, metadata, has_room),
         log_stream,
     ]

@@ -9,10 +9,10 @@ the simulator's.
 from __future__ import annotations
 
 from flightstack.core.contract import FloatArray, LoopRow
+from flightstack.core.severity import Severity
 from flightstack.simulator_link.endpoint import SimulatorLink
 from flightstack.simulator_link.state_steps import is_gap
 from flightstack.vehicle.autopilot import Autopilot
-from flightstack.vehicle.snapshot import CRITICAL, NOTICE
 
 STALL_NS = 1_000_000_000
 """When states keep coming whose time has stood still for so long, the vehicle's clock goes on by the machine's."""
@@ -66,11 +66,11 @@ class Lockstep:
             self._seen_us, self._seen_ns = self._link.time_us, now_ns
             if self._stalled:
                 self._stalled = False
-                self._link.steps.tell(NOTICE, "Simulator clock runs again")
+                self._link.steps.tell(Severity.NOTICE, "Simulator clock runs again")
         elif self._stalled:
             passed_us = (now_ns - self._seen_ns) // 1000
             self._lead_us += passed_us
             self._seen_ns += passed_us * 1000
         elif now_ns - self._seen_ns > STALL_NS:
             self._stalled, self._seen_ns = True, now_ns
-            self._link.steps.tell(CRITICAL, "Simulator clock stands still")
+            self._link.steps.tell(Severity.CRITICAL, "Simulator clock stands still")

@@ -14,7 +14,7 @@ from flightstack.params.identity import identity_specs
 from flightstack.params.param_file import NOTHING_LOADED, LoadedParams, load_into
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore, apply_assignments
-from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.assembly import VehicleParts
 
 
 class Parameters(NamedTuple):
@@ -61,15 +61,14 @@ def behaviour_of(store: ParamStore) -> Behaviour:
     return Behaviour(**values)  # type: ignore[arg-type]  # an integer parameter's value is an int
 
 
-def connect_parameters(
-    store: ParamStore, autopilot: Autopilot, backend: ControlBackend, recorder: FlightRecorder
-) -> None:
+def connect_parameters(store: ParamStore, parts: VehicleParts, recorder: FlightRecorder) -> None:
     """Let every change reach guidance and commander, the loops, and the log, before the next tick."""
+    backend = parts.backend
     loops = {spec.name for spec in backend.parameter_specs}
 
     def on_change(name: str, value: float) -> None:
         if name in SPECS:
-            autopilot.set_behaviour(autopilot.behaviour.updated(name, value))
+            parts.set_behaviour(parts.now.behaviour.updated(name, value))
         if name in loops:
             backend.set_parameter(name, value)
         recorder.parameter(name, value)

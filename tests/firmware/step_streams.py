@@ -102,9 +102,8 @@ GUSTY: dict[str, Any] = {"wind": (4.0, 2.0, 0.0), "gust": 2.0, "drag": True}
 
 def flown_steps(plan: str = "hop.plan", air: Mapping[str, Any] = GUSTY) -> list[bytes]:
     """Fly a mission and return the steps of its loops."""
-    flight = World(**air)
-    recorder = Recorder(flight.stack.autopilot.backend)
-    flight.stack.autopilot.backend = recorder
+    flight = World(wrap_loops=Recorder, **air)
+    recorder = flight.stack.loops
     flight.upload(plan)
     flight.start_mission()
     flight.until_disarmed()

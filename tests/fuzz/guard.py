@@ -16,8 +16,7 @@ class Guard:
     """Watches plans, parameters and the control loops' memory of one vehicle."""
 
     def __init__(self, world: World) -> None:
-        self._autopilot, self._params = world.stack.autopilot, world.stack.params
-        self._world, self._loops = world, world.stack.autopilot.backend
+        self._world, self._stack = world, world.stack
         self.plan_changes = self.parameter_changes = 0
         self.after_tick()
 
@@ -43,10 +42,10 @@ class Guard:
             assert kinds & _CHANGES_PARAMETERS, kinds
 
     def _content(self) -> tuple[object, object, object]:
-        autopilot, loops = self._autopilot, self._loops
+        stack, loops = self._stack, self._stack.loops
         memory = loops._memory.tobytes() + loops._position_memory.tobytes()
-        plans = (autopilot.places.ids, autopilot.items)
-        return memory, plans, self._params.values()
+        plans = (stack.places.ids, stack.parts.mission.items)
+        return memory, plans, stack.params.values()
 
     def _answers(self, peer: PeerAddress) -> list[Message]:
         """Return what is sent to ``peer`` now."""

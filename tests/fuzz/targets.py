@@ -79,15 +79,15 @@ def hub(script: bytes) -> int:
 
 def check_vehicle(world: World) -> None:
     """What holds of a vehicle, whatever it was told."""
-    autopilot, params = world.stack.autopilot, world.stack.params
+    stack, params = world.stack, world.stack.params
     assert np.isfinite(world.simulator.frame.state).all()
-    assert np.isfinite(autopilot.now.setpoint).all()
+    assert np.isfinite(stack.now.setpoint).all()
     for name, value in params.values().items():
         assert params.specs[name].accepted(value) == value
     assert world.stack.ground.forward_backlog <= MAX_TO_FORWARD
-    places = autopilot.places
+    places = stack.places
     assert all(math.isfinite(number) for number in places.home_point)
-    assert autopilot.now.progress.current <= len(autopilot.items)
+    assert stack.now.progress.current <= len(stack.parts.mission.items)
 
 
 def answers(world: World, link: Link) -> set[str]:

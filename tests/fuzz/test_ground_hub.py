@@ -45,11 +45,10 @@ def throw(world: World, inputs: Inputs, messages: int, peers: int = 80) -> None:
 
 def flight_content(world: World) -> tuple[object, ...]:
     """All that a stranger must not change."""
-    autopilot = world.stack.autopilot
-    places = autopilot.places
+    places = world.stack.places
     return (
         world.simulator.frame.state.tobytes(), world.stack.simulator.rotor_speed_rad_s.tobytes(),
-        world.armed, world.mode, places.ids, dict(world.stack.params.values()), autopilot.home,
+        world.armed, world.mode, places.ids, dict(world.stack.params.values()), world.stack.area.home,
     )  # fmt: skip
 
 

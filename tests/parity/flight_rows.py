@@ -18,7 +18,7 @@ def flight_rows(vehicle: str, controller: str, ticks: int) -> np.ndarray:
     world = World(vehicle=vehicle, controller=controller, wind=(1.0, -2.0, 0.0), gust=0.5, drag=drag)
     world.upload([item(115, p1=30.0), item(22, z=1.0), item(16, north=3.0, east=-2.0, z=1.5), item(20)])
     world.start_mission()
-    now = world.stack.autopilot.now
+    now = world.stack.now
     rows = []
     for _ in range(ticks):
         world.tick()

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import load_controller
 from flightstack.control.loops import PythonLoops
 from flightstack.core.contract import FloatArray, LoopRow
@@ -32,7 +33,8 @@ class Recording(NamedTuple):
 class RecordingLoops:
     """Loops that note each call before they pass it on."""
 
-    def __init__(self, loops: PythonLoops) -> None:
+    def __init__(self, loops: ControlBackend) -> None:
+        assert isinstance(loops, PythonLoops)
         self.loops = loops
         self.rows: list[tuple[np.ndarray, ...]] = []
         self.flags: list[int] = []
@@ -81,12 +83,10 @@ class RecordingLoops:
 
 def record(plan: str, **config: Any) -> Recording:
     """Fly a plan of ``missions/`` to its end with Python's loops."""
-    world = World(**config)
+    world = World(wrap_loops=RecordingLoops, **config)
     stack = world.stack
-    loops = stack.autopilot.backend
-    assert isinstance(loops, PythonLoops)
-    recorder = RecordingLoops(loops)
-    stack.autopilot.backend = recorder
+    recorder = stack.loops
+    assert isinstance(recorder, RecordingLoops)
     world.upload(plan)
     world.start_mission()
     world.until_disarmed()

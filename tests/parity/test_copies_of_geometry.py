@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.geometry import euler_from_quaternion, quaternion_from_euler
 from flightstack.core.geometry_bulk import euler_from_quaternions, heading_from_quaternions
-from flightstack.services.telemetry import euler
+from flightstack.services.telemetry.fields import euler
 
 QUATERNIONS = np.roll(Rotation.random(200, rng=7).as_quat(), 1, axis=1)
 

@@ -226,13 +226,13 @@ def test_a_refused_parameter_is_explained_in_a_text(vehicle: SignedVehicle) -> N
 def test_all_parameters_are_reset_by_command_but_not_while_armed(vehicle: SignedVehicle) -> None:
     assert vehicle.world.stack.params.set("MIS_TAKEOFF_ALT", 9.0) is None
     reset = common.MAVLink_command_long_message(1, 1, 245, 0, 2.0, 0, 0, 0, 0, 0, 0)
-    status = vehicle.world.stack.autopilot.now.status
-    vehicle.world.stack.autopilot.now.status = status._replace(armed=True)
+    status = vehicle.world.stack.now.status
+    vehicle.world.stack.now.status = status._replace(armed=True)
     try:
         station = Station(vehicle, KEY)
         assert [ack.result for ack in of_type(station.ask(reset), "COMMAND_ACK")] == [2]  # DENIED
         assert vehicle.world.stack.params.value("MIS_TAKEOFF_ALT") == 9.0
     finally:
-        vehicle.world.stack.autopilot.now.status = status
+        vehicle.world.stack.now.status = status
     assert [ack.result for ack in of_type(station.ask(reset), "COMMAND_ACK")] == [0]
     assert vehicle.world.stack.params.is_default("MIS_TAKEOFF_ALT")

@@ -117,7 +117,7 @@ def test_a_home_that_sank_opens_no_way_below_the_ground(hovering: World) -> None
 
 
 def test_a_goto_at_present_altitude_into_a_hill_is_refused(hovering: World) -> None:
-    hovering.stack.autopilot.set_rally([rally_point((40.0, 0.0), 20.0)])
+    hovering.stack.area.set_rally([rally_point((40.0, 0.0), 20.0)])
     assert command_int(hovering, RELATIVE, 8.0, north=38.0) == DENIED
     assert command_int(hovering, RELATIVE, 25.0, north=38.0) == ACCEPTED
 
@@ -172,7 +172,7 @@ def test_offboard_may_descend_into_the_ground_and_touches_it_slowly(
 
 
 def hold_below_the_ground(world: World) -> None:
-    assert world.stack.autopilot.go_to(0.0, 0.0, 20.0, NAN, NAN) is None
+    assert world.stack.parts.requests.go_to(0.0, 0.0, 20.0, NAN, NAN) is None
 
 
 def return_to_a_sunken_home(world: World) -> None:
@@ -186,7 +186,7 @@ def land_over_a_sunken_home(world: World) -> None:
 
 
 def return_to_a_rally_point_below_the_ground(world: World) -> None:
-    world.stack.autopilot.set_rally([rally_point((0.0, 5.0), -20.0)])
+    world.stack.area.set_rally([rally_point((0.0, 5.0), -20.0)])
     assert world.stack.params.set("RTL_TYPE", 1) is None
     assert world.return_home() == ACCEPTED
 

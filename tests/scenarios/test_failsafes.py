@@ -147,7 +147,7 @@ def ends(world: World, case: Case, phase: Phase) -> None:
     world.until(lambda: world.mode is Mode.TERMINATION, 3.0)
     assert said(world, case)
     assert not world.armed
-    assert float(np.abs(world.stack.autopilot.now.row[31:39]).max()) == 0.0
+    assert float(np.abs(world.stack.now.row[31:39]).max()) == 0.0
     assert world.arm() == 1
     assert world.hold() == 1
 

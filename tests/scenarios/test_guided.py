@@ -225,7 +225,7 @@ def test_who_is_outside_the_geofence_may_pause_and_come_nearer_but_not_go_farthe
     world.resume_mission()
     world.stack.params.set("GF_MAX_HOR_DIST", 20.0)
     world.stack.params.set("GF_MAX_VER_DIST", 15.0)
-    assert world.stack.autopilot.supervisor.fence.refusal(*world.position[:2]) is not None
+    assert world.stack.area.fence.refusal(*world.position[:2]) is not None
     assert go_to(world) == ACCEPTED
     assert world.mode is Mode.HOLD
     assert go_to(world, 35.0, 0.0) == DENIED
@@ -237,7 +237,7 @@ def test_who_is_outside_the_geofence_may_pause_and_come_nearer_but_not_go_farthe
 
 def test_a_goto_across_an_exclusion_area_is_refused() -> None:
     world = World()
-    world.stack.autopilot.set_fence([circle((15.0, 0.0), 5.0, inclusion=False)])
+    world.stack.area.set_fence([circle((15.0, 0.0), 5.0, inclusion=False)])
     world.arm()
     world.takeoff(5.0)
     world.until(lambda: world.mode is Mode.HOLD)

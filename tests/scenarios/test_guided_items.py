@@ -97,9 +97,9 @@ def test_an_upload_goes_on_when_an_item_to_fly_comes_between(hovering: World) ->
     world = hovering
     world.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0))
     assert answer(world, item(3.0, 0.0, 5.0)) == ACCEPTED
-    assert not world.stack.autopilot.items
+    assert not world.stack.parts.mission.items
     assert answer(world, item(4.0, 0.0, 5.0, current=0)) == ACCEPTED
-    assert len(world.stack.autopilot.items) == 1
+    assert len(world.stack.parts.mission.items) == 1
 
 
 @pytest.mark.parametrize(

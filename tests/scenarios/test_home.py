@@ -44,7 +44,7 @@ def fly_and_return(world: World) -> None:
     world.takeoff(3.0)
     world.until(lambda: world.mode is Mode.HOLD)
     north_m, east_m = world.position[:2]
-    world.stack.autopilot.go_to(north_m, east_m + 15.0, math.nan, math.nan, math.nan)
+    world.stack.parts.requests.go_to(north_m, east_m + 15.0, math.nan, math.nan, math.nan)
     world.run(10.0)
     assert world.return_home() == ACCEPTED
     world.until_disarmed()
@@ -58,7 +58,7 @@ def told_home(world: World) -> Vector3:
 
 def test_home_moves_to_where_the_vehicle_arms_and_a_return_ends_there() -> None:
     world = landed_away()
-    assert world.stack.autopilot.home == DEFAULT_HOME  # not by landing: by arming
+    assert world.stack.area.home == DEFAULT_HOME  # not by landing: by arming
     north_m = world.position[0]
     fly_and_return(world)
     assert abs(world.position[0] - north_m) < 0.1
@@ -78,7 +78,7 @@ def test_everybody_is_told_at_once() -> None:
 def test_the_first_flight_leaves_home_exactly_where_it_was_configured() -> None:
     world = World()
     world.arm()
-    assert world.stack.autopilot.home == DEFAULT_HOME
+    assert world.stack.area.home == DEFAULT_HOME
 
 
 def test_com_home_en_off_keeps_home() -> None:
@@ -93,11 +93,11 @@ def test_a_home_that_was_chosen_stays_and_the_present_place_does_not() -> None:
     numbers = (0, 0, 0, math.nan, here.latitude_deg, here.longitude_deg, here.altitude_m)
     assert world.command(mavlink.MAV_CMD_DO_SET_HOME, *numbers) == ACCEPTED
     fly_and_return(world)
-    home = world.stack.autopilot.places.home
+    home = world.stack.places.home
     assert (home.north_m, home.east_m) == pytest.approx((5.0, 0.0), abs=0.5)  # degrees in a float32
     assert world.position[:2] == pytest.approx([home.north_m, home.east_m], abs=0.1)
     assert world.command(mavlink.MAV_CMD_DO_SET_HOME, 1) == ACCEPTED
-    assert not world.stack.autopilot.places.home_is_chosen
+    assert not world.stack.places.home_is_chosen
 
 
 def test_a_takeoff_selected_before_home_rose_ends_above_the_new_one() -> None:
@@ -111,7 +111,7 @@ def test_a_takeoff_to_an_altitude_above_the_sea_ends_there_though_home_rose() ->
 def altitude_of_takeoff(altitude_m: float) -> float:
     """Select a takeoff while home is a metre below the vehicle, arm, and return where it ends."""
     world = World()
-    world.stack.autopilot.set_home(FRAME.to_geo(Vector3(0.0, 0.0, 1.0)), chosen=False)
+    world.stack.area.set_home(FRAME.to_geo(Vector3(0.0, 0.0, 1.0)), chosen=False)
     world.takeoff(altitude_m)
     world.arm()
     world.until(lambda: world.mode is Mode.HOLD)
@@ -123,13 +123,13 @@ def test_a_geofence_is_judged_where_it_lies_after_home_has_moved() -> None:
     world = landed_away()
     world.arm()
     world.disarm()
-    assert world.stack.autopilot.places.home.north_m == pytest.approx(20.0, abs=0.1)
-    autopilot = world.stack.autopilot
+    assert world.stack.places.home.north_m == pytest.approx(20.0, abs=0.1)
+    area = world.stack.area
     around_old_home = square(10.0)
-    rejection = autopilot.check_fence(around_old_home)
+    rejection = area.check_fence(around_old_home)
     assert rejection is not None
     assert "leaves out the home position" in rejection.reason
-    autopilot.set_fence(polygon([(5, 9), (5, -9), (15, -9), (15, 9)], inclusion=False))
+    area.set_fence(polygon([(5, 9), (5, -9), (15, -9), (15, 9)], inclusion=False))
     beyond = world.upload([item(16, north=-5.0, z=3.0)])  # from here, not from where home was
     assert isinstance(beyond, Failed)
     world.run(0.02)

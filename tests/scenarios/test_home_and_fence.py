@@ -55,13 +55,13 @@ def set_home(
 
 def go_north(world: World, north_m: float, seconds: float) -> None:
     """Fly to a place to the north of the origin."""
-    assert world.stack.autopilot.go_to(north_m, 0.0, math.nan, math.nan, math.nan) is None
+    assert world.stack.parts.requests.go_to(north_m, 0.0, math.nan, math.nan, math.nan) is None
     world.run(seconds)
 
 
 def margin(world: World) -> float:
     """Distance to the nearest limit of the fence, as the vehicle sees it."""
-    return world.stack.autopilot.supervisor.fence.margin_m
+    return world.stack.area.fence.margin_m
 
 
 # ---------------------------------------------------------------------- home and the geofence
@@ -72,7 +72,7 @@ def test_home_is_not_moved_out_of_the_geofence() -> None:
     upload(world, MissionType.FENCE, polygon(square(20.0)))
     assert set_home(world, 40.0) == DENIED
     assert any("outside the geofence" in text for text in world.texts), world.texts
-    assert world.stack.autopilot.home == DEFAULT_HOME
+    assert world.stack.area.home == DEFAULT_HOME
     world.return_home()
     world.until_disarmed()
     assert np.linalg.norm(world.position[:2]) < 0.1
@@ -89,7 +89,7 @@ def test_a_return_lands_where_it_is_if_no_place_to_return_to_is_inside_the_geofe
     world.land()
     world.until_disarmed()
     world.arm()
-    assert world.stack.autopilot.places.home.north_m == pytest.approx(40.0, abs=0.1)
+    assert world.stack.places.home.north_m == pytest.approx(40.0, abs=0.1)
     world.takeoff(5.0)
     world.until(lambda: world.mode is Mode.HOLD)
     go_north(world, 5.0, 18.0)
@@ -107,7 +107,7 @@ def test_a_return_to_an_outside_home_takes_a_rally_point_inside() -> None:
     world = hover()
     upload(world, MissionType.RALLY, [rally_point((0.0, 8.0))])
     assert set_home(world, 40.0) == ACCEPTED  # and then a fence without it, from a reboot with other plans
-    world.stack.autopilot.set_fence(polygon(square(20.0)))
+    world.stack.area.set_fence(polygon(square(20.0)))
     world.return_home()
     assert world.mode is Mode.RETURN
     world.until_disarmed()
@@ -155,7 +155,7 @@ def test_home_is_not_a_kilometre_above_or_below_the_ground(up_m: float) -> None:
 def test_home_in_terrain_or_local_frames_is_not_supported(frame: int) -> None:
     world = World()
     assert set_home(world, 0.0, frame=frame) == UNSUPPORTED_FRAME
-    assert world.stack.autopilot.home == DEFAULT_HOME
+    assert world.stack.area.home == DEFAULT_HOME
 
 
 def test_lower_limits_hold_a_mission_that_breaks_them() -> None:
@@ -228,10 +228,10 @@ def test_a_rally_points_altitude_counts_from_a_moved_home() -> None:
     world = hover(10.0)
     upload(world, MissionType.RALLY, [rally_point((30.0, 0.0), 2.0)])
     assert set_home(world, 0.0, up_m=4.0) == ACCEPTED
-    (point,) = world.stack.autopilot.places.points
+    (point,) = world.stack.places.points
     assert point.altitude_m == pytest.approx(6.0, abs=1e-3)
     upload(world, MissionType.RALLY, [rally_point((30.0, 0.0), 3.0)])
-    (point,) = world.stack.autopilot.places.points
+    (point,) = world.stack.places.points
     assert point.altitude_m == pytest.approx(7.0, abs=1e-3)
 
 

@@ -70,7 +70,7 @@ def watch_landing(world: World, limit_s: float = 30.0) -> Landing:
             touched_s, touched_at = world.time_s, world.position
         if math.isnan(found_s) and world.landed:
             found_s = world.time_s - touched_s
-        deepest_m = max(deepest_m, float(world.stack.autopilot.now.setpoint[2] - world.position[2]))
+        deepest_m = max(deepest_m, float(world.stack.now.setpoint[2] - world.position[2]))
     slid_m = float(np.linalg.norm((world.position - touched_at)[:2]))
     world.run(0.5)
     _, x, y, _ = world.simulator.frame.state[6:10]
@@ -208,7 +208,7 @@ FAST = ("MPC_TKO_SPEED=5", "MPC_Z_VEL_MAX_UP=8", "MPC_ACC_UP_MAX=5")
 
 def watch_flight(world: World, seconds: float) -> None:
     """Fly on; no contact may be found in the air."""
-    navigator = world.stack.autopilot.navigator
+    navigator = world.stack.parts.navigator
     for _ in range(round(seconds * world.stack.rates.inner_hz)):
         world.tick()
         assert not world.landed
@@ -285,7 +285,7 @@ def enter(world: World, mode: Mode) -> None:
     """Stay in place in this mode, with the setpoint that the vehicle has."""
     if mode is Mode.HOLD:
         return
-    north, east, down = world.stack.autopilot.now.setpoint[:3].tolist()
+    north, east, down = world.stack.now.setpoint[:3].tolist()
     maker = sticks if mode is Mode.POSITION else lambda: local_point((north, east, down))
     stream(world, maker(), 0.2)
     assert select(world, 3 if mode is Mode.POSITION else 6) == 0

@@ -15,7 +15,7 @@ START, SET_CURRENT = mavlink.MAV_CMD_MISSION_START, mavlink.MAV_CMD_DO_SET_MISSI
 
 
 def current(world: World) -> int:
-    return world.stack.autopilot.now.progress.current
+    return world.stack.now.progress.current
 
 
 @pytest.mark.parametrize("seq", [99.0, -2.0, 1.5, math.inf])
@@ -43,8 +43,8 @@ def test_a_restart_and_an_item_act_together() -> None:
 def test_a_start_that_may_not_arm_leaves_mode_and_item() -> None:
     world = World(params=["NAV_DLL_ACT=2"])
     world.upload("square.plan")
-    world.stack.autopilot.links.gcs_lost = True
-    assert world.stack.autopilot.arming_refusals()
+    world.stack.parts.supervisor.links.gcs_lost = True
+    assert world.stack.parts.readiness.arming_refusals()
     assert world.command(START, 2) == REJECTED
     assert world.mode is Mode.HOLD
     assert current(world) == 0

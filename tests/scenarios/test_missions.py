@@ -148,7 +148,7 @@ def test_the_reference_is_followed_closely() -> None:
     while world.armed:
         world.run(0.01)
         if not world.landed:
-            errors.append(float(np.linalg.norm(world.position - world.stack.autopilot.now.setpoint[:3])))
+            errors.append(float(np.linalg.norm(world.position - world.stack.now.setpoint[:3])))
     assert max(errors[: -int(1.0 / 0.01)]) < 0.25
     assert float(np.sqrt(np.mean(np.square(errors)))) < 0.08
 

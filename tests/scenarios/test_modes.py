@@ -128,7 +128,7 @@ def test_disarming_in_the_air_needs_force(hovering: World) -> None:
     assert hovering.disarm(force=True) == ACCEPTED
     assert not hovering.armed
     hovering.run(0.2)
-    assert float(np.abs(hovering.stack.autopilot.now.row[31:39]).max()) == 0.0
+    assert float(np.abs(hovering.stack.now.row[31:39]).max()) == 0.0
 
 
 def test_a_second_takeoff_in_the_air_is_refused(hovering: World) -> None:
@@ -162,7 +162,7 @@ def test_a_refused_upload_leaves_the_mission_and_names_the_item() -> None:
 
 
 def test_a_state_that_is_not_finite_holds_the_rotors_and_is_reported(hovering: World) -> None:
-    row = hovering.stack.autopilot.now.row.copy()
+    row = hovering.stack.now.row.copy()
     for _ in range(10):  # two outer ticks: one sees the status of the loops of the one before
         hovering.stack.simulator.state[11] = math.nan
         commands = hovering.stack.autopilot.tick(hovering.stack.simulator.time_us)

@@ -64,7 +64,7 @@ def test_set_mode_takes_any_mode(mode: Mode) -> None:
 @pytest.mark.parametrize("mode", SELECTABLE)
 def test_a_mode_may_be_selected_before_there_is_a_state(mode: Mode) -> None:
     world = World()
-    world.stack.autopilot.has_state = False
+    world.stack.now.has_state = False
     world.stack.simulator.state[:] = math.nan
     assert select(world, mode) == 0
     assert world.mode is mode

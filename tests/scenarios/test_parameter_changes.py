@@ -29,9 +29,9 @@ def cruising(**config) -> World:
 def test_a_new_cruise_speed_is_flown_at_once() -> None:
     world = cruising()
     assert world.stack.params.set("MPC_XY_CRUISE", 7.0) is None
-    before = world.stack.autopilot.now.setpoint[3]
+    before = world.stack.now.setpoint[3]
     world.run(0.02)
-    assert world.stack.autopilot.now.setpoint[3] > before, "the reference speeds up with the next outer tick"
+    assert world.stack.now.setpoint[3] > before, "the reference speeds up with the next outer tick"
     world.run(5.0)
     assert world.velocity[0] == pytest.approx(7.0, abs=0.02)
     world.stack.params.set("MPC_XY_CRUISE", 2.0)
@@ -55,12 +55,12 @@ def test_a_gain_acts_on_the_next_tick(controller: str, gain: str) -> None:
     changed, same = (
         cruising(controller=controller, wind=(0.0, 3.0, 0.0), gust=1.0, drag=True) for _ in range(2)
     )
-    assert changed.stack.autopilot.now.row.tolist() == same.stack.autopilot.now.row.tolist()
+    assert changed.stack.now.row.tolist() == same.stack.now.row.tolist()
     params = changed.stack.params
     params.set(gain, 2.0 * params.value(gain))
     for world in (changed, same):
         world.tick()
-    row, reference = changed.stack.autopilot.now.row, same.stack.autopilot.now.row
+    row, reference = changed.stack.now.row, same.stack.now.row
     roll = LoopRow.WRENCH.start + 1
     assert row[roll] != reference[roll]
     assert row[LoopRow.STATE].tolist() == reference[LoopRow.STATE].tolist(), "what is seen is still the same"
@@ -75,7 +75,7 @@ def test_a_ground_station_changes_a_gain_in_flight_and_is_told() -> None:
     world = cruising()
     world.send(mavlink.MAVLink_param_set_message(1, 1, b"POS_XY_P", 6.1, mavlink.MAV_PARAM_TYPE_REAL32))
     world.run(0.1)
-    assert world.stack.autopilot.backend.get_parameter("POS_XY_P") == 6.1
+    assert world.stack.loops.get_parameter("POS_XY_P") == 6.1
     assert world.received["PARAM_VALUE"].param_id == "POS_XY_P"
     assert world.received["PARAM_VALUE"].param_value == pytest.approx(6.1)
     world.send(mavlink.MAVLink_param_set_message(1, 1, b"POS_XY_P", math.nan, mavlink.MAV_PARAM_TYPE_REAL32))
@@ -91,13 +91,13 @@ def test_an_integral_gain_changes_without_a_bump() -> None:
     world.takeoff(4.0)
     world.until(lambda: world.mode is Mode.HOLD)
     world.run(4.0)
-    held = float(world.stack.autopilot.now.row[LoopRow.WRENCH][1])
+    held = float(world.stack.now.row[LoopRow.WRENCH][1])
     assert held == pytest.approx(-0.05, abs=2e-3)
     world.stack.params.set("PID_ROLL_I", world.stack.params.value("PID_ROLL_I") / 2.0)
     highest = lowest = held
     for _ in range(250):
         world.tick()
-        torque = float(world.stack.autopilot.now.row[LoopRow.WRENCH][1])
+        torque = float(world.stack.now.row[LoopRow.WRENCH][1])
         highest, lowest = max(highest, torque), min(lowest, torque)
     assert highest - lowest < 1e-3  # a step would be 0.025 N m
 
@@ -109,7 +109,7 @@ def test_less_tilt_is_flown_with_less_tilt() -> None:
     tilts = []
     for _ in range(400):
         world.tick()
-        x, y = world.stack.autopilot.now.attitude_target[1:3]
+        x, y = world.stack.now.attitude_target[1:3]
         tilts.append(math.degrees(math.acos(1.0 - 2.0 * (x * x + y * y))))
     assert max(tilts[5:]) <= 7.2  # 5° on each axis at most
     assert max(tilts) > 4.9
@@ -133,7 +133,7 @@ def test_a_change_that_is_taken_back_leaves_no_trace() -> None:
     """Every parameter of the loops to an end of its range and back: the same numbers, bit for bit."""
     flights = [World(), World()]
     params = flights[1].stack.params
-    backend = flights[1].stack.autopilot.backend
+    backend = flights[1].stack.loops
     for spec in backend.parameter_specs:
         assert params.set(spec.name, spec.high) is None
         assert backend.get_parameter(spec.name) == pytest.approx(spec.high, rel=1e-12)
@@ -150,7 +150,7 @@ def test_the_log_holds_all_parameters_and_their_changes() -> None:
     world.arm()
     world.takeoff(2.0)
     world.run(2.0)
-    changed_us = world.stack.autopilot.now.time_us
+    changed_us = world.stack.now.time_us
     world.stack.params.set("MPC_XY_CRUISE", 6.5)
     world.stack.params.set("MPC_YAW_MODE", 0)
     world.run(1.0)

@@ -58,7 +58,7 @@ class OtherClock(World):
     def tick(self) -> None:
         super().tick()
         if self.armed and not self.landed and self.altitude > 0.1:  # after touchdown the setpoint waits below
-            error = self.stack.autopilot.now.state[:3] - self.stack.autopilot.now.setpoint[:3]
+            error = self.stack.now.state[:3] - self.stack.now.setpoint[:3]
             self.largest_error_m = max(self.largest_error_m, float(np.linalg.norm(error)))
 
     def fly_the_square(self) -> None:
@@ -175,14 +175,14 @@ def test_a_state_that_comes_twice_ticks_the_loops_once() -> None:
 def test_a_clock_that_cannot_be_followed_leads_to_the_failsafe(stamp: Callable[[int], int]) -> None:
     world = OtherClock()
     world.hover()
-    began_us = world.stack.autopilot.now.time_us
+    began_us = world.stack.now.time_us
     world.stamp = stamp
     for _ in range(2000):  # four seconds of the machine's clock
         world.machine_ns += 2_000_000
         world.tick()
     assert world.told("Simulator clock stands still")
     assert world.told("State is frozen or missing: rotors hold their speeds")
-    passed_s = (world.stack.autopilot.now.time_us - began_us) * 1e-6
+    passed_s = (world.stack.now.time_us - began_us) * 1e-6
     assert passed_s == pytest.approx(3.0, abs=0.1)  # all but the second in which the stall was found
 
 

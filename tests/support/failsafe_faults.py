@@ -48,7 +48,7 @@ def breach_fence(world: World) -> None:
     north = float(world.position[0]) - 20.5 if world.position[0] > 0.9 else -100.0
     far = item(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, north=north, p1=20.0)
     frame = LocalFrame(world.config.home)
-    world.stack.autopilot.supervisor.set_fence(Fence.from_items([far], frame))
+    world.stack.area.fence.set_fence(Fence.from_items([far], frame))
 
 
 def lose_states(world: World) -> None:

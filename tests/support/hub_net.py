@@ -55,8 +55,8 @@ class Net:
 
     def __init__(self) -> None:
         stack = build(StackConfig(system_id=7), lambda: None)
-        self.autopilot, self.hub = stack.autopilot, stack.ground
-        self.autopilot.has_state = True
+        self.stack, self.hub = stack, stack.ground
+        stack.now.has_state = True
         self.now_s = 50.0
         self.stations: dict[PeerAddress, Station] = {}
         self.strangers: list[PeerAddress] = []
@@ -78,5 +78,5 @@ class Net:
     def run(self, seconds: float, vehicle_rate: float = 1.0, step_s: float = 0.01) -> None:
         for _ in range(round(seconds / step_s)):
             self.now_s += step_s
-            self.autopilot.now.time_us += round(step_s * vehicle_rate * 1e6)
+            self.stack.now.time_us += round(step_s * vehicle_rate * 1e6)
             self.poll()

@@ -18,10 +18,12 @@ from pathlib import Path
 
 import numpy as np
 
+from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.core.modes import Mode
 from flightstack.core.port_numbers import GROUND
+from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
@@ -79,11 +81,14 @@ class World:
         seed: int = 1,
         params: Sequence[str] = (),
         flight_logs: LogStore = NO_LOGS,
+        wrap_loops: Callable[[ControlBackend], ControlBackend] = lambda loops: loops,
         **config: object,
     ) -> None:
         self.logs: list[LogBuffer] = []
         self.config = StackConfig(params=tuple(params), **config)  # type: ignore[arg-type]
-        self.stack: Stack = build(self.config, self._open_log, flight_logs)
+        self.stack: Stack = build(
+            self.config, self._open_log, flight_logs, lambda *choice: wrap_loops(make_loops(*choice))
+        )
         disturbance = Disturbance(wind, gust, force, torque, torque_gust)
         vehicle = self.stack.vehicle.with_drag(plant) if drag else self.stack.vehicle
         self.simulator = Simulator(vehicle, plant, PlantOptions(disturbance=disturbance, seed=seed))
@@ -115,7 +120,7 @@ class World:
         self._next_log_us = 0
         self._ticks = 0
         self.stack.simulator.receive(memoryview(self.states()))
-        self.stack.autopilot.has_state = True
+        self.stack.now.has_state = True
         self.stack.ground.add_peer(PEER, permanent=True)
 
     def _open_log(self) -> FlightLog:
@@ -126,7 +131,7 @@ class World:
 
     @property
     def time_s(self) -> float:
-        return self.stack.autopilot.now.time_us * 1e-6
+        return self.stack.now.time_us * 1e-6
 
     @property
     def position(self) -> np.ndarray:
@@ -142,15 +147,15 @@ class World:
 
     @property
     def armed(self) -> bool:
-        return self.stack.autopilot.now.status.armed
+        return self.stack.now.status.armed
 
     @property
     def mode(self) -> Mode:
-        return self.stack.autopilot.now.status.mode
+        return self.stack.now.status.mode
 
     @property
     def landed(self) -> bool:
-        return self.stack.autopilot.now.landed
+        return self.stack.now.landed
 
     @property
     def log(self) -> bytes:
@@ -170,11 +175,11 @@ class World:
         else:
             commands = self._lockstep.tick(self.machine_ns)
         for severity, text in stack.simulator.steps.take_notices():
-            stack.autopilot.say(severity, text)
+            stack.journal.say(severity, text)
         self.take_answer(stack.simulator.answer(commands, self.armed))
         self._ticks += 1
         if self._ticks % stack.rates.divisor == 0:
-            time_us = stack.autopilot.now.time_us
+            time_us = stack.now.time_us
             if time_us >= self._next_log_us:
                 self._next_log_us = time_us + 1_000_000
                 stack.recorder.timing(time_us, **stack.report.log_fields(time_us // stack.rates.interval_us))

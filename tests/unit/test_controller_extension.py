@@ -161,15 +161,15 @@ def test_without_a_declaration_every_field_is_a_parameter(installed: Path) -> No
     assert (spec.default, spec.low, spec.high, spec.group) == (
         pytest.approx(200.0), -1e6, 1e6, "Attitude Controller lqr",
     )  # fmt: skip
-    assert world.stack.autopilot.backend.get_parameter("LQR_ANGLE_ROLL") == 250.0
+    assert world.stack.loops.get_parameter("LQR_ANGLE_ROLL") == 250.0
     world.arm()
     world.takeoff(2.0)
     world.run(1.0)
-    before = world.stack.autopilot.now.row.copy()
+    before = world.stack.now.row.copy()
     params.set("LQR_IX_KG_M2", 0.0)
     world.tick()
     assert before[LoopRow.WRENCH][1] != 0.0
-    assert world.stack.autopilot.now.row[LoopRow.WRENCH][1] == 0.0, "no inertia, no torque, in the next tick"
+    assert world.stack.now.row[LoopRow.WRENCH][1] == 0.0, "no inertia, no torque, in the next tick"
 
 
 def test_a_declaration_chooses_names_and_ranges(site: Path) -> None:

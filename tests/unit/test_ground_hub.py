@@ -11,11 +11,12 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from flightstack.core.modes import Mode
 from flightstack.core.port_numbers import GROUND
+from flightstack.core.severity import Severity
+from flightstack.guidance.navigator import MissionProgress
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.services.routing.hub import MAX_PEERS
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.vehicle.snapshot import NOTICE
 from tests.support.hub_net import ACCEPTED, ALICE, BOB, DENIED, NAN, REJECTED, UNSUPPORTED, Net
 
 COMMAND = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
@@ -35,14 +36,14 @@ def test_commands_to_others_are_ignored(net: Net, system: int, component: int) -
     alice.command(COMMAND, 1.0, system=system, component=component)
     net.poll()
     assert alice.take("COMMAND_ACK") == []
-    assert not net.autopilot.now.status.armed
+    assert not net.stack.now.status.armed
 
 
 @pytest.mark.parametrize(("system", "component"), [(7, 1), (0, 1), (7, 0), (0, 0)])
 def test_commands_to_us_or_to_all_are_carried_out(net: Net, system: int, component: int) -> None:
     alice = net.join(ALICE)
     assert alice.ask(COMMAND, 1.0, system=system, component=component) == ACCEPTED
-    assert net.autopilot.now.status.armed
+    assert net.stack.now.status.armed
 
 
 def test_an_acknowledgement_is_addressed_to_its_sender_and_goes_only_there(net: Net) -> None:
@@ -59,9 +60,9 @@ def test_mode_requests_of_old_stations_are_for_one_system(net: Net) -> None:
     alice = net.join(ALICE)
     takeoff = 4 << 16 | 2 << 24
     alice.send(mavlink.MAVLink_set_mode_message(8, 1, takeoff))
-    assert net.autopilot.now.status.mode is Mode.HOLD
+    assert net.stack.now.status.mode is Mode.HOLD
     alice.send(mavlink.MAVLink_set_mode_message(7, 1, takeoff))
-    assert net.autopilot.now.status.mode is Mode.TAKEOFF
+    assert net.stack.now.status.mode is Mode.TAKEOFF
     alice.send(mavlink.MAVLink_set_mode_message(7, 1, 12345))
     net.poll()
     assert any("no such mode" in text.text for text in alice.take("STATUSTEXT"))
@@ -83,7 +84,7 @@ def test_each_peer_has_sequence_numbers_of_its_own(net: Net) -> None:
 def test_an_unheard_permanent_peer_gets_heartbeats_only(net: Net) -> None:
     station = net.join(ALICE, heard=False)
     net.hub.add_peer(ALICE, permanent=True)
-    net.autopilot.say(NOTICE, "nobody hears this")
+    net.stack.journal.say(Severity.NOTICE, "nobody hears this")
     net.run(10.0)
     assert {message.get_type() for message in station.inbox} == {"HEARTBEAT"}
     assert len(station.inbox) == pytest.approx(10, abs=1)
@@ -170,11 +171,12 @@ def test_heartbeats_tell_a_change_at_once(net: Net) -> None:
 def test_texts_and_reached_items_go_to_all_who_listen(net: Net) -> None:
     alice, bob = net.join(ALICE), net.join(BOB)
     net.poll()
-    net.autopilot.say(NOTICE, "x" * 120)
-    net.autopilot.now.reached += [3, 4]
+    net.stack.journal.say(Severity.NOTICE, "x" * 120)
+    for seq in (3, 4):
+        net.stack.journal.item_reached(seq, MissionProgress(seq, seq, False, False), 5)
     net.poll()
     for station in (alice, bob):
-        assert [len(chunk.text) for chunk in station.take("STATUSTEXT")] == [50, 50, 20]
+        assert [len(chunk.text) for chunk in station.take("STATUSTEXT")] == [50, 50, 20, 22, 22]
         assert [message.seq for message in station.take("MISSION_ITEM_REACHED")] == [3, 4]
     net.poll()
     assert alice.take("STATUSTEXT") == alice.take("MISSION_ITEM_REACHED") == []
@@ -252,11 +254,11 @@ def test_shut_down_is_for_a_vehicle_on_the_ground(net: Net) -> None:
     alice = net.join(ALICE)
     shutdown = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
     assert alice.ask(shutdown, 4.0) == UNSUPPORTED
-    net.autopilot.now.status = net.autopilot.now.status._replace(armed=True)
-    net.autopilot.now.landed = False
+    net.stack.now.status = net.stack.now.status._replace(armed=True)
+    net.stack.now.landed = False
     assert alice.ask(shutdown, 2.0) == DENIED
     assert not net.hub.vehicle.shutdown_requested
-    net.autopilot.now.landed = True
+    net.stack.now.landed = True
     assert alice.ask(shutdown, 2.0) == ACCEPTED
     assert net.hub.vehicle.shutdown_requested
 

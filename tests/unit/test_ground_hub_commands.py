@@ -59,18 +59,18 @@ def test_home_is_set_to_a_place_and_everybody_is_told_at_once(
     assert ask_int(alice, SET_HOME, frame, place, z) == ACCEPTED
     for station in (alice, bob):
         assert told_home(station) == (*place, round(altitude_m * 1e3))
-    assert net.autopilot.home == GeoPoint(47.398, 8.546, altitude_m)
-    assert net.autopilot.places.frame.origin == DEFAULT_HOME
-    assert net.autopilot.places.home_is_chosen
+    assert net.stack.area.home == GeoPoint(47.398, 8.546, altitude_m)
+    assert net.stack.places.frame.origin == DEFAULT_HOME
+    assert net.stack.places.home_is_chosen
 
 
 def test_home_is_set_to_where_the_vehicle_is(net: Net) -> None:
     alice = net.join(ALICE)
-    net.autopilot.now.state[:3] = (30.0, -40.0, -2.0)
+    net.stack.now.state[:3] = (30.0, -40.0, -2.0)
     assert alice.ask(SET_HOME, HERE) == ACCEPTED
-    home = net.autopilot.places.home
+    home = net.stack.places.home
     assert (home.north_m, home.east_m, home.altitude_m) == pytest.approx((30.0, -40.0, 2.0), abs=1e-6)
-    assert not net.autopilot.places.home_is_chosen
+    assert not net.stack.places.home_is_chosen
     assert any(text.text == "Home set" for text in alice.take("STATUSTEXT"))
 
 
@@ -92,14 +92,14 @@ def test_a_home_that_cannot_be_is_denied_and_the_old_one_stays(
     alice = net.join(ALICE)
     assert alice.ask(SET_HOME, 0.0, 0.0, 0.0, 0.0, *place) == DENIED
     assert any(reason in text.text for text in alice.take("STATUSTEXT"))
-    assert net.autopilot.home == DEFAULT_HOME
+    assert net.stack.area.home == DEFAULT_HOME
 
 
 def test_the_present_place_needs_a_state(net: Net) -> None:
     alice = net.join(ALICE)
-    net.autopilot.has_state = False
+    net.stack.now.has_state = False
     assert alice.ask(SET_HOME, HERE) == REJECTED
-    assert net.autopilot.home == DEFAULT_HOME
+    assert net.stack.area.home == DEFAULT_HOME
 
 
 def test_home_comes_on_request_to_who_asks(net: Net) -> None:

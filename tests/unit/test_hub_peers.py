@@ -8,6 +8,7 @@ import random
 import pytest
 
 from flightstack.core.port_numbers import GROUND
+from flightstack.core.severity import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import SILENT_AFTER_S, Link
 from flightstack.params.config import StackConfig
@@ -15,7 +16,6 @@ from flightstack.process.assembly import build
 from flightstack.process.reboot import carry_over
 from flightstack.services.routing.hub import FORWARDED_A_POLL, KEPT_TEXTS, MAX_PEERS, PEER_FORGOTTEN_S
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.vehicle.snapshot import NOTICE
 from tests.support.hub_net import ALICE, BOB, Net
 
 CAMERA = PeerAddress("tcp", "camera", 3)
@@ -52,7 +52,7 @@ def test_a_command_for_another_vehicle_is_passed_on_and_not_carried_out(net: Net
     other.inbox.clear()
     alice.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, system=8)
     net.poll()
-    assert not net.autopilot.now.status.armed
+    assert not net.stack.now.status.armed
     assert len(other.take("COMMAND_LONG")) == 1
     assert alice.take("COMMAND_ACK") == []
 
@@ -104,7 +104,7 @@ def test_a_silent_peer_gets_heartbeats_only(net: Net) -> None:
     net.run(SILENT_AFTER_S)
     bob.heartbeat()
     assert len(alice.take("ATTITUDE")) > 200
-    net.autopilot.say(NOTICE, "for those present")
+    net.stack.journal.say(Severity.NOTICE, "for those present")
     alice.frames.clear()
     alice.inbox.clear()
     for _ in range(3):
@@ -129,7 +129,7 @@ def test_status_texts_wait_for_a_silent_peer(net: Net) -> None:
     alice = net.join(ALICE)
     net.run(SILENT_AFTER_S + 0.5)
     for number in range(2 * KEPT_TEXTS):
-        net.autopilot.say(NOTICE, f"text {number}")
+        net.stack.journal.say(Severity.NOTICE, f"text {number}")
     net.run(1.0)
     assert alice.take("STATUSTEXT") == []
     alice.heartbeat()
@@ -144,7 +144,7 @@ def test_a_configured_ground_station_with_a_lost_uplink_keeps_its_telemetry(net:
     alice.heartbeat()
     net.run(2.0 * SILENT_AFTER_S)
     alice.inbox.clear()
-    net.autopilot.say(NOTICE, "failsafe")
+    net.stack.journal.say(Severity.NOTICE, "failsafe")
     net.run(1.0)
     assert [message.text for message in alice.take("STATUSTEXT")] == ["failsafe"]
     assert alice.take("ATTITUDE")
@@ -157,7 +157,7 @@ def test_telemetry_waits_for_a_congested_peer_and_answers_do_not(net: Net) -> No
     alice.command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_HOME_POSITION)
     for _ in range(50):
         net.now_s += 0.01
-        net.autopilot.now.time_us += 10_000
+        net.stack.now.time_us += 10_000
         for where, data in net.hub.poll(net.now_s, {ALICE}):
             net.stations[where].inbox += net.stations[where].codec.decode(data)
     kinds = {message.get_type() for message in alice.inbox}
@@ -198,7 +198,7 @@ def test_a_poll_may_be_taken_in_parts_while_messages_arrive(net: Net) -> None:
         station.frames.clear()
     for _ in range(50):
         net.now_s += 0.02
-        net.autopilot.now.time_us += 20_000
+        net.stack.now.time_us += 20_000
         for count, (where, data) in enumerate(net.hub.poll(net.now_s)):
             net.stations[where].frames.append(data)
             if count < 2:  # answered in the next poll
@@ -221,7 +221,7 @@ def test_a_peer_may_go_in_the_middle_of_a_poll(net: Net) -> None:
     net.join(BOB)
     net.run(0.1)
     net.now_s += 1.0
-    net.autopilot.now.time_us += 1_000_000
+    net.stack.now.time_us += 1_000_000
     poll = net.hub.poll(net.now_s)
     (where, _) = next(poll)
     other = BOB if where == ALICE else ALICE

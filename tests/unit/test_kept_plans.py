@@ -113,9 +113,9 @@ def test_all_plans_survive_a_restart(tmp_path: Path) -> None:
     again, file, problem = stack_with(path)
     assert problem is None
     assert again.ground.plans() == kept
-    assert again.autopilot.places.ids == stack.autopilot.places.ids
-    assert again.autopilot.now.progress.current == 2
-    assert again.autopilot.home == NEAR_HOME
+    assert again.places.ids == stack.places.ids
+    assert again.now.progress.current == 2
+    assert again.area.home == NEAR_HOME
     before = path.stat().st_mtime_ns
     save(again, file)
     assert path.stat().st_mtime_ns == before, "nothing changed, nothing is written"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,24 +11,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyulog import ULog
 
+from flightstack.commander.fence_watch import FenceBreaches
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.modes import Mode
 from flightstack.flight_log.event_topics import EVENT_TOPICS
 from flightstack.flight_log.flight_log import FlightLog
+from flightstack.guidance.fence import FenceBreach
+from flightstack.guidance.navigator import MissionProgress
 from flightstack.mavlink.dialect import FsLoopTiming, mavlink
 from flightstack.mavlink.field_numbers import fitted
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.log_messages import log_data_message
 from flightstack.params.vehicle import load_vehicle
-from flightstack.services.telemetry import MAKERS, messages, status_texts
-from flightstack.services.telemetry.facts import FenceBreaches, FlightTimes, PlanIds
+from flightstack.services.telemetry.telemetry import MAKERS, STREAMED
+from flightstack.services.telemetry.vehicle import status_texts
 from flightstack.simulator_link.battery_frame import decode_battery, encode_battery
+from flightstack.simulator_link.endpoint import Battery
+from flightstack.vehicle.status import FlightTimes, PlanIds
 from gcs_cli.clients.mission_client import MissionClient
 from sim_bridge.plant.battery import BatteryState, battery_report
 from sim_bridge.server.hil import hil_state
 from sim_bridge.simulator import Simulator
 from tests.support.synthetic_flight import HOME, KeptBytes
-from tests.support.telemetry_facts import facts
+from tests.support.telemetry_status import status, telemetry
 
 KINDS = sorted((kind for kind in mavlink.mavlink_map.values() if kind.id >= 0), key=lambda kind: kind.id)
 DAY_US = 86_400_000_000
@@ -76,18 +80,19 @@ def test_every_message_of_the_dialect_takes_any_number(number: float, text: byte
     values=st.lists(ANY_FLOAT, min_size=13, max_size=13),
 )
 def test_telemetry_of_extreme_facts_is_sent(times: list[int], counts: list[int], values: list[float]) -> None:
-    strange = facts(
+    strange = status(
         time_us=times[0], flight=FlightTimes(*times[1:4]), state=np.array(values),
         row=np.resize(values, 48), setpoint=np.resize(values, 11), attitude_target=np.array(values[:5]),
-        fence_breaches=FenceBreaches(counts[0], times[4], 1), plan_ids=PlanIds(*counts[1:4]),
-        mission_current=counts[4], mission_count=counts[5], system_id=1, mode=Mode.OFFBOARD,
-        battery=SimpleNamespace(voltage_v=values[0], current_a=values[1], remaining=values[2], valid=True),
-        loop_timing=lambda: FsLoopTiming(
-            times[0], *counts[5:8], values[0], values[1], values[2], *values[3:9], 0
-        ),
+        fence_breaches=FenceBreaches(counts[0], times[4], FenceBreach.OUTSIDE), plan_ids=PlanIds(*counts[1:4]),
+        mission=MissionProgress(counts[4], -1, False, False), mission_count=counts[5], mode=Mode.OFFBOARD,
+        battery=Battery(voltage_v=values[0], current_a=values[1], remaining=values[2], valid=True),
     )  # fmt: skip
-    for message_id in MAKERS:
-        for message in messages(message_id, strange):
+
+    def timing() -> FsLoopTiming:
+        return FsLoopTiming(times[0], *counts[5:8], values[0], values[1], values[2], *values[3:9], 0)
+
+    for message_id in STREAMED:
+        for message in telemetry(strange, timing).messages(message_id):
             over_the_wire(message)
 
 
@@ -127,12 +132,13 @@ def test_a_plan_too_long_for_its_count_is_not_announced_as_a_short_one() -> None
          60 * DAY_US // 1000 % 2**32),
         (mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION, "time_boot_ms", {"time_us": UNIX_US}, UNIX_US // 1000 % 2**32),
         (mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, "time_usec", {"time_us": UNIX_US}, UNIX_US % 2**32),
-        (mavlink.MAVLINK_MSG_ID_FENCE_STATUS, "breach_time", {"fence_breaches": FenceBreaches(1, 50 * DAY_US, 1)},
+        (mavlink.MAVLINK_MSG_ID_FENCE_STATUS, "breach_time",
+         {"fence_breaches": FenceBreaches(1, 50 * DAY_US, FenceBreach.OUTSIDE)},
          50 * DAY_US // 1000 % 2**32),
     ],
 )  # fmt: skip
 def test_clocks_wrap_at_the_range_of_their_field(message_id, field, changes, expected) -> None:
-    assert getattr(over_the_wire(MAKERS[message_id](facts(**changes))), field) == expected
+    assert getattr(over_the_wire(MAKERS[message_id](status(**changes))), field) == expected
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,11 @@ class Vehicle:
 
     def server(self) -> SetpointServer:
         return SetpointServer(
-            Address(1, 1), self, StreamWatch(lambda: self.time_us, lambda: 1.0, self.lost.append)
+            Address(1, 1),
+            self.here,
+            self.take_offboard,
+            self.refuse_offboard,
+            StreamWatch(lambda: self.time_us, lambda: 1.0, self.lost.append),
         )
 
 

@@ -275,12 +275,12 @@ def test_order_of_precedence(tmp_path: Path) -> None:
     path = tmp_path / "my.params"
     path.write_text("1\t1\tPOS_XY_P\t6.5\t9\n1\t1\tMPC_XY_CRUISE\t5.0\t9\n1\t1\tMAV_SYS_ID\t42\t6\n")
     stack = build(StackConfig(params_file=str(path), params=("MPC_XY_CRUISE=3",)), lambda: None)
-    backend = stack.autopilot.backend
+    backend = stack.loops
     assert backend.get_parameter("POS_XY_P") == 6.5
     assert backend.get_parameter("POS_XY_I") == 3.125  # tuned.toml
-    assert stack.autopilot.behaviour.cruise_speed_m_s == 3.0
-    assert stack.autopilot.navigator.params.cruise_speed_m_s == 3.0
-    assert stack.autopilot.behaviour.climb_speed_m_s == 2.5
+    assert stack.now.behaviour.cruise_speed_m_s == 3.0
+    assert stack.parts.navigator.params.cruise_speed_m_s == 3.0
+    assert stack.now.behaviour.climb_speed_m_s == 2.5
     stack.ground.add_peer(PEER, permanent=True)
     frames = [data for _, data in stack.ground.poll(0.0)]
     assert {frame[5] for frame in frames} == {42}, "the system id in MAVLink 2's header"

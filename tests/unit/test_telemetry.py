@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,22 +10,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from flightstack.commander.failsafe import Action
+from flightstack.commander.fence_watch import FenceBreaches
 from flightstack.core.contract import LoopRow
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.modes import CUSTOM_MODE, Mode
+from flightstack.guidance.fence import FenceBreach
+from flightstack.guidance.navigator import MissionProgress
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Link
-from flightstack.services.telemetry import MAKERS, autopilot_version, heartbeat, messages, status_texts
-from flightstack.services.telemetry.facts import FenceBreaches
 from flightstack.services.telemetry.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
-from tests.support.telemetry_facts import EULER, HOME, W, X, Y, Z, facts
+from flightstack.services.telemetry.telemetry import STREAMED, Telemetry
+from flightstack.services.telemetry.vehicle import autopilot_version, heartbeat, status_texts
+from flightstack.simulator_link.endpoint import Battery
+from tests.support.telemetry_status import EULER, HOME, W, X, Y, Z, status, telemetry, usual_timing
 
 ATTITUDE = mavlink.MAVLINK_MSG_ID_ATTITUDE
 
 
 def on_the_wire(message_id: int, **changes: object):
     """What a ground station decodes of the message."""
-    (message,) = Link(255, 190).decode(Link(1, 1).encode(MAKERS[message_id](facts(**changes))))
+    (message,) = Link(255, 190).decode(
+        Link(1, 1).encode(telemetry(status(**changes)).messages(message_id)[0])
+    )
     assert message.get_msgId() == message_id
     return message
 
@@ -73,7 +79,7 @@ def test_hud() -> None:
 
 @pytest.mark.parametrize(("yaw", "heading"), [(-0.1, 354), (-1e-9, 360), (math.pi, 180), (0.0, 0)])
 def test_headings_are_0_to_360(yaw: float, heading: int) -> None:
-    state = facts().state
+    state = status().state.copy()
     state[6:10] = math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)
     assert on_the_wire(mavlink.MAVLINK_MSG_ID_VFR_HUD, state=state).heading == heading
     assert 0 <= on_the_wire(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, state=state).hdg <= 35999
@@ -81,7 +87,7 @@ def test_headings_are_0_to_360(yaw: float, heading: int) -> None:
 
 @pytest.mark.parametrize(("rotors", "expected"), [(4, [(0, 100.0)]), (6, [(0, 100.0), (4, 500.0)])])
 def test_rotor_speeds_in_groups_of_four(rotors: int, expected: list[tuple[int, float]]) -> None:
-    sent = list(messages(EscStatus.id, facts(rotors=rotors)))
+    sent = telemetry(status({"rotors": rotors})).messages(EscStatus.id)
     decoded = [next(Link(2, 1).decode(Link(1, 1).encode(message))) for message in sent]
     assert [(m.index, m.rpm[0]) for m in decoded] == [
         (at, round(speed * 30 / math.pi)) for at, speed in expected
@@ -93,31 +99,65 @@ def test_rotor_speeds_in_groups_of_four(rotors: int, expected: list[tuple[int, f
     ("changes", "state"),
     [
         ({"landed": True}, mavlink.MAV_LANDED_STATE_ON_GROUND),
-        ({"landed": True, "climbing": True}, mavlink.MAV_LANDED_STATE_ON_GROUND),
+        ({"landed": True, "mode": Mode.TAKEOFF}, mavlink.MAV_LANDED_STATE_ON_GROUND),
         ({}, mavlink.MAV_LANDED_STATE_IN_AIR),
-        ({"climbing": True}, mavlink.MAV_LANDED_STATE_TAKEOFF),
-        ({"descending": True}, mavlink.MAV_LANDED_STATE_LANDING),
+        ({"mode": Mode.TAKEOFF}, mavlink.MAV_LANDED_STATE_TAKEOFF),
+        ({"mode": Mode.LAND}, mavlink.MAV_LANDED_STATE_LANDING),
     ],
 )
-def test_landed_state(changes: dict[str, bool], state: int) -> None:
+def test_landed_state(changes: dict[str, object], state: int) -> None:
     assert on_the_wire(mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, **changes).landed_state == state
 
 
 def test_heartbeat_is_px4s() -> None:
-    armed, disarmed = heartbeat(facts()), heartbeat(facts(armed=False, mode=Mode.HOLD, system_status=3))
+    armed, disarmed = heartbeat(status()), heartbeat(status(armed=False, mode=Mode.HOLD))
     assert (armed.type, armed.autopilot) == (mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
     assert (armed.custom_mode, disarmed.custom_mode) == (4 << 16 | 4 << 24, 4 << 16 | 3 << 24)
     assert armed.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     assert not disarmed.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-    states = (armed.system_status, disarmed.system_status, heartbeat(facts(), leaving=True).system_status)
+    states = (armed.system_status, disarmed.system_status, heartbeat(status(), leaving=True).system_status)
     assert states == (mavlink.MAV_STATE_ACTIVE, mavlink.MAV_STATE_STANDBY, mavlink.MAV_STATE_POWEROFF)
+
+
+@pytest.mark.parametrize(
+    ("changes", "state"),
+    [
+        ({}, mavlink.MAV_STATE_ACTIVE),
+        ({"failsafe_action": Action.WARN}, mavlink.MAV_STATE_ACTIVE),
+        ({"failsafe_action": Action.HOLD}, mavlink.MAV_STATE_CRITICAL),
+        ({"failsafe_action": Action.LAND}, mavlink.MAV_STATE_EMERGENCY),
+        ({"mode": Mode.TERMINATION, "armed": False}, mavlink.MAV_STATE_FLIGHT_TERMINATION),
+    ],
+)
+def test_heartbeat_reports_the_failsafe_action(changes: dict[str, object], state: int) -> None:
+    assert heartbeat(status(**changes)).system_status == state
+
+
+@pytest.mark.parametrize(
+    ("changes", "state"),
+    [
+        ({"mission_count": 0}, mavlink.MISSION_STATE_NO_MISSION),
+        ({"mission_complete": True}, mavlink.MISSION_STATE_COMPLETE),
+        ({"armed": False}, mavlink.MISSION_STATE_NOT_STARTED),
+        ({"mode": Mode.HOLD}, mavlink.MISSION_STATE_PAUSED),
+        (
+            {"mode": Mode.HOLD, "mission": MissionProgress(0, -1, False, False)},
+            mavlink.MISSION_STATE_NOT_STARTED,
+        ),
+    ],
+)
+def test_mission_state(changes: dict[str, object], state: int) -> None:
+    assert on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, **changes).mission_state == state
 
 
 def test_mission_progress_and_its_end() -> None:
     m = on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
     assert (m.seq, m.total, m.mission_state, m.mission_mode) == (2, 5, 3, 1)
-    assert on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mission_current=5).seq == 4
-    nothing = on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mission_current=0, mission_count=0)
+    assert (
+        on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mission=MissionProgress(5, 4, True, False)).seq
+        == 4
+    )
+    nothing = on_the_wire(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mission_count=0)
     assert (nothing.seq, nothing.total) == (0, 65535)
 
 
@@ -132,12 +172,12 @@ def test_mission_progress_and_its_end() -> None:
     ],
 )
 def test_the_heartbeat_announces_the_type_by_the_rotors(rotors: int, system_type: int) -> None:
-    assert heartbeat(facts(rotors=rotors)).type == system_type
+    assert heartbeat(status({"rotors": rotors})).type == system_type
 
 
 @pytest.mark.parametrize("rotors", [4, 6, 8])
 def test_every_message_about_rotors_has_all_of_them(rotors: int) -> None:
-    top = {"rotors": rotors, "top_speed_rad_s": [600.0] * rotors}
+    top = {"info": {"rotors": rotors, "top_speed_rad_s": (600.0,) * rotors}}
     outputs = on_the_wire(mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS, **top)
     pulses = on_the_wire(mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, **top)
     assert outputs.active == (1 << rotors) - 1
@@ -187,7 +227,7 @@ def test_gps_altitude_and_battery_say_what_is_known() -> None:
     assert on_the_wire(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, home=lower_home).relative_alt == 38_000
     none = on_the_wire(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS)
     assert (none.voltages[0], none.current_battery, none.battery_remaining) == (0xFFFF, -1, -1)
-    pack = SimpleNamespace(voltage_v=11.72, current_a=8.51, remaining=0.473, valid=True)
+    pack = Battery(voltage_v=11.72, current_a=8.51, remaining=0.473, valid=True)
     battery = on_the_wire(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, battery=pack)
     assert (battery.voltages[0], battery.current_battery, battery.battery_remaining) == (11_720, 851, 47)
     status = on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, battery=pack)
@@ -211,7 +251,7 @@ def test_a_breached_fence_is_ill() -> None:
 
 
 def test_a_breach_is_told_with_its_kind_number_and_time() -> None:
-    breaches = FenceBreaches(3, 1_234_567, mavlink.FENCE_BREACH_MAXALT)
+    breaches = FenceBreaches(3, 1_234_567, FenceBreach.TOO_HIGH)
     for broken in (True, False):  # the latest is told after its end too
         m = on_the_wire(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, fence_breached=broken, fence_breaches=breaches)
         assert (m.breach_status, m.breach_count, m.breach_type, m.breach_time) == (broken, 3, 2, 1234)
@@ -228,7 +268,7 @@ def test_a_breach_is_told_with_its_kind_number_and_time() -> None:
 )
 def test_the_charge_has_a_state_where_it_is_known(level: int, state: int) -> None:
     kind = mavlink.MAVLINK_MSG_ID_BATTERY_STATUS
-    pack = SimpleNamespace(voltage_v=11.7, current_a=8.5, remaining=0.1, valid=True)
+    pack = Battery(voltage_v=11.7, current_a=8.5, remaining=0.1, valid=True)
     assert on_the_wire(kind, battery=pack, battery_level=level).charge_state == state
     assert on_the_wire(kind, battery_level=level).charge_state == mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
 
@@ -246,25 +286,26 @@ def test_a_fence_without_action_is_not_enabled() -> None:
 
 
 def test_every_mode_is_listed_and_named_once() -> None:
-    listed = list(messages(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, facts(), 0.0))
+    listed = telemetry().requested(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES)
     assert sorted(m.custom_mode for m in listed) == sorted(CUSTOM_MODE.values())
     assert [m.mode_index for m in listed] == list(range(1, len(listed) + 1))
     assert {m.number_modes for m in listed} == {len(listed)}
-    (third,) = messages(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, facts(), 3.0)
+    (third,) = telemetry().requested(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, 3.0)
     assert third.custom_mode == listed[2].custom_mode
     for index in (-1.0, 0.5, len(listed) + 1.0, math.inf, 1e30):
-        assert len(list(messages(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, facts(), index))) in (0, len(listed))
+        some = telemetry().requested(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES, index)
+        assert len(some) in (0, len(listed))
     (decoded,) = Link(255, 190).decode(Link(1, 1).encode(listed[0]))
     assert decoded.mode_name == "Hold"
     assert on_the_wire(mavlink.MAVLINK_MSG_ID_CURRENT_MODE).custom_mode == CUSTOM_MODE[Mode.MISSION]
 
 
 def test_a_generic_vehicle_does_not_call_itself_px4() -> None:
-    assert heartbeat(facts(is_generic=True)).autopilot == mavlink.MAV_AUTOPILOT_GENERIC
+    assert heartbeat(status({"is_generic": True})).autopilot == mavlink.MAV_AUTOPILOT_GENERIC
 
 
 def test_version_is_ours() -> None:
-    m = autopilot_version(facts(system_id=3))
+    m = autopilot_version(status({"system_id": 3}))
     assert m.uid == 3
     assert m.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
 
@@ -274,12 +315,12 @@ def test_version_is_ours() -> None:
 def test_no_state_is_too_absurd_to_be_told(values: list[float], thrust: float) -> None:
     """Doubles of any size go through single-precision and integer fields."""
     state, row = np.array(values), np.resize(values, LoopRow.SIZE)
-    strange = facts(
+    strange = status(
         state=state, row=row, setpoint=np.resize(values, 11), attitude_target=np.array([*values[:4], thrust])
     )
     codec = Link(1, 1)
-    for message_id in MAKERS:
-        for message in messages(message_id, strange):
+    for message_id in STREAMED:
+        for message in telemetry(strange).messages(message_id):
             assert codec.encode(message)
 
 
@@ -313,9 +354,11 @@ def test_texts_are_utf_8() -> None:
 def count(streams: Streams, seconds: float, vehicle_rate: float, step_s: float = 0.0005) -> dict[int, int]:
     """Poll at the link's steps while vehicle time runs ``vehicle_rate`` times as fast; count messages."""
     counts: dict[int, int] = {}
+    now_s, shown = 0.0, status()
+    told = Telemetry(lambda: shown, lambda: round(now_s * vehicle_rate * 1e6), usual_timing)
     for tick in range(round(seconds / step_s)):
         now_s = tick * step_s
-        for message in streams.due(facts(time_us=round(now_s * vehicle_rate * 1e6)), 100.0 + now_s):
+        for message in streams.due(told, 100.0 + now_s):
             counts[message.get_msgId()] = counts.get(message.get_msgId(), 0) + 1
     return counts
 
@@ -347,7 +390,8 @@ def test_after_a_gap_nothing_is_made_up_for() -> None:
     streams = Streams({ATTITUDE: 10.0})
     count(streams, 1.0, 1.0)
     late = [
-        list(streams.due(facts(time_us=at), at * 1e-6 + 100.0)) for at in (60_000_000, 60_010_000, 60_110_000)
+        list(streams.due(telemetry(status(time_us=at)), at * 1e-6 + 100.0))
+        for at in (60_000_000, 60_010_000, 60_110_000)
     ]
     assert [len(sent) for sent in late] == [1, 0, 1]
 

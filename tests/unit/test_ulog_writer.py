@@ -18,7 +18,7 @@ from flightstack.core.geometry import euler_from_quaternion
 from flightstack.core.geometry_bulk import euler_from_quaternions, heading_from_quaternions
 from flightstack.flight_log import ulog
 from flightstack.flight_log.event_topics import EVENT_TOPICS
-from flightstack.flight_log.flight_log import FlightLog, vehicle_info
+from flightstack.flight_log.flight_log import FlightLog, vehicle_fields
 from flightstack.flight_log.row_block import RowBlock
 from flightstack.flight_log.topics import OUTER, OUTER_TOPICS, inner_topics
 from flightstack.params.vehicle import load_vehicle
@@ -315,8 +315,8 @@ def test_a_message_too_long_for_the_format_is_an_error() -> None:
 
 def test_vehicle_info_has_limits_only_where_there_are_some() -> None:
     vehicle = load_vehicle("paper_quad")
-    assert vehicle_info(vehicle)["rotor_max_speed_rad_s"] == pytest.approx(303.4, abs=0.1)
-    assert "rotor_max_speed_rad_s" not in vehicle_info(vehicle.with_ideal_rotors())
+    assert vehicle_fields(vehicle)["rotor_max_speed_rad_s"] == pytest.approx(303.4, abs=0.1)
+    assert "rotor_max_speed_rad_s" not in vehicle_fields(vehicle.with_ideal_rotors())
 
 
 def test_bulk_euler_angles_equal_the_compiled_ones() -> None:

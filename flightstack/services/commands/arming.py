@@ -13,14 +13,14 @@ FORCE_MAGIC = 21196.0
 
 def arm_or_disarm(vehicle: VehicleContext, command: Command) -> Answer:
     """COMPONENT_ARM_DISARM: parameter 1 arms (1) or disarms (0), parameter 2 forces."""
-    autopilot = vehicle.autopilot
+    armed, requests = vehicle.now.status.armed, vehicle.requests
     if command.params[0] == 1.0:
-        return Answer(ACCEPTED) if autopilot.now.status.armed else answer_to(autopilot.happen(Event.ARM))
+        return Answer(ACCEPTED) if armed else answer_to(requests.request(Event.ARM))
     if command.params[0] == 0.0:
-        if not autopilot.now.status.armed:
+        if not armed:
             return Answer(ACCEPTED)
         force = command.params[1] == FORCE_MAGIC
-        return answer_to(autopilot.happen(Event.FORCE_DISARM if force else Event.DISARM))
+        return answer_to(requests.request(Event.FORCE_DISARM if force else Event.DISARM))
     return Answer(DENIED, "parameter 1 must be 0 (disarm) or 1 (arm)")
 
 

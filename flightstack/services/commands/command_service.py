@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
+from flightstack.core.severity import Severity
 from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
@@ -14,7 +15,6 @@ from flightstack.services.commands.failure_commands import FailureCommands
 from flightstack.services.commands.link_commands import LINK_COMMANDS
 from flightstack.services.commands.modes import select_custom_mode
 from flightstack.services.routing.peer import Peer
-from flightstack.vehicle.snapshot import WARNING
 
 INJECT_FAILURE = int(mavlink.MAV_CMD_INJECT_FAILURE)
 
@@ -43,7 +43,7 @@ class CommandService:
         """Execute a command and answer it."""
         if message.get_type() == "SET_MODE":  # has no answer: success shows in the heartbeat
             if message.target_system in (0, self._own.system):
-                self._report(select_custom_mode(self._vehicle.autopilot, message.custom_mode), "Mode change")
+                self._report(select_custom_mode(self._vehicle.requests, message.custom_mode), "Mode change")
             return
         command = self._server.receive(message, peer, now_s)
         if command is None:
@@ -63,7 +63,7 @@ class CommandService:
 
     def _report(self, answer: Answer, what: str) -> None:
         if answer.result not in (ACCEPTED, UNSUPPORTED) and answer.reason:
-            self._vehicle.autopilot.say(WARNING, f"{what}: {answer.reason}")
+            self._vehicle.journal.say(Severity.WARNING, f"{what}: {answer.reason}")
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Return the answers."""

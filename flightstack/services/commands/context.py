@@ -6,12 +6,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol, TypeAlias
 
+from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.store import ParamStore
 from flightstack.services.commands.command_server import Command
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.logs.log_stream import LogTail
-from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.area import FlightArea
+from flightstack.vehicle.assembly import VehicleParts
+from flightstack.vehicle.flight_state import FlightState
+from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.mission import Mission
+from flightstack.vehicle.readiness import Readiness
+from flightstack.vehicle.requests import FlightRequests
+from flightstack.vehicle.takeoff import Takeoff
 
 ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
 REJECTED = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
@@ -62,7 +70,14 @@ class FailureLink(Protocol):
 class VehicleContext:
     """The vehicle as its commands see it."""
 
-    autopilot: Autopilot
+    now: FlightState
+    journal: Journal
+    requests: FlightRequests
+    readiness: Readiness
+    mission: Mission
+    area: FlightArea
+    takeoff: Takeoff
+    frame: LocalFrame
     params: ParamStore
     simulator: FailureLink
     is_generic: bool = False
@@ -74,6 +89,21 @@ class VehicleContext:
     logs: LogStore = NO_LOGS
     open_log_tail: Callable[[], LogTail | None] = field(default=lambda: None)
     """Opens the log that is being written, to stream it; None while there is none."""
+
+    @classmethod
+    def of(
+        cls,
+        parts: VehicleParts,
+        params: ParamStore,
+        simulator: FailureLink,
+        is_generic: bool = False,
+        logs: LogStore = NO_LOGS,
+    ) -> VehicleContext:
+        """Return the context of commands to the vehicle of ``parts``."""
+        return cls(
+            parts.now, parts.journal, parts.requests, parts.readiness, parts.mission, parts.area, parts.takeoff,
+            parts.places.frame, params, simulator, is_generic, logs=logs,
+        )  # fmt: skip
 
 
 Handler: TypeAlias = Callable[[VehicleContext, Command], Answer]

@@ -8,6 +8,7 @@ from flightstack.commander.transitions import Event, Need
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.modes import Mode
 from flightstack.core.portable_math import distance
+from flightstack.guidance.safe_places import plan_limits
 from flightstack.mavlink.dialect import mavlink
 from flightstack.services.commands.command_server import Command
 from flightstack.services.commands.context import (
@@ -37,7 +38,7 @@ def above_home_m(vehicle: VehicleContext, command: Command) -> float:
     It is above sea level, as PX4 takes it, unless a COMMAND_INT's frame says that it is above home.
     """
     altitude_m = command.params[6]
-    return altitude_m if command.frame in RELATIVE_FRAMES else altitude_m - vehicle.autopilot.home.altitude_m
+    return altitude_m if command.frame in RELATIVE_FRAMES else altitude_m - vehicle.area.home.altitude_m
 
 
 def take_off(vehicle: VehicleContext, command: Command) -> Answer:
@@ -51,19 +52,19 @@ def take_off(vehicle: VehicleContext, command: Command) -> Answer:
     altitude_m = command.params[6]
     is_plain = vehicle.is_generic and command.frame is None
     if not is_plain and command.frame not in RELATIVE_FRAMES:
-        altitude_m -= vehicle.autopilot.home_at_takeoff_m
+        altitude_m -= vehicle.takeoff.home_altitude_m
     if math.isinf(altitude_m):
         return Answer(DENIED, "the takeoff altitude is not a number")
     wanted = None if math.isnan(altitude_m) else altitude_m
-    return answer_to(vehicle.autopilot.happen(Event.SELECT_TAKEOFF, wanted))
+    return answer_to(vehicle.requests.request(Event.SELECT_TAKEOFF, wanted))
 
 
 def brings_down(event: Event) -> Handler:
     """Return the handler of a command that ends a flight: unlike the choice of its mode, it needs one."""
 
     def handle(vehicle: VehicleContext, command: Command) -> Answer:
-        autopilot = vehicle.autopilot
-        return answer_to(autopilot.happen(event) if autopilot.now.status.armed else Need.ARMED.value)
+        armed = vehicle.now.status.armed
+        return answer_to(vehicle.requests.request(event) if armed else Need.ARMED.value)
 
     return handle
 
@@ -74,27 +75,26 @@ def reposition(vehicle: VehicleContext, command: Command) -> Answer:
     Ground speed [m/s] or −1, flags, –, heading [rad], latitude, longitude, altitude. Without the flag that changes
     the mode the vehicle must hold already.
     """
-    autopilot = vehicle.autopilot
     speed, flags, _, yaw_rad, latitude, longitude, _ = command.params
     unsupported = frame_answer(command)
     if unsupported is not None:
         return unsupported
     bits = int(flags) if math.isfinite(flags) and 0.0 <= flags < 256.0 else 0
-    if not bits & CHANGE_MODE and autopilot.now.status.mode is not Mode.HOLD:
+    if not bits & CHANGE_MODE and vehicle.now.status.mode is not Mode.HOLD:
         return Answer(REJECTED, "the vehicle is not in hold mode")
     altitude_m = above_home_m(vehicle, command)
     refusal = _not_a_place(latitude, longitude, altitude_m, yaw_rad)
     if refusal is not None:
         return Answer(DENIED, refusal)
-    home = autopilot.home
-    place = autopilot.places.frame.to_ned(GeoPoint(latitude, longitude, home.altitude_m + altitude_m))
+    home_m = vehicle.area.home.altitude_m
+    place = vehicle.frame.to_ned(GeoPoint(latitude, longitude, home_m + altitude_m))
     is_pause = math.isnan(latitude) and math.isnan(altitude_m)
     refusal = None if is_pause else _out_of_reach(vehicle, place.x, place.y, altitude_m)
     if refusal is not None:
         return Answer(DENIED, refusal)
     if bits & RELATIVE_YAW:
-        yaw_rad += float(autopilot.now.setpoint[9])
-    return answer_to(autopilot.go_to(*place, yaw_rad, speed if math.isfinite(speed) else math.nan))
+        yaw_rad += float(vehicle.now.setpoint[9])
+    return answer_to(vehicle.requests.go_to(*place, yaw_rad, speed if math.isfinite(speed) else math.nan))
 
 
 def _not_a_place(latitude: float, longitude: float, altitude_m: float, yaw_rad: float) -> str | None:
@@ -110,9 +110,9 @@ def _not_a_place(latitude: float, longitude: float, altitude_m: float, yaw_rad: 
 
 def _out_of_reach(vehicle: VehicleContext, north_m: float, east_m: float, altitude_m: float) -> str | None:
     """Tell why the vehicle does not go to a place: the limits of a mission, the ground and the geofence."""
-    autopilot = vehicle.autopilot
-    limits, (x, y, z) = autopilot.limits, autopilot.now.state[:3].tolist()
-    home_m = autopilot.places.home.altitude_m
+    area, limits = vehicle.area, plan_limits(vehicle.now.behaviour)
+    home_m = area.home_above_origin_m
+    x, y, z = vehicle.now.state[:3].tolist()
     if 0.0 < limits.max_altitude_m < altitude_m:
         return f"altitude {altitude_m:.6g} m is above {limits.max_altitude_m:g} m"
     away_m = distance(north_m - x, east_m - y)
@@ -123,15 +123,11 @@ def _out_of_reach(vehicle: VehicleContext, north_m: float, east_m: float, altitu
         north_m, east_m = x, y
     if math.isnan(altitude_m):
         altitude_m = here[2]
-    ground_m = autopilot.ground_m(north_m, east_m) - home_m
-    valley_m = max(
-        0.0, autopilot.ground_m(x, y) - home_m - here[2]
-    )  # the vehicle is below what counts as ground
+    ground_m = area.ground_m(north_m, east_m) - home_m
+    valley_m = max(0.0, area.ground_m(x, y) - home_m - here[2])  # the vehicle is below what counts as ground
     if altitude_m < ground_m - valley_m - GROUND_TOLERANCE_M:
         return f"altitude {altitude_m:.6g} m above home is below the ground, which is at {ground_m:.4g} m"
-    if autopilot.behaviour.fence_action == 0:
-        return None
-    refusal = autopilot.supervisor.fence.way_refusal(here, (north_m, east_m, altitude_m))
+    refusal = area.way_refusal(here, (north_m, east_m, altitude_m))
     return None if refusal is None else f"the place {refusal}"
 
 
@@ -146,8 +142,7 @@ def change_speed(vehicle: VehicleContext, command: Command) -> Answer:
     if speed != DEFAULT and not 0.0 < speed < math.inf:
         return Answer(DENIED, "the speed is not positive")
     wanted = math.nan if speed == DEFAULT else speed
-    autopilot = vehicle.autopilot
-    autopilot.set_speeds(autopilot.speeds._replace(**{field: wanted}))
+    vehicle.requests.set_speeds(**{field: wanted})
     return Answer(ACCEPTED)
 
 
@@ -157,7 +152,7 @@ def pause_or_continue(vehicle: VehicleContext, command: Command) -> Answer:
     if wanted not in (0.0, 1.0):
         return Answer(DENIED, "parameter 1 must be 0 (pause) or 1 (continue)")
     event = Event.SELECT_MISSION if wanted else Event.SELECT_HOLD
-    return answer_to(vehicle.autopilot.happen(event))
+    return answer_to(vehicle.requests.request(event))
 
 
 HANDLERS: dict[int, Handler] = {

@@ -13,9 +13,7 @@ from flightstack.services.commands.context import ACCEPTED, DENIED, REJECTED, UN
 from flightstack.services.files.component_metadata import ComponentMetadata
 from flightstack.services.logs.log_stream import LogStream
 from flightstack.services.routing.peer import Peer
-from flightstack.services.telemetry import is_available, messages
-from flightstack.services.telemetry.fields import boot_ms
-from flightstack.services.vehicle_facts import AutopilotFacts
+from flightstack.services.telemetry.telemetry import Telemetry, is_available
 
 LINK_COMMANDS = frozenset(
     {
@@ -53,7 +51,7 @@ class LinkCommands:
     def __init__(
         self,
         own: Address,
-        facts: AutopilotFacts,
+        telemetry: Telemetry,
         peer_at: Callable[[Hashable], Peer],
         log_stream: LogStream,
         metadata: ComponentMetadata,
@@ -61,7 +59,7 @@ class LinkCommands:
         self._own = own
         self._log_stream = log_stream
         self._metadata = metadata
-        self._facts = facts
+        self._telemetry = telemetry
         self._peer_at = peer_at
 
     def answer(self, peer: Peer, command: Command) -> Answer:
@@ -82,13 +80,13 @@ class LinkCommands:
         if number == mavlink.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return self._send_interval(peer, _message_id(argument))
         if number == mavlink.MAVLINK_MSG_ID_COMPONENT_METADATA:
-            peer.outbox.append(self._metadata.message(boot_ms(self._facts)))
+            peer.outbox.append(self._metadata.message(self._telemetry.boot_ms))
             return Answer(ACCEPTED)
         if number == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
             peer.streams.add_standard_modes()
         if not is_available(number):
             return Answer(DENIED)  # without a text: ground stations ask each vehicle for gimbals and cameras
-        peer.outbox.extend(messages(number, self._facts, argument))
+        peer.outbox.extend(self._telemetry.requested(number, argument))
         return Answer(ACCEPTED)
 
     def _stream_log(self, command: Command) -> Answer:

@@ -14,13 +14,12 @@ def start_mission(vehicle: VehicleContext, command: Command) -> Answer:
 
     Nothing changes unless all of it can be done.
     """
-    autopilot = vehicle.autopilot
     first = command.params[0]
     begins_there = math.isfinite(first) and first > 0.0
-    refusal = autopilot.item_refusal(int(first)) if begins_there else None
+    refusal = vehicle.mission.item_refusal(int(first)) if begins_there else None
     if refusal is not None:
         return Answer(DENIED, refusal)
-    return answer_to(autopilot.start_mission(int(first) if begins_there else None))
+    return answer_to(vehicle.requests.start_mission(int(first) if begins_there else None))
 
 
 def set_current(vehicle: VehicleContext, command: Command) -> Answer:
@@ -28,19 +27,19 @@ def set_current(vehicle: VehicleContext, command: Command) -> Answer:
 
     A command that is denied changes nothing.
     """
-    autopilot = vehicle.autopilot
+    mission = vehicle.mission
     seq, reset = command.params[0], command.params[1]
     names_item = not math.isnan(seq) and seq != -1.0
     if names_item:
         if not math.isfinite(seq) or seq != int(seq):
             return Answer(DENIED, "the item is not a whole number")
-        refusal = autopilot.item_refusal(int(seq))
+        refusal = mission.item_refusal(int(seq))
         if refusal is not None:
             return Answer(DENIED, refusal)
     if reset == 1.0:
-        autopilot.restart_mission()
+        mission.restart()
     if names_item:
-        autopilot.set_current_item(int(seq))
+        mission.set_current(int(seq))
     return Answer(ACCEPTED)
 
 

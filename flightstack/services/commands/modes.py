@@ -9,7 +9,7 @@ from flightstack.core.modes import MODE_OF_CUSTOM, Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.services.commands.command_server import Command
 from flightstack.services.commands.context import DENIED, Answer, Handler, VehicleContext, answer_to
-from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.requests import FlightRequests
 
 SELECT: dict[Mode, Event] = {
     Mode.HOLD: Event.SELECT_HOLD,
@@ -30,15 +30,15 @@ def set_mode(vehicle: VehicleContext, command: Command) -> Answer:
         return Answer(DENIED, "mode numbers must be 0 to 255")
     if not int(base) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
         return Answer(DENIED, "only custom modes can be selected")
-    return select_custom_mode(vehicle.autopilot, int(main) << 16 | int(sub) << 24)
+    return select_custom_mode(vehicle.requests, int(main) << 16 | int(sub) << 24)
 
 
-def select_custom_mode(autopilot: Autopilot, custom_mode: int) -> Answer:
+def select_custom_mode(requests: FlightRequests, custom_mode: int) -> Answer:
     """Select a mode by PX4's custom mode number."""
     mode = MODE_OF_CUSTOM.get(custom_mode)
     if mode is None or mode not in SELECT:
         return Answer(DENIED, "this vehicle has no such mode")
-    return answer_to(autopilot.happen(SELECT[mode]))
+    return answer_to(requests.request(SELECT[mode]))
 
 
 HANDLERS: dict[int, Handler] = {mavlink.MAV_CMD_DO_SET_MODE: set_mode}

@@ -22,7 +22,7 @@ def storage(vehicle: VehicleContext, command: Command) -> Answer:
     if wanted not in (_WRITE, _RESET, _FACTORY_RESET):
         return Answer(UNSUPPORTED)
     if wanted != _WRITE:
-        if vehicle.autopilot.now.status.armed:
+        if vehicle.now.status.armed:
             return Answer(DENIED, "the vehicle is armed")
         vehicle.params.reset()
     return Answer(ACCEPTED)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from flightstack.commander.transitions import Need
-from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint
+from flightstack.core.severity import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.services.commands.command_server import Command
 from flightstack.services.commands.context import (
@@ -19,7 +19,6 @@ from flightstack.services.commands.context import (
     answer_to,
     frame_answer,
 )
-from flightstack.vehicle.snapshot import NOTICE
 
 DO_NOTHING, REBOOT, SHUT_DOWN = 0.0, 1.0, 2.0
 
@@ -31,8 +30,7 @@ def reboot_or_shut_down(vehicle: VehicleContext, command: Command) -> Answer:
         return Answer(ACCEPTED)
     if wanted not in (REBOOT, SHUT_DOWN):
         return Answer(UNSUPPORTED)
-    now = vehicle.autopilot.now
-    if now.status.armed and not now.landed:
+    if vehicle.now.status.armed and not vehicle.now.landed:
         return Answer(DENIED, "the vehicle is in the air")
     if wanted == REBOOT and not vehicle.reboot_requested:
         problem = vehicle.prepare_reboot()
@@ -45,12 +43,11 @@ def reboot_or_shut_down(vehicle: VehicleContext, command: Command) -> Answer:
 
 def terminate_flight(vehicle: VehicleContext, command: Command) -> Answer:
     """DO_FLIGHTTERMINATION: parameter 1 above 0.5 stops the rotors for good, in the air too (PX4's threshold)."""
-    autopilot = vehicle.autopilot
     if not command.params[0] > 0.5:  # NaN too
         return Answer(DENIED, "parameter 1 must be 1; a termination cannot be taken back")
-    if not autopilot.now.status.armed:
+    if not vehicle.now.status.armed:
         return answer_to(Need.ARMED.value)
-    autopilot.terminate("commanded")
+    vehicle.requests.terminate("commanded")
     return Answer(ACCEPTED)
 
 
@@ -59,23 +56,21 @@ def set_home(vehicle: VehicleContext, command: Command) -> Answer:
 
     A named place stays home for all flights to come; the present one follows the vehicle to where it arms next (PX4).
     """
-    autopilot = vehicle.autopilot
     if command.params[0] == 1.0:
-        if not autopilot.facts.state_is_valid:
+        if not vehicle.readiness.facts.state_is_valid:
             return answer_to(Need.STATE.value)
-        position = Vector3(*autopilot.now.state[:3].tolist())
-        refusal = autopilot.set_home(autopilot.places.frame.to_geo(position), chosen=False)
+        refusal = vehicle.area.set_home_here()
     else:
         unsupported = frame_answer(command)
         if unsupported is not None:
             return unsupported
         latitude, longitude, altitude = command.params[4:7]
         if command.frame in RELATIVE_FRAMES:
-            altitude += autopilot.home.altitude_m
-        refusal = autopilot.set_home(GeoPoint(latitude, longitude, altitude))
+            altitude += vehicle.area.home.altitude_m
+        refusal = vehicle.area.set_home(GeoPoint(latitude, longitude, altitude))
     if refusal is not None:
         return Answer(DENIED, refusal)
-    autopilot.say(NOTICE, "Home set")
+    vehicle.journal.say(Severity.NOTICE, "Home set")
     return Answer(ACCEPTED)
 
 

@@ -20,9 +20,8 @@ def file_services(
     has_room: Callable[[Hashable], bool],
 ) -> tuple[Service, Service]:
     """Return the services of MAVLink FTP and of the log protocol."""
-    autopilot = vehicle.autopilot
     files = vehicle_files(metadata, lambda arguments: pack_file(vehicle.params, arguments), vehicle.logs)
     return (
         FtpServer(own, files, has_room),
-        LogServer(own, vehicle.logs, lambda: autopilot.now.status.armed, autopilot.say, has_room),
+        LogServer(own, vehicle.logs, lambda: vehicle.now.status.armed, vehicle.journal.say, has_room),
     )

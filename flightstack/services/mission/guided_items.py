@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Mapping
 
+from flightstack.core.severity import Severity
 from flightstack.mavlink.addressing import Address, is_for, sender
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
@@ -18,7 +19,6 @@ from flightstack.services.commands import VehicleContext
 from flightstack.services.commands.command_server import Command
 from flightstack.services.commands.context import ACCEPTED, DENIED, UNSUPPORTED_FRAME, Answer
 from flightstack.services.commands.guided import CHANGE_MODE, reposition
-from flightstack.vehicle.snapshot import WARNING
 
 _RESULTS: Mapping[int, MissionResult] = {
     ACCEPTED: MissionResult.ACCEPTED,
@@ -48,7 +48,7 @@ class GuidedItems:
             answer = self._go(message, peer)
             result = _RESULTS.get(answer.result, MissionResult.ERROR)
             if answer.reason:
-                self._vehicle.autopilot.say(WARNING, f"Goto refused: {answer.reason}")
+                self._vehicle.journal.say(Severity.WARNING, f"Goto refused: {answer.reason}")
         ack = ack_message(sender(message), result, message.mission_type, 0)
         self._outbox.append((peer, ack))
 

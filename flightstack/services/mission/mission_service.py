@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
+from flightstack.core.severity import Severity
 from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.link import Message
 from flightstack.mavlink.mission_messages import PROTOCOL
@@ -16,35 +17,34 @@ from flightstack.services.mission.mission_store import (
     MissionRefused,
     MissionReplaced,
 )
-from flightstack.vehicle.autopilot import Autopilot
-from flightstack.vehicle.snapshot import NOTICE, WARNING
+from flightstack.vehicle.assembly import VehicleParts
 
 
 class MissionService:
-    """Lets the autopilot follow what clients upload."""
+    """Applies uploaded plans to the vehicle."""
 
     handles = PROTOCOL
 
-    def __init__(self, own: Address, autopilot: Autopilot) -> None:
-        self._autopilot = autopilot
+    def __init__(self, own: Address, vehicle: VehicleParts) -> None:
+        self._vehicle = vehicle
         self._server = MissionServer(
             own,
             {
-                MissionType.MISSION: autopilot.check_mission,
-                MissionType.FENCE: autopilot.check_fence,
-                MissionType.RALLY: autopilot.check_rally,
+                MissionType.MISSION: vehicle.mission.check,
+                MissionType.FENCE: vehicle.area.check_fence,
+                MissionType.RALLY: vehicle.area.check_rally,
             },
         )
         self._setters = {
-            MissionType.MISSION: autopilot.set_mission,
-            MissionType.FENCE: autopilot.set_fence,
-            MissionType.RALLY: autopilot.set_rally,
+            MissionType.MISSION: vehicle.requests.set_mission,
+            MissionType.FENCE: vehicle.area.set_fence,
+            MissionType.RALLY: vehicle.area.set_rally,
         }
 
     def plans(self) -> KeptPlans:
         """Return the plans in force; a mission that was flown to its end begins anew."""
         mission, fence, rally = (self._server.items(kind) for kind in self._setters)
-        places, progress = self._autopilot.places, self._autopilot.now.progress
+        places, progress = self._vehicle.places, self._vehicle.now.progress
         goes_on = not progress.finished and progress.current < len(mission)
         home = places.home_point if places.home_is_chosen else None
         return KeptPlans(mission, fence, rally, progress.current if goes_on else 0, home)
@@ -54,7 +54,7 @@ class MissionService:
 
         Home and the geofence come first: the others were checked against them, and are not taken without them.
         """
-        refusal = None if plans.home is None else self._autopilot.set_home(plans.home)
+        refusal = None if plans.home is None else self._vehicle.area.set_home(plans.home)
         if refusal is not None:
             return f"home: {refusal}"
         reasons: list[str] = []
@@ -67,7 +67,7 @@ class MissionService:
                 if kind is MissionType.FENCE:
                     break
             elif kind is MissionType.MISSION and plans.current:
-                self._autopilot.set_current_item(plans.current)
+                self._vehicle.mission.set_current(plans.current)
         return reasons[0] if reasons else None
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
@@ -77,7 +77,7 @@ class MissionService:
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Return requests, items and acknowledgements."""
-        self._server.current_seq = self._autopilot.now.progress.current
+        self._server.current_seq = self._vehicle.now.progress.current
         outbox = list(self._server.poll(now_s))
         self._take_events()
         return outbox
@@ -87,24 +87,24 @@ class MissionService:
         return self._server.next_deadline()
 
     def _take_events(self) -> None:
-        autopilot = self._autopilot
+        journal = self._vehicle.journal
         events = self._server.events()
         if not events:  # most of the time: nor have the plans' numbers changed
             return
         for event in events:
             if isinstance(event, MissionReplaced):
                 self._setters[event.mission_type](event.items)
-                autopilot.say(NOTICE, f"{_name(event.mission_type)} loaded, items: {len(event.items)}")
+                journal.say(Severity.NOTICE, f"{_name(event.mission_type)} loaded, items: {len(event.items)}")
             elif isinstance(event, MissionCleared):
                 self._setters[event.mission_type](())
             elif isinstance(event, CurrentRequested):
-                refusal = autopilot.set_current_item(event.seq)
+                refusal = self._vehicle.mission.set_current(event.seq)
                 if refusal is not None:
-                    autopilot.say(WARNING, f"Mission item: {refusal}")
+                    journal.say(Severity.WARNING, f"Mission item: {refusal}")
             elif isinstance(event, MissionRefused):
-                autopilot.say(WARNING, f"{_name(event.mission_type)} refused: {event.reason}")
+                journal.say(Severity.WARNING, f"{_name(event.mission_type)} refused: {event.reason}")
         mission, fence, rally = (self._server.plan_id(kind) for kind in self._setters)
-        autopilot.places.ids = (mission, fence, rally)
+        self._vehicle.places.ids = (mission, fence, rally)
 
 
 def _name(kind: MissionType) -> str:

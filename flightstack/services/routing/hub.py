@@ -24,9 +24,12 @@ from flightstack.services.routing.router import Router
 from flightstack.services.routing.signed_links import NEVER_FORWARDED, link_signing, signing_setup
 from flightstack.services.service import Service
 from flightstack.services.services import make_services
-from flightstack.services.telemetry import MAKERS, VehicleFacts, heartbeat, messages, status_texts
 from flightstack.services.telemetry.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
-from flightstack.services.vehicle_facts import AutopilotFacts
+from flightstack.services.telemetry.telemetry import Telemetry
+from flightstack.services.telemetry.vehicle import status_texts
+from flightstack.vehicle.assembly import VehicleParts
+from flightstack.vehicle.journal import ItemReached, Text
+from flightstack.vehicle.status import VehicleInfo
 
 HEARTBEAT_S = 1.0
 PEER_FORGOTTEN_S = 30.0
@@ -41,23 +44,28 @@ MAX_TO_FORWARD = 4096
 class GroundHub:
     """Receives bytes of any peer on any channel and returns the bytes to send."""
 
-    def __init__(self, vehicle: VehicleContext, facts: AutopilotFacts, system_id: int) -> None:
+    def __init__(
+        self, vehicle: VehicleContext, parts: VehicleParts, telemetry: Telemetry, info: VehicleInfo
+    ) -> None:
         self.vehicle = vehicle
-        self._autopilot = vehicle.autopilot
-        self._facts = facts
-        self._own = Address(system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
+        self._now = parts.now
+        self._journal = parts.journal
+        self._area = parts.area
+        self._telemetry = telemetry
+        self._own = Address(info.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._peers: dict[PeerAddress, Peer] = {}
-        self._setup = signing_setup(self._own, vehicle.autopilot)
+        self._setup = signing_setup(self._own, parts)
         self._congested: Set[PeerAddress] = frozenset()
         self._polled_s = -math.inf
-        services = make_services(self._own, vehicle, facts, self._peer_at, self._has_room)
+        services = make_services(self._own, vehicle, parts, telemetry, info, self._peer_at, self._has_room)
         self._services = [*services, self._setup]
         self._by_type: dict[str, list[Service]] = {}
         for service in self._services:
             for kind in service.handles:
                 self._by_type.setdefault(kind, []).append(service)
-        self._shown = (facts.armed, facts.mode)
-        self._home = facts.home
+        self._shown = parts.now.status
+        self._home = parts.area.home
+        self._texts: list[Text] = []
         self.signing: Signing | None = None
         """What peers are signed with; set by ``use_signing``."""
         self._router: Router[PeerAddress] = Router(self._own)
@@ -65,7 +73,6 @@ class GroundHub:
         self._forget_due_s = -math.inf
         self.last_heard_s = -math.inf
         """When any peer was last heard, forgotten ones too; −inf if none ever was."""
-        self._made: dict[int, tuple[Message, ...]] = {}
 
     def use_signing(self, signing: Signing, store: Callable[[bytes], None]) -> None:
         """Sign what is sent to peers that are added from now on, and check what they send.
@@ -198,7 +205,7 @@ class GroundHub:
         for service in self._services:
             self._collect(service.poll(now_s))
         self._spread_texts()
-        self._made.clear()
+        self._telemetry.begin_poll()
         for address, peer in list(self._peers.items()):
             if self._peers.get(address) is peer:  # it may have gone while its turn had not come
                 due = self._due(peer, changed, now_s, streams=address not in congested)
@@ -216,13 +223,6 @@ class GroundHub:
             if peer is not None and peer.is_served(now_s):
                 yield address, frame
 
-    def _make(self, message_id: int, facts: VehicleFacts) -> tuple[Message, ...]:
-        """Return a message of telemetry, made once in a poll for all peers."""
-        made = self._made.get(message_id)
-        if made is None:
-            made = self._made[message_id] = tuple(messages(message_id, facts))
-        return made
-
     def _collect(self, addressed: Iterable[tuple[Hashable | None, Message]]) -> None:
         for address, message in addressed:
             if address is None:
@@ -234,7 +234,7 @@ class GroundHub:
         """Yield what ``peer`` is to get now; texts wait for one that has fallen silent, and may speak again."""
         if (peer.heard or peer.permanent) and (changed or now_s >= peer.heartbeat_due_s):
             peer.heartbeat_due_s = now_s + HEARTBEAT_S
-            yield from self._make(mavlink.MAVLINK_MSG_ID_HEARTBEAT, self._facts)
+            yield from self._telemetry.messages(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
         if not peer.is_served(now_s):
             texts = [message for message in peer.outbox if message.get_type() == "STATUSTEXT"]
             peer.outbox[:] = texts[-KEPT_TEXTS:]
@@ -242,35 +242,45 @@ class GroundHub:
         yield from peer.outbox
         peer.outbox.clear()
         if streams:
-            yield from peer.streams.due(self._facts, now_s, self._make)
+            yield from peer.streams.due(self._telemetry, now_s)
 
     def _note_changes(self) -> bool:
-        """Announce reached items and another home; tell whether mode or arming changed."""
-        facts = self._facts
-        facts.watch_fence()
-        reached = self._autopilot.now.reached
-        for seq in reached:
-            self._to_all(mavlink.MAVLink_mission_item_reached_message(seq))
-        shown = (facts.armed, facts.mode)
-        changed = shown != self._shown
-        self._shown = shown
-        if facts.home != self._home:
-            self._home = facts.home
-            self._to_all(MAKERS[mavlink.MAVLINK_MSG_ID_HOME_POSITION](facts))
+        """Announce reached items and a change of home; return True if mode or arming changed."""
+        reached = self._take_events()
+        changed = self._now.status != self._shown
+        self._shown = self._now.status
+        if self._area.home != self._home:
+            self._home = self._area.home
+            self._announce(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
         if changed or reached:
-            self._to_all(MAKERS[mavlink.MAVLINK_MSG_ID_MISSION_CURRENT](facts))
-        reached.clear()
+            self._announce(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
         return changed
 
+    def _take_events(self) -> bool:
+        """Take the journal's events: texts wait for ``_spread_texts``; return True if an item was reached."""
+        reached = False
+        for event in self._journal.take_events():
+            if isinstance(event, ItemReached):
+                reached = True
+                self._to_all(mavlink.MAVLink_mission_item_reached_message(event.seq))
+            else:
+                self._texts.append(event)
+        return reached
+
     def _spread_texts(self) -> None:
-        texts = self._autopilot.now.texts
+        """Send the texts to the peers that were heard; until there is one, the newest wait."""
+        self._take_events()  # of the services in this poll
         if not any(peer.heard for peer in self._peers.values()):
-            del texts[:-KEPT_TEXTS]  # for the first one that is heard
+            del self._texts[:-KEPT_TEXTS]
             return
-        for text in texts:
+        for text in self._texts:
             for message in status_texts(text.severity, text.text):
                 self._to_all(message)
-        texts.clear()
+        self._texts.clear()
+
+    def _announce(self, message_id: int) -> None:
+        for message in self._telemetry.requested(message_id):
+            self._to_all(message)
 
     def _to_all(self, message: Message) -> None:
         for peer in self._peers.values():
@@ -283,6 +293,6 @@ class GroundHub:
             self._collect(service.poll(0.0))
         self._spread_texts()
         for address, peer in self._peers.items():
-            for message in [*peer.outbox, heartbeat(self._facts, leaving=True)]:
+            for message in [*peer.outbox, self._telemetry.farewell()]:
                 yield address, peer.link.encode(message)
             peer.outbox.clear()

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
 
+from flightstack.commander.conditions import LinkFacts
 from flightstack.commander.link_watch import LinkWatch
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.flight_state import FlightState
 
 
 class LinkLossService:
@@ -20,23 +21,23 @@ class LinkLossService:
 
     handles = frozenset({"HEARTBEAT"})
 
-    def __init__(self, autopilot: Autopilot) -> None:
-        self._autopilot = autopilot
+    def __init__(self, now: FlightState, links: LinkFacts) -> None:
+        self._now = now
+        self._links = links
         self._watch = LinkWatch()
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a heartbeat."""
         if message.type == mavlink.MAV_TYPE_GCS:
-            self._watch.heard(now_s, self._autopilot.now.time_us)
-            links = self._autopilot.links  # at once: the next message may be the command to arm
-            links.gcs_heard, links.gcs_lost = True, False
+            self._watch.heard(now_s, self._now.time_us)
+            # at once: the next message may be the command to arm
+            self._links.gcs_heard, self._links.gcs_lost = True, False
 
     def poll(self, now_s: float) -> Iterable[tuple[Hashable | None, Message]]:
-        """Tell the autopilot; there is nothing to send."""
-        autopilot = self._autopilot
-        links, behaviour = autopilot.links, autopilot.behaviour
+        """Update the link facts; there is nothing to send."""
+        links, behaviour = self._links, self._now.behaviour
         if links.gcs_heard:
-            links.gcs_lost = self._watch.lost(now_s, autopilot.now.time_us, behaviour.gcs_loss_s)
+            links.gcs_lost = self._watch.lost(now_s, self._now.time_us, behaviour.gcs_loss_s)
         else:
             links.gcs_lost = behaviour.gcs_loss_action > 0
         return ()

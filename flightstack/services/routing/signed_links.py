@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from flightstack.core.port_numbers import API, GROUND, is_loopback
+from flightstack.core.severity import Severity
 from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.services.routing.signing_setup import SigningSetup
-from flightstack.vehicle.autopilot import Autopilot
-from flightstack.vehicle.snapshot import NOTICE
+from flightstack.vehicle.assembly import VehicleParts
 
 NEVER_FORWARDED = frozenset({"SETUP_SIGNING"})
 """A key that came over a safe link must not go out on another."""
@@ -25,13 +25,13 @@ def link_signing(signing: Signing | None, address: PeerAddress) -> LinkSigning |
     return LinkSigning(signing, _LINK_IDS.get(address.channel, _OTHER_LINK_ID))
 
 
-def signing_setup(own: Address, autopilot: Autopilot) -> SigningSetup:
+def signing_setup(own: Address, vehicle: VehicleParts) -> SigningSetup:
     """Return the service that refuses new keys until it is to ``use`` a signing, from this machine then."""
     return SigningSetup(
         own,
-        lambda: autopilot.now.status.armed,
+        lambda: vehicle.now.status.armed,
         _is_on_this_machine,
-        lambda text: autopilot.say(NOTICE, text),
+        lambda text: vehicle.journal.say(Severity.NOTICE, text),
     )
 
 

@@ -1,10 +1,9 @@
-"""Take offboard setpoints from whoever streams them; the last writer wins."""
+"""Offboard setpoints; of several senders the newest message counts."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
-from typing import Protocol
+from collections.abc import Callable, Hashable
 
 from flightstack.guidance.setpoints import OffboardSetpoint
 from flightstack.mavlink.addressing import Address, is_for
@@ -15,22 +14,6 @@ from flightstack.services.streams.stream_watch import StreamWatch
 _SILENCE_S = 10.0  # between two texts about refused setpoints: they come at 50 Hz
 
 
-class SetpointReceiver(Protocol):
-    """What the service needs of the vehicle."""
-
-    def here(self) -> Here:
-        """Tell where the vehicle is now."""
-        ...
-
-    def take_offboard(self, setpoint: OffboardSetpoint) -> None:
-        """Remember the newest setpoint."""
-        ...
-
-    def refuse_offboard(self, reason: str) -> None:
-        """Tell the operator why setpoints are not taken."""
-        ...
-
-
 class SetpointServer:
     """SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and SET_ATTITUDE_TARGET."""
 
@@ -38,9 +21,19 @@ class SetpointServer:
         {"SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "SET_ATTITUDE_TARGET"}
     )
 
-    def __init__(self, own: Address, vehicle: SetpointReceiver, watch: StreamWatch) -> None:
+    def __init__(
+        self,
+        own: Address,
+        here: Callable[[], Here],
+        take: Callable[[OffboardSetpoint], None],
+        refuse: Callable[[str], None],
+        watch: StreamWatch,
+    ) -> None:
+        """Give accepted setpoints to ``take`` and texts about others to ``refuse``; ``here`` is the vehicle's pose."""
         self._own = own
-        self._vehicle = vehicle
+        self._here = here
+        self._take = take
+        self._refuse = refuse
         self._watch = watch
         self._said_s = -math.inf
 
@@ -48,13 +41,13 @@ class SetpointServer:
         """Take a setpoint; one that is refused neither replaces the last nor keeps the stream alive."""
         if not is_for(message, self._own):
             return
-        setpoint = read_setpoint(message, self._vehicle.here())
+        setpoint = read_setpoint(message, self._here())
         if not isinstance(setpoint, str):
-            self._vehicle.take_offboard(setpoint)
+            self._take(setpoint)
             self._watch.heard(now_s)
         elif now_s - self._said_s >= _SILENCE_S:
             self._said_s = now_s
-            self._vehicle.refuse_offboard(f"Setpoint refused: {setpoint}")
+            self._refuse(f"Setpoint refused: {setpoint}")
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Send nothing; note a stream that has fallen silent."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from flightstack.core.contract import FloatArray
-from flightstack.services.telemetry.facts import VehicleFacts
+from flightstack.vehicle.status import VehicleStatus
 
 NAN = math.nan
 _SINGLE_LIMIT = 1e18
@@ -30,7 +30,7 @@ def wrapped(time: int) -> int:
     return time & 0xFFFFFFFF
 
 
-def boot_ms(f: VehicleFacts) -> int:
+def boot_ms(f: VehicleStatus) -> int:
     """Return the time since boot as the field ``time_boot_ms``, which wraps after 49.7 days."""
     return wrapped(f.time_us // 1000)
 

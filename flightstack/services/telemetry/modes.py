@@ -9,7 +9,7 @@ from typing import NamedTuple
 from flightstack.core.modes import CUSTOM_MODE, Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.services.telemetry.facts import VehicleFacts
+from flightstack.vehicle.status import VehicleStatus
 
 ADVANCED, NOT_SELECTABLE, AUTOMATIC = 1, 2, 4
 """MAV_MODE_PROPERTY."""
@@ -39,13 +39,13 @@ MODES = (
 _STANDARD = {entry.mode: entry.standard for entry in MODES}
 
 
-def current_mode(f: VehicleFacts) -> Message:
+def current_mode(f: VehicleStatus) -> Message:
     """CURRENT_MODE; a mode is entered at once or not at all, so the intended one is the present one."""
     number = CUSTOM_MODE[f.mode]
     return mavlink.MAVLink_current_mode_message(_STANDARD[f.mode], number, number)
 
 
-def available_modes_monitor(_f: VehicleFacts) -> Message:
+def available_modes_monitor(_f: VehicleStatus) -> Message:
     """AVAILABLE_MODES_MONITOR: the list of modes never changes."""
     return mavlink.MAVLink_available_modes_monitor_message(0)
 

@@ -8,58 +8,58 @@ from flightstack.core.contract import LoopRow, Vector3
 from flightstack.mavlink.dialect import EscStatus, mavlink
 from flightstack.mavlink.field_numbers import int16, int32, whole
 from flightstack.mavlink.link import Message
-from flightstack.services.telemetry.facts import VehicleFacts
 from flightstack.services.telemetry.fields import NAN, boot_ms, euler, floats, heading_deg, singles, wrapped
+from flightstack.vehicle.status import VehicleStatus
 
 RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
 UNKNOWN_COVARIANCE = [NAN, *[0.0] * 20]
 UNKNOWN_SATELLITES = 255
 
 
-def attitude(f: VehicleFacts) -> Message:
+def attitude(f: VehicleStatus) -> Message:
     """ATTITUDE."""
     x = floats(f.state)
     return mavlink.MAVLink_attitude_message(boot_ms(f), *euler(x[6:10]), *x[10:13])
 
 
-def attitude_quaternion(f: VehicleFacts) -> Message:
+def attitude_quaternion(f: VehicleStatus) -> Message:
     """ATTITUDE_QUATERNION."""
     return mavlink.MAVLink_attitude_quaternion_message(boot_ms(f), *floats(f.state)[6:13])
 
 
-def attitude_target(f: VehicleFacts) -> Message:
+def attitude_target(f: VehicleStatus) -> Message:
     """ATTITUDE_TARGET: what the outer loop asks of the inner one, and the reference rates."""
     target = floats(f.attitude_target)
     rates = floats(f.row[LoopRow.REFERENCE_RATES])
-    thrust = min(1.0, max(0.0, target[4] / f.max_thrust_n)) if math.isfinite(target[4]) else 0.0
+    thrust = min(1.0, max(0.0, target[4] / f.info.max_thrust_n)) if math.isfinite(target[4]) else 0.0
     return mavlink.MAVLink_attitude_target_message(boot_ms(f), 0, target[:4], *rates, thrust)
 
 
-def local_position(f: VehicleFacts) -> Message:
+def local_position(f: VehicleStatus) -> Message:
     """LOCAL_POSITION_NED."""
     return mavlink.MAVLink_local_position_ned_message(boot_ms(f), *floats(f.state)[:6])
 
 
-def position_target(f: VehicleFacts) -> Message:
+def position_target(f: VehicleStatus) -> Message:
     """POSITION_TARGET_LOCAL_NED."""
     s = floats(f.setpoint)
     return mavlink.MAVLink_position_target_local_ned_message(boot_ms(f), mavlink.MAV_FRAME_LOCAL_NED, 0, *s)
 
 
-def position_target_global(f: VehicleFacts) -> Message:
+def position_target_global(f: VehicleStatus) -> Message:
     """POSITION_TARGET_GLOBAL_INT."""
     s = floats(f.setpoint)
-    point = f.frame.to_geo(Vector3(*s[:3]))
+    point = f.info.frame.to_geo(Vector3(*s[:3]))
     return mavlink.MAVLink_position_target_global_int_message(
         boot_ms(f), mavlink.MAV_FRAME_GLOBAL_INT, 0,
         int32(point.latitude_deg * 1e7), int32(point.longitude_deg * 1e7), point.altitude_m, *s[3:],
     )  # fmt: skip
 
 
-def global_position(f: VehicleFacts) -> Message:
+def global_position(f: VehicleStatus) -> Message:
     """GLOBAL_POSITION_INT: altitude above the sea and above home."""
     x = floats(f.state)
-    point = f.frame.to_geo(Vector3(*x[:3]))
+    point = f.info.frame.to_geo(Vector3(*x[:3]))
     return mavlink.MAVLink_global_position_int_message(
         boot_ms(f),
         int32(point.latitude_deg * 1e7),
@@ -71,10 +71,10 @@ def global_position(f: VehicleFacts) -> Message:
     )
 
 
-def gps_raw(f: VehicleFacts) -> Message:
+def gps_raw(f: VehicleStatus) -> Message:
     """GPS_RAW_INT from the true position: a 3D fix while there are good states; no satellites are simulated."""
     x = floats(f.state)
-    point = f.frame.to_geo(Vector3(*x[:3]))
+    point = f.info.frame.to_geo(Vector3(*x[:3]))
     fix = mavlink.GPS_FIX_TYPE_3D_FIX if f.state_is_good else mavlink.GPS_FIX_TYPE_NO_FIX
     course = math.degrees(math.atan2(x[4], x[3])) % 360.0 if math.isfinite(x[3] + x[4]) else 0.0
     altitude_mm = int32(point.altitude_m * 1e3)
@@ -85,16 +85,16 @@ def gps_raw(f: VehicleFacts) -> Message:
     )  # fmt: skip
 
 
-def altitude(f: VehicleFacts) -> Message:
+def altitude(f: VehicleStatus) -> Message:
     """ALTITUDE; the ground is not known to be flat, so terrain and clearance are not told."""
     down_m = floats(f.state)[2]
-    above_sea_m = f.frame.origin.altitude_m - down_m
+    above_sea_m = f.info.frame.origin.altitude_m - down_m
     return mavlink.MAVLink_altitude_message(
         f.time_us, above_sea_m, above_sea_m, -down_m, above_sea_m - f.home.altitude_m, NAN, NAN
     )
 
 
-def odometry(f: VehicleFacts) -> Message:
+def odometry(f: VehicleStatus) -> Message:
     """ODOMETRY: pose in NED, velocity in the body frame FRD."""
     x = floats(f.state)
     return mavlink.MAVLink_odometry_message(
@@ -114,28 +114,28 @@ def _into_body(q: list[float], v: list[float]) -> list[float]:
     ]
 
 
-def esc_status(f: VehicleFacts, first: int = 0) -> Message:
+def esc_status(f: VehicleStatus, first: int = 0) -> Message:
     """ESC_STATUS of the four rotors from ``first`` on."""
     speeds = f.row[LoopRow.ROTOR_SPEED].tolist()[first : first + 4]
     rpm = [int32(speed * RPM_PER_RAD_S) for speed in speeds]
     return EscStatus(first, f.time_us, rpm, [NAN] * 4, [NAN] * 4)
 
 
-def _command_shares(f: VehicleFacts) -> list[float]:
+def _command_shares(f: VehicleStatus) -> list[float]:
     """Rotor speed commands as shares of the largest speed, in order of the vehicle file."""
     commands = f.row[LoopRow.ROTOR_COMMAND].tolist()
-    shares = [command / top for command, top in zip(commands, f.top_speed_rad_s, strict=False)]
+    shares = [command / top for command, top in zip(commands, f.info.top_speed_rad_s, strict=False)]
     return [min(1.0, max(0.0, share)) if math.isfinite(share) else 0.0 for share in shares]
 
 
-def servo_output(f: VehicleFacts) -> Message:
+def servo_output(f: VehicleStatus) -> Message:
     """SERVO_OUTPUT_RAW: rotor speed commands as pulses, 1000 µs for none to 2000 µs for the largest."""
     pulses = [1000 + round(1000.0 * share) for share in _command_shares(f)]
     pulses += [0] * (8 - len(pulses))
     return mavlink.MAVLink_servo_output_raw_message(wrapped(f.time_us), 0, *pulses)
 
 
-def actuator_output(f: VehicleFacts) -> Message:
+def actuator_output(f: VehicleStatus) -> Message:
     """ACTUATOR_OUTPUT_STATUS: rotor speed commands, 0 to 1 of the largest."""
     shares = _command_shares(f)
     return mavlink.MAVLink_actuator_output_status_message(
@@ -143,12 +143,12 @@ def actuator_output(f: VehicleFacts) -> Message:
     )
 
 
-def vfr_hud(f: VehicleFacts) -> Message:
+def vfr_hud(f: VehicleStatus) -> Message:
     """VFR_HUD."""
     x = floats(f.state)
     speed = math.hypot(x[3], x[4])
-    throttle = 100.0 * float(f.row[LoopRow.WRENCH_ACHIEVED][0]) / f.max_thrust_n
-    above_sea_m = f.frame.origin.altitude_m - x[2]
+    throttle = 100.0 * float(f.row[LoopRow.WRENCH_ACHIEVED][0]) / f.info.max_thrust_n
+    above_sea_m = f.info.frame.origin.altitude_m - x[2]
     return mavlink.MAVLink_vfr_hud_message(
         speed, speed, int16(heading_deg(x[6:10])), whole(throttle, 0, 100), above_sea_m, -x[5]
     )

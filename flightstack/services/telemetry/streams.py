@@ -7,12 +7,11 @@ time a client gets 50 attitudes a second, not 2 500. At speed 1, and over a memo
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from typing import TypeAlias
+from collections.abc import Iterator
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.services.telemetry import MAKERS, VehicleFacts, messages
+from flightstack.services.telemetry.telemetry import STREAMED, Telemetry
 
 M = mavlink
 
@@ -88,9 +87,6 @@ GROUPS: dict[int, tuple[int, ...]] = {
 """Messages of the groups of REQUEST_DATA_STREAM, as ArduPilot divides them."""
 
 
-Make: TypeAlias = Callable[[int, VehicleFacts], Iterable[Message]]
-
-
 class _Stream:
     """A message of a link, due at ``vehicle_s`` on the vehicle's clock and ``link_s`` on the link's."""
 
@@ -121,11 +117,11 @@ class Streams:
         """Interval of a message; −1 if it is not sent, 0 if it is not known."""
         if message_id in self._streams:
             return round(self._streams[message_id].interval_s * 1e6)
-        return -1 if message_id in MAKERS else 0
+        return -1 if message_id in STREAMED else 0
 
     def set_interval(self, message_id: int, interval_us: float) -> bool:
         """Set an interval as SET_MESSAGE_INTERVAL says (−1 stop, 0 default); tell whether it can be done."""
-        if message_id not in MAKERS or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # nor is NaN
+        if message_id not in STREAMED or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # nor is NaN
             return False
         if interval_us == 0 and message_id in self._default:
             self._streams[message_id] = _Stream(message_id, 1.0 / self._default[message_id])
@@ -149,15 +145,15 @@ class Streams:
         for message_id in members:
             self.set_interval(message_id, interval_us)
 
-    def due(self, facts: VehicleFacts, link_now_s: float, make: Make = messages) -> Iterator[Message]:
-        """Yield the messages that are due by the vehicle's time and by the link's, made by ``make``."""
-        now_s = facts.time_us * 1e-6
+    def due(self, telemetry: Telemetry, link_now_s: float) -> Iterator[Message]:
+        """Yield the messages that are due by the vehicle's time and by the link's."""
+        now_s = telemetry.time_us * 1e-6
         if now_s < self._soonest_s:
             return
         soonest_s = math.inf
         for stream in self._streams.values():
             if now_s >= stream.vehicle_s and link_now_s >= stream.link_s:
                 stream.sent(now_s, link_now_s)
-                yield from make(stream.message_id, facts)
+                yield from telemetry.messages(stream.message_id)
             soonest_s = min(soonest_s, stream.vehicle_s)
         self._soonest_s = soonest_s

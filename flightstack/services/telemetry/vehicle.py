@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from flightstack import __version__
+from flightstack.commander.failsafe import Action
 from flightstack.core.contract import Vector3
 from flightstack.core.modes import CUSTOM_MODE, Mode
+from flightstack.guidance.fence import FenceBreach
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.field_numbers import int16, int32, whole
 from flightstack.mavlink.link import Message
 from flightstack.params.vehicle import system_type
-from flightstack.services.telemetry.facts import VehicleFacts
 from flightstack.services.telemetry.fields import NAN, boot_ms
+from flightstack.vehicle.status import VehicleStatus
 
 MAVLINK_2 = 200
 NO_MISSION = 0xFFFF
@@ -23,7 +26,7 @@ NAME_IN_VERSION = list(b"flightst")
 _OWN_TARGETS = (Mode.TAKEOFF, Mode.MISSION, Mode.HOLD, Mode.RETURN, Mode.LAND)
 
 
-def heartbeat(f: VehicleFacts, leaving: bool = False) -> Message:
+def heartbeat(f: VehicleStatus, leaving: bool = False) -> Message:
     """HEARTBEAT, with PX4's custom mode; the base mode's flags are those that PX4 sets in each mode."""
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_HIL_ENABLED
     base |= mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
@@ -35,32 +38,57 @@ def heartbeat(f: VehicleFacts, leaving: bool = False) -> Message:
         base |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
     if f.armed:
         base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
-    system = mavlink.MAV_STATE_POWEROFF if leaving else f.system_status
-    autopilot = mavlink.MAV_AUTOPILOT_GENERIC if f.is_generic else mavlink.MAV_AUTOPILOT_PX4
+    system = mavlink.MAV_STATE_POWEROFF if leaving else system_status(f)
+    autopilot = mavlink.MAV_AUTOPILOT_GENERIC if f.info.is_generic else mavlink.MAV_AUTOPILOT_PX4
     return mavlink.MAVLink_heartbeat_message(
-        system_type(f.rotors), autopilot, base, CUSTOM_MODE[f.mode], system, 3
+        system_type(f.info.rotors), autopilot, base, CUSTOM_MODE[f.mode], system, 3
     )
 
 
-def extended_state(f: VehicleFacts) -> Message:
+def system_status(f: VehicleStatus) -> int:
+    """Return MAV_STATE: critical while a failsafe acts, emergency when its action ends the flight."""
+    if f.mode is Mode.TERMINATION:
+        return int(mavlink.MAV_STATE_FLIGHT_TERMINATION)
+    if f.armed and f.failsafe_action >= Action.LAND:
+        return int(mavlink.MAV_STATE_EMERGENCY)
+    if f.armed and f.failsafe_action > Action.WARN:
+        return int(mavlink.MAV_STATE_CRITICAL)
+    return int(mavlink.MAV_STATE_ACTIVE if f.armed else mavlink.MAV_STATE_STANDBY)
+
+
+def mission_state(f: VehicleStatus) -> int:
+    """Return MISSION_STATE."""
+    if not f.mission_count:
+        return int(mavlink.MISSION_STATE_NO_MISSION)
+    if f.mission_complete:
+        return int(mavlink.MISSION_STATE_COMPLETE)
+    if f.mode is Mode.MISSION:
+        return int(mavlink.MISSION_STATE_ACTIVE if f.armed else mavlink.MISSION_STATE_NOT_STARTED)
+    begun = f.mission.reached >= 0
+    return int(mavlink.MISSION_STATE_PAUSED if begun else mavlink.MISSION_STATE_NOT_STARTED)
+
+
+def extended_state(f: VehicleStatus) -> Message:
     """EXTENDED_SYS_STATE."""
     landed = mavlink.MAV_LANDED_STATE_IN_AIR
     if f.landed:
         landed = mavlink.MAV_LANDED_STATE_ON_GROUND
-    elif f.climbing:
+    elif f.mode is Mode.TAKEOFF:
         landed = mavlink.MAV_LANDED_STATE_TAKEOFF
-    elif f.descending:
+    elif f.mode is Mode.LAND:
         landed = mavlink.MAV_LANDED_STATE_LANDING
     return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed)
 
 
-def mission_current(f: VehicleFacts) -> Message:
+def mission_current(f: VehicleStatus) -> Message:
     """MISSION_CURRENT; the field ``total`` has a number of its own for no mission, and 0 would be "not supported"."""
     total = f.mission_count or NO_MISSION
     # a finished mission's current item would be one past its last
-    current = min(f.mission_current, max(0, f.mission_count - 1))
+    current = min(f.mission.current, max(0, f.mission_count - 1))
     mission_mode = 1 if f.mode is Mode.MISSION else 2
-    return mavlink.MAVLink_mission_current_message(current, total, f.mission_state, mission_mode, *f.plan_ids)
+    return mavlink.MAVLink_mission_current_message(
+        current, total, mission_state(f), mission_mode, *f.plan_ids
+    )
 
 
 SENSORS = (
@@ -75,7 +103,7 @@ SENSORS = (
 """What stands for the true state that the simulator sends: clients count a vehicle without them as ill."""
 
 
-def sys_status(f: VehicleFacts) -> Message:
+def sys_status(f: VehicleStatus) -> Message:
     """SYS_STATUS: the health bits by which MAVSDK and QGroundControl judge a vehicle."""
     present = SENSORS | mavlink.MAV_SYS_STATUS_GEOFENCE | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     healthy = present if f.state_is_good else 0
@@ -92,7 +120,7 @@ def sys_status(f: VehicleFacts) -> Message:
     )
 
 
-def _battery_fields(f: VehicleFacts) -> tuple[int, int, int]:
+def _battery_fields(f: VehicleStatus) -> tuple[int, int, int]:
     """Voltage [mV], current [cA] and charge [%], or what stands for not known."""
     b = f.battery
     if not b.valid:
@@ -111,7 +139,7 @@ CHARGE_STATES = (
 """By the level that arming and failsafes go by."""
 
 
-def battery_status(f: VehicleFacts) -> Message:
+def battery_status(f: VehicleStatus) -> Message:
     """BATTERY_STATUS: one pack, its cells not told apart."""
     voltage, current, remaining = _battery_fields(f)
     known = f.battery.valid and math.isfinite(f.battery.remaining)
@@ -122,31 +150,31 @@ def battery_status(f: VehicleFacts) -> Message:
     )  # fmt: skip
 
 
-def system_time(f: VehicleFacts) -> Message:
+def system_time(f: VehicleStatus) -> Message:
     """SYSTEM_TIME: time since boot; simulated time knows no date."""
     return mavlink.MAVLink_system_time_message(0, boot_ms(f))
 
 
-def home_position(f: VehicleFacts) -> Message:
+def home_position(f: VehicleStatus) -> Message:
     """HOME_POSITION."""
     home = f.home
-    local = f.frame.to_ned(home)
+    local = f.info.frame.to_ned(home)
     return mavlink.MAVLink_home_position_message(
         int32(home.latitude_deg * 1e7), int32(home.longitude_deg * 1e7), int32(home.altitude_m * 1e3),
         *local, [1.0, 0.0, 0.0, 0.0], NAN, NAN, NAN, f.time_us,
     )  # fmt: skip
 
 
-def origin(f: VehicleFacts) -> Message:
+def origin(f: VehicleStatus) -> Message:
     """GPS_GLOBAL_ORIGIN: where the local frame begins."""
-    point = f.frame.to_geo(Vector3(0.0, 0.0, 0.0))
+    point = f.info.frame.to_geo(Vector3(0.0, 0.0, 0.0))
     return mavlink.MAVLink_gps_global_origin_message(
         int32(point.latitude_deg * 1e7), int32(point.longitude_deg * 1e7), int32(point.altitude_m * 1e3),
         f.time_us,
     )  # fmt: skip
 
 
-def estimator_status(f: VehicleFacts) -> Message:
+def estimator_status(f: VehicleStatus) -> Message:
     """ESTIMATOR_STATUS: the true state, so nothing to innovate."""
     flags = (
         mavlink.ESTIMATOR_ATTITUDE | mavlink.ESTIMATOR_VELOCITY_HORIZ | mavlink.ESTIMATOR_VELOCITY_VERT
@@ -158,7 +186,7 @@ def estimator_status(f: VehicleFacts) -> Message:
     )
 
 
-def flight_information(f: VehicleFacts) -> Message:
+def flight_information(f: VehicleStatus) -> Message:
     """FLIGHT_INFORMATION: arming, takeoff and landing of the present flight, on the vehicle's clock."""
     times = f.flight
     return mavlink.MAVLink_flight_information_message(
@@ -166,10 +194,16 @@ def flight_information(f: VehicleFacts) -> Message:
     )
 
 
-def fence_status(f: VehicleFacts) -> Message:
+def fence_status(f: VehicleStatus) -> Message:
     """FENCE_STATUS: whether the fence is broken now; the number of breaches, and kind and time of the latest."""
-    number, latest_us, kind = f.fence_breaches
-    return mavlink.MAVLink_fence_status_message(int(f.fence_breached), number, kind, latest_us // 1000)
+    breaches = f.fence_breaches
+    kind = mavlink.FENCE_BREACH_NONE
+    if breaches.number:  # of several limits the boundary is reported: it takes longer to return
+        too_high = breaches.flags is FenceBreach.TOO_HIGH
+        kind = mavlink.FENCE_BREACH_MAXALT if too_high else mavlink.FENCE_BREACH_BOUNDARY
+    return mavlink.MAVLink_fence_status_message(
+        int(f.fence_breached), breaches.number, kind, breaches.latest_us // 1000
+    )
 
 
 CAPABILITIES = (
@@ -189,17 +223,32 @@ CAPABILITIES = (
 )
 
 
-def autopilot_version(f: VehicleFacts) -> Message:
+def autopilot_version(f: VehicleStatus) -> Message:
     """AUTOPILOT_VERSION: what this vehicle can do, and which version of the stack it runs."""
     major, minor, patch = (int(part) for part in __version__.split(".")[:3])
     version = major << 24 | minor << 16 | patch << 8
     nothing = [0] * 8
     return mavlink.MAVLink_autopilot_version_message(
-        CAPABILITIES, version, 0, 0, 0, NAME_IN_VERSION, nothing, nothing, 0, 0, f.system_id
+        CAPABILITIES, version, 0, 0, 0, NAME_IN_VERSION, nothing, nothing, 0, 0, f.info.system_id
     )
 
 
-def protocol_version(f: VehicleFacts) -> Message:
+def protocol_version(f: VehicleStatus) -> Message:
     """PROTOCOL_VERSION: MAVLink 2 is spoken, MAVLink 1 understood."""
     nothing = [0] * 8
     return mavlink.MAVLink_protocol_version_message(MAVLINK_2, 100, MAVLINK_2, nothing, nothing)
+
+
+STATUSTEXT_SIZE = 50
+
+
+def status_texts(severity: int, text: str) -> Iterator[Message]:
+    """STATUSTEXT, in chunks of 50 octets when it is longer; the last chunk is the one that is not full."""
+    octets = text.encode("utf-8")
+    if len(octets) <= STATUSTEXT_SIZE:
+        yield mavlink.MAVLink_statustext_message(severity, octets, 0, 0)
+        return
+    identity = 1 + sum(octets) % 0xFFFF
+    for chunk, start in enumerate(range(0, len(octets) + 1, STATUSTEXT_SIZE)):
+        part = octets[start : start + STATUSTEXT_SIZE]
+        yield mavlink.MAVLink_statustext_message(severity, part, identity, chunk)

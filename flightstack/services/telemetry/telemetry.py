@@ -1,0 +1,118 @@
+"""Telemetry of the vehicle: every message from one status per poll."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
+from flightstack.mavlink.link import Message
+from flightstack.services.telemetry import modes, motion, vehicle
+from flightstack.services.telemetry.fields import wrapped
+from flightstack.vehicle.status import VehicleStatus
+
+MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT: vehicle.heartbeat,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: vehicle.sys_status,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: vehicle.system_time,
+    mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: motion.gps_raw,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: motion.attitude,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: motion.attitude_quaternion,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: motion.local_position,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: motion.global_position,
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: motion.servo_output,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: vehicle.mission_current,
+    mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: vehicle.origin,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: motion.vfr_hud,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: motion.attitude_target,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: motion.position_target,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: motion.position_target_global,
+    mavlink.MAVLINK_MSG_ID_ALTITUDE: motion.altitude,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: vehicle.battery_status,
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: vehicle.autopilot_version,
+    mavlink.MAVLINK_MSG_ID_FENCE_STATUS: vehicle.fence_status,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: vehicle.estimator_status,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: vehicle.home_position,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: vehicle.extended_state,
+    mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: vehicle.flight_information,
+    EscStatus.id: motion.esc_status,
+    mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION: vehicle.protocol_version,
+    mavlink.MAVLINK_MSG_ID_ODOMETRY: motion.odometry,
+    mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: motion.actuator_output,
+    mavlink.MAVLINK_MSG_ID_CURRENT_MODE: modes.current_mode,
+    mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: modes.available_modes_monitor,
+}
+"""What the status alone tells, by message id."""
+
+STREAMED = frozenset({*MAKERS, FS_LOOP_TIMING_ID})
+"""Messages that can be sent at a rate."""
+_AVAILABLE = STREAMED | {mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES}
+
+
+def is_available(message_id: int) -> bool:
+    """Return True if ``Telemetry`` can make the message."""
+    return message_id in _AVAILABLE
+
+
+class Telemetry:
+    """Makes each message once per poll, for all links."""
+
+    def __init__(
+        self,
+        status: Callable[[], VehicleStatus],
+        time_us: Callable[[], int],
+        loop_timing: Callable[[], Message],
+    ) -> None:
+        self._status_of_now = status
+        self._time_us = time_us
+        self._loop_timing = loop_timing
+        self._status: VehicleStatus | None = None
+        self._made: dict[int, tuple[Message, ...]] = {}
+
+    def begin_poll(self) -> None:
+        """Forget the status and the messages of the poll before."""
+        self._status = None
+        self._made.clear()
+
+    @property
+    def status(self) -> VehicleStatus:
+        """The status in this poll."""
+        if self._status is None:
+            self._status = self._status_of_now()
+        return self._status
+
+    @property
+    def time_us(self) -> int:
+        """Vehicle time of the newest tick."""
+        return self._time_us()
+
+    @property
+    def boot_ms(self) -> int:
+        """Vehicle time as the field ``time_boot_ms``."""
+        return wrapped(self.time_us // 1000)
+
+    def messages(self, message_id: int) -> tuple[Message, ...]:
+        """Return a message that can be sent at a rate, as of this poll."""
+        made = self._made.get(message_id)
+        if made is None:
+            made = self._made[message_id] = tuple(self._make(message_id))
+        return made
+
+    def requested(self, message_id: int, argument: float = 0.0) -> tuple[Message, ...]:
+        """Return an available message as of now; ``argument`` is the second parameter of REQUEST_MESSAGE."""
+        if message_id == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
+            return tuple(modes.available_modes(argument))
+        self.begin_poll()
+        return self.messages(message_id)
+
+    def farewell(self) -> Message:
+        """Return the last HEARTBEAT, MAV_STATE_POWEROFF."""
+        self.begin_poll()
+        return vehicle.heartbeat(self.status, leaving=True)
+
+    def _make(self, message_id: int) -> Iterator[Message]:
+        if message_id == FS_LOOP_TIMING_ID:
+            yield self._loop_timing()
+            return
+        yield MAKERS[message_id](self.status)
+        if message_id == EscStatus.id and self.status.info.rotors > 4:  # one message holds four rotors
+            yield motion.esc_status(self.status, 4)

@@ -1,0 +1,195 @@
+"""Where the vehicle may fly, where it returns to, and how high the ground is. No I/O, no clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from flightstack.commander.fence_watch import FenceWatch
+from flightstack.core.contract import Vector3
+from flightstack.core.geodesy import GeoPoint
+from flightstack.core.modes import Mode
+from flightstack.core.portable_math import distance
+from flightstack.guidance.navigator import Navigator
+from flightstack.guidance.rally import HOME, ReturnPlace
+from flightstack.guidance.safe_places import SafePlaces, plan_limits
+from flightstack.plan import MissionItem, Rejection
+from flightstack.vehicle.flight_state import FlightState
+from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.mission import Mission
+
+CEILING_MARGIN_M = 1.0
+"""A return stays this far below GF_MAX_VER_DIST: a breach of it ends there (``fence.HYSTERESIS_M``)."""
+
+
+class FlightArea:
+    """Holds home, geofence, rally points, and the height of the ground."""
+
+    def __init__(
+        self,
+        now: FlightState,
+        places: SafePlaces,
+        fence: FenceWatch,
+        mission: Mission,
+        navigator: Navigator,
+        journal: Journal,
+    ) -> None:
+        self.fence = fence
+        self._now = now
+        self._places = places
+        self._mission = mission
+        self._navigator = navigator
+        self._journal = journal
+        self._ground_m = -math.inf  # above the origin, where a return or landing ends
+        self._stood = HOME  # where the vehicle armed or landed last
+        self.set_bounds()
+
+    # ------------------------------------------------------------------ home
+
+    @property
+    def home(self) -> GeoPoint:
+        """Destination of a return, and the zero of relative altitudes."""
+        return self._places.home_point
+
+    @property
+    def home_above_origin_m(self) -> float:
+        """Height of home above the origin of the local frame."""
+        return self._places.home.altitude_m
+
+    @property
+    def home_follows(self) -> bool:
+        """True if home moves to the place where the vehicle arms."""
+        return bool(self._now.behaviour.home_follows) and not self._places.home_is_chosen
+
+    def set_home(self, point: GeoPoint, chosen: bool = True) -> str | None:
+        """Move home; return the refusal, or None. Relative altitudes of the mission and limits of the fence follow.
+
+        A ``chosen`` home stays when the vehicle arms elsewhere. Refused are a home that a return could not fly to and
+        one that would spoil the mission in flight.
+        """
+        return self._home_refusal(point) or self._move_home(point, chosen)
+
+    def set_home_here(self) -> str | None:
+        """Move home to the vehicle; return the refusal, or None."""
+        return self.set_home(self._places.frame.to_geo(self._here()), chosen=False)
+
+    def bring_home(self) -> float:
+        """Move home to the vehicle, which arms; return the change of its height [m]."""
+        places, here = self._places, self._here()
+        before_m = places.home.altitude_m
+        if self.home_follows and places.has_left_home(here):
+            self._move_home(places.frame.to_geo(here), chosen=False)
+        return places.home.altitude_m - before_m
+
+    def _here(self) -> Vector3:
+        return Vector3(*self._now.state[:3].tolist())
+
+    def _home_refusal(self, point: GeoPoint) -> str | None:
+        places, now, behaviour = self._places, self._now, self._now.behaviour
+        there = places.frame.to_ned(point)
+        if not all(math.isfinite(number) for number in there):
+            return None  # ``SafePlaces.set_home`` refuses it with its reason
+        if not places.fence.shape.allows(there.x, there.y):
+            return "home would be outside the geofence"
+        if not now.status.armed:
+            return None
+        spoils = self._mission.home_refusal(point) if now.status.mode is Mode.MISSION else None
+        if spoils is not None:
+            return spoils
+        farthest_m = behaviour.fence_max_distance_m
+        away_m = distance(now.state[0] - there.x, now.state[1] - there.y)
+        if 0.0 < farthest_m < away_m and not now.landed and behaviour.fence_action > 0.0:
+            return f"home would be more than {farthest_m:g} m from the vehicle (GF_MAX_HOR_DIST)"
+        return None
+
+    def _move_home(self, point: GeoPoint, chosen: bool) -> str | None:
+        refusal = self._places.set_home(point, chosen)
+        if refusal is None:
+            home = self._places.home
+            home_ned_m = Vector3(home.north_m, home.east_m, -home.altitude_m)
+            self._mission.home_moved()
+            self.fence.set_home(home_ned_m)
+            self.set_bounds()
+            self._journal.home(point, home_ned_m)
+        return refusal
+
+    # ------------------------------------------------------------------ ground
+
+    def stands_here(self) -> None:
+        """Note that there is ground where the vehicle stands."""
+        here = self._here()
+        self._stood = ReturnPlace(here.x, here.y, -here.z)
+        self.set_bounds()
+
+    @property
+    def stood_down_m(self) -> float:
+        """Height at which the vehicle armed or landed last [m NED]."""
+        return -self._stood.altitude_m
+
+    def ground_m(self, north_m: float, east_m: float) -> float:
+        """Return the estimated height of the ground above the origin at a position [m]."""
+        return self._places.ground_m(north_m, east_m, self._stood)
+
+    def find_ground(self, return_place: ReturnPlace | None) -> None:
+        """Estimate the ground at the end of a return or landing that begins: there, or at the nearest known place."""
+        self._ground_m = -math.inf
+        if return_place is not None:
+            self._ground_m = return_place.altitude_m
+        elif self._now.status.mode is Mode.LAND:
+            here = self._here()
+            self._ground_m = self.ground_m(here.x, here.y)
+        self.set_bounds()
+
+    def set_bounds(self) -> None:
+        """Give guidance the height of the ground, and the ceiling of climbs that no plan asks for.
+
+        A descent is slow from the highest known ground on: home or a rally point may have been placed too low.
+        """
+        now = self._now
+        home_m, limit_m = self._places.home.altitude_m, now.behaviour.fence_max_altitude_m
+        if now.status.mode not in (Mode.RETURN, Mode.LAND):
+            self._ground_m = -math.inf
+        below_m = max(limit_m - CEILING_MARGIN_M, 0.5 * limit_m)
+        ceiling_m = home_m + below_m if limit_m > 0.0 else math.inf
+        self._navigator.set_bounds(-max(self._ground_m, home_m, self._stood.altitude_m), -ceiling_m)
+
+    # ------------------------------------------------------------------ return
+
+    def return_place(self) -> ReturnPlace | None:
+        """Return the destination of a return from here, or None if all are outside the geofence."""
+        here = self._here()
+        return self._places.return_place(here.x, here.y, self._now.behaviour.return_type, self._is_allowed)
+
+    def return_destination(self) -> ReturnPlace:
+        """Return the destination of a return from here; home if the geofence allows none."""
+        return self.return_place() or self._places.home
+
+    def _is_allowed(self, place: ReturnPlace) -> bool:
+        if self._now.behaviour.fence_action == 0.0:
+            return True
+        above_home_m = place.altitude_m - self._places.home.altitude_m
+        return self.fence.refusal(place.north_m, place.east_m, above_home_m) is None
+
+    # ------------------------------------------------------------------ geofence and rally points
+
+    def way_refusal(self, here: tuple[float, float, float], there: tuple[float, float, float]) -> str | None:
+        """Return why the geofence denies the straight way to a position (north, east, above home) [m], or None."""
+        return self.fence.way_refusal(here, there) if self._now.behaviour.fence_action else None
+
+    def check_fence(self, items: Sequence[MissionItem]) -> Rejection | None:
+        """Return why the vehicle would refuse a geofence, or None: in flight, one that it would breach at once."""
+        now = self._now
+        acts_in_air = not now.landed and now.behaviour.fence_action > 0.0
+        return self._places.check_fence(items, (now.state[0], now.state[1]) if acts_in_air else None)
+
+    def set_fence(self, items: Sequence[MissionItem]) -> None:
+        """Take a geofence that was checked; no items remove it."""
+        self.fence.set_fence(self._places.set_fence(items))
+
+    def check_rally(self, items: Sequence[MissionItem]) -> Rejection | None:
+        """Return why the vehicle would refuse a list of rally points, or None."""
+        return self._places.check_rally(items, plan_limits(self._now.behaviour))
+
+    def set_rally(self, items: Sequence[MissionItem]) -> None:
+        """Take rally points that were checked, for the next return; no items remove them."""
+        self._places.set_rally(items)

@@ -1,0 +1,106 @@
+"""The parts of a vehicle, and how they are joined."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flightstack.commander.conditions import StateSource
+from flightstack.commander.ground_watch import GroundWatch
+from flightstack.commander.supervisor import Supervisor
+from flightstack.control.backend import ControlBackend
+from flightstack.core.contract import FloatArray, LoopRow
+from flightstack.core.geodesy import GeoPoint
+from flightstack.guidance.navigator import Navigator
+from flightstack.guidance.params import guidance_params
+from flightstack.guidance.safe_places import SafePlaces, plan_limits
+from flightstack.params.behaviour import Behaviour
+from flightstack.params.vehicle import Vehicle
+from flightstack.vehicle.area import FlightArea
+from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.flight_state import FlightState
+from flightstack.vehicle.flight_watch import FlightWatch
+from flightstack.vehicle.journal import Journal, Recorder
+from flightstack.vehicle.mission import Mission
+from flightstack.vehicle.mode_control import ModeControl
+from flightstack.vehicle.readiness import Readiness
+from flightstack.vehicle.requests import FlightRequests
+from flightstack.vehicle.takeoff import Takeoff
+
+
+class VehicleParts(NamedTuple):
+    """A vehicle without links, clock and simulator."""
+
+    vehicle: Vehicle
+    now: FlightState
+    journal: Journal
+    places: SafePlaces
+    mission: Mission
+    area: FlightArea
+    takeoff: Takeoff
+    readiness: Readiness
+    modes: ModeControl
+    requests: FlightRequests
+    supervisor: Supervisor
+    navigator: Navigator
+    backend: ControlBackend
+    autopilot: Autopilot
+
+    def warm_up(self) -> None:
+        """Compile the kernels of loops and commander, or load them from the cache."""
+        now = self.now
+        self.backend.warm_up(now.state, now.setpoint, now.rotor_speed)
+        self.supervisor.warm_up()
+
+    def set_behaviour(self, behaviour: Behaviour) -> None:
+        """Take new parameters of guidance and commander, from the next outer tick on."""
+        limits, self.now.behaviour = plan_limits(self.now.behaviour), behaviour
+        self.navigator.set_params(guidance_params(behaviour, self.vehicle.weight_n))
+        self.supervisor.set_behaviour(behaviour)
+        self.area.set_bounds()
+        if plan_limits(behaviour) != limits:
+            self.modes.check_mission_in_flight()
+
+
+def assemble(
+    vehicle: Vehicle,
+    backend: ControlBackend,
+    behaviour: Behaviour,
+    home: GeoPoint,
+    divisor: int,
+    outer_hz: float,
+    recorder: Recorder,
+    state: FloatArray,
+    rotor_speed_rad_s: FloatArray,
+    source: StateSource,
+) -> VehicleParts:
+    """Join the parts of a vehicle on the ground at ``home``.
+
+    ``source`` writes ``state`` (13,) and ``rotor_speed_rad_s`` (8,) in place. An outer tick is every ``divisor``-th.
+    """
+    navigator = Navigator(guidance_params(behaviour, vehicle.weight_n), outer_hz)
+    idle_row = np.zeros(LoopRow.SIZE)
+    now = FlightState(
+        behaviour, state, rotor_speed_rad_s, navigator.setpoint, backend.attitude_target, idle_row
+    )
+    journal = Journal(now, recorder)
+    places = SafePlaces(home)
+    supervisor = Supervisor(vehicle, behaviour, outer_hz, divisor, state, source)
+    ground = GroundWatch()
+    mission = Mission(now, places, navigator, journal)
+    area = FlightArea(now, places, supervisor.fence, mission, navigator, journal)
+    readiness = Readiness(now, supervisor, ground, mission)
+    takeoff = Takeoff(now, places, area, readiness)
+    modes = ModeControl(
+        now, journal, readiness, supervisor, ground, mission, area, takeoff, navigator, backend
+    )
+    requests = FlightRequests(now, journal, modes, readiness, supervisor, mission, navigator)
+    watch = FlightWatch(
+        now, journal, modes, supervisor, ground, mission, area, takeoff, navigator, vehicle.weight_n
+    )
+    autopilot = Autopilot(now, watch, supervisor, navigator, backend, recorder, divisor)
+    return VehicleParts(
+        vehicle, now, journal, places, mission, area, takeoff, readiness, modes, requests, supervisor, navigator,
+        backend, autopilot,
+    )  # fmt: skip

@@ -1,0 +1,140 @@
+"""Events of the flight: failsafes, takeoff and landing, progress of the mission. No I/O, no clock."""
+
+from __future__ import annotations
+
+from flightstack.commander.failsafe import Action, Failsafe, phase_of
+from flightstack.commander.ground_watch import GroundWatch, Standing
+from flightstack.commander.supervisor import EVENTS_OF_ACTION, Supervisor
+from flightstack.commander.transitions import Event
+from flightstack.core.modes import STREAM_MODES, Mode
+from flightstack.core.severity import Severity
+from flightstack.guidance.navigator import Navigator
+from flightstack.vehicle.area import FlightArea
+from flightstack.vehicle.flight_state import FlightState
+from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.mission import Mission
+from flightstack.vehicle.mode_control import ModeControl
+from flightstack.vehicle.takeoff import Takeoff
+
+AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
+"""Modes that take a vehicle off the ground, now or later."""
+
+# used in every outer tick: a member of an enumeration takes seven times as long to look up as a name
+_MISSION, _TAKEOFF = Mode.MISSION, Mode.TAKEOFF
+
+
+class FlightWatch:
+    """Turns what failsafes, guidance and the land detector find into events, once per outer tick."""
+
+    def __init__(
+        self,
+        now: FlightState,
+        journal: Journal,
+        modes: ModeControl,
+        supervisor: Supervisor,
+        ground: GroundWatch,
+        mission: Mission,
+        area: FlightArea,
+        takeoff: Takeoff,
+        navigator: Navigator,
+        weight_n: float,
+    ) -> None:
+        self._now = now
+        self._journal = journal
+        self._modes = modes
+        self._supervisor = supervisor
+        self._ground = ground
+        self._mission = mission
+        self._area = area
+        self._takeoff = takeoff
+        self._navigator = navigator
+        self._weight_n = weight_n
+
+    def update(self) -> None:
+        """Evaluate the newest state and apply the events that follow."""
+        now, supervisor, navigator = self._now, self._supervisor, self._navigator
+        self._ground.watch(now.time_us, float(now.state[5]))
+        supervisor.position_is_controlled = now.flying and not (now.attitude_is_given or now.rests)
+        supervisor.on_ground = now.landed or navigator.touches_ground
+        conditions = supervisor.look(now.time_us, now.status, now.landed, now.setpoint, now.row)
+        if conditions is not None:
+            self._meet_failsafes(conditions)
+        if not now.status.armed:
+            return
+        for rotor in supervisor.take_unmeasured():
+            self._journal.say(
+                Severity.WARNING, f"Rotor {rotor}: speed not measured, failures of it are not detected"
+            )
+        if now.landed or navigator.landed:
+            self._watch_ground()
+        mode = now.status.mode
+        if mode is _MISSION:
+            self._watch_mission()
+        elif mode is _TAKEOFF and now.flying and self._takeoff.is_reached:
+            self._modes.apply(Event.TAKEOFF_REACHED)
+        elif now.landed and mode in STREAM_MODES and self._modes.takes_off() is not now.flying:
+            self._modes.choose_loops()
+
+    def _meet_failsafes(self, conditions: frozenset[Failsafe]) -> None:
+        """Evaluate the failsafes and carry out their decision."""
+        now, supervisor = self._now, self._supervisor
+        before = supervisor.decision
+        phase = phase_of(now.status.armed, now.landed, now.status.mode, self._navigator.goes_elsewhere)
+        for severity, text in supervisor.judge(conditions, phase):
+            self._journal.say(severity, text)
+        decision = supervisor.decision
+        if decision.action <= Action.WARN:
+            return
+        if decision != before:
+            self._journal.status(now.status, failsafe=True)
+        if Failsafe.POSITION_ERROR in supervisor.failsafes:
+            self._navigator.take_up(now.state)
+        for event in EVENTS_OF_ACTION.get(decision.action, ()):
+            if self._modes.apply(event) is None:
+                supervisor.took_over()
+                break
+
+    def _watch_ground(self) -> None:
+        """Note takeoff and landing, and disarm a vehicle that stands too long."""
+        now, landed = self._now, self._navigator.landed
+        if landed != now.landed:
+            now.landed = landed
+            self._ground.changed(now.time_us)
+            if landed:
+                now.landing_us = now.time_us
+                self._area.stands_here()
+            else:
+                now.takeoff_us = now.takeoff_us or now.time_us
+            self._journal.landed(landed)
+            self._modes.choose_loops()
+        event = self._due_on_ground() if landed else None
+        if event is Event.NO_TAKEOFF:
+            waits = now.status.mode is _MISSION and not now.flying
+            if waits and self._mission.takes_off():
+                self._ground.waits(now.time_us)
+                return
+            self._journal.say(Severity.WARNING, "Disarmed: no takeoff")
+        if event is not None:
+            self._modes.apply(event)
+
+    def _due_on_ground(self) -> Event | None:
+        """Return the event that is due on the ground: disarming after a landing, or without a takeoff."""
+        now = self._now
+        goes_on = now.status.mode in AIRBORNE_MODES or (now.status.mode in STREAM_MODES and now.flying)
+        lift = float(now.attitude_target[4]) / self._weight_n
+        standing = Standing(goes_on, now.flying, float(now.state[2]), float(now.state[5]), lift)
+        return self._ground.event(now.time_us, standing, now.behaviour)
+
+    def _watch_mission(self) -> None:
+        """Report progress of the mission, and begin what follows its end."""
+        now = self._now
+        if self._mission.report_progress():
+            self._modes.choose_loops()
+        if now.progress.wants_return:
+            now.mission_complete = True
+            self._journal.say(Severity.INFO, "Mission finished: returning home")
+            self._modes.apply(Event.MISSION_ASKS_RETURN)
+        elif now.progress.finished:
+            now.mission_complete = True
+            self._journal.say(Severity.INFO, "Mission finished")
+            self._modes.apply(Event.MISSION_FINISHED)

@@ -1,0 +1,104 @@
+"""What happened in the flight: events for telemetry, records for the flight log."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol, TypeAlias
+
+from flightstack.commander.transitions import Status
+from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.geodesy import GeoPoint
+from flightstack.core.severity import Severity
+from flightstack.guidance.navigator import MissionProgress
+from flightstack.vehicle.flight_state import FlightState
+
+
+class Recorder(Protocol):
+    """The flight log as the autopilot writes it; ``flight_log.recorder`` implements it."""
+
+    def inner_row(self, time_us: int) -> FloatArray:
+        """Return the row, shape (48,), that the inner loop fills in this tick."""
+
+    def outer(
+        self,
+        time_us: int,
+        state: FloatArray,
+        setpoint: FloatArray,
+        attitude_target: FloatArray,
+        loop_flags: int,
+    ) -> None:
+        """Record one outer tick; ``loop_flags`` say what the loops began it with, 0 while they rest."""
+
+    def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
+        """Record a change of mode, arming, or failsafe."""
+
+    def landed(self, time_us: int, landed: bool) -> None:
+        """Record a change of the land detector."""
+
+    def mission(self, time_us: int, progress: MissionProgress, count: int) -> None:
+        """Record progress of the mission."""
+
+    def home(self, time_us: int, home: GeoPoint, position_ned_m: Vector3) -> None:
+        """Record a change of home."""
+
+    def text(self, time_us: int, severity: int, text: str) -> None:
+        """Record a text."""
+
+
+class Text(NamedTuple):
+    """A text for the operator, sent as STATUSTEXT."""
+
+    severity: int
+    text: str
+
+
+class ItemReached(NamedTuple):
+    """A mission item was reached."""
+
+    seq: int
+
+
+Event: TypeAlias = Text | ItemReached
+
+
+class Journal:
+    """Queues events until telemetry takes them, and records them."""
+
+    def __init__(self, now: FlightState, recorder: Recorder) -> None:
+        self._now = now
+        self._recorder = recorder
+        self._events: list[Event] = []
+
+    def take_events(self) -> list[Event]:
+        """Return the events since the last call, oldest first."""
+        if not self._events:  # the usual case
+            return self._events
+        events, self._events = self._events, []
+        return events
+
+    def say(self, severity: int, text: str) -> None:
+        """Send a text to the operator and record it."""
+        self._events.append(Text(severity, text))
+        self._recorder.text(self._now.time_us, severity, text)
+
+    def item_reached(self, seq: int, progress: MissionProgress, count: int) -> None:
+        """Announce and record that mission item ``seq`` of ``count`` was reached."""
+        self._events.append(ItemReached(seq))
+        self.mission(progress._replace(reached=seq), count)
+        self.say(Severity.INFO, f"Mission item {seq} reached")
+
+    def mission(self, progress: MissionProgress, count: int) -> None:
+        """Record progress of the mission."""
+        self._recorder.mission(self._now.time_us, progress, count)
+
+    def status(self, status: Status, failsafe: bool = False) -> None:
+        """Record a change of mode, arming, or failsafe."""
+        self._recorder.status(self._now.time_us, status, failsafe)
+
+    def landed(self, landed: bool) -> None:
+        """Record and announce a change of the land detector."""
+        self._recorder.landed(self._now.time_us, landed)
+        self.say(Severity.INFO, "Landing detected" if landed else "Takeoff detected")
+
+    def home(self, home: GeoPoint, position_ned_m: Vector3) -> None:
+        """Record a change of home."""
+        self._recorder.home(self._now.time_us, home, position_ned_m)

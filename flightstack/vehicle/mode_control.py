@@ -1,0 +1,149 @@
+"""What events do to mode and arming, and which loops and guidance fly then. No I/O, no clock."""
+
+from __future__ import annotations
+
+from flightstack.commander.ground_watch import GroundWatch
+from flightstack.commander.supervisor import Supervisor
+from flightstack.commander.transitions import Event, Status, transition
+from flightstack.control.backend import ControlBackend
+from flightstack.core.modes import STREAM_MODES, Mode
+from flightstack.core.severity import Severity
+from flightstack.guidance.navigator import Navigator
+from flightstack.guidance.speeds import SpeedOverrides
+from flightstack.vehicle.area import FlightArea
+from flightstack.vehicle.flight_state import FlightState
+from flightstack.vehicle.journal import Journal
+from flightstack.vehicle.mission import Mission
+from flightstack.vehicle.readiness import Readiness
+from flightstack.vehicle.takeoff import Takeoff
+
+
+class ModeControl:
+    """Applies events by the table of ``commander.transitions``."""
+
+    def __init__(
+        self,
+        now: FlightState,
+        journal: Journal,
+        readiness: Readiness,
+        supervisor: Supervisor,
+        ground: GroundWatch,
+        mission: Mission,
+        area: FlightArea,
+        takeoff: Takeoff,
+        navigator: Navigator,
+        backend: ControlBackend,
+    ) -> None:
+        self._now = now
+        self._journal = journal
+        self._readiness = readiness
+        self._supervisor = supervisor
+        self._ground = ground
+        self._mission = mission
+        self._area = area
+        self._takeoff = takeoff
+        self._navigator = navigator
+        self._backend = backend
+
+    # ------------------------------------------------------------------ events
+
+    def apply(self, event: Event, takeoff_altitude_m: float | None = None) -> str | None:
+        """Apply an event; return the refusal, or None. ``takeoff_altitude_m`` is above home."""
+        before = self._now.status
+        outcome = transition(before, self._readiness.facts, event)
+        refusal = outcome.refusal
+        if refusal is None and event is Event.SELECT_TAKEOFF:
+            refusal = self._takeoff.set_altitude(takeoff_altitude_m)
+        if refusal is None and event is Event.SELECT_MISSION and before.armed:
+            refusal = self._mission.refusal()
+        if refusal is not None:
+            return refusal
+        if self._begins_return(before, outcome.status) and self._area.return_place() is None:
+            if before.mode is not Mode.LAND:
+                self._journal.say(Severity.WARNING, "No place to return to is inside the geofence: landing")
+            return self.apply(Event.SELECT_LAND)
+        self._adopt(before, outcome.status, event)
+        return None
+
+    def check_mission_in_flight(self) -> None:
+        """Hold if the mission in flight has become one to refuse: home or limits have changed."""
+        status = self._now.status
+        refusal = self._mission.refusal() if status.armed and status.mode is Mode.MISSION else None
+        if refusal is not None:
+            self._journal.say(Severity.WARNING, f"Mission held: {refusal}")
+            self.apply(Event.SELECT_HOLD)
+
+    def mission_cleared(self) -> None:
+        """Hold if the mission in flight was cleared. Not a user's choice of mode: it overrides no failsafe."""
+        if self._now.status.mode is Mode.MISSION:
+            self.apply(Event.SELECT_HOLD)
+
+    def _begins_return(self, before: Status, after: Status) -> bool:
+        return after.mode is Mode.RETURN and before.mode is not Mode.RETURN and not self._now.landed
+
+    def _adopt(self, before: Status, after: Status, event: Event) -> None:
+        now, journal = self._now, self._journal
+        now.status = after
+        if after.armed and not before.armed:
+            self._begin_flight()
+        if before.armed and not after.armed:  # before the status, which ends the log
+            if now.landed:
+                journal.say(Severity.NOTICE, "Disarmed")
+            else:
+                self._ground.dropped(now.time_us)
+                journal.say(Severity.CRITICAL, "Disarmed in the air")
+        if after != before:
+            journal.status(after)
+        if after.armed and not before.armed:
+            journal.say(Severity.NOTICE, "Armed")
+        if not after.armed:
+            now.landed = True
+            self._navigator.set_speed(SpeedOverrides())
+        if after.mode is Mode.MISSION and before.mode is not Mode.MISSION:
+            self._mission.restart_if_finished()  # before the loops: a finished mission does not take off
+        if event is Event.MISSION_FINISHED:
+            self._navigator.hold_at_last_item()
+        continues = event in (Event.TAKEOFF_REACHED, Event.MISSION_FINISHED)
+        reentered = event in (Event.SELECT_TAKEOFF, Event.SELECT_HOLD)
+        self.choose_loops(entering=not continues and (after.mode is not before.mode or reentered))
+
+    def _begin_flight(self) -> None:
+        """Forget the flight before: the vehicle arms."""
+        now = self._now
+        now.armed_us = now.time_us
+        now.takeoff_us = now.landing_us = 0
+        self._supervisor.armed()
+        self._ground.armed(now.time_us)
+        self._takeoff.altitude_m += self._area.bring_home()
+        now.landed = True
+        self._area.stands_here()
+        self._navigator.rest_at(
+            now.state
+        )  # guidance may hold the end of a flight that was disarmed in the air
+
+    # ------------------------------------------------------------------ loops and guidance
+
+    def choose_loops(self, entering: bool = False) -> None:
+        """Start or stop the loops; ``entering`` makes guidance begin the mode."""
+        now = self._now
+        flying = now.status.armed and (not now.landed or self.takes_off())
+        starting = flying and not now.flying
+        if starting:
+            self._backend.reset(now.state)
+            now.loops_reset = True
+            self._navigator.rest_at(now.state)
+        if entering:
+            place = self._area.return_destination() if now.status.mode is Mode.RETURN else None
+            if place is not None:
+                self._navigator.return_to(place.north_m, place.east_m, -place.altitude_m)
+            self._area.find_ground(place)
+        if starting or (flying and entering):
+            self._navigator.enter(now.status.mode, self._takeoff.altitude_m)
+        now.flying = flying
+
+    def takes_off(self) -> bool:
+        """Return True if the mode takes a vehicle off the ground now."""
+        mode = self._now.status.mode
+        if mode in STREAM_MODES:
+            return self._navigator.wants_to_rise(mode, self._area.stood_down_m)
+        return mode is Mode.TAKEOFF or (mode is Mode.MISSION and self._navigator.mission_flies)

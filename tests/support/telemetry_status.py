@@ -1,0 +1,54 @@
+"""The status of which telemetry messages are made, for tests: a vehicle in flight at a known state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from flightstack.commander.failsafe import Action
+from flightstack.commander.fence_watch import FenceBreaches
+from flightstack.core.contract import LoopRow
+from flightstack.core.geodesy import GeoPoint, LocalFrame
+from flightstack.core.modes import Mode
+from flightstack.guidance.navigator import MissionProgress
+from flightstack.mavlink.dialect import FsLoopTiming
+from flightstack.mavlink.link import Message
+from flightstack.services.telemetry.telemetry import Telemetry
+from flightstack.simulator_link.endpoint import NO_BATTERY
+from flightstack.vehicle.status import FlightTimes, PlanIds, VehicleInfo, VehicleStatus
+
+HOME = GeoPoint(47.397742, 8.545594, 488.0)
+EULER = (0.1, -0.2, 2.5)
+X, Y, Z, W = Rotation.from_euler("ZYX", EULER[::-1]).as_quat()
+
+
+def status(info: dict[str, object] | None = None, **changes: object) -> VehicleStatus:
+    """Return the status with ``changes``, and with those of ``info`` in its constant part."""
+    row = np.zeros(LoopRow.SIZE)
+    row[LoopRow.REFERENCE_RATES] = 0.4, 0.5, 0.6
+    row[LoopRow.WRENCH_ACHIEVED] = 6.0, 0.0, 0.0, 0.0
+    row[LoopRow.ROTOR_SPEED] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 0.0, 0.0]
+    constant = VehicleInfo("paper_quad", 1, False, 4, 12.0, (600.0,) * 4, LocalFrame(HOME))
+    usual = VehicleStatus(
+        info=constant._replace(**(info or {})), time_us=12_345_678, armed=True, mode=Mode.MISSION, landed=False,
+        can_arm=True, failsafe_action=Action.NONE, state_is_good=True,
+        state=np.array([10.0, -20.0, -30.0, 1.0, -2.0, 0.5, W, X, Y, Z, 0.01, 0.02, 0.03]),
+        setpoint=np.arange(11.0), attitude_target=np.array([1.0, 0.0, 0.0, 0.0, 5.0]), row=row, home=HOME,
+        flight=FlightTimes(), mission=MissionProgress(2, 1, False, False), mission_count=5, mission_complete=False,
+        plan_ids=PlanIds(), battery=NO_BATTERY, battery_level=0, fence_acts=True, fence_breached=False,
+        fence_breaches=FenceBreaches(),
+    )  # fmt: skip
+    return replace(usual, **changes)
+
+
+def usual_timing() -> Message:
+    return FsLoopTiming(1, 2, 0, 0, 500.0, 100.0, 30.0, *[1.0] * 6, 0)
+
+
+def telemetry(of: VehicleStatus | None = None, timing: Callable[[], Message] = usual_timing) -> Telemetry:
+    """Return telemetry of a status that does not change."""
+    shown = of or status()
+    return Telemetry(lambda: shown, lambda: shown.time_us, timing)
