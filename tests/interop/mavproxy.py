@@ -33,7 +33,6 @@ class MavProxy:
         """Start it on ``master`` ("tcp:HOST:PORT", "udpin:HOST:PORT") and wait until it has seen the vehicle."""
         self.vehicle = vehicle
         self._lines: int | None = None  # that it had said when it was to end
-        self.lost_at_start = 0
         self._process = Process(
             "MAVProxy.mavproxy", "--master", master, "--state-basedir", str(directory), *options, listens=True
         )
