@@ -8,6 +8,7 @@ import signal
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 
 # pymavlink's mavutil reads it once, at its first import, whichever module that is: without it mavutil.mavlink is
 # the dialect of version 1, whose messages cannot be signed
@@ -17,6 +18,10 @@ os.environ.setdefault("MAVLINK20", "1")
 # Ctrl-C could pass
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# every run tries the same examples: one that fails does so on every machine, and again
+settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
+settings.load_profile("repeatable")
 
 HANGS_AFTER_S = 600.0
 

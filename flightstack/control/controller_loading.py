@@ -15,6 +15,7 @@ from flightstack.params.tunable import Tunable, declaration_problem, undeclared
 from flightstack.params.vehicle import Vehicle
 
 ENTRY_POINT_GROUP = "flightstack.attitude_controllers"
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 _LONGEST_REASON = 160
 
 
@@ -104,14 +105,17 @@ def controller_params(controller: AttitudeController, vehicle: Vehicle, gains: T
 
 def compile_error(name: str, error: Exception) -> ConfigError:
     """Return the error to raise when the controller's step does not compile: the reason and its line."""
-    place = re.search(r'File "([^"]+)", line (\d+)', str(error))
+    place = re.search(r'File "([^"]+)", line (\d+)', _COLOURS.sub("", str(error)))
     where = f" ({place[1].rsplit('/', 1)[-1]}, line {place[2]})" if place else ""
     return controller_error(name, f"its step cannot be compiled: {_reason(error)}{where}")
 
 
 def _reason(error: Exception) -> str:
-    """Return the line of an error's text that says most; Numba's begin with where the compiler was."""
-    lines = [line.strip() for line in str(error).splitlines()]
+    """Return the first line of an error's text that gives a reason: Numba puts its own position before it.
+
+    Numba colours its text if colorama is installed.
+    """
+    lines = [line.strip() for line in _COLOURS.sub("", str(error)).splitlines()]
     telling = [line for line in lines if line and not line.startswith("Failed in")]
     reason = telling[0] if telling else type(error).__name__
     return reason if len(reason) <= _LONGEST_REASON else reason[: _LONGEST_REASON - 1] + "…"

@@ -458,7 +458,7 @@ def test_a_bad_line_changes_no_result() -> None:
         assert bad.steps == status.steps == 30, seed
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.binary(max_size=2_000), rounds=st.integers(1, 3))
 def test_any_octets_leave_a_target_that_answers(data: bytes, rounds: int) -> None:
     target = Target()

@@ -127,7 +127,7 @@ SEGMENTS = st.one_of(
 )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(parts=st.lists(SEGMENTS, max_size=12), eager=st.booleans(), poisoned=st.booleans())
 def test_any_mixture_gives_its_frames_and_every_octet_is_accounted_for(
     codec: ctypes.CDLL, parts: list[bytes], eager: bool, poisoned: bool

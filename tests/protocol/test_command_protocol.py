@@ -166,7 +166,7 @@ def test_an_integer_command_is_sent_as_given() -> None:
     assert math.isnan(message.param4)
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(seed=st.integers(0, 2**32))
 def test_over_a_bad_link_a_command_ends_with_the_vehicles_answer_or_none(seed: int) -> None:
     link = LossyLink(LOSSY, seed)

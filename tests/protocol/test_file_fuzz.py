@@ -83,7 +83,7 @@ class CountedTree:
         return None if file is None else CountedFile(file.read(0, file.size))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(steps)
 def test_the_ftp_server_answers_every_request_and_closes_every_file(
     story: list[tuple[Packet, int, float]],
@@ -107,7 +107,7 @@ def test_the_ftp_server_answers_every_request_and_closes_every_file(
     assert server.next_deadline() is None
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.lists(st.tuples(BYTES, st.integers(1, 255)), max_size=60))
 def test_random_payloads_harm_nobody(payloads: list[tuple[bytes, int]]) -> None:
     server, client = FtpServer(VEHICLE, TREE), FtpClient(VEHICLE, GCS)
@@ -127,7 +127,7 @@ def test_random_payloads_harm_nobody(payloads: list[tuple[bytes, int]]) -> None:
     assert good.result == FtpDone(BIG)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(steps)
 def test_the_ftp_client_takes_whatever_a_vehicle_answers(story: list[tuple[Packet, int, float]]) -> None:
     client, now_s = FtpClient(VEHICLE, GCS), 0.0
@@ -162,7 +162,7 @@ log_messages = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(st.lists(st.tuples(log_messages, st.integers(1, 3), st.floats(0.0, 3.0)), max_size=60))
 def test_the_log_server_takes_any_request(story: list[tuple[Message, int, float]]) -> None:
     store, now_s = MemoryLogs(LOGS.content), 0.0
@@ -181,7 +181,7 @@ def test_the_log_server_takes_any_request(story: list[tuple[Message, int, float]
     assert [entry.size for entry in good.result.entries] == [len(data) for data in store.content.values()]
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     st.integers(0, 400),
     st.lists(

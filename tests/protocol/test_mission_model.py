@@ -157,7 +157,5 @@ class Transfers(RuleBasedStateMachine):
                 assert client.plan_id == mission_id(wish or ())
 
 
-Transfers.TestCase.settings = settings(
-    derandomize=True, deadline=None, max_examples=200 if NIGHTLY else 60, stateful_step_count=40
-)
+Transfers.TestCase.settings = settings(max_examples=200 if NIGHTLY else 60, stateful_step_count=40)
 TestTransfers = Transfers.TestCase

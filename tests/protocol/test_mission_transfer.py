@@ -39,7 +39,7 @@ def test_a_lossless_upload_takes_one_request_and_one_answer_per_item() -> None:
     assert world.now_s == 100.0
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(seed=SEEDS, count=st.integers(1, 40))
 def test_a_bad_link_carries_the_mission_whole_or_not_at_all(seed: int, count: int) -> None:
     world = World(GroundStation("gcs", LOSSY, seed), GroundStation("observer", system=254))
@@ -54,7 +54,7 @@ def test_a_bad_link_carries_the_mission_whole_or_not_at_all(seed: int, count: in
     assert world.download("observer") == world.server.items()
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(seed=SEEDS, count=st.integers(0, 40))
 def test_a_bad_link_carries_a_download_whole_or_not_at_all(seed: int, count: int) -> None:
     world = World(GroundStation("gcs", LOSSY, seed), GroundStation("other", system=254))
@@ -72,7 +72,7 @@ def test_uploads_over_a_bad_link_nearly_always_succeed() -> None:
     assert failures <= 2
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(seed=SEEDS, steps=st.integers(0, 120))
 def test_a_cancelled_upload_leaves_the_old_mission_and_the_server_free(seed: int, steps: int) -> None:
     world = World(GroundStation("gcs", LOSSY, seed), GroundStation("other", system=254))
@@ -92,7 +92,7 @@ def test_a_cancelled_upload_leaves_the_old_mission_and_the_server_free(seed: int
     assert world.upload("other", mission(4, mark=3)) == Done(mission(4, mark=3))
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(seed=SEEDS, steps=st.integers(0, 60), count=st.sampled_from([5, 20, 33]))
 @example(seed=32483, steps=9, count=1)  # these mix, or are cut short, when the second starts at once
 @example(seed=3673, steps=6, count=20)
@@ -112,7 +112,7 @@ def test_an_upload_right_after_a_cancelled_one_never_mixes_with_it(seed: int, st
         assert world.server.items() == second
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(seed=SEEDS, head_start=st.integers(0, 80))
 def test_two_clients_at_once_never_mix(seed: int, head_start: int) -> None:
     world = World(GroundStation("one", LOSSY, seed), GroundStation("two", LOSSY, seed + 1, system=254))

@@ -6,7 +6,7 @@ import struct
 from contextlib import suppress
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavftp
 
@@ -103,7 +103,6 @@ def test_unknown_arguments_are_ignored(store: ParamStore) -> None:
     assert pack_file(store, "colour=red") == pack_file(store, "")
 
 
-@settings(derandomize=True, deadline=None)
 @given(
     st.dictionaries(NAME, st.tuples(st.floats(-100, 100, width=32), st.booleans()), min_size=1, max_size=30)
 )
@@ -119,7 +118,6 @@ def test_any_set_of_names_comes_back(parameters: dict[str, tuple[float, bool]]) 
     assert [(name.decode(), value) for name, value, _ in params] == [row[:2] for row in expected(store)]
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.binary(max_size=60), st.booleans())
 def test_bytes_that_are_no_such_file_are_refused(junk: bytes, has_header: bool) -> None:
     data = struct.pack("<HHH", 0x671B, 5, 5) + junk if has_header else junk

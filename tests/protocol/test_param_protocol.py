@@ -278,7 +278,7 @@ READS = st.builds(mavlink.MAVLink_param_request_read_message, IDS, IDS, NAMES, s
 LISTS = st.builds(mavlink.MAVLink_param_request_list_message, IDS, IDS)
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.lists(st.one_of(SETS, READS, LISTS), max_size=30))
 def test_any_message_is_taken_and_no_value_leaves_its_range(messages: list[Message]) -> None:
     world = world_of(40)
@@ -344,7 +344,7 @@ def test_a_vehicle_that_knows_no_param_error_is_told_by_the_value_it_keeps() -> 
     assert world.set("gcs", "P001_", 2000.0) == ParamFailed("the vehicle keeps 0.1", None, False)
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(seed=SEEDS, count=st.integers(1, 120), loss=st.floats(0.0, 0.5))
 def test_a_list_over_a_bad_link_is_complete(seed: int, count: int, loss: float) -> None:
     world = World(store_of(count), Station("gcs", LOSSY._replace(loss=loss), seed))
@@ -360,7 +360,7 @@ def test_lists_over_half_a_link_nearly_always_succeed() -> None:
     assert max(world.now_s for world in worlds) - 100.0 < 15.0
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(seed=SEEDS, loss=st.floats(0.0, 0.5), value=st.integers(-40, 40))
 def test_a_set_over_a_bad_link_never_lies(seed: int, loss: float, value: int) -> None:
     world = World(store_of(10), Station("gcs", LOSSY._replace(loss=loss), seed))
@@ -376,7 +376,7 @@ def test_a_set_over_a_bad_link_never_lies(seed: int, loss: float, value: int) ->
         assert loss > 0.3
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(seed=SEEDS)
 def test_two_clients_at_once_agree(seed: int) -> None:
     world = World(store_of(60), Station("one", LOSSY, seed), Station("two", LOSSY, seed + 1, system=254))

@@ -34,7 +34,7 @@ IDENTITY = Quaternion(1.0, 0.0, 0.0, 0.0)
 AXES = ["roll", "pitch", "yaw"]
 AT_REST, NO_MEMORY = PidMemory(0.0, 0.0, 0.0), BacksteppingMemory(0.0)
 
-properties = settings(derandomize=True, deadline=None, max_examples=60)
+properties = settings(max_examples=60)
 vectors = st.tuples(*[st.floats(-5.0, 5.0)] * 3)
 
 

@@ -62,7 +62,7 @@ def test_rates_that_cannot_be(inner: float, outer: float, sentence: str) -> None
     assert str(error.value) == sentence
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(50, 100_000))
 def test_the_default_outer_rate_divides_any_inner_rate(interval_us: int) -> None:
     inner = 1e6 / interval_us
@@ -126,7 +126,7 @@ def test_missed_deadlines_are_skipped_counted_and_not_hurried_after() -> None:
     assert timing.missed == 2
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(st.integers(0, 5 * PERIOD), min_size=1, max_size=40))
 def test_periods_add_up_to_the_time_that_has_passed(work: list[int]) -> None:
     """The loops' time never runs ahead of the clock and never falls back by a period."""

@@ -17,7 +17,12 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 from flightstack.control.attitude_pid import CONTROLLER as PID
-from flightstack.control.controller_loading import controller_names, form_problem, load_controller
+from flightstack.control.controller_loading import (
+    compile_error,
+    controller_names,
+    form_problem,
+    load_controller,
+)
 from flightstack.core.contract import LoopRow
 from flightstack.core.errors import ConfigError
 from flightstack.params.config import StackConfig
@@ -344,6 +349,12 @@ def test_a_broken_controller_is_one_sentence_that_lists_the_installed_ones(site:
     assert shown.endswith("; installed are backstepping, broken, pid")
     assert "\n" not in shown
     assert len(shown) < 400
+
+
+def test_colours_of_the_compiler_do_not_hide_the_reason() -> None:
+    """Numba colours its messages if colorama is installed."""
+    text = '\x1b[1mFailed in nopython mode\x1b[0m\n\x1b[1mUnknown attribute\x1b[0m\n\x1b[1mFile "a.py", line 3:\x1b[0m'
+    assert "compiled: Unknown attribute (a.py, line 3)" in str(compile_error("pid", ValueError(text)))
 
 
 def test_two_packages_with_one_name_are_not_guessed_between(installed: Path) -> None:

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from flightstack.commander.failsafe import Action, Failsafe, Phase
 from flightstack.commander.failsafe_step import (
-    CRITICAL,
-    EMERGENCY,
     IDLE,
-    NOTICE,
-    WARNING,
     Announcement,
     Memory,
     Situation,
@@ -16,6 +12,7 @@ from flightstack.commander.failsafe_step import (
     failsafe_step,
     override,
 )
+from flightstack.core.severity import Severity
 from flightstack.params.behaviour import Behaviour, with_assignments
 
 
@@ -47,8 +44,8 @@ def test_a_return_waits_in_hold_and_both_are_said_once() -> None:
     flight.phase = Phase.RETURN
     assert flight.run(5.0, Failsafe.GCS_LOST) is Action.WARN
     assert flight.said == [
-        (CRITICAL, "Ground station lost: holding, returning in 5 s"),
-        (CRITICAL, "Failsafe: returning (ground station lost)"),
+        (Severity.CRITICAL, "Ground station lost: holding, returning in 5 s"),
+        (Severity.CRITICAL, "Failsafe: returning (ground station lost)"),
     ]
 
 
@@ -56,7 +53,7 @@ def test_a_condition_that_ends_in_the_wait_is_over() -> None:
     flight = Flight("NAV_DLL_ACT=2")
     flight.run(2.0, Failsafe.GCS_LOST)
     assert flight.run(9.0) is Action.NONE
-    assert flight.said[-1] == (NOTICE, "Ground station is back")
+    assert flight.said[-1] == (Severity.NOTICE, "Ground station is back")
     assert active(flight.memory) == ()
     assert flight.run(1.0, Failsafe.GCS_LOST) is Action.HOLD  # the wait begins anew
 
@@ -69,7 +66,7 @@ def test_who_returns_or_lands_is_not_made_to_wait() -> None:
 def test_without_delay_a_failsafe_acts_at_once() -> None:
     flight = Flight("NAV_DLL_ACT=3", "COM_FAIL_ACT_T=0")
     assert flight.run(0.1, Failsafe.GCS_LOST) is Action.LAND
-    assert flight.said == [(CRITICAL, "Ground station lost: landing")]
+    assert flight.said == [(Severity.CRITICAL, "Ground station lost: landing")]
 
 
 def test_a_second_failsafe_escalates_and_names_itself() -> None:
@@ -80,9 +77,9 @@ def test_a_second_failsafe_escalates_and_names_itself() -> None:
     everything = (Failsafe.BATTERY_LOW, Failsafe.BATTERY_CRITICAL, Failsafe.BATTERY_EMERGENCY)
     assert flight.run(0.1, *everything) is Action.LAND
     assert flight.said == [
-        (WARNING, "Battery level is low"),
-        (CRITICAL, "Battery level is critical: returning"),
-        (CRITICAL, "Battery level is dangerously low: landing"),
+        (Severity.WARNING, "Battery level is low"),
+        (Severity.CRITICAL, "Battery level is critical: returning"),
+        (Severity.CRITICAL, "Battery level is dangerously low: landing"),
     ]
     assert active(flight.memory) == everything[::-1]
 
@@ -109,8 +106,8 @@ def test_without_a_state_the_rotors_hold_and_then_stop() -> None:
     assert flight.run(2.0, Failsafe.STATE_STALE) is Action.BLIND
     assert flight.run(0.1, Failsafe.STATE_STALE) is Action.TERMINATE
     assert flight.said == [
-        (EMERGENCY, "State is frozen or missing: rotors hold their speeds"),
-        (EMERGENCY, "Failsafe: flight terminated (state is frozen or missing)"),
+        (Severity.EMERGENCY, "State is frozen or missing: rotors hold their speeds"),
+        (Severity.EMERGENCY, "Failsafe: flight terminated (state is frozen or missing)"),
     ]
 
 
@@ -118,7 +115,7 @@ def test_a_state_that_comes_back_ends_the_blindness() -> None:
     flight = Flight("FS_BLIND_T=2")
     flight.run(1.5, Failsafe.NOT_FINITE)
     assert flight.run(5.0) is Action.NONE
-    assert flight.said[-1] == (NOTICE, "State and controller output are finite again")
+    assert flight.said[-1] == (Severity.NOTICE, "State and controller output are finite again")
 
 
 def test_rotors_may_hold_for_ever() -> None:
@@ -134,7 +131,7 @@ def test_an_action_that_is_switched_off_says_nothing() -> None:
 def test_a_link_without_action_is_told_of_all_the_same() -> None:
     flight = Flight("NAV_DLL_ACT=0")
     assert flight.run(1.0, Failsafe.GCS_LOST) is Action.WARN
-    assert flight.said == [(WARNING, "Ground station lost")]
+    assert flight.said == [(Severity.WARNING, "Ground station lost")]
 
 
 def test_disarming_forgets() -> None:

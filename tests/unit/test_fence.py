@@ -80,7 +80,7 @@ def star_of(seeds: list[tuple[int, int]]) -> list[Point]:
 STARS = st.lists(st.tuples(st.integers(3, 60), st.integers(0, 80)), min_size=3, max_size=12).map(star_of)
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(points=STARS, place=POINTS)
 def test_inside_and_distance_are_those_of_exact_geometry(points: list[Point], place: Point) -> None:
     north, east = Fraction(place[0]), Fraction(place[1])
@@ -97,7 +97,7 @@ def test_inside_and_distance_are_those_of_exact_geometry(points: list[Point], pl
     assert (inside_m, outside_m > 0.0) == (math.inf, not is_inside)
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(points=st.lists(POINTS, min_size=3, max_size=7, unique=True))
 def test_polygons_that_cross_themselves_are_found(points: list[tuple[int, int]]) -> None:
     """Against every pair of edges in whole numbers: do they share a point that they should not?"""
@@ -125,7 +125,7 @@ def test_polygons_that_cross_themselves_are_found(points: list[tuple[int, int]])
     assert found == (expected[0] if expected else None)
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     outer=STARS,
     holes=st.lists(st.tuples(POINTS, st.integers(1, 25)), max_size=2),

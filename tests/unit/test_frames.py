@@ -43,7 +43,7 @@ def test_a_stream_may_be_cut_anywhere(signed: bool, version: int, step: int) -> 
     assert not reader.has_partial
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.lists(st.one_of(st.binary(max_size=60), st.integers(0, 4)), max_size=20), st.integers(1, 300))
 def test_good_frames_are_found_between_noise(parts: list, step: int) -> None:
     """What is reported is always a frame that was sent: noise may hide a frame, but never makes a known one."""

@@ -283,7 +283,6 @@ def test_the_table_fits_a_terminal_of_80_columns() -> None:
     assert "0.38729835" in output.getvalue()
 
 
-@settings(derandomize=True, deadline=None)
 @given(
     st.dictionaries(
         st.text("ABC_", min_size=1, max_size=16),
@@ -361,7 +360,7 @@ KEYS = st.sampled_from(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.lists(st.dictionaries(KEYS, JSON | st.just("P"), max_size=8) | JSON, max_size=4))
 def test_any_metadata_is_read_or_passed_over(entries: list[object]) -> None:
     infos = parse_metadata(lzma.compress(json.dumps({"parameters": entries}).encode()))
@@ -370,7 +369,6 @@ def test_any_metadata_is_read_or_passed_over(entries: list[object]) -> None:
         assert info.help.isprintable()
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.binary(max_size=40) | st.binary(max_size=40).map(lzma.compress))
 def test_bytes_that_are_no_metadata_are_none(data: bytes) -> None:
     assert parse_metadata(data) == {}

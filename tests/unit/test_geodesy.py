@@ -66,7 +66,7 @@ def test_close_to_the_origin_at_sea_level_it_is_exact() -> None:
         assert np.abs(exact - ned).max() < 3e-6
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.floats(-89.0, 89.0),
     st.floats(-180.0, 180.0),

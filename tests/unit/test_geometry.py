@@ -36,7 +36,7 @@ attitudes = (
     .filter(lambda q: np.linalg.norm(q) > 0.1)
     .map(lambda q: Quaternion(*(np.array(q) / np.linalg.norm(q)).tolist()))
 )
-properties = settings(derandomize=True, deadline=None, max_examples=60)
+properties = settings(max_examples=60)
 
 
 def scipy_rotation(q: Quaternion) -> Rotation:

@@ -326,7 +326,7 @@ def any_command(draw: st.DrawFn) -> bytes:
     )
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(st.one_of(st.binary(max_size=100), any_frame(), any_command()), min_size=1, max_size=12))
 def test_nothing_that_arrives_raises(storm: list[bytes]) -> None:
     net = Net()

@@ -14,7 +14,7 @@ from flightstack.mavlink.dialect import FsActuators, FsPlantState, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 
-properties = settings(derandomize=True, deadline=None, max_examples=60)
+properties = settings(max_examples=60)
 times = st.integers(0, 2**64 - 1)
 doubles = st.floats(allow_nan=True, allow_infinity=True, width=64)
 singles = st.floats(allow_nan=True, allow_infinity=True, width=32)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightstack.core.modes import Mode
@@ -38,7 +38,6 @@ def test_the_message_is_read_as_px4_reads_it(sent, sticks: tuple[float, ...]) ->
     assert read_sticks(sent) == pytest.approx(sticks)
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.floats(-1.0, 1.0), st.floats(0.0, 0.9), st.floats(0.0, 1.0))
 def test_a_shaped_stick_is_odd_reaches_its_ends_and_rests_in_the_dead_zone(
     stick: float, deadzone: float, expo: float

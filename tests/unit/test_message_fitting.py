@@ -62,7 +62,7 @@ def filled(kind, number: float, text: bytes):
     return kind(*values)
 
 
-@settings(derandomize=True, deadline=None, max_examples=24)
+@settings(max_examples=24)
 @given(number=st.one_of(HUGE_INTEGERS, ANY_FLOAT), text=st.binary(max_size=300))
 def test_every_message_of_the_dialect_takes_any_number(number: float, text: bytes) -> None:
     for kind in KINDS:
@@ -73,7 +73,7 @@ def test_every_message_of_the_dialect_takes_any_number(number: float, text: byte
             raise
 
 
-@settings(derandomize=True, deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(
     times=st.lists(HUGE_INTEGERS, min_size=5, max_size=5),
     counts=st.lists(HUGE_INTEGERS, min_size=8, max_size=8),
@@ -96,7 +96,7 @@ def test_telemetry_of_extreme_facts_is_sent(times: list[int], counts: list[int],
             over_the_wire(message)
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(time_us=HUGE_INTEGERS, values=st.lists(ANY_FLOAT, min_size=13, max_size=13))
 def test_simulator_state_of_extreme_values_is_sent(time_us: int, values: list[float]) -> None:
     vehicle = load_vehicle("paper_quad")
@@ -186,7 +186,7 @@ def logged(*events: tuple[int, dict[str, float]], topic: str) -> ULog:
 
 
 @pytest.mark.parametrize("topic", EVENT_TOPICS, ids=lambda topic: topic.name)
-@settings(derandomize=True, deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(time_us=HUGE_INTEGERS, number=st.one_of(HUGE_INTEGERS, ANY_FLOAT))
 def test_every_event_topic_takes_any_number(topic, time_us: int, number: float) -> None:
     read = logged((time_us, {field.name: number for field in topic.fields}), (5, {}), topic=topic.name)

@@ -18,7 +18,7 @@ from tests.support.rotor_sets import irregular_vehicles, ring
 PAPER, X_QUAD = load_vehicle("paper_quad"), load_vehicle("x_quad")
 VEHICLES = {"paper": PAPER, "x": X_QUAD, "hexa": ring(6, first_deg=30.0), "octo": ring(8, first_deg=22.5)}
 
-properties = settings(derandomize=True, deadline=None, max_examples=60)
+properties = settings(max_examples=60)
 demands = st.tuples(*[st.floats(-1.0, 1.0)] * 4)
 
 
@@ -129,7 +129,7 @@ def best_by_linear_programming(vehicle: Vehicle, wrench: tuple[float, ...]) -> n
     return np.array([thrust, k * wrench[1], k * wrench[2], s * wrench[3]])
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.one_of(irregular_vehicles(), st.sampled_from(list(VEHICLES.values()))), demands, st.floats(0.3, 3.0)
 )

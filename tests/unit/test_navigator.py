@@ -30,7 +30,7 @@ def test_takeoff_rises_straight_to_its_altitude_at_its_speed() -> None:
     assert not vehicle.navigator.landed
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.floats(-8.0, 8.0), st.floats(-8.0, 8.0), st.floats(-2.0, 1.5))
 def test_hold_stops_ahead_and_never_goes_back_far(north: float, east: float, sink: float) -> None:
     """The hold's point is where the reference comes to rest."""

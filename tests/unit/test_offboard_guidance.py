@@ -210,7 +210,7 @@ point = st.builds(PointSetpoint, vector, vector, vector, number, number)
 unit = st.floats(-1.0, 1.0)
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     st.lists(st.tuples(point, st.integers(1, 60)), min_size=1, max_size=6),
     st.builds(Sticks, unit, unit, unit, unit),

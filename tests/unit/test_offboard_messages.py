@@ -155,7 +155,7 @@ def test_an_attitude_is_normalised_and_its_thrust_bounded() -> None:
 number = st.floats(width=32)
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(
     st.integers(0, 0xFFFF),
     st.integers(0, 255),

@@ -53,7 +53,7 @@ from gcs_cli.experiments.paper.linear.small_signal import (
 from gcs_cli.experiments.paper.linear.steps import SecondOrder, StepFigures, exact_figures, read_figures
 from tests.support.tools import NIGHTLY
 
-properties = settings(derandomize=True, deadline=None, max_examples=60)
+properties = settings(max_examples=60)
 
 POINTS, TIME_S = 0.1, 0.002
 """What the paper's issue asks for: overshoot in points, times in seconds."""

@@ -112,7 +112,7 @@ ITEMS = st.builds(
 )  # fmt: skip
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(items=st.lists(ITEMS, max_size=8))
 def test_no_items_raise(items: list[MissionItem]) -> None:
     for rejection in (check_fence(items, HOME, (0.0, 0.0)), check_rally(items, HOME)):

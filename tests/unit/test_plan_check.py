@@ -183,7 +183,7 @@ def idle_loop_by_brute_force(items: tuple[MissionItem, ...]) -> bool:
     return any(reach[seq][seq] for seq in range(count))
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(data=st.data(), count=st.integers(2, 9))
 def test_idle_loops_are_found_as_by_brute_force(data: st.DataObject, count: int) -> None:
     items: list[MissionItem] = []
@@ -202,7 +202,7 @@ def test_idle_loops_are_found_as_by_brute_force(data: st.DataObject, count: int)
 ANY_FLOAT = st.floats(width=32)
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(
     st.lists(
         st.builds(

@@ -50,7 +50,7 @@ def plans(draw: st.DrawFn) -> Plan:
     return Plan(tuple(draw(items(count)) for _ in range(count)), home)
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(plan=plans())
 def test_a_plan_survives_both_formats(plan: Plan) -> None:
     again = read_plan(plan_to_json(plan), "test")
@@ -61,7 +61,7 @@ def test_a_plan_survives_both_formats(plan: Plan) -> None:
     assert again.home == (None if plan.home == GeoPoint(0.0, 0.0, 0.0) else plan.home)
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(plan=plans())
 def test_pymavlinks_loader_reads_the_same_waypoints(plan: Plan, tmp_path_factory: Any) -> None:
     path = tmp_path_factory.mktemp("wp") / "plan.waypoints"

@@ -26,7 +26,7 @@ ZERO, LEVEL = Vector3(0.0, 0.0, 0.0), Quaternion(1.0, 0.0, 0.0, 0.0)
 EMPTY = PositionMemory(0.0, 0.0, 0.0)
 TUNED = read_position_params(PAPER, open_gains("tuned"), math.radians(45.0))
 
-properties = settings(derandomize=True, deadline=None, max_examples=60)
+properties = settings(max_examples=60)
 
 
 def vehicle_at(position=ZERO, velocity=ZERO, attitude: Quaternion = LEVEL) -> VehicleState:

@@ -183,7 +183,7 @@ def test_loop_timing_comes_from_the_telemetry_log(tmp_path: Path, flight: Flight
     assert "No loop timing" in out.read_text(encoding="utf-8")
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.integers(1, 3000), st.integers(1, 40), st.integers(0, 2**32 - 1))
 def test_decimation_keeps_peaks_order_and_ends(count: int, buckets: int, seed: int) -> None:
     x, y = np.arange(count, dtype=float), np.random.default_rng(seed).normal(size=count)
@@ -202,7 +202,7 @@ def test_a_single_spike_in_a_long_flight_is_drawn() -> None:
     assert decimated(x, y)[1].max() == 7.0
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6), st.integers(3, 12))
 def test_ticks_are_round_few_and_inside(low: float, span: float, count: int) -> None:
     ticks = nice_ticks(low, low + span, count)

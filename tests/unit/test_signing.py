@@ -176,7 +176,6 @@ def test_a_frame_of_another_key_is_refused_and_changes_nothing() -> None:
     assert own.counts == Counts(good=1, bad_signature=1)
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 255))
 def test_a_changed_octet_is_refused(place: int, change: int) -> None:
     own = signing()
@@ -272,7 +271,6 @@ def test_a_heard_timestamp_takes_ours_along() -> None:
     assert own.next_timestamp() == NOW + 1000
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.0, 70.0), st.integers(0, 9_000_000), st.booleans()), max_size=30))
 def test_timestamps_rise_over_orderly_ends(steps: list[tuple[float, int, bool]]) -> None:
     """Frames sent and heard, a clock that is set back now and then, and starts anew."""
@@ -294,7 +292,6 @@ def test_timestamps_rise_over_orderly_ends(steps: list[tuple[float, int, bool]])
     assert used == sorted(set(used))
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.lists(st.tuples(st.floats(1e-4, 70.0), st.booleans()), max_size=30))
 def test_timestamps_follow_the_clock_over_crashes(steps: list[tuple[float, bool]]) -> None:
     disk, clock = [0], Clock()
@@ -360,7 +357,7 @@ def test_a_log_gets_the_frame_without_its_signature() -> None:
     assert without_signature(signed, extra) == without_signature(unsigned, extra) == unsigned
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.binary(max_size=80), st.integers(0, 1), st.booleans())
 def test_any_octets_are_taken_without_an_error(junk: bytes, flags: int, has_header: bool) -> None:
     receiver = link(signing())

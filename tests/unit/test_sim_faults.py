@@ -90,7 +90,7 @@ def test_a_bad_fault_is_named_in_one_sentence(text: str, said: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@settings(max_examples=300)
 @given(st.one_of(st.text(max_size=40), st.from_regex(r"(rotor:\d*:|state:|battery:)\w*=?[\d.e-]*@?[\d.e-]*")))
 def test_any_text_is_read_or_refused(text: str) -> None:
     try:

@@ -18,7 +18,7 @@ VERSION_1 = bytes(
 )
 FRAMES = [HEARTBEAT, ACTUATORS, VERSION_1]
 STARTS = [b"\xfd\xff\x00", b"\xfe\xff", b"\xfd", b"\xfe", b"\xfd\x10\x01", HEARTBEAT[:9], ACTUATORS[:50]]
-properties = settings(derandomize=True, deadline=None, max_examples=200)
+properties = settings(max_examples=200)
 
 
 @properties

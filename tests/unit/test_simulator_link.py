@@ -196,7 +196,7 @@ def test_hil_controls_are_shares_of_thrust(client: Client) -> None:
     assert client.sim.free_running
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(
     st.lists(st.one_of(st.binary(max_size=60), st.sampled_from([actuators(0), actuators(9)])), max_size=12)
 )

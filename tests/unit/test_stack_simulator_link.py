@@ -130,7 +130,7 @@ def test_junk_between_frames_costs_no_state(junk: bytes) -> None:
         assert stack.state.tolist() == STATE
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.lists(
         st.one_of(st.binary(max_size=80), st.sampled_from([STREAM, hil_state(), heartbeat()])), max_size=10

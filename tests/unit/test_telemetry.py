@@ -310,7 +310,7 @@ def test_version_is_ours() -> None:
     assert m.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=13, max_size=13), st.floats())
 def test_no_state_is_too_absurd_to_be_told(values: list[float], thrust: float) -> None:
     """Doubles of any size go through single-precision and integer fields."""

@@ -45,7 +45,7 @@ def test_a_text_is_shown_on_one_line(text: str, shown: str) -> None:
     assert clean(text) == shown
 
 
-@settings(derandomize=True, deadline=None, max_examples=500)
+@settings(max_examples=500)
 @given(HOSTILE)
 def test_a_clean_text_holds_nothing_that_a_terminal_obeys(text: str) -> None:
     shown = clean(text)
@@ -54,7 +54,6 @@ def test_a_clean_text_holds_nothing_that_a_terminal_obeys(text: str) -> None:
     assert clean(shown) == shown
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.binary(max_size=16))
 def test_every_text_field_of_a_message_is_clean(octets: bytes) -> None:
     for message in (
@@ -74,7 +73,6 @@ def test_a_message_that_is_passed_on_keeps_its_octets() -> None:
     assert bytes(received.get_msgbuf()) == frame
 
 
-@settings(derandomize=True, deadline=None)
 @given(HOSTILE)
 def test_a_status_text_is_shown_on_one_line(text: str) -> None:
     session, vehicle = Session(), Link(1, 1)
@@ -85,7 +83,6 @@ def test_a_status_text_is_shown_on_one_line(text: str) -> None:
     assert text_line(entry).isprintable()
 
 
-@settings(derandomize=True, deadline=None)
 @given(HOSTILE.filter(lambda name: name.strip("./") and not set(name) & {"/", "\0"}))
 def test_a_listed_file_has_a_clean_name(name: str) -> None:
     name = name.encode(errors="replace").decode()

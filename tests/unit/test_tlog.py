@@ -80,7 +80,7 @@ def signed_frame() -> bytes:
 KINDS = [*frames(), loop_timing_frame(), version_1_frame(), signed_frame()]
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.lists(st.sampled_from(KINDS), max_size=8), st.integers(0, 400))
 def test_every_prefix_gives_the_whole_records_in_it(chosen: list[bytes], cut: int) -> None:
     records = [encode_record(4 * index, frame) for index, frame in enumerate(chosen)]
@@ -92,7 +92,7 @@ def test_every_prefix_gives_the_whole_records_in_it(chosen: list[bytes], cut: in
     assert [record.time_us for record in got] == [4 * index for index in range(complete)]
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(st.binary(max_size=200))
 def test_any_bytes_are_read_without_error(data: bytes) -> None:
     assert sum(len(record.frame) + 8 for record in decode_records(data)) <= len(data)

@@ -28,7 +28,7 @@ X, Y, Z, VX, VY, VZ, AX, AY, AZ, YAW, YAW_RATE = range(11)
 DEFAULT_LIMITS = TrajectoryLimits(3.0, 3.0, 20.0)
 AT_REST = Trajectory(*[0.0] * 11)
 
-properties = settings(derandomize=True, deadline=None, max_examples=60)
+properties = settings(max_examples=60)
 places = st.tuples(st.floats(-60.0, 60.0), st.floats(-60.0, 60.0), st.floats(-30.0, 30.0))
 # the whole range that the parameters allow, in the form that guidance uses
 limit_sets = st.builds(

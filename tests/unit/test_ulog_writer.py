@@ -291,7 +291,7 @@ def test_partial_writes_are_completed(traces: tuple[np.ndarray, np.ndarray]) -> 
     assert file.content == whole.content
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(
     st.dictionaries(st.from_regex(r"[a-z_0-9]{1,20}", fullmatch=True), st.text(max_size=40), max_size=5),
     st.lists(st.tuples(st.integers(0, 7), st.text(max_size=60)), max_size=5),

@@ -264,7 +264,7 @@ def _raw_frame(message_id: int, payload: bytes) -> Any:
 FOLDED = [0, 1, 2, 30, 32, 33, 42, 46, 74, 83, 85, 242, 245, 253, 291, 53002]
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(st.lists(st.tuples(st.sampled_from(FOLDED), st.binary(min_size=1, max_size=64)), max_size=6))
 def test_no_payload_raises(messages: list[tuple[int, bytes]]) -> None:
     vehicle = Vehicle()

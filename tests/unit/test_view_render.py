@@ -134,7 +134,7 @@ def test_long_messages_are_wrapped_and_the_newest_is_at_the_bottom() -> None:
     assert text.index("refused because") < text.index("unlikely")
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(
     st.tuples(*[st.floats(-1e38, 1e38)] * 3),
     st.lists(st.floats(-3e9, 3e9), max_size=8),
