@@ -32,7 +32,7 @@ from flightstack.guidance.manual import manual_step
 from flightstack.guidance.mission import into_ground, mission_goal, mission_step
 from flightstack.guidance.offboard import attitude_step, point_step
 from flightstack.guidance.params import GuidanceParams
-from flightstack.guidance.setpoints import ATTITUDE, S_KIND
+from flightstack.guidance.setpoints import ATTITUDE
 from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, setpoint_of, trajectory_step
 from flightstack.params.vehicle import GRAVITY_M_S2
 
@@ -168,7 +168,7 @@ def stream_kernel(
     mode: int,
     state_array: FloatArray,
     trajectory: FloatArray,
-    stream: FloatArray,
+    stream: RecordArray,
     land: FloatArray,
     last_target: FloatArray,
     params_array: FloatArray,
@@ -187,14 +187,15 @@ def stream_kernel(
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     last, limits = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE)), _limits(params)
     lift = lift_share(state, attitude_target(last_target).thrust_n, params.weight_n)
-    if mode == OFFBOARD and stream[S_KIND] >= ATTITUDE:
-        reference = attitude_step(stream, last_target, state, params, limits, dt_s, target)
+    s = stream[0]
+    if mode == OFFBOARD and s["kind"] >= ATTITUDE:
+        reference = attitude_step(s, last_target, state, params, limits, dt_s, target)
         descent_m_s = math.inf
     else:
         if mode == OFFBOARD:
-            reference = point_step(last, stream, state, params, limits, dt_s)
+            reference = point_step(last, s, state, params, limits, dt_s)
         else:
-            reference = manual_step(last, stream, state, mode == POSITION, params, limits, dt_s)
+            reference = manual_step(last, s["sticks"], state, mode == POSITION, params, limits, dt_s)
         reference = _waiting(last, reference, state)
         descent_m_s = reference.vz
     _finish(last, reference, state, trajectory, land, lift, descent_m_s, dt_s, setpoint)

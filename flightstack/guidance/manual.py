@@ -11,7 +11,7 @@ from flightstack.core.portable_math import sin_cos, tan
 from flightstack.guidance.follow import follow_heading, follow_horizontally, follow_vertically, leashed
 from flightstack.guidance.mission import landing_speed
 from flightstack.guidance.params import GuidanceParams
-from flightstack.guidance.setpoints import NOT_GIVEN, STICKS_AT
+from flightstack.guidance.setpoints import NOT_GIVEN
 from flightstack.guidance.trajectory import KA, Trajectory, TrajectoryLimits, clipped
 from flightstack.params.vehicle import GRAVITY_M_S2
 
@@ -30,10 +30,10 @@ def shaped(stick: float, deadzone: float, expo: float) -> float:
 
 
 @compiled
-def _horizontal_sticks(stream: FloatArray, params: GuidanceParams, expo: float) -> tuple[float, float]:
+def _horizontal_sticks(sticks: FloatArray, params: GuidanceParams, expo: float) -> tuple[float, float]:
     """Return forward and right within the unit circle: diagonally no faster than straight."""
-    forward = shaped(stream[STICKS_AT], params.stick_deadzone, expo)
-    right = shaped(stream[STICKS_AT + 1], params.stick_deadzone, expo)
+    forward = shaped(sticks[0], params.stick_deadzone, expo)
+    right = shaped(sticks[1], params.stick_deadzone, expo)
     return clipped(forward, right, 1.0)
 
 
@@ -44,16 +44,16 @@ def _to_ned(forward: float, right: float, yaw_rad: float) -> tuple[float, float]
 
 
 @compiled
-def _climb_wanted(stream: FloatArray, down_m: float, params: GuidanceParams) -> float:
+def _climb_wanted(sticks: FloatArray, down_m: float, params: GuidanceParams) -> float:
     """Vertical speed [m/s], down positive; near the ground the descent is a landing's."""
-    up = shaped(stream[STICKS_AT + 2], params.stick_deadzone, params.stick_z_expo)
+    up = shaped(sticks[2], params.stick_deadzone, params.stick_z_expo)
     return -up * (params.climb_speed_m_s if up > 0.0 else landing_speed(down_m, params))
 
 
 @compiled
 def manual_step(
     t: Trajectory,
-    stream: FloatArray,
+    sticks: FloatArray,
     state: VehicleState,
     holds_position: bool,
     params: GuidanceParams,
@@ -68,16 +68,16 @@ def manual_step(
     """
     p, v = state.position_ned_m, state.velocity_ned_m_s
     none = math.nan
-    turn = shaped(stream[STICKS_AT + 3], params.stick_deadzone, params.stick_yaw_expo)
+    turn = shaped(sticks[3], params.stick_deadzone, params.stick_yaw_expo)
     present_yaw = euler_from_quaternion(state.attitude).z
     top = params.manual_yaw_rate_rad_s
     yaw, yaw_rate = follow_heading(t, none, turn * top, top, present_yaw, dt_s)
-    climb = _climb_wanted(stream, p.z, params)
+    climb = _climb_wanted(sticks, p.z, params)
     z, vz, az = follow_vertically(
         t, none, climb, none, params.climb_speed_m_s, params.descent_speed_m_s, limits, dt_s
     )
     if holds_position:
-        forward, right = _horizontal_sticks(stream, params, params.stick_xy_expo)
+        forward, right = _horizontal_sticks(sticks, params, params.stick_xy_expo)
         north, east = _to_ned(forward, right, t.yaw_rad)
         top = params.manual_speed_m_s
         x, y, vx, vy, ax, ay = follow_horizontally(
@@ -85,7 +85,7 @@ def manual_step(
         )
         x, y = leashed(x, p.x), leashed(y, p.y)
     else:
-        forward, right = _horizontal_sticks(stream, params, 0.0)
+        forward, right = _horizontal_sticks(sticks, params, 0.0)
         size = math.sqrt(forward * forward + right * right)
         scale = GRAVITY_M_S2 * tan(size * params.manual_tilt_rad) / size if size > 1e-9 else 0.0
         north, east = _to_ned(forward * scale, right * scale, t.yaw_rad)

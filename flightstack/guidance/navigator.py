@@ -34,12 +34,6 @@ from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import (
     ATTITUDE,
     POINT,
-    S_ACCELERATION,
-    S_KIND,
-    S_POSITION,
-    S_THRUST,
-    S_VELOCITY,
-    STICKS_AT,
     OffboardSetpoint,
     Sticks,
     empty_stream,
@@ -81,13 +75,13 @@ class Navigator:
         # a field is read ten times as fast through a memoryview of it
         views = (self._mission[name].data for name in MissionProgress._fields)
         self._current, self._reached, self._finished, self._wants_return = views
-        self._progress_seen: MissionProgress | None = None
         self._reported = 0
         self._repositions = False
         self._aim: RecordArray = np.zeros(1, AIM)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0, 0.0))
         self._land_now = self._land.data  # a number of an array takes four times as long to read
         self._stream = empty_stream()
+        self._stream_kind = self._stream["kind"].data
         self.attitude_target = np.eye(1, ATTITUDE_TARGET_SIZE)[0]
         """What the loops fly in place of the outer loop's target while ``flies_attitude``; array form."""
         self._plan: RecordArray = np.zeros(0, PLAN_ITEM)
@@ -176,11 +170,6 @@ class Navigator:
         return MissionProgress(
             self._current[0], self._reached[0], bool(self._finished[0]), bool(self._wants_return[0])
         )
-
-    def progress_changed(self) -> bool:
-        """Tell whether ``progress`` is another one than at the last call."""
-        seen, self._progress_seen = self._progress_seen, self.progress
-        return seen != self._progress_seen
 
     @property
     def mission_flies(self) -> bool:
@@ -325,22 +314,22 @@ class Navigator:
 
     def set_sticks(self, sticks: Sticks) -> None:
         """Remember the sticks; POSITION and ALTITUDE fly by them."""
-        self._stream[STICKS_AT:] = sticks
+        self._stream["sticks"] = sticks
 
     def flies_attitude(self, mode: Mode) -> bool:
         """Tell whether guidance gives attitude and thrust itself, in ``attitude_target``."""
-        return mode is _OFFBOARD and bool(self._stream[S_KIND] >= ATTITUDE)
+        return mode is _OFFBOARD and self._stream_kind[0] >= ATTITUDE
 
     def wants_to_rise(self, mode: Mode, down_m: float) -> bool:
         """Tell whether the stream asks a vehicle that stands at ``down_m`` to take off."""
-        s, p = self._stream, self.params
+        s, p = self._stream[0], self.params
         if mode is not Mode.OFFBOARD:
-            return shaped(s[STICKS_AT + 2], p.stick_deadzone, p.stick_z_expo) > TAKEOFF_STICK
-        if s[S_KIND] >= ATTITUDE:
-            return bool(s[S_THRUST] > 0.5 * p.weight_n)
-        if s[S_KIND] != POINT:
+            return shaped(s["sticks"][2], p.stick_deadzone, p.stick_z_expo) > TAKEOFF_STICK
+        if s["kind"] >= ATTITUDE:
+            return bool(s["thrust"] > 0.5 * p.weight_n)
+        if s["kind"] != POINT:
             return False
-        z, vz, az = (float(s[at + 2]) for at in (S_POSITION, S_VELOCITY, S_ACCELERATION))
+        z, vz, az = (float(s[name][2]) for name in ("position", "velocity", "acceleration"))
         if math.isfinite(z):
             return z < down_m - CLIMB_M
         return vz < 0.0 if math.isfinite(vz) else az < 0.0

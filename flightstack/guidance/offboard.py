@@ -6,7 +6,7 @@ import math
 
 from flightstack.core.arrays import attitude_target, store_attitude_target
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import AttitudeTarget, FloatArray, Quaternion, Vector3, VehicleState
+from flightstack.core.contract import AttitudeTarget, FloatArray, Quaternion, Record, Vector3, VehicleState
 from flightstack.core.geometry import (
     conjugate,
     euler_from_quaternion,
@@ -18,20 +18,7 @@ from flightstack.core.geometry import (
 )
 from flightstack.guidance.follow import follow_heading, follow_horizontally, follow_vertically, leashed
 from flightstack.guidance.params import GuidanceParams
-from flightstack.guidance.setpoints import (
-    ATTITUDE,
-    POINT,
-    S_ACCELERATION,
-    S_AGE,
-    S_ATTITUDE,
-    S_KIND,
-    S_POSITION,
-    S_RATES,
-    S_THRUST,
-    S_VELOCITY,
-    S_YAW,
-    S_YAW_RATE,
-)
+from flightstack.guidance.setpoints import ATTITUDE, POINT
 from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, approach_speed, clipped
 from flightstack.params.vehicle import GRAVITY_M_S2
 
@@ -49,8 +36,8 @@ def _given(value: float) -> float:
 
 
 @compiled
-def _vector(stream: FloatArray, at: int) -> Vector3:
-    return Vector3(stream[at], stream[at + 1], stream[at + 2])
+def _vector(v: FloatArray) -> Vector3:
+    return Vector3(v[0], v[1], v[2])
 
 
 @compiled
@@ -68,21 +55,21 @@ def descent_above(height_m: float, params: GuidanceParams, limits: TrajectoryLim
 @compiled
 def point_step(
     t: Trajectory,
-    stream: FloatArray,
+    stream: Record,
     state: VehicleState,
     params: GuidanceParams,
     limits: TrajectoryLimits,
     dt_s: float,
 ) -> Trajectory:
     """Move the reference by one outer tick along the newest point; without any it brakes and stays."""
-    p, v, a = _vector(stream, S_POSITION), _vector(stream, S_VELOCITY), _vector(stream, S_ACCELERATION)
-    yaw_wanted, turn = stream[S_YAW], stream[S_YAW_RATE]
-    if stream[S_KIND] != POINT:
+    p, v, a = _vector(stream["position"]), _vector(stream["velocity"]), _vector(stream["acceleration"])
+    yaw_wanted, turn = stream["yaw"], stream["yaw_rate"]
+    if stream["kind"] != POINT:
         none = math.nan
         p, v, a = Vector3(none, none, none), Vector3(0.0, 0.0, 0.0), Vector3(none, none, none)
         yaw_wanted, turn = none, none
-    age_s = stream[S_AGE]
-    stream[S_AGE] = min(age_s + dt_s, EXTRAPOLATION_S)
+    age_s = stream["age"]
+    stream["age"] = min(age_s + dt_s, EXTRAPOLATION_S)
     p = Vector3(_moved(p.x, v.x, a.x, age_s), _moved(p.y, v.y, a.y, age_s), _moved(p.z, v.z, a.z, age_s))
     here = state.position_ned_m
     x, y, vx, vy, ax, ay = follow_horizontally(t, p, v, a, params.max_speed_m_s, limits, dt_s)
@@ -115,7 +102,7 @@ def _turned(target: Quaternion, rates: Vector3, present: Quaternion, dt_s: float
 
 @compiled
 def attitude_step(
-    stream: FloatArray,
+    stream: Record,
     last_target: FloatArray,
     state: VehicleState,
     params: GuidanceParams,
@@ -128,13 +115,12 @@ def attitude_step(
     The reference goes along with the vehicle, accelerated as the target's thrust does: whatever mode comes
     next begins with the motion and the attitude at hand.
     """
-    if stream[S_KIND] == ATTITUDE:
-        q = Quaternion(
-            stream[S_ATTITUDE], stream[S_ATTITUDE + 1], stream[S_ATTITUDE + 2], stream[S_ATTITUDE + 3]
-        )
+    if stream["kind"] == ATTITUDE:
+        wanted = stream["attitude"]
+        q = Quaternion(wanted[0], wanted[1], wanted[2], wanted[3])
     else:
-        q = _turned(attitude_target(last_target).attitude, _vector(stream, S_RATES), state.attitude, dt_s)
-    thrust_n = stream[S_THRUST]
+        q = _turned(attitude_target(last_target).attitude, _vector(stream["rates"]), state.attitude, dt_s)
+    thrust_n = stream["thrust"]
     store_attitude_target(target, AttitudeTarget(q, thrust_n))
     lift = rotate(q, Vector3(0.0, 0.0, -GRAVITY_M_S2 * thrust_n / params.weight_n))
     ax, ay = clipped(lift.x, lift.y, limits.acceleration_m_s2)

@@ -1,7 +1,4 @@
-"""What a companion or a pilot streams to the vehicle: offboard setpoints and stick positions. Pure.
-
-The array form of a stream, ``stream`` in the kernels, is laid out by ``S_…`` and ``STICKS_AT``.
-"""
+"""Offboard setpoints and stick positions, and the record in which the kernels read the newest of them. Pure."""
 
 from __future__ import annotations
 
@@ -10,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray, Quaternion, Vector3
+from flightstack.core.contract import Quaternion, RecordArray, Vector3
 
 NOT_GIVEN = Vector3(math.nan, math.nan, math.nan)
 IDENTITY = Quaternion(1.0, 0.0, 0.0, 0.0)
@@ -52,34 +49,47 @@ class Sticks(NamedTuple):
 
 CENTRED = Sticks(0.0, 0.0, 0.0, 0.0)
 
-# array form: the kind, the numbers of either setpoint, the age of the newest, and the sticks
-S_KIND, S_POSITION, S_VELOCITY, S_ACCELERATION, S_YAW, S_YAW_RATE = 0, 1, 4, 7, 10, 11
-S_ATTITUDE, S_THRUST, S_RATES, S_AGE = 12, 16, 17, 20
-STICKS_AT = 21
-STREAM_SIZE = 25
-NOTHING, POINT, ATTITUDE, RATES = 0.0, 1.0, 2.0, 3.0
+NOTHING, POINT, ATTITUDE, RATES = range(4)
 """Kinds of setpoint."""
 
+STREAM = np.dtype(
+    [
+        ("kind", "i8"),
+        ("age", "f8"),  # s since the newest setpoint
+        ("position", "f8", 3),  # m NED, NaN where not given, as in the next two
+        ("velocity", "f8", 3),
+        ("acceleration", "f8", 3),
+        ("yaw", "f8"),
+        ("yaw_rate", "f8"),
+        ("attitude", "f8", 4),
+        ("rates", "f8", 3),  # rad/s FRD
+        ("thrust", "f8"),  # N
+        ("sticks", "f8", 4),  # fields of ``Sticks``
+    ]
+)
 
-def empty_stream() -> FloatArray:
+
+def empty_stream() -> RecordArray:
     """Return a stream without setpoint, sticks centred."""
-    stream = np.zeros(STREAM_SIZE)
-    stream[S_POSITION:S_ATTITUDE] = math.nan
-    stream[S_ATTITUDE] = 1.0
+    stream: RecordArray = np.zeros(1, STREAM)
+    for name in ("position", "velocity", "acceleration", "yaw", "yaw_rate"):
+        stream[name] = math.nan
+    stream["attitude"] = IDENTITY
     return stream
 
 
-def store_setpoint(stream: FloatArray, setpoint: OffboardSetpoint, max_thrust_n: float) -> None:
+def store_setpoint(stream: RecordArray, setpoint: OffboardSetpoint, max_thrust_n: float) -> None:
     """Make ``setpoint`` the newest of ``stream``; the thrust becomes newtons."""
-    stream[S_AGE] = 0.0
+    s = stream[0]
+    s["age"] = 0.0
     if isinstance(setpoint, PointSetpoint):
-        stream[S_KIND] = POINT
-        stream[S_POSITION:S_VELOCITY] = setpoint.position_ned_m
-        stream[S_VELOCITY:S_ACCELERATION] = setpoint.velocity_ned_m_s
-        stream[S_ACCELERATION:S_YAW] = setpoint.acceleration_ned_m_s2
-        stream[S_YAW], stream[S_YAW_RATE] = setpoint.yaw_rad, setpoint.yaw_rate_rad_s
+        s["kind"] = POINT
+        s["position"] = setpoint.position_ned_m
+        s["velocity"] = setpoint.velocity_ned_m_s
+        s["acceleration"] = setpoint.acceleration_ned_m_s2
+        s["yaw"], s["yaw_rate"] = setpoint.yaw_rad, setpoint.yaw_rate_rad_s
         return
-    stream[S_KIND] = RATES if setpoint.attitude is None else ATTITUDE
-    stream[S_ATTITUDE:S_THRUST] = IDENTITY if setpoint.attitude is None else setpoint.attitude
-    stream[S_RATES:S_AGE] = setpoint.rates_frd_rad_s
-    stream[S_THRUST] = setpoint.thrust_share * max_thrust_n
+    s["kind"] = RATES if setpoint.attitude is None else ATTITUDE
+    s["attitude"] = setpoint.attitude or IDENTITY
+    s["rates"] = setpoint.rates_frd_rad_s
+    s["thrust"] = setpoint.thrust_share * max_thrust_n
