@@ -13,19 +13,29 @@ from enum import IntFlag
 import numpy as np
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import STATE_SIZE, FloatArray, Record, RecordArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import distance
 from flightstack.plan import FenceShape, MissionItem, fence_shape
-from flightstack.plan.fence_layout import A_EAST, A_END, A_GROUP, A_INCLUSION, A_NORTH, A_RADIUS, A_START
 
 HYSTERESIS_M = 1.0
 """How far inside a limit the vehicle must be for a breach of it to end, so that it does not flicker."""
 
-F_FLAGS, F_INCLUSION_M, F_EXCLUSION_M, F_HEIGHT_M, F_DISTANCE_M = range(5)
-FENCE_MEMORY_SIZE = 5
-L_MAX_DISTANCE, L_MAX_ALTITUDE, L_HOME_NORTH, L_HOME_EAST, L_HOME_DOWN, L_DECELERATION, L_VERTICAL = range(7)
-LIMITS_SIZE = 7
+LIMITS = np.dtype(
+    [
+        ("distance", "f8"),  # from home, m; 0 none
+        ("altitude", "f8"),  # above home, m; 0 none
+        ("home", "f8", 3),  # m NED
+        ("deceleration", "f8"),  # to look ahead with, m/s²; 0 to evaluate the present position only
+        ("vertical_deceleration", "f8"),
+    ]
+)
+BREACH = np.dtype(
+    [
+        ("flags", "i8"),  # of ``FenceBreach``
+        ("margins", "f8", 4),  # to the limits in the order of the flags, m; negative when broken
+    ]
+)
 NO_MARGIN = math.inf
 
 
@@ -44,16 +54,17 @@ class FenceBreach(IntFlag):
 
 
 @compiled
-def area_margin(areas: FloatArray, vertices: FloatArray, index: int, north_m: float, east_m: float) -> float:
+def area_margin(areas: RecordArray, vertices: FloatArray, index: int, north_m: float, east_m: float) -> float:
     """Return the distance to the edge of area ``index`` [m]: positive inside, negative outside."""
-    radius_m = areas[index, A_RADIUS]
+    area = areas[index]
+    radius_m = area["radius"]
     if radius_m > 0.0:
-        return float(radius_m - distance(north_m - areas[index, A_NORTH], east_m - areas[index, A_EAST]))
+        return float(radius_m - distance(north_m - area["north"], east_m - area["east"]))
     inside = False
     nearest2 = math.inf
-    end = int(areas[index, A_END])
+    end = area["end"]
     before = end - 1
-    for vertex in range(int(areas[index, A_START]), end):
+    for vertex in range(area["start"], end):
         n1, e1 = vertices[before, 0] - north_m, vertices[before, 1] - east_m
         n2, e2 = vertices[vertex, 0] - north_m, vertices[vertex, 1] - east_m
         dn, de = n2 - n1, e2 - e1
@@ -73,7 +84,7 @@ def area_margin(areas: FloatArray, vertices: FloatArray, index: int, north_m: fl
 
 @compiled
 def fence_margins(
-    areas: FloatArray, vertices: FloatArray, groups: int, north_m: float, east_m: float
+    areas: RecordArray, vertices: FloatArray, groups: int, north_m: float, east_m: float
 ) -> tuple[float, float]:
     """Return by how much a place is inside the inclusion areas and outside the exclusion areas [m].
 
@@ -83,12 +94,12 @@ def fence_margins(
     outside_m = math.inf
     inside_m = math.inf if groups == 0 else -math.inf
     for index in range(len(areas)):
-        if areas[index, A_INCLUSION] == 0.0:
+        if areas[index]["inclusion"] == 0:
             outside_m = min(outside_m, -area_margin(areas, vertices, index, north_m, east_m))
     for group in range(groups):
         group_m = math.inf
         for index in range(len(areas)):
-            if areas[index, A_INCLUSION] > 0.0 and areas[index, A_GROUP] == group:
+            if areas[index]["inclusion"] != 0 and areas[index]["group"] == group:
                 group_m = min(group_m, area_margin(areas, vertices, index, north_m, east_m))
         inside_m = max(inside_m, group_m)
     return inside_m, outside_m
@@ -102,42 +113,42 @@ def _stops_at(position: float, velocity: float, deceleration: float) -> float:
 
 @compiled
 def fence_step(
-    areas: FloatArray,
+    areas: RecordArray,
     vertices: FloatArray,
     groups: int,
-    limits: FloatArray,
+    limits: RecordArray,
     state: FloatArray,
-    memory: FloatArray,
+    breach: RecordArray,
 ) -> None:
     """Find the margins and breaches of one outer tick.
 
-    ``state`` (13,) as everywhere; ``limits`` (7,): greatest distance and altitude (0: none), home in NED, and
-    horizontal and vertical deceleration to look ahead with (0: look at the present only). ``memory`` (5,): flags
-    of ``FenceBreach`` and the margins of its four limits; what is not finite keeps the flags as they are.
+    ``state`` (13,) is the vehicle's; ``limits`` (1,) holds ``LIMITS``, ``breach`` (1,) ``BREACH``. A state that is
+    not finite keeps the flags.
     """
+    limit, found = limits[0], breach[0]
     north_m, east_m, down_m = state[0], state[1], state[2]
-    if limits[L_DECELERATION] > 0.0:
+    if limit["deceleration"] > 0.0:
         speed = distance(state[3], state[4])
-        ahead_s = speed / (2.0 * limits[L_DECELERATION])
+        ahead_s = speed / (2.0 * limit["deceleration"])
         north_m, east_m = north_m + state[3] * ahead_s, east_m + state[4] * ahead_s
-        down_m = _stops_at(down_m, state[5], limits[L_VERTICAL])
+        down_m = _stops_at(down_m, state[5], limit["vertical_deceleration"])
     if not (math.isfinite(north_m) and math.isfinite(east_m) and math.isfinite(down_m)):
         return
-    inside_m, outside_m = fence_margins(areas, vertices, groups, north_m, east_m)
-    distance_m = distance(north_m - limits[L_HOME_NORTH], east_m - limits[L_HOME_EAST])
-    memory[F_INCLUSION_M], memory[F_EXCLUSION_M] = inside_m, outside_m
-    memory[F_HEIGHT_M], memory[F_DISTANCE_M] = math.inf, math.inf
-    if limits[L_MAX_ALTITUDE] > 0.0:
-        memory[F_HEIGHT_M] = limits[L_MAX_ALTITUDE] - (limits[L_HOME_DOWN] - down_m)
-    if limits[L_MAX_DISTANCE] > 0.0:
-        memory[F_DISTANCE_M] = limits[L_MAX_DISTANCE] - distance_m
-    before = int(memory[F_FLAGS])
+    home, margins = limit["home"], found["margins"]
+    margins[0], margins[1] = fence_margins(areas, vertices, groups, north_m, east_m)
+    distance_m = distance(north_m - home[0], east_m - home[1])
+    margins[2], margins[3] = math.inf, math.inf
+    if limit["altitude"] > 0.0:
+        margins[2] = limit["altitude"] - (home[2] - down_m)
+    if limit["distance"] > 0.0:
+        margins[3] = limit["distance"] - distance_m
+    before = found["flags"]
     after = 0
-    for limit in range(4):
-        needed_m = HYSTERESIS_M if before & (1 << limit) else 0.0
-        if memory[F_INCLUSION_M + limit] < needed_m:
-            after |= 1 << limit
-    memory[F_FLAGS] = float(after)
+    for index in range(4):
+        needed_m = HYSTERESIS_M if before & (1 << index) else 0.0
+        if margins[index] < needed_m:
+            after |= 1 << index
+    found["flags"] = after
 
 
 class Fence:
@@ -167,13 +178,18 @@ class Fence:
 NO_FENCE = Fence(FenceShape((), GeoPoint(0.0, 0.0, 0.0)))
 
 
+def _no_breach() -> RecordArray:
+    breach: RecordArray = np.zeros(1, BREACH)
+    breach["margins"] = NO_MARGIN
+    return breach
+
+
 class FenceMonitor:
     """Watches the vehicle; ``flags`` and ``margin_m`` are those of the last step. No I/O, no clock."""
 
     def __init__(self) -> None:
-        self._limits = np.zeros(LIMITS_SIZE)
-        self._memory = np.full(FENCE_MEMORY_SIZE, NO_MARGIN)
-        self._memory[F_FLAGS] = 0.0
+        self._limits: RecordArray = np.zeros(1, LIMITS)
+        self._breach = _no_breach()
         self.configure(NO_FENCE)
 
     def configure(
@@ -192,71 +208,71 @@ class FenceMonitor:
         self.fence = fence
         shape = fence.shape
         self._areas, self._vertices, self._groups = shape.areas, shape.vertices, shape.groups
-        self._limits[:] = (max_distance_m, max_altitude_m, *home_ned_m, *(decelerations_m_s2 or (0.0, 0.0)))
+        self._limits[0] = (max_distance_m, max_altitude_m, home_ned_m, *(decelerations_m_s2 or (0.0, 0.0)))
         self.is_active = not fence.is_empty or max_distance_m > 0.0 or max_altitude_m > 0.0
 
     def step(self, state: FloatArray) -> int:
         """Look at ``state`` (13,), once per outer tick; return the flags of ``FenceBreach``."""
         if not self.is_active:
-            self._memory[F_FLAGS] = 0.0
+            self._breach["flags"] = 0
             return 0
-        fence_step(self._areas, self._vertices, self._groups, self._limits, state, self._memory)
-        return int(self._memory[F_FLAGS])
+        fence_step(self._areas, self._vertices, self._groups, self._limits, state, self._breach)
+        return int(self._breach["flags"][0])
 
     @property
     def flags(self) -> FenceBreach:
         """The limits that are broken."""
-        return FenceBreach(int(self._memory[F_FLAGS]))
+        return FenceBreach(int(self._breach["flags"][0]))
 
     @property
     def margin_m(self) -> float:
         """Distance to the nearest limit [m]: negative when broken, infinite when there is none."""
-        return float(self._memory[F_INCLUSION_M:].min()) if self.is_active else NO_MARGIN
+        return float(self._breach["margins"].min()) if self.is_active else NO_MARGIN
 
     def refusal(self, north_m: float, east_m: float, altitude_m: float = 0.0) -> str | None:
         """Return why the vehicle may not be at a place (altitude above home), as the end of a sentence, or None.
 
         For arming, takeoff and goto: "the vehicle" or "the target" " is outside the geofence".
         """
-        memory = self._look_at(north_m, east_m, altitude_m)
-        if memory is None:
+        breach = self._at(north_m, east_m, altitude_m)
+        if breach is None:
             return "is nowhere"
-        return self.text(int(memory[F_FLAGS])) or None
+        return self.text(int(breach["flags"])) or None
 
     def way_refusal(self, here: tuple[float, float, float], there: tuple[float, float, float]) -> str | None:
         """Return why the vehicle may not go straight to a place (north, east, altitude above home), or None.
 
-        Who is outside a limit already may go where it is no farther outside: out of a breach there must be a way.
+        A vehicle outside a limit may go to any position that does not increase the violation.
         """
-        present, wanted = self._look_at(*here), self._look_at(*there)
+        present, wanted = self._at(*here), self._at(*there)
         if present is None or wanted is None:
             return "is nowhere"
-        no_worse = wanted[F_INCLUSION_M:] >= present[F_INCLUSION_M:]
-        broken = int(wanted[F_FLAGS])
+        no_worse = wanted["margins"] >= present["margins"]
+        broken, present_flags = int(wanted["flags"]), int(present["flags"])
         for limit in range(4):
-            if broken & int(present[F_FLAGS]) & 1 << limit and no_worse[limit]:
+            if broken & present_flags & 1 << limit and no_worse[limit]:
                 broken &= ~(1 << limit)
         if broken:
             return self.text(broken)
-        if int(present[F_FLAGS]) & (FenceBreach.OUTSIDE | FenceBreach.EXCLUDED):
+        if present_flags & (FenceBreach.OUTSIDE | FenceBreach.EXCLUDED):
             return None
         ways_out = self.fence.shape.ways_out(np.array([here[:2]]), np.array([there[:2]]))
         return "is beyond an edge of the geofence" if ways_out else None
 
-    def _look_at(self, north_m: float, east_m: float, altitude_m: float) -> FloatArray | None:
-        """Return flags and margins of a place, as ``fence_step`` writes them; None if it is nowhere."""
-        probe, memory = np.zeros(13), np.zeros(FENCE_MEMORY_SIZE)
+    def _at(self, north_m: float, east_m: float, altitude_m: float) -> Record | None:
+        """Return the ``BREACH`` of a position without looking ahead, or None if it is not finite."""
+        state, breach = np.zeros(STATE_SIZE), _no_breach()
         limits = self._limits.copy()
-        limits[[L_DECELERATION, L_VERTICAL]] = 0.0
-        probe[:3] = north_m, east_m, limits[L_HOME_DOWN] - altitude_m
-        if not np.isfinite(probe).all():
+        limits["deceleration"] = limits["vertical_deceleration"] = 0.0
+        state[:3] = north_m, east_m, limits["home"][0, 2] - altitude_m
+        if not np.isfinite(state).all():
             return None
-        fence_step(self._areas, self._vertices, self._groups, limits, probe, memory)
-        return memory
+        fence_step(self._areas, self._vertices, self._groups, limits, state, breach)
+        return breach[0]
 
     def text(self, flags: int) -> str:
         """Return what ``flags`` mean, as the end of a sentence: "is outside the geofence"; empty for none."""
-        distance_m, altitude_m = self._limits[L_MAX_DISTANCE], self._limits[L_MAX_ALTITUDE]
+        distance_m, altitude_m = self._limits["distance"][0], self._limits["altitude"][0]
         parts = {
             FenceBreach.OUTSIDE: "outside the geofence",
             FenceBreach.EXCLUDED: "inside an exclusion area of the geofence",

@@ -12,18 +12,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, Record, RecordArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.plan.fence_layout import (
-    A_EAST,
-    A_END,
-    A_GROUP,
-    A_INCLUSION,
-    A_NORTH,
-    A_RADIUS,
-    A_START,
-    AREA_COLUMNS,
+
+AREA = np.dtype(
+    [
+        ("inclusion", "i8"),  # 1, or 0 for an exclusion area
+        ("group", "i8"),  # of an inclusion area, from 0
+        ("start", "i8"),  # index of the first vertex, and the one behind the last
+        ("end", "i8"),
+        ("north", "f8"),  # centre and radius of a circle, m; the radius of a polygon is 0
+        ("east", "f8"),
+        ("radius", "f8"),
+    ]
 )
+"""An area of a geofence as the kernels read it; the vertices are in an array of their own, shape (m, 2) [m]."""
 
 
 class Area(NamedTuple):
@@ -43,28 +46,27 @@ class Area(NamedTuple):
 class FenceShape:
     """The areas of a geofence in metres.
 
-    ``areas``, shape (n, 7): inclusion (1 or 0), group (0, 1, 2, ...), first vertex and the one behind the last,
-    centre north and east, radius; the radius of a polygon is 0. ``vertices``, shape (m, 2). ``groups``: how many
-    groups of inclusion areas there are.
+    ``areas`` holds ``AREA`` records, shape (n,); ``vertices`` has shape (m, 2); ``groups`` is the number of groups of
+    inclusion areas.
     """
 
     def __init__(self, areas: Sequence[Area], home: GeoPoint) -> None:
         self._home = home
         self._frame = LocalFrame(home)
-        self.areas: FloatArray = np.zeros((len(areas), AREA_COLUMNS))
+        self.areas: RecordArray = np.zeros(len(areas), AREA)
         vertices: list[tuple[float, float]] = []
         names = sorted({area.group for area in areas if area.is_inclusion})
         self.groups = len(names)
         for row, area in zip(self.areas, areas, strict=True):
-            row[A_INCLUSION] = float(area.is_inclusion)
-            row[A_GROUP] = names.index(area.group) if area.is_inclusion else -1.0
-            row[A_START] = len(vertices)
+            row["inclusion"] = area.is_inclusion
+            row["group"] = names.index(area.group) if area.is_inclusion else -1
+            row["start"] = len(vertices)
             if area.radius_m:
-                row[A_NORTH], row[A_EAST] = self.local(*area.points_deg[0])
-                row[A_RADIUS] = area.radius_m
+                row["north"], row["east"] = self.local(*area.points_deg[0])
+                row["radius"] = area.radius_m
             else:
                 vertices += [self.local(*point) for point in area.points_deg]
-            row[A_END] = len(vertices)
+            row["end"] = len(vertices)
         self.vertices: FloatArray = np.array(vertices, dtype=np.float64).reshape(-1, 2)
         self._begins, self._ends = self._edges()
 
@@ -76,7 +78,7 @@ class FenceShape:
     def polygon(self, index: int) -> FloatArray:
         """Return the vertices of an area, shape (n, 2)."""
         row = self.areas[index]
-        return self.vertices[int(row[A_START]) : int(row[A_END])]
+        return self.vertices[row["start"] : row["end"]]
 
     def _edges(self) -> tuple[FloatArray, FloatArray]:
         """Return where the edges of all polygons begin and end, each of shape (n, 2)."""
@@ -89,8 +91,8 @@ class FenceShape:
         excluded = np.zeros(len(places), dtype=np.bool_)
         for index, row in enumerate(self.areas):
             inside = self._inside(index, places)
-            if row[A_INCLUSION]:
-                in_group[int(row[A_GROUP])] &= inside
+            if row["inclusion"]:
+                in_group[row["group"]] &= inside
             else:
                 excluded |= inside
         in_any = in_group.any(axis=0) if self.groups else ~np.zeros_like(excluded)
@@ -103,9 +105,9 @@ class FenceShape:
     def _inside(self, index: int, places: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         row = self.areas[index]
         north, east = places[:, 0], places[:, 1]
-        if row[A_RADIUS]:
+        if row["radius"]:
             inside: np.ndarray[tuple[int], np.dtype[np.bool_]] = (
-                np.hypot(north - row[A_NORTH], east - row[A_EAST]) <= row[A_RADIUS]
+                np.hypot(north - row["north"], east - row["east"]) <= row["radius"]
             )
             return inside
         inside = np.zeros(len(places), dtype=np.bool_)
@@ -144,10 +146,10 @@ class FenceShape:
             )
             meets |= ((t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)).any(axis=1)
         length2 = np.maximum((along**2).sum(axis=1), 1e-12)
-        for row in self.areas[self.areas[:, A_RADIUS] > 0.0]:
-            to_centre = row[[A_NORTH, A_EAST]] - begins
+        for row in self.areas[self.areas["radius"] > 0.0]:
+            to_centre = _centre(row) - begins
             nearest = np.clip((to_centre * along).sum(axis=1) / length2, 0.0, 1.0)
-            meets |= np.hypot(*(to_centre - nearest[:, None] * along).T) <= row[A_RADIUS]
+            meets |= np.hypot(*(to_centre - nearest[:, None] * along).T) <= row["radius"]
         return meets
 
     def _first_outside(self, begin: FloatArray, end: FloatArray) -> tuple[float, float] | None:
@@ -157,8 +159,8 @@ class FenceShape:
         if len(self._begins):
             t, u = _meeting(begin, along, self._begins, self._ends - self._begins)
             shares += t[(t > 0.0) & (t < 1.0) & (u >= 0.0) & (u <= 1.0)].tolist()
-        for row in self.areas[self.areas[:, A_RADIUS] > 0.0]:
-            shares += _circle_shares(begin - row[[A_NORTH, A_EAST]], along, float(row[A_RADIUS]))
+        for row in self.areas[self.areas["radius"] > 0.0]:
+            shares += _circle_shares(begin - _centre(row), along, float(row["radius"]))
         shares.sort()
         middles = 0.5 * (np.array(shares[:-1]) + np.array(shares[1:]))
         places = np.concatenate([begin[None], begin + middles[:, None] * along, end[None]])
@@ -167,6 +169,10 @@ class FenceShape:
             return None
         north_m, east_m = places[outside[0]].tolist()
         return north_m, east_m
+
+
+def _centre(area: Record) -> FloatArray:
+    return np.array([area["north"], area["east"]])
 
 
 def _meeting(

@@ -141,7 +141,7 @@ def test_ways_out_are_those_that_a_dense_walk_finds(
     combined.vertices[:] = shape.vertices
     combined._begins, combined._ends = combined._edges()
     for row, (centre, _) in zip(combined.areas[1:], holes, strict=True):
-        row[4:6] = centre
+        row["north"], row["east"] = centre
     walk = np.linspace(begin, end, 400).astype(np.float64)
     fence = Fence(combined)
     clear_m = [min(fence.margins(*place)) for place in walk]
