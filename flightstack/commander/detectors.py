@@ -1,7 +1,7 @@
-"""What notices that a flight goes wrong: limits of attitude and position, rotors, the battery, frozen states. Pure.
+"""Detectors of faults in flight: limits of attitude and position, rotors, the battery. Pure.
 
-Each detector has a time for which its limit must be passed before it triggers, and needs ``RELEASE_S`` of good
-behaviour to let go, so that a value at the limit does not chatter.
+A detector triggers when its limit is exceeded for its time, and releases when the value is within the limit for
+``RELEASE_S``, so that a value at the limit does not chatter.
 """
 
 from __future__ import annotations
@@ -12,7 +12,15 @@ import numpy as np
 
 from flightstack.core.arrays import vehicle_state
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import MAX_ROTORS, FloatArray, LoopRow, LoopStatus
+from flightstack.core.contract import (
+    MAX_ROTORS,
+    FloatArray,
+    LoopRow,
+    LoopStatus,
+    Quaternion,
+    Record,
+    RecordArray,
+)
 from flightstack.core.portable_math import acos, asin, atan2, exp
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
@@ -33,11 +41,37 @@ UNMEASURED_AFTER_S = 0.5
 
 ROLL, PITCH, TILT_ERROR, POSITION, ROTORS = range(5)
 TIMERS = 5
-M_TRIGGERED = TIMERS
-DETECTOR_MEMORY_SIZE = 2 * TIMERS
-P_LIMIT, P_TIME, P_ROTORS, P_SLOW = 0, TIMERS, 2 * TIMERS, 2 * TIMERS + 1
-R_EXPECTED, R_MEAN, R_ERROR, R_MISSING_S, R_MEASURED = (block * MAX_ROTORS for block in range(5))
-ROTOR_MEMORY_SIZE = R_MEASURED + 1
+DETECTORS = np.dtype([("time", "f8", TIMERS), ("triggered", "i8", TIMERS)])
+"""For each detector the time [s] for which the value has contradicted its answer, and the answer."""
+LIMITS = np.dtype(
+    [
+        ("limit", "f8", TIMERS),  # rad, rad, rad, m, share of the rotor speed; 0 is off
+        ("time", "f8", TIMERS),  # s beyond the limit before a detector triggers
+        ("rotors", "i8"),
+        ("slow", "f8"),  # rad/s; below it errors count as shares of this speed
+    ]
+)
+ROTOR_SPEEDS = np.dtype(
+    [
+        (
+            "expected",
+            "f8",
+            MAX_ROTORS,
+        ),  # rad/s: first-order lag of the commands, exact for commands that are held
+        ("mean", "f8", MAX_ROTORS),  # of the expected speed
+        ("error", "f8", MAX_ROTORS),  # mean of the measured minus the expected speed
+        ("missing", "f8", MAX_ROTORS),  # s without a measurement
+        ("measured", "i8"),  # 1 once any speed other than 0 was measured
+    ]
+)
+ROTOR_LAGS = np.dtype(
+    [
+        ("lag", "f8", MAX_ROTORS),  # share of each rotor's lag that passes in a tick
+        ("mean", "f8"),  # share of ROTOR_MEAN_S that passes in a tick
+        ("dt", "f8"),  # s
+        ("rotors", "i8"),
+    ]
+)
 
 _REFERENCE_AT = LoopRow.REFERENCE_ATTITUDE.start
 _COMMAND_AT = LoopRow.ROTOR_COMMAND.start
@@ -46,97 +80,106 @@ _STATUS_AT = LoopRow.STATUS
 _BAD_OUTPUT = LoopStatus.OUTPUT_NOT_FINITE
 
 
-def detector_params(behaviour: Behaviour, vehicle: Vehicle) -> FloatArray:
-    """Return the numbers that ``detect`` takes, shape (12,); a limit of 0 is off.
-
-    Limits and times are in the order roll, pitch, tilt error [rad], position error [m], rotor speed [share]. Then
-    come the number of rotors, and the speed below which errors count as shares of that speed.
-    """
+def detector_limits(behaviour: Behaviour, vehicle: Vehicle) -> RecordArray:
+    """Return ``LIMITS``, shape (1,), in the order roll, pitch, tilt error, position error, rotor speed."""
     b = behaviour
     least_deg = b.max_tilt_deg + TILT_MARGIN_DEG
-    limits = (
+    limits: RecordArray = np.zeros(1, LIMITS)
+    limits["limit"] = (
         math.radians(max(b.max_roll_deg, least_deg)) if b.max_roll_deg > 0 else 0.0,
         math.radians(max(b.max_pitch_deg, least_deg)) if b.max_pitch_deg > 0 else 0.0,
         math.radians(b.max_tilt_error_deg),
         b.max_position_error_m,
         b.rotor_error if b.rotor_check else 0.0,
     )
-    times = (b.max_roll_s, b.max_pitch_s, b.max_tilt_error_s, b.max_position_error_s, b.rotor_error_ms * 1e-3)
-    slow_rad_s = 0.1 * min(1e4, *(rotor.max_speed_rad_s for rotor in vehicle.rotors))
-    return np.array([*limits, *times, len(vehicle.rotors), slow_rad_s], dtype=np.float64)
+    limits["time"] = (
+        b.max_roll_s, b.max_pitch_s, b.max_tilt_error_s, b.max_position_error_s, b.rotor_error_ms * 1e-3
+    )  # fmt: skip
+    limits["rotors"] = len(vehicle.rotors)
+    limits["slow"] = 0.1 * min(1e4, *(rotor.max_speed_rad_s for rotor in vehicle.rotors))
+    return limits
 
 
-def rotor_params(vehicle: Vehicle, dt_s: float) -> FloatArray:
-    """Return the numbers that ``follow_rotors`` takes: for each rotor the share of its lag that passes in ``dt_s``,
-    then that of the mean's time, and ``dt_s``.
-    """
-    shares = [1.0 - exp(-dt_s / r.lag_s) if r.lag_s > 0.0 else 1.0 for r in vehicle.rotors]
-    return np.array([*shares, 1.0 - exp(-dt_s / ROTOR_MEAN_S), dt_s], dtype=np.float64)
+def rotor_lags(vehicle: Vehicle, dt_s: float) -> RecordArray:
+    """Return ``ROTOR_LAGS``, shape (1,), for ticks of ``dt_s``."""
+    lags: RecordArray = np.zeros(1, ROTOR_LAGS)
+    for i, rotor in enumerate(vehicle.rotors):
+        lags["lag"][0, i] = 1.0 - exp(-dt_s / rotor.lag_s) if rotor.lag_s > 0.0 else 1.0
+    lags["mean"], lags["dt"], lags["rotors"] = 1.0 - exp(-dt_s / ROTOR_MEAN_S), dt_s, len(vehicle.rotors)
+    return lags
 
 
 @compiled
-def follow_rotors(row: FloatArray, memory: FloatArray, params: FloatArray) -> None:
-    """Compare each rotor's measured speed with what its commands lead to; once per inner tick.
+def follow_rotors(row: FloatArray, speeds: RecordArray, lags: RecordArray) -> None:
+    """Compare each rotor's measured speed with the speed that its commands lead to; once per inner tick.
 
-    ``row`` (48,) holds speeds from before its commands. ``memory`` (33,) keeps, for each rotor, the speed that the
-    commands lead to (first-order lag, exact for commands that are held), its mean, the mean of the error, and the time
-    without a measurement. A command that is not finite, or beyond ``FASTEST_RAD_S``, is left out. Such a speed is a
-    missing measurement: the mean of the error decays meanwhile, so that no old error outlasts the measurements.
+    ``row`` (48,) holds speeds from before its commands; ``speeds`` (1,) holds ``ROTOR_SPEEDS``. A command that is not
+    finite, or beyond ``FASTEST_RAD_S``, is left out. Such a speed is a missing measurement: the mean of the error
+    decays meanwhile, so that no old error outlasts the measurements.
     """
-    count = len(params) - 2
-    share, dt_s = params[count], params[count + 1]
-    for i in range(count):
-        expected = memory[R_EXPECTED + i]
-        memory[R_MEAN + i] += (expected - memory[R_MEAN + i]) * share
+    s, lag = speeds[0], lags[0]
+    for i in range(lag["rotors"]):
+        expected = s["expected"][i]
+        s["mean"][i] += (expected - s["mean"][i]) * lag["mean"]
         speed, command = row[_SPEED_AT + i], row[_COMMAND_AT + i]
         is_measured = abs(speed) <= FASTEST_RAD_S  # NaN is not
         error = speed - expected if is_measured else 0.0
-        memory[R_ERROR + i] += (error - memory[R_ERROR + i]) * share
-        memory[R_MISSING_S + i] = 0.0 if is_measured else memory[R_MISSING_S + i] + dt_s
+        s["error"][i] += (error - s["error"][i]) * lag["mean"]
+        s["missing"][i] = 0.0 if is_measured else s["missing"][i] + lag["dt"]
         if abs(command) <= FASTEST_RAD_S:
-            memory[R_EXPECTED + i] = expected + (command - expected) * params[i]
+            s["expected"][i] = expected + (command - expected) * lag["lag"][i]
 
 
 @compiled
-def _watch(memory: FloatArray, index: int, beyond: bool, time_s: float, dt_s: float) -> None:
-    """Advance one timer.
-
-    The timer counts how long the value has been on the other side than the detector's answer.
-    """
-    triggered = memory[M_TRIGGERED + index] > 0.0
-    if beyond == triggered:
-        memory[index] = 0.0
+def _advance(detectors: Record, index: int, beyond: bool, time_s: float, dt_s: float) -> None:
+    """Advance one detector."""
+    time, triggered = detectors["time"], detectors["triggered"]
+    if beyond == (triggered[index] != 0):
+        time[index] = 0.0
         return
-    memory[index] += dt_s
-    if memory[index] >= (RELEASE_S if triggered else time_s) - 1e-9:
-        memory[index] = 0.0
-        memory[M_TRIGGERED + index] = 0.0 if triggered else 1.0
+    time[index] += dt_s
+    if time[index] >= (RELEASE_S if triggered[index] else time_s) - 1e-9:
+        time[index] = 0.0
+        triggered[index] = 0 if triggered[index] else 1
 
 
 @compiled
-def _found(memory: FloatArray) -> int:
+def _found(detectors: Record) -> int:
     """Return the bits of the detectors that are triggered."""
     bits = (BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT)
     result = 0
     for index in range(TIMERS):
-        if memory[M_TRIGGERED + index] > 0.0:
+        if detectors["triggered"][index]:
             result |= bits[index]
     return result
 
 
 @compiled
-def _rotor_error(row: FloatArray, rotors: FloatArray, params: FloatArray) -> float:
+def _rotor_error(row: FloatArray, speeds: Record, limits: Record) -> float:
     """Return the largest mean error of a rotor's speed as share of the mean speed that was expected.
 
-    A simulator that measures no speeds sends zeros: while none other has come in this flight nothing is known, and
-    the error is 0. After that, zeros are rotors that stand: an empty battery stops them all.
+    A simulator that measures no speeds sends zeros: until another value comes in this flight the error is unknown, 0.
+    After that, zeros are rotors that stand: an empty battery stops them all.
     """
     worst = 0.0
-    for i in range(int(params[P_ROTORS])):
+    for i in range(limits["rotors"]):
         if 0.0 < abs(row[_SPEED_AT + i]) <= FASTEST_RAD_S:
-            rotors[R_MEASURED] = 1.0
-        worst = max(worst, abs(rotors[R_ERROR + i]) / max(abs(rotors[R_MEAN + i]), params[P_SLOW]))
-    return worst if rotors[R_MEASURED] > 0.0 else 0.0
+            speeds["measured"] = 1
+        worst = max(worst, abs(speeds["error"][i]) / max(abs(speeds["mean"][i]), limits["slow"]))
+    return worst if speeds["measured"] else 0.0
+
+
+@compiled
+def _tilt_between(q: Quaternion, reference: FloatArray) -> float:
+    """Return the angle [rad] between the thrust axes: between the third columns of the rotation matrices."""
+    qw, qx, qy, qz = q
+    rw, rx, ry, rz = reference[0], reference[1], reference[2], reference[3]
+    cosine = (
+        4.0 * (qx * qz + qw * qy) * (rx * rz + rw * ry)
+        + 4.0 * (qy * qz - qw * qx) * (ry * rz - rw * rx)
+        + (1.0 - 2.0 * (qx * qx + qy * qy)) * (1.0 - 2.0 * (rx * rx + ry * ry))
+    )
+    return acos(min(1.0, max(-1.0, cosine)))
 
 
 @compiled
@@ -144,19 +187,19 @@ def detect(
     state: FloatArray,
     setpoint: FloatArray,
     row: FloatArray,
-    rotors: FloatArray,
-    memory: FloatArray,
-    params: FloatArray,
+    rotor_speeds: RecordArray,
+    detectors: RecordArray,
+    limits_array: RecordArray,
     on_ground: bool,
     dt_s: float,
 ) -> int:
-    """Advance all detectors by one outer tick; return the bits of what is wrong, ``MOVING`` and ``UNMEASURED``.
+    """Advance all detectors by one outer tick; return the bits of the faults, ``MOVING`` and ``UNMEASURED``.
 
-    ``state`` (13,), ``setpoint`` (11,) and ``row`` (48,), the newest row of the inner loop, as in ``contract``;
-    ``rotors`` (33,) is the memory of ``follow_rotors``; ``memory`` (10,) is updated; ``params`` come from
-    ``detector_params``. A state that is not finite leaves the other detectors, and what they found, as they are.
-    ``on_ground``: the feet hold the vehicle, and its attitude need not follow the reference; it must still be upright.
+    ``state`` (13,), ``setpoint`` (11,) and ``row`` (48,), the newest row of the inner loop, as in ``contract``. A state
+    that is not finite leaves the other detectors as they are. ``on_ground``: the feet hold the vehicle, and its
+    attitude need not follow the reference; it must still be upright.
     """
+    speeds, memory, limits = rotor_speeds[0], detectors[0], limits_array[0]
     status = int(row[_STATUS_AT])
     for value in state:
         if not math.isfinite(value):
@@ -166,33 +209,21 @@ def detect(
     v, w = now.velocity_ned_m_s, now.rates_frd_rad_s
     if max(abs(v.x), abs(v.y), abs(v.z), abs(w.x), abs(w.y), abs(w.z)) > MOVING_ABOVE:
         result |= MOVING
-    for i in range(int(params[P_ROTORS])):
-        if params[P_LIMIT + ROTORS] > 0.0 and rotors[R_MISSING_S + i] >= UNMEASURED_AFTER_S:
+    for i in range(limits["rotors"]):
+        if limits["limit"][ROTORS] > 0.0 and speeds["missing"][i] >= UNMEASURED_AFTER_S:
             result |= UNMEASURED
     qw, qx, qy, qz = now.attitude
     roll = atan2(2.0 * (qw * qx + qy * qz), 1.0 - 2.0 * (qx * qx + qy * qy))
     pitch = asin(min(1.0, max(-1.0, 2.0 * (qw * qy - qz * qx))))
-    # cosine between the thrust axes: third columns of the two rotation matrices
-    rw, rx, ry, rz = (
-        row[_REFERENCE_AT],
-        row[_REFERENCE_AT + 1],
-        row[_REFERENCE_AT + 2],
-        row[_REFERENCE_AT + 3],
-    )
-    cosine = (
-        4.0 * (qx * qz + qw * qy) * (rx * rz + rw * ry)
-        + 4.0 * (qy * qz - qw * qx) * (ry * rz - rw * rx)
-        + (1.0 - 2.0 * (qx * qx + qy * qy)) * (1.0 - 2.0 * (rx * rx + ry * ry))
-    )
-    tilt_error = 0.0 if on_ground else acos(min(1.0, max(-1.0, cosine)))
+    tilt_error = 0.0 if on_ground else _tilt_between(now.attitude, row[_REFERENCE_AT:])
     p = now.position_ned_m
     dx, dy, dz = p.x - setpoint[0], p.y - setpoint[1], p.z - setpoint[2]
     distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-    errors = (abs(roll), abs(pitch), tilt_error, distance, _rotor_error(row, rotors, params))
+    errors = (abs(roll), abs(pitch), tilt_error, distance, _rotor_error(row, speeds, limits))
     for index in range(TIMERS):
-        limit = params[P_LIMIT + index]
+        limit = limits["limit"][index]
         beyond = limit > 0.0 and not errors[index] <= limit
-        _watch(memory, index, beyond, params[P_TIME + index], dt_s)
+        _advance(memory, index, beyond, limits["time"][index], dt_s)
     return result | _found(memory)
 
 

@@ -7,22 +7,21 @@ import numpy as np
 from flightstack.commander.detectors import (
     BEYOND_ATTITUDE,
     BEYOND_POSITION,
-    DETECTOR_MEMORY_SIZE,
+    DETECTORS,
     MOVING,
     NOT_FINITE,
-    R_MISSING_S,
     ROTOR_FAULT,
-    ROTOR_MEMORY_SIZE,
+    ROTOR_SPEEDS,
     UNMEASURED,
     UNMEASURED_AFTER_S,
     detect,
-    detector_params,
+    detector_limits,
     follow_rotors,
-    rotor_params,
+    rotor_lags,
 )
 from flightstack.commander.failsafe import Failsafe
 from flightstack.core.compiled import direct
-from flightstack.core.contract import SETPOINT_SIZE, FloatArray, LoopRow
+from flightstack.core.contract import SETPOINT_SIZE, FloatArray, LoopRow, RecordArray
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
 
@@ -44,34 +43,34 @@ class FaultWatch:
         self._vehicle = vehicle
         self._state = state
         self._dt_s = 1.0 / outer_hz
-        self._detector = np.zeros(DETECTOR_MEMORY_SIZE)
-        self._rotors = np.zeros(ROTOR_MEMORY_SIZE)
+        self._detectors: RecordArray = np.zeros(1, DETECTORS)
+        self._rotors: RecordArray = np.zeros(1, ROTOR_SPEEDS)
         self._nowhere = np.zeros(SETPOINT_SIZE)
-        self._rotor_params = rotor_params(vehicle, self._dt_s / divisor)
+        self._lags = rotor_lags(vehicle, self._dt_s / divisor)
         self._unmeasured: set[int] = set()
         self.found = 0
         """Bits of ``detectors.detect``, of the newest look."""
         self.set_behaviour(behaviour)
         row = np.zeros(LoopRow.SIZE)
-        self._follow = direct(follow_rotors, row, self._rotors, self._rotor_params)
+        self._follow = direct(follow_rotors, row, self._rotors, self._lags)
         self._detect = direct(
-            detect, state, self._nowhere, row, self._rotors, self._detector, self._params, False, self._dt_s
+            detect, state, self._nowhere, row, self._rotors, self._detectors, self._limits, False, self._dt_s
         )
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Take new limits, from the next look on."""
-        self._params = detector_params(behaviour, self._vehicle)
+        self._limits = detector_limits(behaviour, self._vehicle)
 
     def begin(self) -> None:
         """Forget what was seen before: a flight begins."""
-        self._detector[:] = 0.0
-        self._rotors[:] = 0.0
+        self._detectors[:] = np.zeros(1, DETECTORS)
+        self._rotors[:] = np.zeros(1, ROTOR_SPEEDS)
         self._unmeasured.clear()
         self.found = 0
 
     def follow_rotors(self, row: FloatArray) -> None:
         """Take the newest row of the inner loop, shape (48,), once per inner tick."""
-        self._follow(row, self._rotors, self._rotor_params)
+        self._follow(row, self._rotors, self._lags)
 
     def look(
         self, setpoint: FloatArray, row: FloatArray, position_is_controlled: bool, on_ground: bool
@@ -85,7 +84,7 @@ class FaultWatch:
             self._nowhere[:3] = self._state[:3]
             setpoint = self._nowhere
         self.found = self._detect(
-            self._state, setpoint, row, self._rotors, self._detector, self._params, on_ground, self._dt_s
+            self._state, setpoint, row, self._rotors, self._detectors, self._limits, on_ground, self._dt_s
         )
         return self.found
 
@@ -103,7 +102,7 @@ class FaultWatch:
         """Return the rotors, from 1, whose speed is no longer measured; each once in a flight."""
         if not self.found & UNMEASURED:
             return []
-        missing_s = self._rotors[R_MISSING_S : R_MISSING_S + len(self._vehicle.rotors)]
+        missing_s = self._rotors["missing"][0, : len(self._vehicle.rotors)]
         fresh = {int(i) + 1 for i in np.flatnonzero(missing_s >= UNMEASURED_AFTER_S)} - self._unmeasured
         self._unmeasured |= fresh
         return sorted(fresh)

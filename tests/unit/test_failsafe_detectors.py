@@ -15,16 +15,16 @@ from flightstack.commander.detectors import (
     BATTERY_HYSTERESIS,
     BEYOND_ATTITUDE,
     BEYOND_POSITION,
-    DETECTOR_MEMORY_SIZE,
+    DETECTORS,
     MOVING,
     NOT_FINITE,
     ROTOR_FAULT,
-    ROTOR_MEMORY_SIZE,
+    ROTOR_SPEEDS,
     battery_level,
     detect,
-    detector_params,
+    detector_limits,
     follow_rotors,
-    rotor_params,
+    rotor_lags,
 )
 from flightstack.commander.failsafe import Failsafe
 from flightstack.commander.fault_watch import FaultWatch
@@ -44,10 +44,10 @@ class Bench:
 
     def __init__(self, *assignments: str) -> None:
         behaviour = with_assignments(Behaviour(), list(assignments))
-        self.params = detector_params(behaviour, VEHICLE)
-        self.rotor_params = rotor_params(VEHICLE, INNER_S)
-        self.rotors = np.zeros(ROTOR_MEMORY_SIZE)
-        self.memory = np.zeros(DETECTOR_MEMORY_SIZE)
+        self.limits = detector_limits(behaviour, VEHICLE)
+        self.lags = rotor_lags(VEHICLE, INNER_S)
+        self.rotors = np.zeros(1, ROTOR_SPEEDS)
+        self.memory = np.zeros(1, DETECTORS)
         self.state = np.array([0.0] * 6 + [1.0] + [0.0] * 6)
         self.setpoint = np.zeros(11)
         self.on_ground = False
@@ -63,14 +63,14 @@ class Bench:
         found = 0
         for _ in range(round(seconds / DT_S)):
             for _ in range(5):
-                follow_rotors(self.row, self.rotors, self.rotor_params)
+                follow_rotors(self.row, self.rotors, self.lags)
             found = detect(
                 self.state,
                 self.setpoint,
                 self.row,
                 self.rotors,
                 self.memory,
-                self.params,
+                self.limits,
                 self.on_ground,
                 DT_S,
             )
@@ -186,10 +186,10 @@ def test_rotors_that_are_shaken_are_no_fault(period: int) -> None:
     command[:] = speed[:] = 0.0
     for tick in range(2000):
         command[:] = 900.0 if tick // period % 2 else 100.0
-        follow_rotors(bench.row, bench.rotors, bench.rotor_params)
+        follow_rotors(bench.row, bench.rotors, bench.lags)
         if tick % 5 == 0:
             found = detect(
-                bench.state, bench.setpoint, bench.row, bench.rotors, bench.memory, bench.params, False, DT_S
+                bench.state, bench.setpoint, bench.row, bench.rotors, bench.memory, bench.limits, False, DT_S
             )
             assert not found & ROTOR_FAULT
         speed += (command - speed) * (1.0 - math.exp(-INNER_S / lag_s))
@@ -238,7 +238,7 @@ def test_one_bad_rotor_sample_leaves_its_detector_as_it_was(column: int, bad: fl
         bench.run(1.0)
     good = disturbed.row[column]
     disturbed.row[column] = bad
-    follow_rotors(disturbed.row, disturbed.rotors, disturbed.rotor_params)
+    follow_rotors(disturbed.row, disturbed.rotors, disturbed.lags)
     disturbed.row[column] = good
     assert not disturbed.run(0.5) & ROTOR_FAULT
     quiet.run(0.5)
@@ -326,7 +326,7 @@ def test_no_number_breaks_the_detectors(values: list[float]) -> None:
     bench = Bench()
     bench.state[:], bench.setpoint[:], bench.row[:47] = values[:13], values[13:24], values[24:71]
     bench.run(0.1)
-    assert set(bench.memory[5:10]) <= {0.0, 1.0}
+    assert set(bench.memory["triggered"][0].tolist()) <= {0, 1}
 
 
 # ---------------------------------------------------------------------- battery
