@@ -156,6 +156,6 @@ def renew(memory: Memory, failsafe: Failsafe) -> Memory:
     return memory._replace(entries={f: entry for f, entry in memory.entries.items() if f is not failsafe})
 
 
-def active(memory: Memory) -> tuple[Failsafe, ...]:
+def active_failsafes(memory: Memory) -> tuple[Failsafe, ...]:
     """Return the active failsafes, overridden ones too, in order of priority."""
     return tuple(sorted(memory.entries, key=lambda failsafe: -PRIORITY[failsafe]))

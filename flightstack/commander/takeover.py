@@ -38,16 +38,16 @@ class Takeovers:
         self._taken: dict[Phase, Failsafe] = {}
         self._asked_us: dict[Phase, int] = {}
 
-    def forget(self) -> None:
+    def begin_flight(self) -> None:
         """Begin a flight."""
         self._taken.clear()
         self._asked_us.clear()
 
-    def took(self, phase: Phase, cause: Failsafe) -> None:
+    def record(self, phase: Phase, cause: Failsafe) -> None:
         """Remember that a failsafe has ended a phase of flight."""
         self._taken[phase] = cause
 
-    def granted(self) -> None:
+    def clear(self) -> None:
         """A user's choice was carried out: from now on all modes are there to be chosen again."""
         self._taken.clear()
 

@@ -1,12 +1,15 @@
-"""The seam between the flight stack and the loops that fly: Python now, C on host or target beside it."""
+"""Seam between the flight stack and the control loops that fly: Python, C on the host, or C on a target."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Protocol
 
-from flightstack.core.contract import FloatArray
+import numpy as np
+
+from flightstack.core.contract import FloatArray, LoopRow, LoopStatus
 from flightstack.params.spec import ParamSpec
+from flightstack.params.vehicle import Vehicle
 
 
 class ControlBackend(Protocol):
@@ -61,3 +64,21 @@ class ControlBackend(Protocol):
 
     def close(self) -> None:
         """End; nothing is called after it."""
+
+
+class IdleRow:
+    """Writes rows of loops that rest."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._speed = np.array([max(0.0, rotor.min_speed_rad_s) for rotor in vehicle.rotors])
+        self._columns = slice(LoopRow.ROTOR_COMMAND.start, LoopRow.ROTOR_COMMAND.start + self._speed.size)
+
+    def write(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
+        """Write ``row`` (48,): rotors at idle speed when armed, else stopped; the reference at the attitude."""
+        row[:] = 0.0
+        row[LoopRow.STATE] = state
+        row[LoopRow.REFERENCE_ATTITUDE] = state[6:10]
+        if armed:
+            row[self._columns] = self._speed
+        row[LoopRow.ROTOR_SPEED] = rotor_speed_rad_s
+        row[LoopRow.STATUS] = LoopStatus.IDLE

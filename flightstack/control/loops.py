@@ -15,8 +15,8 @@ from flightstack.control.attitude_reference import (
     attitude_reference_step,
     in_body_frame,
 )
+from flightstack.control.backend import IdleRow
 from flightstack.control.controller_loading import compile_error
-from flightstack.control.idle import IdleRow
 from flightstack.control.loop_parameters import LoopParameters, loop_numbers
 from flightstack.control.mixer import WORK_ROWS, Mixer, mix, mixer_for, relative_rotor_speed
 from flightstack.control.position_pid import (

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from flightstack.control.attitude_controller import AttitudeController
-from flightstack.control.idle import IdleRow
+from flightstack.control.backend import IdleRow
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.core.contract import (
     ATTITUDE_TARGET_SIZE,

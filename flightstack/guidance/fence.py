@@ -184,7 +184,7 @@ def _no_breach() -> RecordArray:
     return breach
 
 
-class FenceMonitor:
+class FenceEvaluator:
     """Watches the vehicle; ``flags`` and ``margin_m`` are those of the last step. No I/O, no clock."""
 
     def __init__(self) -> None:

@@ -26,10 +26,10 @@ from flightstack.core.contract import (
 from flightstack.core.geometry import blend, euler_from_quaternion
 from flightstack.core.modes import Mode
 from flightstack.core.portable_math import sin_cos
-from flightstack.guidance.aim import RETURN, advance_return, aim_goal
 from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
 from flightstack.guidance.mission import into_ground, mission_goal, mission_step
+from flightstack.guidance.mode_target import RETURN, advance_return, target_goal
 from flightstack.guidance.offboard import attitude_step, point_step
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.setpoints import ATTITUDE
@@ -131,7 +131,7 @@ def goal_kernel(
     mission: RecordArray,
     plan: RecordArray,
     jumps_left: FloatArray,
-    aim: RecordArray,
+    mode_target: RecordArray,
     land: FloatArray,
     last_target: FloatArray,
     params_array: FloatArray,
@@ -148,7 +148,7 @@ def goal_kernel(
     state = vehicle_state(state_array)
     params = GuidanceParams(*as_tuple(params_array, GUIDANCE_PARAMS_SIZE))
     last = Trajectory(*as_tuple(trajectory, TRAJECTORY_SIZE))
-    m, a = mission[0], aim[0]
+    m, a = mission[0], mode_target[0]
     if mode == MISSION:
         landed = LandMemory(*as_tuple(land, LAND_MEMORY_SIZE)).landed > 0.0
         mission_step(m, plan, jumps_left, state, last.yaw_rad, landed, params, dt_s)
@@ -156,7 +156,7 @@ def goal_kernel(
     else:
         if mode == RETURN:
             advance_return(a, state, params)
-        goal = aim_goal(mode, a, params)
+        goal = target_goal(mode, a, params)
     goal = into_ground(goal, state.position_ned_m.z, params)
     lift = lift_share(state, attitude_target(last_target).thrust_n, params.weight_n)
     reference = _waiting(last, trajectory_step(last, goal, _limits(params), dt_s), state)

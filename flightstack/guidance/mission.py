@@ -7,15 +7,18 @@ advanced in place. ``jumps_left`` holds for each DO_JUMP how often it still jump
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Record, RecordArray, VehicleState
+from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.geometry import euler_from_quaternion, wrap_pi
 from flightstack.core.portable_math import atan2
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.trajectory import Goal, Trajectory
+from flightstack.plan import MissionItem
 
 WAYPOINT = 16
 LOITER_TIME = 19
@@ -350,3 +353,28 @@ def landing_speed(down_m: float, params: GuidanceParams) -> float:
     """Descent speed of a landing at ``down_m``: slower near the ground."""
     height_m = params.ground_down_m - down_m
     return params.descent_speed_m_s if height_m > params.land_slow_altitude_m else params.land_speed_m_s
+
+
+def plan_table(
+    items: Sequence[MissionItem], frame: LocalFrame, home_altitude_m: float
+) -> tuple[RecordArray, FloatArray]:
+    """Return the plan, n of ``PLAN_ITEM``, and the repeats of its jumps, shape (n,); see ``guidance.mission``.
+
+    Positions are in the local ``frame``; relative altitudes count from home, at ``home_altitude_m`` above the sea.
+    """
+    origin_altitude_m = frame.origin.altitude_m
+    plan: RecordArray = np.empty(len(items), PLAN_ITEM)
+    jumps = np.zeros(len(items))
+    for row, item in enumerate(items):
+        north_m = east_m = down_m = math.nan
+        position = item.position_deg
+        if position is not None:
+            local = frame.to_ned(GeoPoint(position[0], position[1], origin_altitude_m))
+            north_m, east_m = local.x, local.y
+        if item.is_global and math.isfinite(item.z):
+            base_m = home_altitude_m - origin_altitude_m if item.altitude_is_relative else -origin_altitude_m
+            down_m = -(item.z + base_m)
+        plan[row] = (item.command, *item.params, north_m, east_m, down_m)
+        if item.command == DO_JUMP:
+            jumps[row] = item.param2
+    return plan, jumps

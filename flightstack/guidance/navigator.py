@@ -11,7 +11,6 @@ from flightstack.core.compiled import direct
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray, RecordArray
 from flightstack.core.modes import STREAM_MODES, Mode
 from flightstack.core.portable_math import atan2, distance
-from flightstack.guidance.aim import AIM, CLIMBING
 from flightstack.guidance.kernels import (
     TRAJECTORY_SIZE,
     goal_kernel,
@@ -30,7 +29,8 @@ from flightstack.guidance.mission import (
     mission_start,
 )
 from flightstack.guidance.mission import LAND as LAND_ITEM
-from flightstack.guidance.params import GuidanceParams
+from flightstack.guidance.mode_target import CLIMBING, MODE_TARGET
+from flightstack.guidance.params import GuidanceParams, SpeedOverrides
 from flightstack.guidance.setpoints import (
     ATTITUDE,
     POINT,
@@ -39,7 +39,6 @@ from flightstack.guidance.setpoints import (
     empty_stream,
     store_setpoint,
 )
-from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.guidance.trajectory import BRAKING, Trajectory
 
 LEVEL_S = 0.1
@@ -77,7 +76,7 @@ class Navigator:
         self._current, self._reached, self._finished, self._wants_return = views
         self._reported = 0
         self._repositions = False
-        self._aim: RecordArray = np.zeros(1, AIM)
+        self._mode_target: RecordArray = np.zeros(1, MODE_TARGET)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0, 0.0))
         self._land_now = self._land.data  # a number of an array takes four times as long to read
         self._stream = empty_stream()
@@ -96,7 +95,7 @@ class Navigator:
             self._params_array, self._dt_s, self.setpoint, self.attitude_target,
         )  # fmt: skip
         self._fly_goal = direct(
-            goal_kernel, 0, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim,
+            goal_kernel, 0, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target,
             self._land, target, self._params_array, self._dt_s, self.setpoint,
         )  # fmt: skip
 
@@ -205,7 +204,7 @@ class Navigator:
 
     def set_current(self, index: int) -> None:
         """Make ``index`` the mission's current item."""
-        t, aim = self._reference(), self._aim[0]
+        t, aim = self._reference(), self._mode_target[0]
         mission_start(self._mission[0], index, t, self.params)
         aim["start_x"], aim["start_y"] = t.x, t.y
 
@@ -213,11 +212,11 @@ class Navigator:
         """Return the state of the reference point."""
         return Trajectory(*self._trajectory.tolist())
 
-    def rest_at(self, state: FloatArray) -> None:
+    def reset_on_ground(self, state: FloatArray) -> None:
         """Put the reference at the vehicle's position, at rest, before it leaves the ground; not at a state of NaNs."""
         self._rest(state, self._trajectory, self._land, self.setpoint)
 
-    def take_up(self, state: FloatArray) -> None:
+    def reset_reference(self, state: FloatArray) -> None:
         """Put the reference where the vehicle is, moving as it does: it could not follow the old one."""
         if not np.isfinite(state).all():
             return
@@ -226,7 +225,7 @@ class Navigator:
 
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
         """Aim for ``mode`` from where the reference is now."""
-        t, aim, p = self._reference(), self._aim[0], self.params
+        t, aim, p = self._reference(), self._mode_target[0], self.params
         self._repositions = False
         aim["x"], aim["y"], aim["z"], aim["yaw"], aim["speed"] = t.x, t.y, t.z, t.yaw_rad, 0.0
         if mode == Mode.TAKEOFF:
@@ -246,7 +245,7 @@ class Navigator:
 
         The ceiling comes first: a return does not break the fence that it may have been called by.
         """
-        t, aim, p = self._reference(), self._aim[0], self.params
+        t, aim, p = self._reference(), self._mode_target[0], self.params
         aim["phase"] = CLIMBING
         if distance(t.x - aim["home_x"], t.y - aim["home_y"]) > p.return_min_distance_m:
             aim["z"] = min(t.z, aim["home_z"] - p.return_altitude_m)
@@ -254,7 +253,7 @@ class Navigator:
 
     def return_to(self, north_m: float, east_m: float, ground_down_m: float) -> None:
         """Let the next return end at this place [m NED]: home, or a rally point."""
-        aim = self._aim[0]
+        aim = self._mode_target[0]
         aim["home_x"], aim["home_y"], aim["home_z"] = north_m, east_m, ground_down_m
 
     def reposition(
@@ -264,7 +263,7 @@ class Navigator:
 
         Call it after entering HOLD.
         """
-        t, aim = self._reference(), self._aim[0]
+        t, aim = self._reference(), self._mode_target[0]
         self._repositions = True
         if math.isfinite(north_m) and math.isfinite(east_m):
             aim["x"], aim["y"] = north_m, east_m
@@ -283,7 +282,7 @@ class Navigator:
         """Whether HOLD is on its way to a place that ``reposition`` named."""
         if not self._repositions:
             return False
-        t, aim = self._reference(), self._aim[0]
+        t, aim = self._reference(), self._mode_target[0]
         return distance(t.x - aim["x"], t.y - aim["y"], t.z - aim["z"]) > ARRIVED_M
 
     def _enter_mission(self) -> None:
@@ -303,7 +302,7 @@ class Navigator:
 
     def hold_at_last_item(self) -> None:
         """Hold where the mission that has just ended was going to; a takeoff's goal needs no such step."""
-        m, aim = self._mission[0], self._aim[0]
+        m, aim = self._mission[0], self._mode_target[0]
         aim["x"], aim["y"], aim["z"], aim["yaw"] = m["x"], m["y"], m["z"], m["yaw"]
 
     # ------------------------------------------------------------------ streams
@@ -349,6 +348,6 @@ class Navigator:
             )  # fmt: skip
             return
         self._fly_goal(
-            number, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._aim,
+            number, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target,
             self._land, attitude_target, self._params_array, self._dt_s, self.setpoint,
         )  # fmt: skip

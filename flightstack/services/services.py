@@ -1,31 +1,64 @@
-"""The services of the vehicle, put together: one line each."""
+"""The services of the vehicle: their interface, and all of them joined."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
+from functools import partial
+from typing import Protocol
 
 from flightstack import __version__
+from flightstack.core.contract import Vector3
 from flightstack.core.severity import Severity
 from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.param_pack import pack_file
 from flightstack.params.metadata import parameters_json
 from flightstack.services.commands import VehicleContext
 from flightstack.services.commands.command_service import CommandService
 from flightstack.services.commands.failure_commands import FailureCommands
 from flightstack.services.commands.link_commands import LinkCommands
-from flightstack.services.files.component_metadata import ComponentMetadata
-from flightstack.services.files.file_services import file_services
+from flightstack.services.files.component_metadata import ComponentMetadata, vehicle_files
+from flightstack.services.files.ftp_server import FtpServer
+from flightstack.services.logs.log_server import LogServer
 from flightstack.services.logs.log_stream import LogStream
 from flightstack.services.mission.guided_items import GuidedItems
 from flightstack.services.mission.mission_service import MissionService
 from flightstack.services.params.param_server import ParamServer
-from flightstack.services.routing.link_loss import LinkLossService
 from flightstack.services.routing.peer import Peer
-from flightstack.services.service import Service
-from flightstack.services.streams.stream_services import stream_services
+from flightstack.services.streams.link_loss import GroundLinkMonitor, StreamMonitor
+from flightstack.services.streams.manual_server import ManualServer
+from flightstack.services.streams.setpoint_messages import Here
+from flightstack.services.streams.setpoint_server import SetpointServer
 from flightstack.services.streams.timesync import TimeService
+from flightstack.services.telemetry.fields import euler
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.status import VehicleInfo
+
+
+class Service(Protocol):
+    """A protocol as a state machine: messages in, messages out, no I/O.
+
+    ``now_s`` is the links' own clock: it goes on while simulated time stands still.
+    """
+
+    @property
+    def handles(self) -> frozenset[str]:
+        """Type names of the messages that ``receive`` wants to see."""
+        ...
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take a message from ``peer``; what is not for this vehicle is ignored, and nothing is raised."""
+        ...
+
+    def poll(self, now_s: float) -> Iterable[tuple[Hashable | None, Message]]:
+        """Return the messages to send now, each with its peer; None means every peer that was heard."""
+        ...
+
+    def next_deadline(self) -> float | None:
+        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        ...
+
 
 VENDOR = "flightstack"
 
@@ -55,9 +88,54 @@ def make_services(
         CommandService(own, vehicle, peer_at, link_commands.answer, failures),
         link_commands,
         *stream_services(own, parts, info),
-        LinkLossService(parts.now, parts.supervisor.links),
+        GroundLinkMonitor(parts.now, parts.failsafes.links),
         TimeService(lambda: parts.now.time_us),
         ParamServer(own, vehicle.params, lambda text: parts.journal.say(Severity.WARNING, text)),
         *file_services(own, vehicle, metadata, has_room),
         log_stream,
     ]
+
+
+def stream_services(own: Address, parts: VehicleParts, info: VehicleInfo) -> tuple[Service, Service]:
+    """Return the services of offboard setpoints and of manual control; each reports the loss of its stream."""
+    now, links = parts.now, parts.failsafes.links
+
+    def vehicle_time_us() -> int:
+        return now.time_us
+
+    def set_offboard_lost(lost: bool) -> None:
+        links.offboard_lost = lost
+
+    def set_manual_lost(lost: bool) -> None:
+        links.manual_lost = lost
+
+    def here() -> Here:
+        state: list[float] = now.state.tolist()
+        return Here(Vector3(*state[:3]), euler(state[6:10])[2], info.frame, parts.area.home.altitude_m)
+
+    offboard = StreamMonitor(vehicle_time_us, lambda: now.behaviour.offboard_loss_s, set_offboard_lost)
+    manual = StreamMonitor(vehicle_time_us, lambda: now.behaviour.manual_loss_s, set_manual_lost)
+    return (
+        SetpointServer(
+            own,
+            here,
+            partial(parts.navigator.set_offboard, max_thrust_n=info.max_thrust_n),
+            partial(parts.journal.say, Severity.WARNING),
+            offboard,
+        ),
+        ManualServer(own, parts.requests.take_sticks, manual),
+    )
+
+
+def file_services(
+    own: Address,
+    vehicle: VehicleContext,
+    metadata: ComponentMetadata,
+    has_room: Callable[[Hashable], bool],
+) -> tuple[Service, Service]:
+    """Return the services of MAVLink FTP and of the log protocol."""
+    files = vehicle_files(metadata, lambda arguments: pack_file(vehicle.params, arguments), vehicle.logs)
+    return (
+        FtpServer(own, files, has_room),
+        LogServer(own, vehicle.logs, lambda: vehicle.now.status.armed, vehicle.journal.say, has_room),
+    )

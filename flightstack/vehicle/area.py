@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from flightstack.commander.fence_watch import FenceWatch
+from flightstack.commander.fence_monitor import FenceMonitor
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.modes import Mode
@@ -29,7 +29,7 @@ class FlightArea:
         self,
         now: FlightState,
         places: SafePlaces,
-        fence: FenceWatch,
+        fence: FenceMonitor,
         mission: Mission,
         navigator: Navigator,
         journal: Journal,

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.commander.conditions import StateSource
-from flightstack.commander.ground_watch import GroundWatch
-from flightstack.commander.supervisor import Supervisor
+from flightstack.commander.failsafe_monitor import FailsafeMonitor
+from flightstack.commander.ground_monitor import GroundMonitor
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.geodesy import GeoPoint
@@ -19,8 +19,8 @@ from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
+from flightstack.vehicle.flight_monitor import FlightMonitor
 from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.flight_watch import FlightWatch
 from flightstack.vehicle.journal import Journal, Recorder
 from flightstack.vehicle.mission import Mission
 from flightstack.vehicle.mode_control import ModeControl
@@ -42,7 +42,7 @@ class VehicleParts(NamedTuple):
     readiness: Readiness
     modes: ModeControl
     requests: FlightRequests
-    supervisor: Supervisor
+    failsafes: FailsafeMonitor
     navigator: Navigator
     backend: ControlBackend
     autopilot: Autopilot
@@ -51,13 +51,13 @@ class VehicleParts(NamedTuple):
         """Compile the kernels of loops and commander, or load them from the cache."""
         now = self.now
         self.backend.warm_up(now.state, now.setpoint, now.rotor_speed)
-        self.supervisor.warm_up()
+        self.failsafes.warm_up()
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Take new parameters of guidance and commander, from the next outer tick on."""
         limits, self.now.behaviour = plan_limits(self.now.behaviour), behaviour
         self.navigator.set_params(guidance_params(behaviour, self.vehicle.weight_n))
-        self.supervisor.set_behaviour(behaviour)
+        self.failsafes.set_behaviour(behaviour)
         self.area.set_bounds()
         if plan_limits(behaviour) != limits:
             self.modes.check_mission_in_flight()
@@ -86,21 +86,21 @@ def assemble(
     )
     journal = Journal(now, recorder)
     places = SafePlaces(home)
-    supervisor = Supervisor(vehicle, behaviour, outer_hz, divisor, state, source)
-    ground = GroundWatch()
+    failsafes = FailsafeMonitor(vehicle, behaviour, outer_hz, divisor, state, source)
+    ground = GroundMonitor()
     mission = Mission(now, places, navigator, journal)
-    area = FlightArea(now, places, supervisor.fence, mission, navigator, journal)
-    readiness = Readiness(now, supervisor, ground, mission)
+    area = FlightArea(now, places, failsafes.fence, mission, navigator, journal)
+    readiness = Readiness(now, failsafes, ground, mission)
     takeoff = Takeoff(now, places, area, readiness)
     modes = ModeControl(
-        now, journal, readiness, supervisor, ground, mission, area, takeoff, navigator, backend
+        now, journal, readiness, failsafes, ground, mission, area, takeoff, navigator, backend
     )
-    requests = FlightRequests(now, journal, modes, readiness, supervisor, mission, navigator)
-    watch = FlightWatch(
-        now, journal, modes, supervisor, ground, mission, area, takeoff, navigator, vehicle.weight_n
+    requests = FlightRequests(now, journal, modes, readiness, failsafes, mission, navigator)
+    watch = FlightMonitor(
+        now, journal, modes, failsafes, ground, mission, area, takeoff, navigator, vehicle.weight_n
     )
-    autopilot = Autopilot(now, watch, supervisor, navigator, backend, recorder, divisor)
+    autopilot = Autopilot(now, watch, failsafes, navigator, backend, recorder, divisor)
     return VehicleParts(
-        vehicle, now, journal, places, mission, area, takeoff, readiness, modes, requests, supervisor, navigator,
+        vehicle, now, journal, places, mission, area, takeoff, readiness, modes, requests, failsafes, navigator,
         backend, autopilot,
     )  # fmt: skip

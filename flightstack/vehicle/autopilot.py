@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from flightstack.commander.supervisor import Supervisor
+from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, LoopFlags, LoopRow, LoopStatus
 from flightstack.core.modes import Mode
 from flightstack.guidance.navigator import Navigator
+from flightstack.vehicle.flight_monitor import FlightMonitor
 from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.flight_watch import FlightWatch
 from flightstack.vehicle.journal import Recorder
 
 # used in every tick: a member of an enumeration takes seven times as long to look up as a name
@@ -23,8 +23,8 @@ class Autopilot:
     def __init__(
         self,
         now: FlightState,
-        watch: FlightWatch,
-        supervisor: Supervisor,
+        watch: FlightMonitor,
+        failsafes: FailsafeMonitor,
         navigator: Navigator,
         backend: ControlBackend,
         recorder: Recorder,
@@ -33,7 +33,7 @@ class Autopilot:
         """Run the outer loop every ``divisor`` ticks."""
         self.now = now
         self._watch = watch
-        self._supervisor = supervisor
+        self._failsafes = failsafes
         self._navigator = navigator
         self._backend = backend
         self._recorder = recorder
@@ -43,7 +43,7 @@ class Autopilot:
 
     def tick(self, time_us: int) -> FloatArray:
         """Run one inner tick on the newest state; return the rotor speed commands [rad/s], shape (8,)."""
-        now, supervisor = self.now, self._supervisor
+        now, failsafes = self.now, self._failsafes
         now.time_us = time_us
         outer_due = self._tick % self._divisor == 0
         self._tick += 1
@@ -53,21 +53,21 @@ class Autopilot:
         row, flags = self._recorder.inner_row(time_us), 0
         if now.rests or not now.flying:
             self._backend.idle(now.state, now.rotor_speed, now.status.armed, row)
-            supervisor.follow_rotors(row)
-        elif supervisor.states.holds_rotors:
+            failsafes.follow_rotors(row)
+        elif failsafes.states.holds_rotors:
             row[:] = self._good_row
             row[LoopRow.STATUS] = LoopStatus.INPUT_STALE
         else:
             aims = outer_due and not now.attitude_is_given
             self._backend.step(now.state, now.setpoint, now.rotor_speed, aims, row)
-            supervisor.follow_rotors(row)
+            failsafes.follow_rotors(row)
             flags = _OUTER_DUE if aims else _SET_TARGET
             if now.loops_reset:
                 flags |= _RESET
                 now.loops_reset = False
         now.row = row
         if outer_due:
-            if supervisor.states.is_new:  # commands computed from a stale state are not worth holding
+            if failsafes.states.is_new:  # commands computed from a stale state are not worth holding
                 self._good_row[:] = row
             self._recorder.outer(time_us, now.state, now.setpoint, now.attitude_target, flags)
         commands: FloatArray = row[_COMMANDS]
@@ -80,14 +80,14 @@ class Autopilot:
         rested, now.rests = now.rests, False
         armed, mode = now.status
         waits = armed and mode is _MISSION  # on the ground
-        if self._supervisor.states.holds_rotors or not (flying or waits):
+        if self._failsafes.states.holds_rotors or not (flying or waits):
             return
         target = None
         touched = navigator.touches_ground
         navigator.step(mode, now.state, now.attitude_target)
         flies_attitude = navigator.flies_attitude(mode)
         if touched and not navigator.touches_ground:  # it climbs, or was in the air
-            navigator.take_up(now.state)
+            navigator.reset_reference(now.state)
         touches = flying and navigator.touches_ground and not flies_attitude
         now.rests = touches and navigator.rests
         if rested or now.rests or (touches and not touched):  # integrators hold the contact forces

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flightstack.core.geodesy import GeoPoint
+from flightstack.guidance.mission import plan_table
 from flightstack.guidance.navigator import Navigator
-from flightstack.guidance.plan_table import plan_table
 from flightstack.guidance.safe_places import HOME_SPREAD_M, SafePlaces, plan_limits
 from flightstack.plan import MissionItem, Rejection
 from flightstack.plan.jumps import takes_off

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from flightstack.commander.ground_watch import GroundWatch
-from flightstack.commander.supervisor import Supervisor
+from flightstack.commander.failsafe_monitor import FailsafeMonitor
+from flightstack.commander.ground_monitor import GroundMonitor
 from flightstack.commander.transitions import Event, Status, transition
 from flightstack.control.backend import ControlBackend
 from flightstack.core.modes import STREAM_MODES, Mode
 from flightstack.core.severity import Severity
 from flightstack.guidance.navigator import Navigator
-from flightstack.guidance.speeds import SpeedOverrides
+from flightstack.guidance.params import SpeedOverrides
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
@@ -26,8 +26,8 @@ class ModeControl:
         now: FlightState,
         journal: Journal,
         readiness: Readiness,
-        supervisor: Supervisor,
-        ground: GroundWatch,
+        failsafes: FailsafeMonitor,
+        ground: GroundMonitor,
         mission: Mission,
         area: FlightArea,
         takeoff: Takeoff,
@@ -37,7 +37,7 @@ class ModeControl:
         self._now = now
         self._journal = journal
         self._readiness = readiness
-        self._supervisor = supervisor
+        self._failsafes = failsafes
         self._ground = ground
         self._mission = mission
         self._area = area
@@ -90,7 +90,7 @@ class ModeControl:
             if now.landed:
                 journal.say(Severity.NOTICE, "Disarmed")
             else:
-                self._ground.dropped(now.time_us)
+                self._ground.disarmed_in_air(now.time_us)
                 journal.say(Severity.CRITICAL, "Disarmed in the air")
         if after != before:
             journal.status(after)
@@ -112,12 +112,12 @@ class ModeControl:
         now = self._now
         now.armed_us = now.time_us
         now.takeoff_us = now.landing_us = 0
-        self._supervisor.armed()
+        self._failsafes.armed()
         self._ground.armed(now.time_us)
         self._takeoff.altitude_m += self._area.bring_home()
         now.landed = True
         self._area.stands_here()
-        self._navigator.rest_at(
+        self._navigator.reset_on_ground(
             now.state
         )  # guidance may hold the end of a flight that was disarmed in the air
 
@@ -131,7 +131,7 @@ class ModeControl:
         if starting:
             self._backend.reset(now.state)
             now.loops_reset = True
-            self._navigator.rest_at(now.state)
+            self._navigator.reset_on_ground(now.state)
         if entering:
             place = self._area.return_destination() if now.status.mode is Mode.RETURN else None
             if place is not None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from flightstack.commander.arming_checks import arming_refusals
-from flightstack.commander.ground_watch import GroundWatch
-from flightstack.commander.supervisor import Supervisor
+from flightstack.commander.failsafe_monitor import FailsafeMonitor
+from flightstack.commander.ground_monitor import GroundMonitor
 from flightstack.commander.transitions import Facts, Need
 from flightstack.core.modes import Mode
 from flightstack.vehicle.flight_state import FlightState
@@ -15,10 +15,10 @@ class Readiness:
     """Answers the questions of the transition table and of the arming checks."""
 
     def __init__(
-        self, now: FlightState, supervisor: Supervisor, ground: GroundWatch, mission: Mission
+        self, now: FlightState, failsafes: FailsafeMonitor, ground: GroundMonitor, mission: Mission
     ) -> None:
         self._now = now
-        self._supervisor = supervisor
+        self._failsafes = failsafes
         self._ground = ground
         self._mission = mission
 
@@ -26,7 +26,7 @@ class Readiness:
     def facts(self) -> Facts:
         """Facts that the transition table needs."""
         now = self._now
-        known = self._supervisor.arming_facts(now.status.mode, now.has_state)
+        known = self._failsafes.arming_facts(now.status.mode, now.has_state)
         return Facts(
             state_is_valid=known.state_is_valid and known.state_is_fresh,
             upright=known.upright,
@@ -44,7 +44,7 @@ class Readiness:
         """
         now = self._now
         mode = now.status.mode if mode is None else mode
-        known = self._supervisor.arming_facts(mode, now.has_state)
+        known = self._failsafes.arming_facts(mode, now.has_state)
         known = known._replace(throttle=now.throttle, mode_fault=self._fault_on_ground(mode, first) or "")
         known = known._replace(is_at_rest=self._ground.is_at_rest(now.time_us))
         return arming_refusals(known, now.behaviour)

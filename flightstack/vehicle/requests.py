@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from flightstack.commander.failsafe import PHASE_OF_MODE, Phase
-from flightstack.commander.supervisor import Supervisor
+from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.commander.transitions import RULES, Event, Need, transition
 from flightstack.core.modes import Mode
 from flightstack.core.severity import Severity
@@ -34,7 +34,7 @@ class FlightRequests:
         journal: Journal,
         modes: ModeControl,
         readiness: Readiness,
-        supervisor: Supervisor,
+        failsafes: FailsafeMonitor,
         mission: Mission,
         navigator: Navigator,
     ) -> None:
@@ -42,7 +42,7 @@ class FlightRequests:
         self._journal = journal
         self._modes = modes
         self._readiness = readiness
-        self._supervisor = supervisor
+        self._failsafes = failsafes
         self._mission = mission
         self._navigator = navigator
 
@@ -68,12 +68,12 @@ class FlightRequests:
     def _select(self, event: Event, phase: Phase, takeoff_altitude_m: float | None = None) -> str | None:
         refusal = self._failsafe_refusal(phase) or self._modes.apply(event, takeoff_altitude_m)
         if refusal is None:
-            self._supervisor.override(phase)
+            self._failsafes.override(phase)
         return refusal
 
     def _failsafe_refusal(self, phase: Phase) -> str | None:
         """Return the reason that an active failsafe denies ``phase``, or None; a disarmed vehicle is denied nothing."""
-        return self._supervisor.refusal(phase) if self._now.status.armed else None
+        return self._failsafes.refusal(phase) if self._now.status.armed else None
 
     def start_mission(self, first: int | None) -> str | None:
         """Select MISSION, from item ``first`` if given, and arm if disarmed; return the refusal, or None.
@@ -95,7 +95,7 @@ class FlightRequests:
         refusal = self._modes.apply(Event.SELECT_MISSION)
         if refusal is not None:
             return refusal
-        self._supervisor.override(phase)
+        self._failsafes.override(phase)
         return self.request(Event.ARM) if arms else None
 
     def terminate(self, reason: str) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.commander.failsafe import Action
-from flightstack.commander.fence_watch import FenceBreaches
+from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.modes import Mode
@@ -97,7 +97,7 @@ def vehicle_info(vehicle: Vehicle, system_id: int, is_generic: bool, frame: Loca
 
 def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> VehicleStatus:
     """Return the status of now."""
-    now, supervisor, fence = parts.now, parts.supervisor, parts.area.fence
+    now, failsafes, fence = parts.now, parts.failsafes, parts.area.fence
     return VehicleStatus(
         info=info,
         time_us=now.time_us,
@@ -105,8 +105,8 @@ def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> 
         mode=now.status.mode,
         landed=now.landed,
         can_arm=now.status.armed or not parts.readiness.arming_refusals(),
-        failsafe_action=supervisor.decision.action,
-        state_is_good=now.has_state and not supervisor.states.is_stale and bool(np.isfinite(now.state).all()),
+        failsafe_action=failsafes.decision.action,
+        state_is_good=now.has_state and not failsafes.states.is_stale and bool(np.isfinite(now.state).all()),
         state=now.state.copy(),
         setpoint=now.setpoint.copy(),
         attitude_target=now.attitude_target.copy(),
@@ -118,7 +118,7 @@ def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> 
         mission_complete=now.mission_complete,
         plan_ids=PlanIds(*parts.places.ids),
         battery=battery,
-        battery_level=supervisor.battery_level,
+        battery_level=failsafes.battery_level,
         fence_acts=now.behaviour.fence_action != 0,
         fence_breached=bool(fence.flags),
         fence_breaches=fence.breaches,

@@ -12,7 +12,6 @@ from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from flightstack.services.commands.command_server import Command, CommandServer
-from flightstack.services.routing.peer_monitor import PeerMonitor
 from flightstack.transports.memory import LossyLink
 from gcs_cli.clients.command_client import CommandClient, CommandResult
 from tests.protocol.mission_harness import LOSSY, NAN, VEHICLE
@@ -195,15 +194,3 @@ def test_over_a_bad_link_a_command_ends_with_the_vehicles_answer_or_none(seed: i
         assert executed
     # a late copy of the first message carries no number, so it is the only one that can be executed again
     assert all(command.confirmation == 0 for command in executed[1:])
-
-
-def test_a_peer_is_alive_from_its_first_word_to_the_end_of_the_timeout() -> None:
-    monitor = PeerMonitor(3.0)
-    assert not monitor.is_alive(0.0)
-    assert not monitor.is_lost(100.0)
-    monitor.heard(10.0)
-    assert monitor.is_alive(12.9)
-    assert monitor.next_deadline() == 13.0
-    assert monitor.is_lost(13.0)
-    monitor.heard(20.0)
-    assert not monitor.is_lost(20.0)

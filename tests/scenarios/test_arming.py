@@ -78,7 +78,7 @@ def test_a_reboot_does_not_find_a_lost_ground_station_again() -> None:
     lost = World(vehicle="x_quad", params=["NAV_DLL_ACT=2", "COM_DL_LOSS_T=5"])
     lost.run(0.1)
     lost.sends_heartbeats = False
-    lost.until(lambda: lost.stack.parts.supervisor.links.gcs_lost, 8.0)
+    lost.until(lambda: lost.stack.parts.failsafes.links.gcs_lost, 8.0)
     world = World(vehicle="x_quad", params=["NAV_DLL_ACT=2", "COM_DL_LOSS_T=5"])
     world.sends_heartbeats = False
     carry_over(lost.stack, world.stack)

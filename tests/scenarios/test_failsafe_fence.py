@@ -64,7 +64,7 @@ def test_a_fast_goto_turns_within_its_braking_distance() -> None:
     world.until(lambda: world.velocity[0] > speed - 0.2, 30.0)
     limit = float(world.position[0]) + 10.0
     assert isinstance(world.upload([circle((0.0, 0.0), limit)], MissionType.FENCE), Done)
-    world.until(lambda: bool(world.stack.parts.supervisor.failsafes), 3.0)
+    world.until(lambda: bool(world.stack.parts.failsafes.active), 3.0)
     far = farthest_until(world, lambda: world.velocity[0] < -1.0, 25.0)
     # 48 m with half of MPC_ACC_HOR, and what the jerk limit takes at 12 m/s
     assert far - limit < speed**2 / (2.0 * 0.5 * 3.0) + 0.4 * speed

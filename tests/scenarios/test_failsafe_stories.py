@@ -26,7 +26,7 @@ def flying(*params: str, **options: object) -> World:
 
 def lose_ground_station(world: World, limit_s: float = 8.0) -> None:
     world.sends_heartbeats = False
-    world.until(lambda: world.stack.parts.supervisor.links.gcs_lost, limit_s)
+    world.until(lambda: world.stack.parts.failsafes.links.gcs_lost, limit_s)
     world.run(0.05)
 
 
@@ -97,7 +97,7 @@ def test_a_return_becomes_a_landing_as_the_battery_empties() -> None:
     world.until_disarmed(40.0)
     world.run(0.1)
     assert world.position[0] > 5.0
-    assert world.stack.parts.supervisor.failsafes == ()
+    assert world.stack.parts.failsafes.active == ()
 
 
 def test_a_breach_far_from_the_setpoint_lands() -> None:
@@ -106,7 +106,7 @@ def test_a_breach_far_from_the_setpoint_lands() -> None:
     blow_away(world)
     breach_fence(world)
     world.until(lambda: world.mode is Mode.LAND, 0.2)
-    assert {Failsafe.FENCE, Failsafe.POSITION_ERROR} == set(world.stack.parts.supervisor.failsafes)
+    assert {Failsafe.FENCE, Failsafe.POSITION_ERROR} == set(world.stack.parts.failsafes.active)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_a_frozen_state_is_noticed_and_survived() -> None:
     now_s = world.simulator.time_us * 1e-6
     world.inject(f"state:freeze@{now_s:.3f}-{now_s + 0.3:.3f}")
     world.run(0.15)
-    assert world.stack.parts.supervisor.decision.action is Action.BLIND
+    assert world.stack.parts.failsafes.decision.action is Action.BLIND
     held = world.stack.now.row[31:39].copy()
     world.run(0.1)
     assert np.array_equal(world.stack.now.row[31:39], held)

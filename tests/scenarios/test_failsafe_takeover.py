@@ -121,7 +121,7 @@ def test_nobody_prolongs_blindness() -> None:
     world.run(0.5)
     inject("state:nan")(world)
     world.run(0.5)
-    assert world.stack.parts.supervisor.decision.action is Action.BLIND
+    assert world.stack.parts.failsafes.decision.action is Action.BLIND
     world.hold()
     world.land()
     world.until(lambda: world.mode is Mode.TERMINATION, 1.0)
@@ -132,8 +132,8 @@ def test_a_cleared_mission_is_no_users_choice() -> None:
     until_breach(world, fly_mission)
     world.upload([])
     assert world.mode is Mode.HOLD
-    assert world.stack.parts.supervisor.overridden == ()
-    assert Failsafe.FENCE in world.stack.parts.supervisor.failsafes
+    assert world.stack.parts.failsafes.overridden == ()
+    assert Failsafe.FENCE in world.stack.parts.failsafes.active
 
 
 def test_a_companion_comes_back_after_its_link() -> None:
@@ -154,7 +154,7 @@ def test_a_lost_ground_station_stops_a_goto() -> None:
     fly_goto(world)
     world.run(2.0)
     world.sends_heartbeats = False
-    world.until(lambda: Failsafe.GCS_LOST in world.stack.parts.supervisor.failsafes, 8.0)
+    world.until(lambda: Failsafe.GCS_LOST in world.stack.parts.failsafes.active, 8.0)
     north = world.position[0]
     world.run(8.0)
     assert np.abs(world.velocity).max() < 0.05

@@ -43,7 +43,7 @@ def test_a_restart_and_an_item_act_together() -> None:
 def test_a_start_that_may_not_arm_leaves_mode_and_item() -> None:
     world = World(params=["NAV_DLL_ACT=2"])
     world.upload("square.plan")
-    world.stack.parts.supervisor.links.gcs_lost = True
+    world.stack.parts.failsafes.links.gcs_lost = True
     assert world.stack.parts.readiness.arming_refusals()
     assert world.command(START, 2) == REJECTED
     assert world.mode is Mode.HOLD

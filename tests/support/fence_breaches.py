@@ -66,7 +66,7 @@ def until_breach(world: World, movement: Movement) -> Mode:
     assert isinstance(world.upload([circle((0.0, 0.0), RADIUS)], MissionType.FENCE), Done)
     world.until(lambda: world.position[0] > RADIUS - 1.0, 20.0)
     assert world.mode is mode
-    assert world.stack.parts.supervisor.failsafes == ()
+    assert world.stack.parts.failsafes.active == ()
     world.until(lambda: world.position[0] > RADIUS + 0.2, 5.0)
     return mode
 

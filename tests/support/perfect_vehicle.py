@@ -34,7 +34,7 @@ class PerfectVehicle:
         self.path: list[np.ndarray] = []
         self.yaws: list[float] = []
         self._turned_rad = 0.0
-        self.navigator.rest_at(self.state)
+        self.navigator.reset_on_ground(self.state)
 
     @property
     def position(self) -> np.ndarray:
@@ -66,7 +66,7 @@ class PerfectVehicle:
     def airborne_at(self, north: float, east: float, down: float) -> None:
         """Put the vehicle into the air, at rest, no longer landed."""
         self.state[:3] = north, east, down
-        self.navigator.rest_at(self.state)
+        self.navigator.reset_on_ground(self.state)
         self.navigator._land[:] = LandMemory(0.0, 0.0, 0.0, down)
 
     def tick(self) -> None:

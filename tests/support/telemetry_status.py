@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flightstack.commander.failsafe import Action
-from flightstack.commander.fence_watch import FenceBreaches
+from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.contract import LoopRow
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.modes import Mode

@@ -27,13 +27,13 @@ from flightstack.commander.detectors import (
     rotor_lags,
 )
 from flightstack.commander.failsafe import Failsafe
-from flightstack.commander.fault_watch import FaultWatch
-from flightstack.commander.link_watch import LinkWatch
+from flightstack.commander.fault_detector import FaultDetector
 from flightstack.commander.transitions import TERMINATED, Need
 from flightstack.core.contract import LoopRow, LoopStatus
 from flightstack.core.modes import Mode
 from flightstack.params.behaviour import Behaviour, with_assignments
 from flightstack.params.vehicle import load_vehicle
+from flightstack.services.streams.link_loss import SilenceTimer
 
 DT_S, INNER_S = 0.01, 0.002
 VEHICLE = load_vehicle("x_quad")
@@ -262,7 +262,7 @@ def test_a_deviation_before_missing_samples_is_no_rotor_fault(bad: float) -> Non
 
 
 def test_each_rotor_without_measurement_is_reported_once() -> None:
-    watch = FaultWatch(VEHICLE, Behaviour(), 100.0, 5, Bench().state)
+    watch = FaultDetector(VEHICLE, Behaviour(), 100.0, 5, Bench().state)
     row = Bench().row
 
     def run(seconds: float) -> list[int]:
@@ -270,7 +270,7 @@ def test_each_rotor_without_measurement_is_reported_once() -> None:
         for _ in range(round(seconds / DT_S)):
             for _ in range(5):
                 watch.follow_rotors(row)
-            watch.look(np.zeros(11), row, True, False)
+            watch.update(np.zeros(11), row, True, False)
             reported += watch.take_unmeasured()
         return reported
 
@@ -354,7 +354,7 @@ def test_a_level_is_left_only_well_above_its_threshold() -> None:
 
 
 def test_a_link_is_lost_when_it_is_silent_on_both_clocks() -> None:
-    watch = LinkWatch()
+    watch = SilenceTimer()
     watch.heard(100.0, 5_000_000)
     assert not watch.lost(111.0, 6_000_000, 10.0)  # simulated time hardly moves
     assert not watch.lost(100.5, 55_000_000, 10.0)  # a hundred times real time
@@ -364,7 +364,7 @@ def test_a_link_is_lost_when_it_is_silent_on_both_clocks() -> None:
 
 
 def test_who_never_spoke_is_silent_but_not_lost() -> None:
-    watch = LinkWatch()
+    watch = SilenceTimer()
     assert watch.silent(1e9, 10**15, 10.0)
     assert not watch.lost(1e9, 10**15, 10.0)
 

@@ -8,7 +8,7 @@ from flightstack.commander.failsafe_step import (
     Announcement,
     Memory,
     Situation,
-    active,
+    active_failsafes,
     failsafe_step,
     override,
 )
@@ -54,7 +54,7 @@ def test_a_condition_that_ends_in_the_wait_is_over() -> None:
     flight.run(2.0, Failsafe.GCS_LOST)
     assert flight.run(9.0) is Action.NONE
     assert flight.said[-1] == (Severity.NOTICE, "Ground station is back")
-    assert active(flight.memory) == ()
+    assert active_failsafes(flight.memory) == ()
     assert flight.run(1.0, Failsafe.GCS_LOST) is Action.HOLD  # the wait begins anew
 
 
@@ -81,22 +81,24 @@ def test_a_second_failsafe_escalates_and_names_itself() -> None:
         (Severity.CRITICAL, "Battery level is critical: returning"),
         (Severity.CRITICAL, "Battery level is dangerously low: landing"),
     ]
-    assert active(flight.memory) == everything[::-1]
+    assert active_failsafes(flight.memory) == everything[::-1]
 
 
 def test_a_user_overrides_what_is_active_but_not_what_comes_after() -> None:
     flight = Flight("NAV_DLL_ACT=2", "COM_LOW_BAT_ACT=3", "COM_FAIL_ACT_T=0")
     assert flight.run(0.1, Failsafe.GCS_LOST) is Action.RETURN
-    flight.memory = override(flight.memory, active(flight.memory))  # the user selects the mission again
+    flight.memory = override(
+        flight.memory, active_failsafes(flight.memory)
+    )  # the user selects the mission again
     assert flight.run(20.0, Failsafe.GCS_LOST) is Action.NONE
-    assert active(flight.memory) == (Failsafe.GCS_LOST,)
+    assert active_failsafes(flight.memory) == (Failsafe.GCS_LOST,)
     assert flight.run(0.1, Failsafe.GCS_LOST, Failsafe.BATTERY_CRITICAL) is Action.RETURN
 
 
 def test_after_an_override_the_same_failsafe_acts_when_it_begins_again() -> None:
     flight = Flight("NAV_DLL_ACT=2", "COM_FAIL_ACT_T=0")
     flight.run(1.0, Failsafe.GCS_LOST)
-    flight.memory = override(flight.memory, active(flight.memory))
+    flight.memory = override(flight.memory, active_failsafes(flight.memory))
     flight.run(1.0)
     assert flight.run(0.1, Failsafe.GCS_LOST) is Action.RETURN
 

@@ -28,7 +28,7 @@ class Judge:
     def __init__(self, *active: Failsafe) -> None:
         self.takeovers = Takeovers()
         self.memory = Memory({failsafe: Entry(0) for failsafe in active or (Failsafe.FENCE,)})
-        self.takeovers.took(Phase.OFFBOARD, next(iter(self.memory.entries)))
+        self.takeovers.record(Phase.OFFBOARD, next(iter(self.memory.entries)))
 
     def ask(self, at_s: float, phase: Phase = Phase.OFFBOARD) -> str | None:
         return self.takeovers.refusal(self.memory, phase, round(at_s * 1e6), FENCE_LANDS)
@@ -59,7 +59,7 @@ def test_another_mode_is_given_at_once_and_then_every_mode() -> None:
     judge = Judge()
     assert judge.ask(0.1) is not None
     assert judge.ask(0.2, Phase.HOLD) is None
-    judge.takeovers.granted()
+    judge.takeovers.clear()
     judge.memory = override(judge.memory, opponents(judge.memory, Phase.HOLD, FENCE_LANDS))
     assert judge.ask(0.3) is None
 
@@ -82,7 +82,7 @@ def test_a_link_that_is_back_gives_its_mode_back() -> None:
 def test_a_new_flight_forgets() -> None:
     judge = Judge()
     judge.ask(8.0)
-    judge.takeovers.forget()
+    judge.takeovers.begin_flight()
     judge.memory = Memory()
     assert judge.ask(8.1) is None
 

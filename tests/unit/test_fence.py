@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceMonitor
+from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceEvaluator
 from flightstack.plan import FenceCommand, FenceShape, fence_shape
 from flightstack.plan.fence_shape import Area, edges_that_cross
 from tests.support.fences import HOME, circle, polygon, square, vertex_items
@@ -192,8 +192,8 @@ def state(north: float = 0.0, east: float = 0.0, up: float = 0.0, velocity=(0.0,
     return np.array([north, east, -up, *velocity, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-def monitor(*args: object, **named: object) -> FenceMonitor:
-    watch = FenceMonitor()
+def monitor(*args: object, **named: object) -> FenceEvaluator:
+    watch = FenceEvaluator()
     watch.configure(*args, **named)  # type: ignore[arg-type]
     return watch
 
@@ -232,7 +232,7 @@ def test_margin_is_that_of_the_nearest_limit() -> None:
     assert watch.margin_m == pytest.approx(5.0, abs=0.01)
     watch.step(state(53.0, 0.0, 5.0))
     assert watch.margin_m == pytest.approx(-3.0, abs=0.01)
-    assert FenceMonitor().margin_m == math.inf
+    assert FenceEvaluator().margin_m == math.inf
 
 
 def test_prediction_sees_where_braking_ends() -> None:
@@ -265,11 +265,11 @@ def test_refusals_of_places() -> None:
     assert watch.refusal(0.0, 49.0, 30.0) is None
     assert watch.refusal(0.0, 51.0) == "is outside the geofence"
     assert watch.refusal(0.0, 0.0, 31.0) == "is more than 30 m above home (GF_MAX_VER_DIST)"
-    assert FenceMonitor().refusal(1e9, 0.0) is None
+    assert FenceEvaluator().refusal(1e9, 0.0) is None
 
 
 def test_no_fence_and_a_removed_fence_break_nothing() -> None:
-    watch = FenceMonitor()
+    watch = FenceEvaluator()
     assert watch.step(state(1e6)) == 0
     watch.configure(Fence.from_items(polygon(square(5.0)), FRAME))
     assert watch.step(state(10.0)) == FenceBreach.OUTSIDE

@@ -34,8 +34,8 @@ def test_one_bad_state_moves_no_reference(mode: Mode, bad: float) -> None:
         state = disturbed.state.copy()
         state[index] = bad
         disturbed.navigator.step(mode, state, HOVER)
-        disturbed.navigator.take_up(state)
-        disturbed.navigator.rest_at(state)
+        disturbed.navigator.reset_reference(state)
+        disturbed.navigator.reset_on_ground(state)
     for vehicle in (disturbed, quiet):
         vehicle.run(1.0)
     assert disturbed.state.tolist() == quiet.state.tolist()

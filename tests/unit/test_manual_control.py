@@ -14,8 +14,8 @@ from flightstack.guidance.manual import shaped
 from flightstack.guidance.setpoints import Sticks
 from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
+from flightstack.services.streams.link_loss import StreamMonitor
 from flightstack.services.streams.manual_server import ManualServer, read_sticks
-from flightstack.services.streams.stream_watch import StreamWatch
 from tests.support.perfect_vehicle import PerfectVehicle
 
 
@@ -123,7 +123,7 @@ class Facts:
         self.reports.append(lost)
 
     def server(self) -> ManualServer:
-        watch = StreamWatch(lambda: self.time_us, lambda: 0.5, self.report)
+        watch = StreamMonitor(lambda: self.time_us, lambda: 0.5, self.report)
         return ManualServer(Address(1, 1), self.sticks.append, watch)
 
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyulog import ULog
 
-from flightstack.commander.fence_watch import FenceBreaches
+from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.modes import Mode
 from flightstack.flight_log.event_topics import EVENT_TOPICS

@@ -10,8 +10,7 @@ from numpy.lib.recfunctions import structured_to_unstructured
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.modes import Mode
-from flightstack.guidance.mission import LOG_SIZE
-from flightstack.guidance.plan_table import plan_table
+from flightstack.guidance.mission import LOG_SIZE, plan_table
 from flightstack.plan import MissionItem
 from tests.support.perfect_vehicle import NAN, PerfectVehicle
 

@@ -6,9 +6,9 @@ from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import OffboardSetpoint, PointSetpoint
 from flightstack.mavlink.addressing import Address
+from flightstack.services.streams.link_loss import StreamMonitor
 from flightstack.services.streams.setpoint_messages import Here
 from flightstack.services.streams.setpoint_server import SetpointServer
-from flightstack.services.streams.stream_watch import StreamWatch
 from tests.support.streams import local_point
 
 
@@ -37,7 +37,7 @@ class Vehicle:
             self.here,
             self.take_offboard,
             self.refuse_offboard,
-            StreamWatch(lambda: self.time_us, lambda: 1.0, self.lost.append),
+            StreamMonitor(lambda: self.time_us, lambda: 1.0, self.lost.append),
         )
 
 

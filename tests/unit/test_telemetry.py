@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from flightstack.commander.failsafe import Action
-from flightstack.commander.fence_watch import FenceBreaches
+from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.contract import LoopRow
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.modes import CUSTOM_MODE, Mode

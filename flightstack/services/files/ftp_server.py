@@ -31,7 +31,7 @@ from flightstack.services.files.ftp_sessions import (
     checksum_answer,
     refused,
 )
-from flightstack.services.pace import Pace, always_has_room, in_turn
+from flightstack.services.rate_limit import RateLimit, always_has_room, in_turn
 
 SESSION_TIMEOUT_S = 10.0
 """Silence after which a client's files are closed, as in PX4."""
@@ -73,13 +73,13 @@ class FtpServer:
         own: Address,
         files: VirtualFiles,
         has_room: Callable[[Hashable], bool] = always_has_room,
-        pace: Pace | None = None,
+        pace: RateLimit | None = None,
     ) -> None:
         """Bursts go to peers that ``has_room`` is true for, the others' wait; answers always go."""
         self.own = own
         self._files = files
         self._has_room = has_room
-        self._pace = pace or Pace()
+        self._pace = pace or RateLimit()
         self._clients: dict[tuple[Hashable, Address], FtpSessions] = {}
         self._outbox: list[tuple[Hashable, Message]] = []
         self._turn = 0

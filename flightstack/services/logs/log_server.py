@@ -17,7 +17,7 @@ from flightstack.mavlink.link import Message
 from flightstack.mavlink.log_messages import BLOCK, log_data_message
 from flightstack.mavlink.virtual_files import VirtualFile
 from flightstack.services.logs.log_store import LogInfo, LogStore
-from flightstack.services.pace import Pace, always_has_room, in_turn
+from flightstack.services.rate_limit import RateLimit, always_has_room, in_turn
 
 CLIENT_TIMEOUT_S = 30.0
 """Silence after which a client's list and open log are given up."""
@@ -78,7 +78,7 @@ class LogServer:
         is_armed: Callable[[], bool],
         say: Callable[[int, str], object],
         has_room: Callable[[Hashable], bool] = always_has_room,
-        pace: Pace | None = None,
+        pace: RateLimit | None = None,
     ) -> None:
         """What a peer asked for waits while ``has_room`` is false for it, as in PX4."""
         self.own = own
@@ -86,7 +86,7 @@ class LogServer:
         self._is_armed = is_armed
         self._say = say
         self._has_room = has_room
-        self._pace = pace or Pace()
+        self._pace = pace or RateLimit()
         self._clients: dict[tuple[Hashable, Address], _Client] = {}
         self._turn = 0
 

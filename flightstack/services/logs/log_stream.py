@@ -13,7 +13,7 @@ from typing import Protocol
 from flightstack.mavlink.addressing import Address, is_for, sender
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.services.pace import Pace, always_has_room
+from flightstack.services.rate_limit import RateLimit, always_has_room
 
 CHUNK = 249
 NO_MESSAGE_BEGINS = 255
@@ -104,7 +104,7 @@ class LogStream:
         self._open_tail = open_tail
         self._has_room = has_room
         self._stream: _Stream | None = None
-        self._pace = Pace()
+        self._pace = RateLimit()
 
     def start(self, peer: Hashable, client: Address) -> str | None:
         """Begin to stream to ``client``; return why not, or None. A client that begins again starts afresh."""

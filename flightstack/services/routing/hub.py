@@ -21,9 +21,8 @@ from flightstack.services.commands import VehicleContext
 from flightstack.services.mission.mission_service import MissionService
 from flightstack.services.routing.peer import Peer, PeerAddress
 from flightstack.services.routing.router import Router
-from flightstack.services.routing.signed_links import NEVER_FORWARDED, link_signing, signing_setup
-from flightstack.services.service import Service
-from flightstack.services.services import make_services
+from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_signing, signing_setup
+from flightstack.services.services import Service, make_services
 from flightstack.services.telemetry.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.services.telemetry.vehicle import status_texts

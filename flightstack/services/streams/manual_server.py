@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable
 from flightstack.guidance.setpoints import Sticks
 from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.link import Message
-from flightstack.services.streams.stream_watch import StreamWatch
+from flightstack.services.streams.link_loss import StreamMonitor
 
 _NOT_SUPPLIED = 0x7FFF
 
@@ -31,7 +31,7 @@ class ManualServer:
 
     handles = frozenset({"MANUAL_CONTROL"})
 
-    def __init__(self, own: Address, take_sticks: Callable[[Sticks], None], watch: StreamWatch) -> None:
+    def __init__(self, own: Address, take_sticks: Callable[[Sticks], None], watch: StreamMonitor) -> None:
         self._own = own
         self._take_sticks = take_sticks
         self._watch = watch

@@ -8,8 +8,8 @@ from collections.abc import Callable, Hashable
 from flightstack.guidance.setpoints import OffboardSetpoint
 from flightstack.mavlink.addressing import Address, is_for
 from flightstack.mavlink.link import Message
+from flightstack.services.streams.link_loss import StreamMonitor
 from flightstack.services.streams.setpoint_messages import Here, read_setpoint
-from flightstack.services.streams.stream_watch import StreamWatch
 
 _SILENCE_S = 10.0  # between two texts about refused setpoints: they come at 50 Hz
 
@@ -27,7 +27,7 @@ class SetpointServer:
         here: Callable[[], Here],
         take: Callable[[OffboardSetpoint], None],
         refuse: Callable[[str], None],
-        watch: StreamWatch,
+        watch: StreamMonitor,
     ) -> None:
         """Give accepted setpoints to ``take`` and texts about others to ``refuse``; ``here`` is the vehicle's pose."""
         self._own = own

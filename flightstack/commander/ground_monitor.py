@@ -44,7 +44,7 @@ class _Takeoff(NamedTuple):
     most_lift: float
 
 
-class GroundWatch:
+class GroundMonitor:
     """Counts the time since arming, since the last landing, and since a takeoff last made progress."""
 
     def __init__(self) -> None:
@@ -53,12 +53,12 @@ class GroundWatch:
         self._takeoff: _Takeoff | None = None
         self._fell_us: int | None = None
 
-    def watch(self, time_us: int, down_m_s: float) -> None:
+    def update(self, time_us: int, down_m_s: float) -> None:
         """Take the vertical speed, armed or not; once per outer tick."""
         if abs(down_m_s) > FALL_M_S:
             self._fell_us = time_us
 
-    def dropped(self, time_us: int) -> None:
+    def disarmed_in_air(self, time_us: int) -> None:
         """Note that the vehicle was disarmed in the air."""
         self._fell_us = time_us
 
@@ -70,15 +70,15 @@ class GroundWatch:
         """Note the arming: a flight begins."""
         self._since_us, self._has_flown, self._takeoff = time_us, False, None
 
-    def changed(self, time_us: int) -> None:
+    def took_off_or_landed(self, time_us: int) -> None:
         """Note a takeoff or a landing."""
         self._has_flown, self._since_us = True, time_us
 
-    def waits(self, time_us: int) -> None:
+    def restart_timer(self, time_us: int) -> None:
         """Count anew: the plan makes the vehicle wait on the ground."""
         self._since_us = time_us
 
-    def event(self, time_us: int, standing: Standing, behaviour: Behaviour) -> Event | None:
+    def due_event(self, time_us: int, standing: Standing, behaviour: Behaviour) -> Event | None:
         """Return the event that is due while the vehicle stands: disarming after a landing, or without a takeoff."""
         if self._makes_progress(standing) or abs(standing.down_m_s) > STANDING_M_S:
             self._since_us = time_us

@@ -1,6 +1,6 @@
 """Watches a flight: gathers what the detectors, links, battery and fence say, and what the failsafes make of it.
 
-No I/O and no clock. The autopilot calls ``look`` once per outer tick, ``judge`` if something is wrong, and carries
+No I/O and no clock. The autopilot calls ``update`` once per outer tick, ``evaluate`` if something is wrong, and carries
 out the action.
 """
 
@@ -18,14 +18,13 @@ from flightstack.commander.failsafe_step import (
     IDLE,
     Announcement,
     Situation,
-    active,
+    active_failsafes,
     failsafe_step,
     override,
     renew,
 )
-from flightstack.commander.fault_watch import FaultWatch
-from flightstack.commander.fence_watch import FenceWatch
-from flightstack.commander.state_watch import StateWatch
+from flightstack.commander.fault_detector import FaultDetector
+from flightstack.commander.fence_monitor import FenceMonitor
 from flightstack.commander.takeover import Takeovers, opponents
 from flightstack.commander.transitions import Event, Status
 from flightstack.core.contract import FloatArray
@@ -33,6 +32,40 @@ from flightstack.core.modes import STREAM_MODES, Mode
 from flightstack.guidance.fence import Fence
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
+
+HOLD_AFTER_US = 50_000
+"""Age of a state from which on the loops rest: fed with what does not change, they would go to their limits."""
+
+
+class StateMonitor:
+    """Looks at the source of states once per outer tick."""
+
+    def __init__(self, source: StateSource) -> None:
+        self._source = source
+        self.is_new = True
+        """Whether the state has changed since the outer tick before."""
+        self.holds_rotors = False
+        """Whether the state must not be flown by: it is frozen or missing."""
+        self.is_stale = False
+        """Whether the newest state is too old, or frozen though its own speeds say that it must change."""
+
+    def update(self, time_us: int, moves_in_air: bool, limit_s: float) -> None:
+        """Find out whether the state is too old, or does not change although its own speeds say that it must.
+
+        At rest on the ground, and in the calm at the end of a long hover, it may stay the same to the last bit.
+        ``limit_s`` is the age from which on it is stale.
+        """
+        fresh = self._source.freshness(time_us)
+        age_us, frozen_us = fresh.age_us, fresh.frozen_us
+        if not (age_us or frozen_us):
+            self.is_new, self.holds_rotors, self.is_stale = True, False, False
+            return
+        old_us = max(age_us, frozen_us) if moves_in_air else age_us
+        limit_us = limit_s * 1e6
+        self.is_new = False
+        self.holds_rotors = old_us >= min(limit_us, HOLD_AFTER_US)
+        self.is_stale = old_us >= limit_us
+
 
 UPRIGHT_COSINE = 0.5 * math.sqrt(3.0)  # of 30 degrees
 BATTERY_FAILSAFES = (Failsafe.BATTERY_LOW, Failsafe.BATTERY_CRITICAL, Failsafe.BATTERY_EMERGENCY)
@@ -48,7 +81,7 @@ EVENTS_OF_ACTION: dict[Action, tuple[Event, ...]] = {
 """What a failsafe's action means to the commander: the first event that is not refused."""
 
 
-class Supervisor:
+class FailsafeMonitor:
     """Holds what the detectors and failsafes remember."""
 
     def __init__(
@@ -62,11 +95,11 @@ class Supervisor:
     ) -> None:
         """Watch ``state`` (13,), which ``source`` writes in place; ``divisor`` inner ticks make an outer one."""
         self.links = LinkFacts()
-        self.fence = FenceWatch(behaviour)
-        self.faults = FaultWatch(vehicle, behaviour, outer_hz, divisor, state)
+        self.fence = FenceMonitor(behaviour)
+        self.faults = FaultDetector(vehicle, behaviour, outer_hz, divisor, state)
         self.follow_rotors = self.faults.follow_rotors
         self.take_unmeasured = self.faults.take_unmeasured
-        self.states = StateWatch(source)
+        self.states = StateMonitor(source)
         self.position_is_controlled = False
         """Whether the setpoint's place is flown to: not on the ground, nor while a stream gives attitudes."""
         self.on_ground = True
@@ -88,15 +121,15 @@ class Supervisor:
     # ------------------------------------------------------------------ what is
 
     @property
-    def failsafes(self) -> tuple[Failsafe, ...]:
+    def active(self) -> tuple[Failsafe, ...]:
         """Active failsafes in order of priority, those overridden by a user too."""
-        return active(self._memory)
+        return active_failsafes(self._memory)
 
     @property
     def overridden(self) -> tuple[Failsafe, ...]:
         """Active failsafes that a user has overridden."""
         entries = self._memory.entries
-        return tuple(failsafe for failsafe in active(self._memory) if entries[failsafe].overridden)
+        return tuple(failsafe for failsafe in active_failsafes(self._memory) if entries[failsafe].overridden)
 
     @property
     def decision(self) -> Decision:
@@ -140,7 +173,7 @@ class Supervisor:
     def armed(self) -> None:
         """Forget what the detectors saw before: a flight begins."""
         self.faults.begin()
-        self._takeovers.forget()
+        self._takeovers.begin_flight()
 
     def refusal(self, phase: Phase) -> str | None:
         """Return why a user may not fly in ``phase`` for a failsafe's sake, or None; once for each request."""
@@ -152,16 +185,16 @@ class Supervisor:
         if Failsafe.FENCE in against:
             self.fence.note_override()
         self._memory = override(self._memory, against)
-        self._takeovers.granted()
+        self._takeovers.clear()
 
-    def took_over(self) -> None:
+    def action_applied(self) -> None:
         """The decision was carried out, and has ended the phase of flight of the last step."""
         if self.decision.cause is not None:
-            self._takeovers.took(self._phase, self.decision.cause)
+            self._takeovers.record(self._phase, self.decision.cause)
 
     # ------------------------------------------------------------------ time passes
 
-    def look(
+    def update(
         self, time_us: int, status: Status, landed: bool, setpoint: FloatArray, row: FloatArray
     ) -> frozenset[Failsafe] | None:
         """Advance by one outer tick; return what is wrong, or None when nothing is and nothing was.
@@ -173,12 +206,12 @@ class Supervisor:
         self._watch_battery()
         armed, mode = status
         states, faults = self.states, self.faults
-        states.look(time_us, armed and not landed and faults.moves, self._behaviour.stale_s)
+        states.update(time_us, armed and not landed and faults.moves, self._behaviour.stale_s)
         if not armed:
             self._memory = IDLE
             return None
         if not states.holds_rotors:
-            faults.look(setpoint, row, self.position_is_controlled, self.on_ground)
+            faults.update(setpoint, row, self.position_is_controlled, self.on_ground)
         breached = self.fence.update(self._state, time_us)
         entries = self._memory.entries
         if (
@@ -190,8 +223,8 @@ class Supervisor:
         conditions = self._conditions(breached, mode)
         return conditions if conditions or entries else None
 
-    def judge(self, conditions: frozenset[Failsafe], phase: Phase) -> tuple[Announcement, ...]:
-        """Let the failsafes act on what ``look`` returned; ``decision`` is what to do then."""
+    def evaluate(self, conditions: frozenset[Failsafe], phase: Phase) -> tuple[Announcement, ...]:
+        """Let the failsafes act on what ``update`` returned; ``decision`` is what to do then."""
         self._phase = phase
         entry = self._memory.entries.get(Failsafe.FENCE)
         if entry is not None and entry.overridden and self.fence.breach_grows:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from flightstack.commander.failsafe import Action, Failsafe, phase_of
-from flightstack.commander.ground_watch import GroundWatch, Standing
-from flightstack.commander.supervisor import EVENTS_OF_ACTION, Supervisor
+from flightstack.commander.failsafe_monitor import EVENTS_OF_ACTION, FailsafeMonitor
+from flightstack.commander.ground_monitor import GroundMonitor, Standing
 from flightstack.commander.transitions import Event
 from flightstack.core.modes import STREAM_MODES, Mode
 from flightstack.core.severity import Severity
@@ -23,7 +23,7 @@ AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
 _MISSION, _TAKEOFF = Mode.MISSION, Mode.TAKEOFF
 
 
-class FlightWatch:
+class FlightMonitor:
     """Turns what failsafes, guidance and the land detector find into events, once per outer tick."""
 
     def __init__(
@@ -31,8 +31,8 @@ class FlightWatch:
         now: FlightState,
         journal: Journal,
         modes: ModeControl,
-        supervisor: Supervisor,
-        ground: GroundWatch,
+        failsafes: FailsafeMonitor,
+        ground: GroundMonitor,
         mission: Mission,
         area: FlightArea,
         takeoff: Takeoff,
@@ -42,7 +42,7 @@ class FlightWatch:
         self._now = now
         self._journal = journal
         self._modes = modes
-        self._supervisor = supervisor
+        self._failsafes = failsafes
         self._ground = ground
         self._mission = mission
         self._area = area
@@ -52,16 +52,16 @@ class FlightWatch:
 
     def update(self) -> None:
         """Evaluate the newest state and apply the events that follow."""
-        now, supervisor, navigator = self._now, self._supervisor, self._navigator
-        self._ground.watch(now.time_us, float(now.state[5]))
-        supervisor.position_is_controlled = now.flying and not (now.attitude_is_given or now.rests)
-        supervisor.on_ground = now.landed or navigator.touches_ground
-        conditions = supervisor.look(now.time_us, now.status, now.landed, now.setpoint, now.row)
+        now, failsafes, navigator = self._now, self._failsafes, self._navigator
+        self._ground.update(now.time_us, float(now.state[5]))
+        failsafes.position_is_controlled = now.flying and not (now.attitude_is_given or now.rests)
+        failsafes.on_ground = now.landed or navigator.touches_ground
+        conditions = failsafes.update(now.time_us, now.status, now.landed, now.setpoint, now.row)
         if conditions is not None:
             self._meet_failsafes(conditions)
         if not now.status.armed:
             return
-        for rotor in supervisor.take_unmeasured():
+        for rotor in failsafes.take_unmeasured():
             self._journal.say(
                 Severity.WARNING, f"Rotor {rotor}: speed not measured, failures of it are not detected"
             )
@@ -77,21 +77,21 @@ class FlightWatch:
 
     def _meet_failsafes(self, conditions: frozenset[Failsafe]) -> None:
         """Evaluate the failsafes and carry out their decision."""
-        now, supervisor = self._now, self._supervisor
-        before = supervisor.decision
+        now, failsafes = self._now, self._failsafes
+        before = failsafes.decision
         phase = phase_of(now.status.armed, now.landed, now.status.mode, self._navigator.goes_elsewhere)
-        for severity, text in supervisor.judge(conditions, phase):
+        for severity, text in failsafes.evaluate(conditions, phase):
             self._journal.say(severity, text)
-        decision = supervisor.decision
+        decision = failsafes.decision
         if decision.action <= Action.WARN:
             return
         if decision != before:
             self._journal.status(now.status, failsafe=True)
-        if Failsafe.POSITION_ERROR in supervisor.failsafes:
-            self._navigator.take_up(now.state)
+        if Failsafe.POSITION_ERROR in failsafes.active:
+            self._navigator.reset_reference(now.state)
         for event in EVENTS_OF_ACTION.get(decision.action, ()):
             if self._modes.apply(event) is None:
-                supervisor.took_over()
+                failsafes.action_applied()
                 break
 
     def _watch_ground(self) -> None:
@@ -99,7 +99,7 @@ class FlightWatch:
         now, landed = self._now, self._navigator.landed
         if landed != now.landed:
             now.landed = landed
-            self._ground.changed(now.time_us)
+            self._ground.took_off_or_landed(now.time_us)
             if landed:
                 now.landing_us = now.time_us
                 self._area.stands_here()
@@ -111,7 +111,7 @@ class FlightWatch:
         if event is Event.NO_TAKEOFF:
             waits = now.status.mode is _MISSION and not now.flying
             if waits and self._mission.takes_off():
-                self._ground.waits(now.time_us)
+                self._ground.restart_timer(now.time_us)
                 return
             self._journal.say(Severity.WARNING, "Disarmed: no takeoff")
         if event is not None:
@@ -123,7 +123,7 @@ class FlightWatch:
         goes_on = now.status.mode in AIRBORNE_MODES or (now.status.mode in STREAM_MODES and now.flying)
         lift = float(now.attitude_target[4]) / self._weight_n
         standing = Standing(goes_on, now.flying, float(now.state[2]), float(now.state[5]), lift)
-        return self._ground.event(now.time_us, standing, now.behaviour)
+        return self._ground.due_event(now.time_us, standing, now.behaviour)
 
     def _watch_mission(self) -> None:
         """Report progress of the mission, and begin what follows its end."""

@@ -18,7 +18,7 @@ def always_has_room(peer: Hashable) -> bool:
     return True
 
 
-class Pace:
+class RateLimit:
     """Lets ``per_poll`` messages go at once, and ``rate_hz`` of them per second."""
 
     def __init__(self, per_poll: int = MESSAGES_PER_POLL, rate_hz: float = MESSAGES_PER_S) -> None:

@@ -12,7 +12,7 @@ from flightstack.guidance.trajectory import Goal
 
 TAKEOFF, RETURN, LAND = int(Mode.TAKEOFF), int(Mode.RETURN), int(Mode.LAND)
 
-AIM = np.dtype(
+MODE_TARGET = np.dtype(
     [
         ("x", "f8"),  # m NED
         ("y", "f8"),
@@ -32,27 +32,27 @@ CLIMBING, CRUISING, DESCENDING = range(3)
 
 
 @compiled
-def advance_return(aim: Record, state: VehicleState, params: GuidanceParams) -> None:
+def advance_return(target: Record, state: VehicleState, params: GuidanceParams) -> None:
     """Return: climb, go to the place of the return, descend."""
     p = state.position_ned_m
-    dx, dy = aim["home_x"] - p.x, aim["home_y"] - p.y
-    if aim["phase"] == CLIMBING and abs(p.z - aim["z"]) <= params.altitude_acceptance_m:
-        aim["phase"] = CRUISING
-        aim["x"], aim["y"] = aim["home_x"], aim["home_y"]
+    dx, dy = target["home_x"] - p.x, target["home_y"] - p.y
+    if target["phase"] == CLIMBING and abs(p.z - target["z"]) <= params.altitude_acceptance_m:
+        target["phase"] = CRUISING
+        target["x"], target["y"] = target["home_x"], target["home_y"]
     elif (
-        aim["phase"] == CRUISING
+        target["phase"] == CRUISING
         and dx * dx + dy * dy <= params.acceptance_radius_m * params.acceptance_radius_m
     ):
-        aim["phase"] = DESCENDING
+        target["phase"] = DESCENDING
 
 
 @compiled
-def aim_goal(mode: int, aim: Record, params: GuidanceParams) -> Goal:
+def target_goal(mode: int, target: Record, params: GuidanceParams) -> Goal:
     """Return where ``mode`` sends the reference."""
-    z, climb, descent = aim["z"], params.climb_speed_m_s, params.descent_speed_m_s
-    speed = aim["speed"] if aim["speed"] > 0.0 else params.cruise_speed_m_s
+    z, climb, descent = target["z"], params.climb_speed_m_s, params.descent_speed_m_s
+    speed = target["speed"] if target["speed"] > 0.0 else params.cruise_speed_m_s
     if mode == TAKEOFF:
         climb = params.takeoff_speed_m_s
-    elif mode == LAND or (mode == RETURN and aim["phase"] == DESCENDING):
+    elif mode == LAND or (mode == RETURN and target["phase"] == DESCENDING):
         z = params.far_below_m
-    return Goal(aim["x"], aim["y"], z, aim["yaw"], speed, climb, descent, params.yaw_rate_rad_s, 0.0)
+    return Goal(target["x"], target["y"], z, target["yaw"], speed, climb, descent, params.yaw_rate_rad_s, 0.0)

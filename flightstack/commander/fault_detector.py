@@ -33,7 +33,7 @@ FAULTS = (
 )
 
 
-class FaultWatch:
+class FaultDetector:
     """Looks at each row of the loops, and at state and setpoint once per outer tick."""
 
     def __init__(
@@ -72,7 +72,7 @@ class FaultWatch:
         """Take the newest row of the inner loop, shape (48,), once per inner tick."""
         self._follow(row, self._rotors, self._lags)
 
-    def look(
+    def update(
         self, setpoint: FloatArray, row: FloatArray, position_is_controlled: bool, on_ground: bool
     ) -> int:
         """Advance by one outer tick; return the bits found.

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from flightstack.core.contract import FloatArray
-from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceMonitor
+from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceEvaluator
 from flightstack.params.behaviour import Behaviour
 
 BREACH_GROWS_M = 5.0
@@ -23,7 +23,7 @@ class FenceBreaches(NamedTuple):
     """Limits that the latest one broke last."""
 
 
-class FenceWatch(FenceMonitor):
+class FenceMonitor(FenceEvaluator):
     """A monitor that is set up anew whenever areas, parameters or home change."""
 
     def __init__(self, behaviour: Behaviour) -> None:
@@ -37,7 +37,7 @@ class FenceWatch(FenceMonitor):
 
     def warm_up(self, state: FloatArray) -> None:
         """Compile the fence's step, or load it from the cache."""
-        probe = FenceMonitor()
+        probe = FenceEvaluator()
         probe.configure(NO_FENCE, max_altitude_m=1.0)
         probe.step(state)
 
