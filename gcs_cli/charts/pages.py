@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,13 @@ _HERE = Path(__file__).parent
 _PLOTLY_JS = Path("package_data", "plotly.min.js")
 
 
-def render_page(folder: Path, template: str, **values: Any) -> str:
-    """Return the page that a template of ``folder`` makes of ``values``; it extends ``page.html``."""
+def render_page(folder: Path, template: str, *, more: Sequence[Path] = (), **values: Any) -> str:
+    """Return the page that a template of ``folder`` makes of ``values``; it extends ``page.html``.
+
+    ``more``: folders of other templates that it imports.
+    """
     environment = Environment(
-        loader=FileSystemLoader([folder, _HERE / "templates"]),
+        loader=FileSystemLoader([folder, *more, _HERE / "templates"]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -120,7 +120,7 @@ def _axis(axis: Axis) -> Json:
         "automargin": False,
     }
     if axis.log:
-        found |= {"type": "log", "dtick": 1, "exponentformat": "power"}
+        found |= {"type": "log", "exponentformat": "power"}
     if axis.low is not None or axis.high is not None:
         ends = (axis.low, axis.high)
         found["range"] = [None if end is None else math.log10(end) if axis.log else end for end in ends]
@@ -295,18 +295,32 @@ def _space(figure: SpaceFigure) -> Json:
         "gridcolor": colour("line"), "zerolinecolor": colour("axis"), "linecolor": colour("axis"),
         "showbackground": False, "color": colour("soft"),
     }  # fmt: skip
+    low, high = _corners(figure)
+    span = high - low
     layout["scene"] = {
-        "aspectmode": "data",
-        "xaxis": {**axis, "title": {"text": "east [m]"}},
-        "yaxis": {**axis, "title": {"text": "north [m]"}},
-        "zaxis": {**axis, "title": {"text": "height [m]"}},
-        "camera": {"eye": {"x": 0.9, "y": -1.6, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.2}},
+        "aspectmode": "manual",
+        "aspectratio": dict(zip("xyz", numbers(1.25 * span / span.max(), 4), strict=True)),
+        "camera": {"eye": {"x": 0.8, "y": -1.5, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.15}},
     }
+    for name, title, *ends in zip("xyz", ("east", "north", "height"), low, high, strict=True):
+        layout["scene"][f"{name}axis"] = {**axis, "title": {"text": f"{title} [m]"}, "range": numbers(ends)}
     content: Json = {"data": [_space_trace(path) for path in figure.paths], "layout": layout, "linked": False}
     if figure.playback is not None and len(figure.playback.time_s):
         content["playback"] = _playback(figure)
         content["data"].append(_vehicle_trace())
     return content
+
+
+def _corners(figure: SpaceFigure) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of the axes east, north and height, so that metres are equally long on all of them."""
+    points = np.concatenate([path.ned_m for path in figure.paths])
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        return np.zeros(3), np.ones(3)
+    points = np.column_stack((points[:, 1], points[:, 0], -points[:, 2]))
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = max(0.05 * float((high - low).max()), 0.5)
+    return low - margin, high + margin
 
 
 def _space_trace(path: SpacePath) -> Json:
