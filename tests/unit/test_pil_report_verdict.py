@@ -240,10 +240,8 @@ def test_the_report_is_sound_html_that_needs_nothing_else() -> None:
         assert words in page.text, words
     assert not {"img", "link", "iframe"} & set(page.tags)
     assert "http" not in own_part(html)
-    assert set(page.charts) == {
-        "cost-of-a-step", "difference-position", "difference-target-attitude", "difference-torque",
-        "difference-rotor-command",
-    }  # fmt: skip
+    assert "cost-of-a-step" in page.charts
+    assert "Not drawn, because no bit differs: MIL–SIL" in page.text
     assert [value for name, value in page.attributes if name == "href"] == [
         "mil/report.html", "sil/report.html", "pil/report.html",
     ]  # fmt: skip
