@@ -52,6 +52,8 @@ class Series:
     hints: Sequence[str] = ()
     """Text at the cursor for each sample; empty or as long as ``x``."""
     in_legend: bool = True
+    group: str = ""
+    """Curves of one group are hidden together; without one, those of one name."""
 
 
 @dataclass(frozen=True)

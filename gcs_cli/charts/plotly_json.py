@@ -74,7 +74,7 @@ def _plane(figure: Figure) -> Json:
     for index, panel in enumerate(figure.panels):
         x_name = "x" if shared or not index else f"x{index + 1}"
         y_name = "y" if not index else f"y{index + 1}"
-        data += _traces(panel, x_name, y_name, seen)
+        data += _traces(panel, x_name, y_name, seen, len(figure.panels) > 1)
         domains = _domains(index, figure, rows, inner_px)
         layout[f"xaxis{x_name[1:]}"] = {**_axis(panel.x), "domain": domains[0], "anchor": y_name}
         layout[f"yaxis{y_name[1:]}"] = {**_axis(_with_levels(panel)), "domain": domains[1], "anchor": x_name}
@@ -172,14 +172,16 @@ def _over_x(figure: Figure) -> bool:
     return all(series.dash != "none" and bool(np.all(np.diff(series.x) >= 0.0)) for series in curves)
 
 
-def _traces(panel: Panel, x_name: str, y_name: str, seen: set[tuple[str, str]]) -> Iterator[Json]:
+def _traces(
+    panel: Panel, x_name: str, y_name: str, seen: set[tuple[str, str]], among_others: bool
+) -> Iterator[Json]:
     for series in panel.series:
         key = (series.name, series.colour)
         yield {
-            **_trace(series, panel.y.unit, panel.y.log),
+            **_trace(series, _read_out(series, panel, among_others), panel.y.log),
             "xaxis": x_name,
             "yaxis": y_name,
-            "legendgroup": plain(series.name),
+            "legendgroup": plain(series.group or series.name),
             "showlegend": series.in_legend and key not in seen,
         }
         if series.in_legend:
@@ -188,7 +190,16 @@ def _traces(panel: Panel, x_name: str, y_name: str, seen: set[tuple[str, str]]) 
         yield {**_bar_trace(bars, panel.y.unit), "xaxis": x_name, "yaxis": y_name, "showlegend": False}
 
 
-def _trace(series: Series, unit: str, log: bool) -> Json:
+def _read_out(series: Series, panel: Panel, among_others: bool) -> str:
+    """Return what the cursor shows of a curve: panel and curve, where there are several, value and unit."""
+    names = [
+        *([panel.y.label] if among_others else []),
+        *([series.name] if len(panel.series) > 1 or not among_others else []),
+    ]
+    return f"{plain(', '.join(names))}: %{{y:.5~g}} {plain(panel.y.unit)}<extra></extra>"
+
+
+def _trace(series: Series, read_out: str, log: bool) -> Json:
     y = np.where(series.y > 0.0, series.y, np.nan) if log else series.y
     if series.texts or series.hints or series.dash == "none" or series.filled:
         x = series.x
@@ -206,7 +217,7 @@ def _trace(series: Series, unit: str, log: bool) -> Json:
         "y": numbers(y),
         "mode": "+".join(modes) or "lines",
         "line": {"color": colour(series.colour), "width": series.width, "dash": _DASHES.get(series.dash, "solid")},
-        "hovertemplate": f"%{{fullData.name}}: %{{y:.5~g}} {plain(unit)}<extra></extra>",
+        "hovertemplate": read_out,
     }  # fmt: skip
     if series.marker:
         found["marker"] = {"symbol": series.marker, "size": 7, "color": colour(series.colour)}

@@ -29,13 +29,11 @@ _CIRCLE = np.linspace(0.0, 2.0 * math.pi, 49)
 
 def space_figure(flight: Flight, plan: Plan, span: tuple[float, float]) -> SpaceFigure:
     """Return the flight in space, with the poses of the time slider."""
-    flown, playback = _flown(flight, span), _playback(flight, span)
-    setpoint = _setpoints(flight, span)
+    flown, playback = flown_path(flight, span), _playback(flight, span)
     paths = [
         SpacePath("flown", flown),
-        SpacePath("setpoint", setpoint, "s3", "dot", 2.0),
-        SpacePath("planned, items numbered", route_ned_m(flight, plan), "s2", "dash", 3.0),
-        _places("items", merged(plan_markers(flight, plan), 3), "s2"),
+        SpacePath("setpoint", _setpoints(flight, span), "s3", "dot", 2.0),
+        *plan_paths(flight, plan),
         _places("rally points", rally_markers(flight, plan), "s4"),
         *_walls(list(fence(flight, plan)), flight, flown),
     ]
@@ -51,7 +49,16 @@ def space_figure(flight: Flight, plan: Plan, span: tuple[float, float]) -> Space
     )
 
 
-def _flown(flight: Flight, span: tuple[float, float]) -> FloatArray:
+def plan_paths(flight: Flight, plan: Plan) -> list[SpacePath]:
+    """Return the route of a plan, and its items with their numbers."""
+    return [
+        SpacePath("planned, items numbered", route_ned_m(flight, plan), "s2", "dash"),
+        _places("items", merged(plan_markers(flight, plan), 3), "s2"),
+    ]
+
+
+def flown_path(flight: Flight, span: tuple[float, float]) -> FloatArray:
+    """Return the positions of a stretch of time, NED [m], shape (n, 3)."""
     time_s, position = flight.position
     return position[(time_s >= span[0]) & (time_s <= span[1])]
 
@@ -102,7 +109,18 @@ def _walls(areas: Sequence[Area], flight: Flight, flown: FloatArray) -> Iterator
 
 def map_figure(flight: Flight, plan: Plan, span: tuple[float, float]) -> Figure:
     """Return the path from above; north is up, east is right."""
-    flown = _flown(flight, span)
+    caption = (
+        "The flown path and the plan from above, north up; shaded circles are where items count as reached."
+    )
+    if plan.fence:
+        caption += " Outlined: the geofence."
+    panel = Panel(Axis("north", "m"), map_curves(flight, plan, span), Axis("east", "m"), equal=True)
+    return Figure("path-from-above", "Path from above", [panel], caption, height=500)
+
+
+def map_curves(flight: Flight, plan: Plan, span: tuple[float, float]) -> list[Series]:
+    """Return the plan, and the path flown in a stretch of time; x is east and y is north."""
+    flown = flown_path(flight, span)
     flown = flown[spaced(len(flown), _MAP_POINTS)]
     route, markers = route_ned_m(flight, plan), plan_markers(flight, plan)
     series = [
@@ -113,13 +131,7 @@ def map_figure(flight: Flight, plan: Plan, span: tuple[float, float]) -> Figure:
         *_labelled("items", merged(markers, 2), "s2"),
         *_labelled("rally points", rally_markers(flight, plan), "s4"),
     ]
-    caption = (
-        "The flown path and the plan from above, north up; shaded circles are where items count as reached."
-    )
-    if plan.fence:
-        caption += " Outlined: the geofence."
-    panel = Panel(Axis("north", "m"), [each for each in series if len(each.x)], Axis("east", "m"), equal=True)
-    return Figure("path-from-above", "Path from above", [panel], caption, height=500)
+    return [each for each in series if len(each.x)]
 
 
 def _outlines(areas: Sequence[Area]) -> Iterator[Series]:

@@ -98,6 +98,7 @@ def test_panels_share_their_time_axis_and_a_legend_entry() -> None:
     content = drawn(figure(*panels, linked=True))
     assert [(trace["xaxis"], trace["yaxis"]) for trace in content["data"]] == [("x", "y"), ("x", "y2")]
     assert [trace["showlegend"] for trace in content["data"]] == [True, False]
+    assert [trace["hovertemplate"].partition(":")[0] for trace in content["data"]] == ["roll", "pitch"]
     assert "xaxis2" not in content["layout"]
     assert content["layout"]["yaxis"]["domain"][0] > content["layout"]["yaxis2"]["domain"][1]
 
