@@ -110,7 +110,11 @@
   async function start() {
     for (const card of document.querySelectorAll("[data-chart]")) {
       const chart = {...JSON.parse(card.querySelector("script").textContent), card, plot: card.querySelector(".plot")};
+      chart.plot.style.height = `${chart.layout.height}px`;
       charts.push(chart);
+    }
+    charts.sort((a, b) => Boolean(a.layout.scene) - Boolean(b.layout.scene)); // without a graphics card these take seconds
+    for (const chart of charts) {
       if (chart.playback) playback(chart);
       await draw(chart);
       exports(chart);
