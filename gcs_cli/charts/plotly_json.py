@@ -9,64 +9,31 @@ import json
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import Any, TypeAlias
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray
-from gcs_cli.charts.decimate import drawn_samples, spaced
-from gcs_cli.charts.figure import (
-    AnyFigure,
-    Axis,
-    Band,
-    Bars,
-    Dash,
-    Figure,
-    Level,
-    Panel,
-    Series,
-    SpaceFigure,
-    SpacePath,
-)
+from gcs_cli.charts.decimate import drawn_samples
+from gcs_cli.charts.figure import AnyFigure, Axis, Band, Bars, Figure, Level, Panel, Series, SpaceFigure
+from gcs_cli.charts.plotly_parts import MARGIN, Json, base_layout, colour, dash_of, mode_of, numbers, plain
+from gcs_cli.charts.plotly_space import space_json
 
-Json: TypeAlias = dict[str, Any]
-
-_DASHES: dict[Dash, str] = {name: name for name in ("solid", "dash", "dot", "dashdot", "longdash")}
-_MARGIN = {"l": 64, "r": 18, "t": 44, "b": 44}
 _GAP_PX, _TITLE_PX = 16, 30
 """Between rows of panels: without, and with tick labels and a title."""
 _BAND_LABEL_PX, _PAGE_PX = 7.0, 900.0
 """Width of a character, and of a chart on a wide page: a band that is too short for its label has none."""
-_SPACE_POINTS = 3000
-_POSES = 1500
 
 
 def chart_json(figure: AnyFigure) -> str:
     """Return data, layout and what charts.js needs besides as JSON that is safe within a script element."""
-    content = _space(figure) if isinstance(figure, SpaceFigure) else _plane(figure)
+    content = space_json(figure) if isinstance(figure, SpaceFigure) else _plane(figure)
     content["file"] = figure.name
     text = json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def colour(name: str) -> str:
-    """Return the CSS variable of a colour."""
-    return f"var(--{name})"
-
-
-def plain(text: str) -> str:
-    """Return a text so that plotly.js shows it as it is: it reads some HTML in texts."""
-    return text.replace("&", "&amp;").replace("<", "&lt;")
-
-
-def numbers(values: Iterable[float], digits: int = 6) -> list[float | None]:
-    """Return values rounded to significant digits; None for one that is not finite."""
-    return [float(f"{value:.{digits}g}") + 0.0 if math.isfinite(value) else None for value in values]
-
-
 def _plane(figure: Figure) -> Json:
     data: list[Json] = []
-    layout = _base_layout()
+    layout = base_layout()
     shared = figure.linked and figure.columns == 1
     rows = math.ceil(len(figure.panels) / figure.columns)
     inner_px = rows * figure.height + (rows - 1) * (_GAP_PX if shared else _GAP_PX + 2 * _TITLE_PX)
@@ -86,25 +53,9 @@ def _plane(figure: Figure) -> Json:
             layout["annotations"] += _band_labels(panel, x_name, y_name)
     layout["hovermode"] = "x unified" if _over_x(figure) else "closest"
     layout["hoversubplots"] = "axis"
-    layout["height"] = inner_px + _MARGIN["t"] + _MARGIN["b"]
+    layout["height"] = inner_px + MARGIN["t"] + MARGIN["b"]
     layout["barmode"] = "overlay"
     return {"data": data, "layout": layout, "linked": figure.linked}
-
-
-def _base_layout() -> Json:
-    return {
-        "margin": dict(_MARGIN),
-        "paper_bgcolor": colour("card"),
-        "plot_bgcolor": colour("card"),
-        "font": {"family": "system-ui, sans-serif", "size": 12, "color": colour("soft")},
-        "hoverlabel": {"bgcolor": colour("page"), "bordercolor": colour("axis"), "font": {"color": colour("ink")}},
-        "legend": {"orientation": "h", "x": 0, "xanchor": "left", "y": 1, "yref": "container", "yanchor": "top",
-                   "bgcolor": "rgba(0,0,0,0)", "font": {"color": colour("ink")}},
-        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": colour("axis"), "activecolor": colour("ink")},
-        "uirevision": "kept",
-        "shapes": [],
-        "annotations": [],
-    }  # fmt: skip
 
 
 def _axis(axis: Axis) -> Json:
@@ -205,18 +156,13 @@ def _trace(series: Series, read_out: str, log: bool) -> Json:
         x = series.x
     else:
         x, y = drawn_samples(series.x, y)
-    modes = [
-        *(["lines"] if series.dash != "none" else []),
-        *(["markers"] if series.marker else []),
-        *(["text"] if series.texts else []),
-    ]
     found: Json = {
         "type": "scatter",
         "name": plain(series.name),
         "x": numbers(x, 8),
         "y": numbers(y),
-        "mode": "+".join(modes) or "lines",
-        "line": {"color": colour(series.colour), "width": series.width, "dash": _DASHES.get(series.dash, "solid")},
+        "mode": mode_of(series),
+        "line": {"color": colour(series.colour), "width": series.width, "dash": dash_of(series.dash)},
         "hovertemplate": read_out,
     }  # fmt: skip
     if series.marker:
@@ -296,100 +242,3 @@ def _panel_title(panel: Panel, x_name: str, y_name: str) -> Iterator[Json]:
             "text": f"<b>{plain(panel.title)}</b>", "x": 0, "xref": f"{x_name} domain", "xanchor": "left", "y": 1,
             "yref": f"{y_name} domain", "yanchor": "bottom", "showarrow": False, "font": {"color": colour("ink")},
         }  # fmt: skip
-
-
-def _space(figure: SpaceFigure) -> Json:
-    layout = _base_layout()
-    layout["margin"] = {"l": 0, "r": 0, "t": 30, "b": 0}
-    layout["height"] = figure.height
-    axis = {
-        "gridcolor": colour("line"), "zerolinecolor": colour("axis"), "linecolor": colour("axis"),
-        "showbackground": False, "color": colour("soft"),
-    }  # fmt: skip
-    low, high = _corners(figure)
-    span = high - low
-    layout["scene"] = {
-        "aspectmode": "manual",
-        "aspectratio": dict(zip("xyz", numbers(1.25 * span / span.max(), 4), strict=True)),
-        "camera": {"eye": {"x": 0.8, "y": -1.5, "z": 0.9}, "center": {"x": 0, "y": 0, "z": -0.15}},
-    }
-    for name, title, *ends in zip("xyz", ("east", "north", "height"), low, high, strict=True):
-        layout["scene"][f"{name}axis"] = {**axis, "title": {"text": f"{title} [m]"}, "range": numbers(ends)}
-    content: Json = {"data": [_space_trace(path) for path in figure.paths], "layout": layout, "linked": False}
-    if figure.playback is not None and len(figure.playback.time_s):
-        content["playback"] = _playback(figure)
-        content["data"].append(_vehicle_trace())
-    return content
-
-
-def _corners(figure: SpaceFigure) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of the axes east, north and height, so that metres are equally long on all of them."""
-    points = np.concatenate([path.ned_m for path in figure.paths])
-    points = points[np.isfinite(points).all(axis=1)]
-    if not len(points):
-        return np.zeros(3), np.ones(3)
-    points = np.column_stack((points[:, 1], points[:, 0], -points[:, 2]))
-    low, high = points.min(axis=0), points.max(axis=0)
-    margin = max(0.05 * float((high - low).max()), 0.5)
-    return low - margin, high + margin
-
-
-def _space_trace(path: SpacePath) -> Json:
-    points = path.ned_m if path.texts else path.ned_m[spaced(len(path.ned_m), _SPACE_POINTS)]
-    north, east, down = points.T
-    modes = [
-        *(["lines"] if path.dash != "none" else []),
-        *(["markers"] if path.marker else []),
-        *(["text"] if path.texts else []),
-    ]
-    return {
-        "type": "scatter3d",
-        "name": plain(path.name),
-        **{key: numbers(values) for key, values in (("x", east), ("y", north), ("z", -down))},
-        "mode": "+".join(modes) or "lines",
-        "line": {"color": colour(path.colour), "width": path.width, "dash": _DASHES.get(path.dash, "solid")},
-        "marker": {"color": colour(path.colour), "size": 4, "symbol": _symbol_in_space(path)},
-        "text": [plain(text) for text in path.texts],
-        "textfont": {"color": colour("ink")},
-        "showlegend": path.in_legend,
-        "hovertemplate": "%{fullData.name}<br>%{y:.2f} m north, %{x:.2f} m east, %{z:.2f} m high<extra></extra>",
-    }
-
-
-def _symbol_in_space(path: SpacePath) -> str:
-    return (
-        path.marker
-        if path.marker in ("circle", "x", "cross", "diamond", "square", "circle-open")
-        else "circle"
-    )
-
-
-def _playback(figure: SpaceFigure) -> Json:
-    """Return the poses for the time slider: metres east, north and up; roll, pitch and yaw."""
-    poses = figure.playback
-    assert poses is not None
-    index = spaced(len(poses.time_s), _POSES)
-    north, east, down = poses.ned_m[index].T
-    return {
-        "time": numbers(poses.time_s[index], 7),
-        "east": numbers(east),
-        "north": numbers(north),
-        "up": numbers(-down),
-        **{name: numbers(poses.euler_rad[index, column], 4) for column, name in enumerate(("roll", "pitch", "yaw"))},
-        "size": _vehicle_size_m(poses.ned_m),
-    }  # fmt: skip
-
-
-def _vehicle_size_m(ned_m: FloatArray) -> float:
-    """Return how large the vehicle is drawn: a thirtieth of the flown space, at least its true size."""
-    finite = ned_m[np.isfinite(ned_m).all(axis=1)]
-    extent = float(np.ptp(finite, axis=0).max()) if len(finite) else 0.0
-    return float(f"{max(0.25, extent / 30.0):.3g}")
-
-
-def _vehicle_trace() -> Json:
-    """Return the trace that charts.js moves: the arms, and a longer line ahead."""
-    return {
-        "type": "scatter3d", "name": "vehicle, nose ahead", "x": [], "y": [], "z": [], "mode": "lines",
-        "line": {"color": colour("bad"), "width": 6}, "hoverinfo": "skip", "showlegend": True,
-    }  # fmt: skip

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.mavlink.dialect import FsLoopTiming
+from flightstack.mavlink.dialect import FsLoopTiming, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.plan import Plan, load_plan
 from gcs_cli.link.tlog_file import TlogFile
@@ -113,6 +113,20 @@ def test_errors_are_setpoint_minus_position_on_each_axis(flight: Flight) -> None
     }
     means = [float(panel.series[0].y.mean()) for panel in figures["position-error"].panels]
     assert means == pytest.approx([0.1, 0.2, -0.3, math.sqrt(0.14)], abs=1e-6)
+
+
+def test_battery_has_the_time_of_the_last_position(tmp_path: Path) -> None:
+    tlog, link = tmp_path / "gcs.tlog", Link(1, 1)
+    unknown = dict.fromkeys(mavlink.MAVLink_sys_status_message.fieldnames, 0)
+    with TlogFile(tlog) as log:
+        for second, (percent, voltage_mv) in enumerate([(60, 16_000), (-1, 65_535), (58, 15_900)]):
+            status = {**unknown, "battery_remaining": percent, "voltage_battery": voltage_mv}
+            at = mavlink.MAVLink_local_position_ned_message(1000 * second, 0, 0, 0, 0, 0, 0)
+            for message in (at, mavlink.MAVLink_sys_status_message(**status)):
+                log.write(second, link.encode(message))
+    battery = read_telemetry(tlog, start_s=0.5).battery
+    assert battery.time_s.tolist() == [-0.5, 0.5, 1.5]
+    assert np.array_equal(battery.values, [[60.0, 16.0], [np.nan, np.nan], [58.0, 15.9]], equal_nan=True)
 
 
 def test_a_flight_without_loop_timing_says_so(flight: Flight) -> None:
