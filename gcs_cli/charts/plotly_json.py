@@ -138,7 +138,12 @@ def _traces(
         if series.in_legend:
             seen.add(key)
     for bars in panel.bars:
-        yield {**_bar_trace(bars, panel.y.unit), "xaxis": x_name, "yaxis": y_name, "showlegend": False}
+        yield {
+            **_bar_trace(bars, panel.y.unit),
+            "xaxis": x_name,
+            "yaxis": y_name,
+            "showlegend": len(panel.bars) > 1,
+        }
 
 
 def _read_out(series: Series, panel: Panel, among_others: bool) -> str:

@@ -19,6 +19,8 @@ WIDTH_IN = 7.0
 """Of a text column of A4."""
 _PX_PER_IN = 110.0
 _SPACE_HEIGHT_IN = 4.6
+_BAND_LABEL = 0.011
+"""Width of a character as a share of the axis."""
 _DASHES: dict[Dash, Any] = {
     "solid": "-", "dash": (0, (5, 2)), "dot": (0, (1, 1.5)), "dashdot": (0, (5, 2, 1, 2)), "longdash": (0, (9, 2.5)),
     "none": "",
@@ -58,6 +60,15 @@ def write_figure(path: Path, figure: AnyFigure, width_in: float = WIDTH_IN) -> N
             canvas.savefig(temporary, format=path.suffix[1:], metadata=metadata, dpi=200)
 
 
+def _band_labels(axes: Any, panel: Panel) -> None:
+    """Name the bands that have room for it."""
+    low, high = axes.get_xlim()
+    for band in panel.bands:
+        if (band.end - band.start) / (high - low) > _BAND_LABEL * len(band.label):
+            axes.text(0.5 * (band.start + band.end), 1.01, band.label, transform=axes.get_xaxis_transform(),
+                      ha="center", va="bottom", fontsize=6.5, color=LIGHT["soft"])  # fmt: skip
+
+
 def _plane(figure: Figure, width_in: float) -> Canvas:
     rows = math.ceil(len(figure.panels) / figure.columns)
     height_in = rows * (figure.height / _PX_PER_IN) + 0.7
@@ -67,6 +78,8 @@ def _plane(figure: Figure, width_in: float) -> Canvas:
     ).ravel()
     for axes, panel in zip(grid, figure.panels, strict=False):
         _panel(axes, panel)
+        if panel is figure.panels[0] or not figure.linked:
+            _band_labels(axes, panel)
         if figure.linked:
             axes.label_outer()
     for axes in grid[len(figure.panels) :]:
@@ -98,9 +111,8 @@ def _panel(axes: Any, panel: Panel) -> None:
     for series in panel.series:
         _series(axes, series, panel.y.log)
     for bars in panel.bars:
-        left = np.array(bars.edges[:-1])
-        axes.bar(left, bars.heights, np.diff(bars.edges), align="edge", color=LIGHT[bars.colour], edgecolor="white",
-                 linewidth=0.4, label=bars.name)  # fmt: skip
+        axes.bar(np.array(bars.edges[:-1]), bars.heights, np.diff(bars.edges), align="edge", color=LIGHT[bars.colour],
+                 edgecolor="white", linewidth=0.4, label=bars.name if len(panel.bars) > 1 else None)  # fmt: skip
     for level in panel.levels:
         (axes.axvline if level.upright else axes.axhline)(
             level.at, color=LIGHT[level.colour], linewidth=0.7, linestyle=(0, (4, 3))
