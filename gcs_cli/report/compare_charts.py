@@ -76,7 +76,8 @@ def _renamed(curve: Curve, name: str, arming_s: float, colour: str) -> Curve:
 
 def _shared_plan(flights: Sequence[NamedFlight]) -> bool:
     """True if all flew the same plan, or none is known: it is drawn once then."""
-    return all(plan.items == flights[0][2].items for _, _, plan, _ in flights)
+    plans = [(plan.items, plan.fence, plan.rally) for _, _, plan, _ in flights]
+    return all(plan == plans[0] for plan in plans)
 
 
 def _space(flights: Sequence[NamedFlight]) -> SpaceFigure:
