@@ -22,7 +22,7 @@ from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import Command, Frame, MissionItem, Plan, save_plan
 from flightstack.transports.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.experiments.paper.trajectory import Trajectory, load_trajectory, sample
+from gcs_cli.experiments.paper.flights.trajectory import Trajectory, load_trajectory, sample
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import DEFAULT_HOME, check_ports, checked_plan
 from gcs_cli.pil.run import JSON_NAME, Finished

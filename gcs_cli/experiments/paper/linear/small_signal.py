@@ -17,7 +17,8 @@ from flightstack.core.contract import (
 )
 from flightstack.core.geometry import quaternion_from_euler
 from flightstack.params.vehicle import Vehicle, load_vehicle
-from gcs_cli.experiments.paper.closed_loop import Exchange, make_loops
+from gcs_cli.experiments.paper.flights.closed_loop import Exchange, make_loops
+from gcs_cli.experiments.paper.flights.types import Case
 from gcs_cli.experiments.paper.linear.gains import (
     ATTITUDE_AXES,
     BACKSTEPPING,
@@ -27,7 +28,6 @@ from gcs_cli.experiments.paper.linear.gains import (
     gains_from,
 )
 from gcs_cli.experiments.paper.linear.sampled import Actuators
-from gcs_cli.experiments.paper.types import Case
 
 VELOCITY_AT, RATES_AT = 3, 10
 """Columns of the state: velocity NED, body rates FRD."""

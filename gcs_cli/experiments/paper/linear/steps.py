@@ -16,12 +16,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from flightstack.core.contract import FloatArray
+from gcs_cli.experiments.paper.flights.metrics import HIGH, LOW, SETTLED, rise_time_s, settling_time_s
 from gcs_cli.experiments.paper.linear.continuous import TransferFunction
-from gcs_cli.experiments.paper.linear.exponential import exponential
-from gcs_cli.experiments.paper.metrics import HIGH, LOW, SETTLED, rise_time_s, settling_time_s
 
 _EQUAL = 1e-7  # relative distance of two real poles below which they count as one
 
@@ -150,7 +150,7 @@ def exact_figures(loop: TransferFunction) -> StepFigures | None:
     start[-1] = 1.0  # the constant input
 
     def state(time_s: float) -> FloatArray:
-        moved: FloatArray = exponential(matrix * time_s) @ start
+        moved: FloatArray = np.asarray(expm(matrix * time_s)) @ start
         return moved
 
     def value(time_s: float) -> float:
@@ -185,7 +185,7 @@ def _companion(loop: TransferFunction) -> tuple[FloatArray, FloatArray]:
 
 def _along(matrix: FloatArray, start: FloatArray, times: FloatArray) -> FloatArray:
     """Return the states at equally spaced times, shape (n, states)."""
-    over, states = exponential(matrix * (times[1] - times[0])), np.empty((len(times), len(start)))
+    over, states = np.asarray(expm(matrix * (times[1] - times[0]))), np.empty((len(times), len(start)))
     states[0] = start
     for index in range(1, len(times)):
         states[index] = over @ states[index - 1]

@@ -20,10 +20,14 @@ from gcs_cli.experiments.paper.linear.continuous import (
     tilt_loop,
 )
 from gcs_cli.experiments.paper.linear.gains import ATTITUDE_AXES, POSITION_AXES, AttitudeGains, Gains
-from gcs_cli.experiments.paper.linear.instability import SETTINGS, find_onset
 from gcs_cli.experiments.paper.linear.margins import Margins, lowest_stable_hz, margins, spectral_radius
-from gcs_cli.experiments.paper.linear.outer_onset import TILT_OF, find_outer_onset, lowest_outer_hz, period_of
-from gcs_cli.experiments.paper.linear.sampled import Actuators, AttitudeTick, Rates
+from gcs_cli.experiments.paper.linear.onset import (
+    SETTINGS,
+    find_onset,
+    find_outer_onset,
+    lowest_outer_hz,
+)
+from gcs_cli.experiments.paper.linear.sampled import TILT_OF, Actuators, AttitudeTick, Rates, period_of
 from gcs_cli.experiments.paper.linear.small_signal import flown_gains, spin_up_lead_s
 from gcs_cli.experiments.paper.linear.steps import exact_figures
 
