@@ -80,8 +80,8 @@ def _plane(figure: Figure, width_in: float) -> Canvas:
         _panel(axes, panel)
         if panel is figure.panels[0] or not figure.linked:
             _band_labels(axes, panel)
-        if figure.linked:
-            axes.label_outer()
+        if figure.linked and not axes.get_subplotspec().is_last_row():
+            axes.set_xlabel("")  # the row below has it; y differs from column to column
     for axes in grid[len(figure.panels) :]:
         axes.set_visible(False)
     _legend(canvas, [axes.get_legend_handles_labels() for axes in grid])

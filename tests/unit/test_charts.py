@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gcs_cli.charts import print_figure
 from gcs_cli.charts.decimate import decimated, drawn_samples
 from gcs_cli.charts.figure import (
     AnyFigure,
@@ -171,3 +172,12 @@ def test_printed_figures_repeat_byte_for_byte(described: AnyFigure, suffix: str,
     write_figure(second, described)
     assert first.read_bytes() == second.read_bytes()
     assert len(first.read_bytes()) > 5000
+
+
+def test_print_of_linked_panels_keeps_each_y_axis() -> None:
+    panels = [Panel(Axis(name, "m"), [curve([0.0, 1.0], [0.0, 1.0])]) for name in "abcd"]
+    canvas = print_figure._plane(Figure("linked", "Linked", panels, columns=2, linked=True), 7.0)
+    canvas.draw_without_rendering()
+    assert [axes.get_ylabel() for axes in canvas.axes] == ["a [m]", "b [m]", "c [m]", "d [m]"]
+    assert [axes.get_xlabel() for axes in canvas.axes] == ["", "", "time [s]", "time [s]"]
+    assert all(axes.yaxis.get_ticklabels()[0].get_visible() for axes in canvas.axes)
