@@ -1,4 +1,4 @@
-"""What the flights say about the paper's claims: verdicts by stated thresholds, sentences filled from figures. Pure."""
+"""Verdicts on the paper's claims by stated thresholds, with sentences built from figures. Pure."""
 
 from __future__ import annotations
 
@@ -44,15 +44,15 @@ CLEARLY_POINTS = 1.0
 SAME_POINTS = 0.5
 """Overshoots that differ by less are the same."""
 _READINGS = (PID, RATE_FED_PID)
-"""Table II without the reference's rate, as it flies, and with it, as Table III flies: the paper does not say which."""
+"""Table II without and with the reference rate: the paper does not define it."""
 _ALL = (*_READINGS, BACKSTEPPING)
 
 
 def claims(cases: Cases, linear: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the paper's claims and ours, each with verdict, threshold and a sentence with the figures.
 
-    ``cases`` and ``linear`` are those of results.json. A claim whose flights or analysis were not asked for in this run
-    is left out; any other figure that is missing raises KeyError.
+    ``cases`` and ``linear`` are those of results.json. A claim whose flights or analysis are not part of this run is
+    left out; any other missing figure raises KeyError.
     """
     both = (SMALL_ANGLE, RIGID)
     judges: tuple[tuple[Callable[[str], dict[str, Any]], Sequence[str]], ...] = (

@@ -1,7 +1,4 @@
-"""Claims about stability: by the linear analysis, by who survives which condition, and by what the paper leaves out.
-
-Pure.
-"""
+"""Claims about stability: margins, survived conditions, and the spin-up torque that the paper leaves out. Pure."""
 
 from __future__ import annotations
 
@@ -26,16 +23,16 @@ from gcs_cli.experiments.paper.flights.cases import (
 from gcs_cli.experiments.paper.flights.types import Case
 
 RARELY_PERCENT = 1.0
-"""Rotors that are at their limits in less of the time are not driven there."""
+"""A smaller share of saturated ticks counts as none."""
 NEARER_DB, NEARER_DEG, NEARER_PERCENT = 0.5, 2.0, 5.0
-"""Margins smaller by less, and lowest rates higher by less, are no nearer to instability."""
+"""Smaller differences of margins and lowest rates count as equal."""
 ATTITUDES = ("roll", "pitch", "yaw")
 _FLOWN, _SPIN_UP = "motor lag", "motor lag with spin-up torque"
 _RATE_HZ = Case("", "").inner_hz
 
 
 class Nearness(NamedTuple):
-    """How near a loop is to instability; a loop without margins is unstable."""
+    """Margins and lowest rate of a loop; a loop without margins is unstable."""
 
     axis: str
     gain_db: float
@@ -105,7 +102,7 @@ def _is_nearer(one: Nearness, than: Nearness) -> bool:
 
 
 def survives(cases: Cases, plant: str) -> dict[str, Any]:
-    """Judge by the conditions of the hard profile in which a flight does not come to its end."""
+    """Judge by the conditions of the hard profile in which a flight ends early."""
     question = Question(
         "survives",
         "backstepping survives whatever the PID survives",
@@ -113,23 +110,23 @@ def survives(cases: Cases, plant: str) -> dict[str, Any]:
         "it comes to its end in every condition of the hard profile in which the PID as flown does",
     )
     ended: dict[str, list[str]] = {PID: [], BACKSTEPPING: [], RATE_FED_PID: []}
-    told: dict[str, list[str]] = {who: [] for who in ended}
+    labels: dict[str, list[str]] = {name: [] for name in ended}
     flown = 0
     for condition in CONDITIONS:
-        for who, where in ended.items():
-            case = cases.get(key(who, HARD, condition.name, plant))
+        for name, where in ended.items():
+            case = cases.get(key(name, HARD, condition.name, plant))
             if case is None:
                 continue
             flown += 1
             if case["ended"] is not None:
                 where.append(condition.name)
-                told[who].append(f"{condition.label} ({how_ended(case)})")
+                labels[name].append(f"{condition.label} ({how_ended(case)})")
     if not flown:
         raise NotFlownError(f"{HARD} on {plant}")
     words = (
-        f"On the hard profile {where_of(plant)} the PID does not come to its end with: {_listed(told[PID])}. "
-        f"Backstepping does not with: {_listed(told[BACKSTEPPING])}. The PID with its rate fed ahead does not with: "
-        f"{_listed(told[RATE_FED_PID])}."
+        f"On the hard profile {where_of(plant)} the PID does not come to its end with: {_listed(labels[PID])}. "
+        f"Backstepping does not with: {_listed(labels[BACKSTEPPING])}. The PID with its rate fed ahead does not with: "
+        f"{_listed(labels[RATE_FED_PID])}."
     )
     holds = set(ended[BACKSTEPPING]) <= set(ended[PID])
     return question.answer(holds, words, **ended)
@@ -140,13 +137,13 @@ def _listed(labels: list[str]) -> str:
 
 
 def yaw_saturated_percent(case: Mapping[str, Any]) -> float:
-    """Return in what share of a flight the rotors could not give the yaw torque that was asked for."""
+    """Return the share of a flight in which the rotors could not give the demanded yaw torque."""
     share: float = case["effort"]["saturated_percent"]["yaw"]
     return share
 
 
 def spin_up(cases: Cases) -> dict[str, Any]:
-    """Judge the one torque that the rigid body has and the paper leaves out; no plant without it can tell."""
+    """Judge the spin-up torque of the rotors, which only the rigid body and the multibody plant have."""
     question = Question(
         "spin_up",
         "the torque that spins the rotors up may be left out",
@@ -154,8 +151,8 @@ def spin_up(cases: Cases) -> dict[str, Any]:
         f"the PID's yaw loop saturates in at most {RARELY_PERCENT:g} % of the ticks with it",
     )
     without, there, other = (
-        flight(cases, key(who, DESIRED, PLAIN, which))
-        for who, which in ((PID, SMALL_ANGLE), (PID, RIGID), (BACKSTEPPING, RIGID))
+        flight(cases, key(name, DESIRED, PLAIN, which))
+        for name, which in ((PID, SMALL_ANGLE), (PID, RIGID), (BACKSTEPPING, RIGID))
     )
     shares = [yaw_saturated_percent(case) for case in (without, there, other)]
     drop_m = there["metrics"]["z"]["max_error"]

@@ -1,4 +1,4 @@
-"""The comparison of the controllers in XY, from the ``cases`` of results.json, so that anyone can do the same. Pure."""
+"""The comparison of the controllers in XY, from the ``cases`` of results.json. Pure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Cases = Mapping[str, Mapping[str, Any]]
 def xy(cases: Cases) -> dict[str, Any]:
     """Return the table of the comparison in XY: trajectory, plant, condition, contender, then figures.
 
-    A contender's figures are None where it crashed or lost control; what of the matrix was not flown is left out.
+    The figures are None for a crash or a loss of control; cases that were not flown are left out.
     """
     table: dict[str, Any] = {}
     for trajectory in PATHS:
@@ -33,7 +33,7 @@ def xy(cases: Cases) -> dict[str, Any]:
 
 
 def xy_figures(case: Mapping[str, Any]) -> dict[str, float | None] | None:
-    """Return what the comparison takes from one case; None where it crashed or lost control."""
+    """Return the compared figures of one case; None for a crash or a loss of control."""
     if case["ended"] is not None:
         return None
     path = case["path"]
@@ -76,7 +76,7 @@ class Overshoots(NamedTuple):
 
 
 def shared_overshoots(cases: Sequence[Mapping[str, Any]]) -> Overshoots | None:
-    """Compare flights by the moves of x and y that began at rest in all of them; None where there is no such move."""
+    """Compare flights by the moves of x and y that began at rest in all of them; None without such a move."""
     found = [overshoots_of(case) for case in cases]
     shared = set(found[0]).intersection(*found[1:]) if found else set()
     if not shared:

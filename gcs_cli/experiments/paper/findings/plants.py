@@ -1,4 +1,4 @@
-"""How far two plants come apart when the same loops fly the same trajectory on both. Pure."""
+"""Differences between two plants on which the same loops fly the same trajectory. Pure."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from gcs_cli.experiments.paper.flights.types import Recording
 
 POSITION_BOUND_M = 0.01
 ATTITUDE_BOUND_DEG = 0.5
-"""What the rigid-body plant and the multibody plant may differ by over the whole desired trajectory."""
+"""Largest allowed difference of the rigid-body and the multibody plant over the desired trajectory."""
 ROUNDING_M = 1e-6
-"""A push of 10⁻¹² N that moves the vehicle farther is magnified by a loop that is not stable."""
+"""A larger effect of a push of 10⁻¹² N means that an unstable loop amplifies it."""
 PAIRS = ((RIGID, MULTIBODY, True), (SMALL_ANGLE, RIGID, False))
-"""Pairs of plants, and whether the bound holds for them: small angles are another model, and differ by right."""
+"""Pairs of plants, and True if the bound applies: the small-angle plant is another model."""
 
 
 class Apart(NamedTuple):
-    """How far two flights of the same case are apart, over the n ticks that both flew."""
+    """Differences of two flights of the same case over their n common ticks."""
 
     time_s: FloatArray
     """Shape (n,)."""
@@ -44,7 +44,7 @@ class Apart(NamedTuple):
 
 
 def apart(one: Recording, other: Recording) -> Apart:
-    """Return how far two flights are apart, tick by tick."""
+    """Return the differences of two flights, tick by tick."""
     n = min(len(one.time_s), len(other.time_s))
     return Apart(
         one.time_s[:n],
@@ -54,7 +54,7 @@ def apart(one: Recording, other: Recording) -> Apart:
 
 
 def difference(one: Recording, other: Recording) -> dict[str, Any]:
-    """Return the largest and the RMS difference of position [m] and attitude [°], over the time that both flew."""
+    """Return the largest and the RMS difference of position [m] and attitude [°], over their common time."""
     time_s, position, attitude = apart(one, other)
     worst = attitude.max(axis=1)
     return {
@@ -71,9 +71,8 @@ def difference(one: Recording, other: Recording) -> dict[str, Any]:
 def comparisons(recordings: Mapping[str, Recording], trajectory: str = DESIRED) -> dict[str, Any]:
     """Return the differences of each pair of plants, "rigid_multibody" first, for each contender that flew both.
 
-    Where a contender also flew the rigid body with a push of 10⁻¹² N, ``rounding`` is what became of that push.
-    ``bound_decides`` tells that it stayed small: where a loop magnifies rounding, two plants that are the same but for
-    it come apart by chance, and so does one plant from itself.
+    ``rounding`` is the effect of a push of 10⁻¹² N on the rigid body, if that case was flown. ``bound_decides`` is True
+    if the effect stayed small: a loop that amplifies rounding separates two equal plants by chance.
     """
     table: dict[str, Any] = {}
     for first, second, bounded in PAIRS:

@@ -32,7 +32,7 @@ class Entry(NamedTuple):
 
 
 def table_1(vehicle: Vehicle | None = None) -> list[Entry]:
-    """Table I, the vehicle, and behind it what the paper leaves out and a flight needs."""
+    """Table I, the vehicle, then values that a flight needs and the paper leaves out."""
     v = load_vehicle("paper_quad") if vehicle is None else vehicle
     rotor = v.rotors[0]
     ix, iy, iz = v.inertia_kg_m2
@@ -66,7 +66,7 @@ def table_1(vehicle: Vehicle | None = None) -> list[Entry]:
 
 
 def table_2() -> list[Entry]:
-    """Table II, the PID; behind it what the loops need besides."""
+    """Table II, the PID, then further values that the loops need."""
     gains = open_gains("paper")
     attitude, position, altitude = (gains.table(name) for name in ("attitude_pid", "position", "altitude"))
     kp, kd = attitude.numbers("kp", 3, 0.0, _LARGEST), attitude.numbers("kd", 3, 0.0, _LARGEST)

@@ -1,4 +1,4 @@
-"""What claims are judged with: one verdict as plain data, and the figures of several flights of a profile. Pure."""
+"""Helpers for verdicts: a verdict as plain data, and the flights it compares. Pure."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _PLANNED = frozenset(case.key for case in all_cases(multibody=True))
 
 
 class NotFlownError(Exception):
-    """A verdict needs a flight or an analysis that was not asked for in this run."""
+    """A verdict needs a flight or an analysis that is not part of this run."""
 
 
 class Question(NamedTuple):
-    """What is judged, and by which threshold."""
+    """A claim and the threshold that decides it."""
 
     name: str
     text: str
@@ -47,7 +47,7 @@ class Question(NamedTuple):
         }  # fmt: skip
 
     def nothing_to_compare(self, why: str, where: str) -> dict[str, Any]:
-        """Return the verdict where not all of those who are compared flew to the end: it does not hold."""
+        """Return the verdict for compared flights that ended early: it does not hold."""
         return self.answer(False, f"{sentence(why)} {where}: nothing to compare.")
 
 
@@ -57,32 +57,32 @@ def where_of(plant: str) -> str:
 
 
 def sentence(words: str) -> str:
-    """Return words with a capital at their begin."""
+    """Return words with a capital first letter."""
     return words[:1].upper() + words[1:]
 
 
 def flights(
     cases: Cases, names: Sequence[str], trajectory: str, condition: str, plant: str
 ) -> list[Mapping[str, Any]]:
-    """Return the flights of these contenders; raise NotFlownError, or KeyError for what is no experiment at all."""
+    """Return the flights of these contenders; raise NotFlownError, or KeyError for a key outside the matrix."""
     return [flight(cases, key(name, trajectory, condition, plant)) for name in names]
 
 
 def flight(cases: Cases, name: str) -> Mapping[str, Any]:
-    """Return one flight; raise NotFlownError, or KeyError for what is no experiment at all."""
+    """Return one flight; raise NotFlownError, or KeyError for a key outside the matrix."""
     if name not in cases and name in _PLANNED:
         raise NotFlownError(name)
     return cases[name]
 
 
 def who_ended(names: Sequence[str], found: Sequence[Mapping[str, Any]]) -> str | None:
-    """Return who of these crashed or lost control, in words; None if all flew to the end."""
-    told = [
+    """Return the contenders that crashed or lost control, in words; None if all flights are complete."""
+    ended = [
         f"{NAMES[name]} {how_ended(case)}"
         for name, case in zip(names, found, strict=True)
         if case["ended"] is not None
     ]
-    return ", ".join(told) or None
+    return ", ".join(ended) or None
 
 
 def how_ended(case: Mapping[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""The matrix of experiments: who flies, what, in which conditions, on which plant. Pure."""
+"""The matrix of experiments: controllers, trajectories, conditions and plants. Pure."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Contender(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """What differs from the plain flight."""
+    """A change to the plain flight."""
 
     name: str
     label: str
@@ -78,7 +78,7 @@ CONDITIONS = (
     Condition(SHAPED, "setpoints through a reference model: 3 rad/s, damping 1, 4.5 m/s²", {"shaped": True}),
 )
 NUDGE = Condition("nudge", "a push of 10⁻¹² N", {"force_ned_n": Vector3(1e-12, 0.0, 0.0)})
-"""Beside the plain flight it shows what the loops make of a difference as small as rounding."""
+"""Compared with the plain flight it shows how the loops amplify a difference as small as rounding."""
 _PAIR = [contender for contender in CONTENDERS if contender.name in (PID, BACKSTEPPING)]
 
 
@@ -99,7 +99,7 @@ def key(contender: str, trajectory: str, condition: str = PLAIN, plant: str = SM
 
 
 def condition_of(case: Case) -> str:
-    """Return the name of the condition that a case's key tells; a case outside the matrix is plain."""
+    """Return the condition in a case's key; a case outside the matrix is plain."""
     parts = case.key.split("/")
     return parts[2] if len(parts) == 4 else PLAIN
 
@@ -133,10 +133,10 @@ def matrix(
 def all_cases(multibody: bool) -> list[Case]:
     """Return every experiment of ``gcs paper``.
 
-    The two paths of the comparison in all conditions; the desired trajectory and steps plain and with ideal rotors;
-    all steps of position through the reference model, which smooth paths do not need; on the multibody plant the
-    desired trajectory, and with the paper's gains everything else that is plain. The torque of the motors is a matter
-    of the rigid body: on small angles rotors turn for nothing.
+    Smooth and hard profile in all conditions; the desired trajectory and steps plain and with ideal rotors; hard
+    profile and position steps through the reference model; on the multibody plant the desired trajectory, and with the
+    paper's gains all other plain flights. The motor torque is limited on the rigid body only, because the small-angle
+    plant has no spin-up torque.
     """
     plants = (SMALL_ANGLE, RIGID)
     simple = [condition for condition in CONDITIONS if condition.name in (PLAIN, IDEAL)]

@@ -1,11 +1,11 @@
 """Fly one case: plant and control loops in this process, exchanged as in lockstep, without links.
 
-The one module of the ground station that joins the two (docs/decisions.md): an experiment of the paper is a hundred
-flights of half a minute, which cannot each start three processes. The loops are the flight stack's, the plants the
-simulator's, and a tick is the lockstep's: state to the loops, rotor commands back, held for one period. A test holds
-a case equal, bit for bit, to the same flight through the links.
+Only this module of the ground station joins the two (docs/decisions.md): the experiments are hundreds of flights, too
+many to start three processes for each. The loops are the flight stack's, the plants the simulator's. A tick is that of
+the lockstep: state to the loops, rotor commands back, held for one period. A test holds a case equal, bit for bit, to
+the same flight through the links.
 
-The vehicle starts in the air, in hover, and there is no ground: the paper has none.
+The vehicle starts in hover, and there is no ground: the paper has none.
 """
 
 from __future__ import annotations
@@ -45,24 +45,24 @@ _ARMED = 2  # FS_ACTUATORS
 
 
 class Rows(NamedTuple):
-    """What passed between plant and loops, n inner ticks; row k of ``loops`` answers row k of ``targets``."""
+    """Exchanges of plant and loops over n inner ticks; row k of ``loops`` belongs to row k of ``targets``."""
 
     loops: FloatArray
     """Shape (n, 48): rows of the inner loop."""
     targets: FloatArray
     """Shape (n, 5): the attitude target in each tick, array form of ``AttitudeTarget``."""
     diverged: bool
-    """The plant's numbers ran away in the last tick."""
+    """The plant diverged in the last tick."""
 
 
 def controlled_vehicle(case: Case) -> Vehicle:
-    """Return the vehicle that the loops know: Table I, with or without limits of the rotor speeds."""
+    """Return the vehicle model of the loops: Table I, with or without limits of the rotor speeds."""
     vehicle = load_vehicle(case.vehicle)
     return vehicle if case.limits else vehicle.with_ideal_rotors()
 
 
 def flown_vehicle(case: Case) -> Vehicle:
-    """Return the vehicle that the plant is: with the case's mass, inertia, motor lag and torque."""
+    """Return the vehicle model of the plant, with the case's mass, inertia, motor lag and motor torque."""
     vehicle = load_vehicle(case.vehicle)
     ix, iy, iz = (case.inertia_factor * value for value in vehicle.inertia_kg_m2)
     rotors = vehicle.rotors
@@ -76,7 +76,7 @@ def flown_vehicle(case: Case) -> Vehicle:
 
 
 def make_loops(case: Case, outer_hz: float | None = None) -> PythonLoops:
-    """Return the loops of the case as the flight stack makes them; ``outer_hz`` in place of its own.
+    """Return the loops of the case as the flight stack creates them; ``outer_hz`` replaces the case's rate.
 
     Raise ConfigError.
     """
@@ -91,7 +91,7 @@ def make_loops(case: Case, outer_hz: float | None = None) -> PythonLoops:
 
 
 def make_plant(case: Case) -> tuple[Plant, int]:
-    """Return the plant in hover, and how many of its steps make an inner period."""
+    """Return the plant in hover, and its number of steps in an inner period."""
     options = PlantOptions(
         disturbance=Disturbance(force_ned_n=case.force_ned_n, torque_frd_n_m=case.torque_frd_n_m),
         ground=False,
@@ -108,24 +108,24 @@ def make_plant(case: Case) -> tuple[Plant, int]:
 
 
 def hover_speeds(case: Case) -> tuple[float, ...]:
-    """Return the rotor speeds [rad/s] that carry Table I's vehicle in hover."""
+    """Return the rotor speeds [rad/s] of Table I's vehicle in hover."""
     return tuple(map(math.sqrt, load_vehicle(case.vehicle).hover_speeds_squared()))
 
 
 def fly(case: Case) -> Recording:
-    """Fly the case and return what it recorded: the same bits for the same case; raise ConfigError.
+    """Fly the case and return its recording, the same bits for the same case; raise ConfigError.
 
-    A crash ends a recording and is no error, and so does a loss of control: ``ended_s`` and ``ended_why`` tell of it.
+    A crash or a loss of control ends the recording and is no error: see ``ended_s`` and ``ended_why``.
     """
     trajectory = load_trajectory(case.trajectory)
     return _recording(case, trajectory, fly_rows(case, trajectory))
 
 
 class Exchange:
-    """Plant and loops of a case, which exchange states and rotor commands tick by tick, as the lockstep does."""
+    """Plant and loops of a case, which exchange states and rotor commands tick by tick as in lockstep."""
 
     def __init__(self, case: Case, outer_hz: float | None = None) -> None:
-        """Bring both to hover; raise ConfigError. ``outer_hz`` is what ``make_loops`` takes."""
+        """Bring both to hover; raise ConfigError. ``outer_hz``: see ``make_loops``."""
         self.loops, (self._plant, self._steps) = make_loops(case, outer_hz), make_plant(case)
         self.state: FloatArray = self._plant.output[0]["state"]
         """Array form of ``VehicleState``, shape (13,); a view that every tick changes."""
@@ -141,10 +141,10 @@ class Exchange:
         row: FloatArray,
         instead: FloatArray | None = None,
     ) -> bool:
-        """Pass an inner tick; fill ``row``, shape (48,), and tell whether the plant's numbers ran away.
+        """Run one inner tick, fill ``row``, shape (48,), and return True if the plant diverged.
 
-        ``aim`` is a setpoint (11,), or an attitude target (5,) for the inner loop alone, which hears of it when
-        ``outer_due``. ``instead`` are rotor commands in place of those that are due.
+        ``aim`` is a setpoint (11,), or an attitude target (5,) for the inner loop alone, set when ``outer_due``.
+        ``instead`` replaces the rotor commands that are due.
         """
         if attitude_only and outer_due:
             self.loops.set_attitude_target(aim)
@@ -155,7 +155,7 @@ class Exchange:
 
 
 def fly_rows(case: Case, trajectory: Trajectory) -> Rows:
-    """Fly the case to the trajectory's end, or until the plant's numbers run away; raise ConfigError."""
+    """Fly the case to the trajectory's end, or until the plant diverges; raise ConfigError."""
     exchange, divisor = Exchange(case), _divisor(case)
     count = round(trajectory.duration_s * case.inner_hz)
     wanted = _wanted(case, trajectory, np.arange(0, count, divisor) / case.inner_hz)
@@ -184,7 +184,7 @@ def _padded(speeds: tuple[float, ...]) -> FloatArray:
 
 
 def _wanted(case: Case, trajectory: Trajectory, time_s: FloatArray) -> FloatArray:
-    """What the loops are asked at each outer tick: setpoints (n, 11), or attitude targets (n, 5)."""
+    """Return the input of the loops at each outer tick: setpoints (n, 11), or attitude targets (n, 5)."""
     if trajectory.kind != ATTITUDE:
         shape = shaped_setpoints if case.shaped else setpoints
         return shape(trajectory, time_s, case.scale)

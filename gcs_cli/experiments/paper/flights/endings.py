@@ -1,9 +1,8 @@
-"""When a flight counts as ended before its time: crashed, or out of control though it still flies. Pure.
+"""The conditions under which a flight ends early: crash, or loss of control. Pure.
 
-A vehicle has crashed when it lies on its side, is 10 m away from its reference, or when the plant's numbers run away.
-It has lost control when height, place or heading is far outside everything that its reference was in the last two
-seconds: so a step of the reference, however large, is no loss, and a vehicle that turns away and never comes back is.
-What comes after that is not the flight that was asked for, and none of its figures count.
+A vehicle has crashed when it lies on its side, is 10 m away from its reference, or when the plant diverges. It has lost
+control when height, position or heading is far outside the range of its reference over the last two seconds: a step of
+the reference, however large, is no loss of control. A flight counts only up to its ending.
 """
 
 from __future__ import annotations
@@ -20,27 +19,27 @@ from flightstack.core.geometry_bulk import euler_from_quaternions
 BoolArray: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
 CRASHED, LOST = "crashed", "lost"
 FARTHEST_M = 10.0
-"""A vehicle so far from its reference has lost its way: the flight counts as crashed."""
+"""Distance from the reference at which a flight counts as crashed."""
 HEIGHT_LOST_M, PLACE_LOST_M, HEADING_LOST_DEG = 1.0, 3.0, 60.0
 WINDOW_S = 2.0
-"""How long a value of the reference still counts as asked for."""
-_UPRIGHT = 0.0  # least cosine of the tilt: a vehicle on its side has turned over
+"""Time over which the range of the reference is taken."""
+_UPRIGHT = 0.0  # smallest cosine of the tilt
 
 
 class Ending(NamedTuple):
-    """Until when a flight counts, and why no longer; ``how`` and ``why`` are empty where it flew to its end."""
+    """The end of a flight; ``how`` and ``why`` are empty if it is complete."""
 
     ticks: int
-    """How many of them count."""
+    """Ticks that count."""
     how: str
     why: str
 
 
 def ending(state: FloatArray, reference: FloatArray, diverged: bool, hz: float) -> Ending:
-    """Return how a flight ended; a crash counts before a loss of control.
+    """Return the ending of a flight; a crash takes precedence over a loss of control.
 
     ``state`` has shape (n, 13), the array form of ``VehicleState``; ``reference`` (n, 4): north, east, down, yaw, NaN
-    for what is not steered.
+    for an uncontrolled axis.
     """
     crash = _first(_crashes(state, reference), Ending(len(state), "", ""), CRASHED)
     if not crash.how and diverged:
@@ -51,7 +50,7 @@ def ending(state: FloatArray, reference: FloatArray, diverged: bool, hz: float) 
 
 
 def _first(found: list[tuple[BoolArray, str]], otherwise: Ending, how: str) -> Ending:
-    """Return the earliest of events, each given by when it is (shape (n,), bool) and what is said of it."""
+    """Return the earliest of the events, each given by its ticks (shape (n,), bool) and its description."""
     end = otherwise
     for when, why in found:
         found_at = np.flatnonzero(when)
@@ -83,7 +82,7 @@ def _losses(state: FloatArray, reference: FloatArray, hz: float) -> list[tuple[B
 
 
 def _beyond(actual: FloatArray, reference: FloatArray, window: int) -> FloatArray:
-    """Return by how much each column is outside the range of its reference in the last ``window`` ticks.
+    """Return the distance of each column from the range of its reference in the last ``window`` ticks.
 
     NaN where there is no reference.
     """

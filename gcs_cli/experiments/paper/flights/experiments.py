@@ -1,7 +1,6 @@
-"""Fly many cases, in several processes, and keep of each what results and report need.
+"""Fly many cases in several processes, and keep of each the parts for results and report.
 
-A case does not know of the others and each is flown by one process alone: the results are the same with any number of
-processes, and come in the order of the cases.
+The cases are independent: any number of processes gives the same results, in the order of the cases.
 """
 
 from __future__ import annotations
@@ -34,14 +33,14 @@ from gcs_cli.experiments.paper.flights.types import AxisMetrics, Case, Recording
 
 MOST_JOBS = 8
 THIN = 4
-"""Of a recording that is only drawn, every so many ticks are kept: 250 Hz."""
+"""Decimation of a recording that is only drawn, to 250 Hz."""
 FULL = (DESIRED, *STEPS)
-"""What is kept tick by tick: plants are compared along the one, and the others are quick."""
+"""Trajectories whose recordings are kept tick by tick: the plants are compared along them."""
 _DRAWN = (PLAIN, IDEAL, NO_LIMITS, SHAPED, NUDGE.name)
 
 
 class Flown(NamedTuple):
-    """What experiments gave."""
+    """The results of all cases."""
 
     entries: dict[str, dict[str, Any]]
     """For results.json, by the case's key."""
@@ -50,13 +49,13 @@ class Flown(NamedTuple):
 
 
 def default_jobs() -> int:
-    """Return how many processes fly at once unless told."""
+    """Return the default number of processes."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return min(MOST_JOBS, usable or 1)
 
 
 def entry_of(recording: Recording) -> dict[str, Any]:
-    """Return what results.json holds of a case."""
+    """Return the entry of a case in results.json."""
     path = path_metrics(recording)
     ended = {"time_s": recording.ended_s, "why": recording.ended_why, "how": recording.ended_how}
     return {
@@ -85,7 +84,7 @@ def thinned(recording: Recording, every: int = THIN) -> Recording:
 
 
 def experiment(case: Case) -> tuple[dict[str, Any], Recording | None]:
-    """Fly a case; return its entry, and its recording where it is drawn; raise ConfigError."""
+    """Fly a case; return its entry, and its recording if it is drawn; raise ConfigError."""
     recording = fly(case)
     entry = entry_of(recording)
     condition = condition_of(case)
@@ -99,9 +98,9 @@ def experiment(case: Case) -> tuple[dict[str, Any], Recording | None]:
 def run_cases(
     cases: Sequence[Case], jobs: int, tell: Callable[[int, int], None] = lambda done, total: None
 ) -> Flown:
-    """Fly the cases; ``tell`` is called with how many are done. Raise ConfigError.
+    """Fly the cases; ``tell`` is called with the number of finished cases and their total. Raise ConfigError.
 
-    With one job no process is started.
+    One job starts no process.
     """
     found: dict[str, tuple[dict[str, Any], Recording | None]] = {}
     tell(0, len(cases))
@@ -120,7 +119,7 @@ def run_cases(
 
 
 def _warm_up(cases: Sequence[Case]) -> None:
-    """Compile each kernel once, here: all processes then read it from the cache."""
+    """Compile each kernel once in this process, so that the others read it from the cache."""
     kinds = {(case.plant, case.controller): case for case in cases}
     for case in kinds.values():
         fly(case._replace(trajectory="step_roll", inner_hz=250))
@@ -150,7 +149,7 @@ def _in_processes(
 
 @contextlib.contextmanager
 def _interrupts_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C while processes are started, which then ignore it for good: who started them ends them."""
+    """Ignore Ctrl-C while processes are started, which inherit this: only the parent ends them."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield

@@ -1,16 +1,16 @@
 """Figures of a recording: of each axis against its reference, of the path in XY, and of the rotors' work. Pure.
 
-A move of an axis is what lies between two holds of its reference (nearly a second or longer without a change); a
-step is a move that takes no time. Its response is scaled to 0 before and 1 after it. Over the moves of an axis
+A move of an axis lies between two holds of its reference (0.9 s or longer without a change); a step is a move that
+takes no time. Its response is scaled to 0 before and 1 after it. Over the moves of an axis
 
-* overshoot is the largest share by which the response passes 1 before the next move begins. It is told of each move,
+* overshoot is the largest share by which the response passes 1 before the next move begins. It is given for each move,
   and the largest and the median of them all. A move counts only if the axis was at rest when it began, within 2 % of
-  the move of its place and slower than 2 % of the move per second: else what is left of the move before would count;
+  the move of its place and slower than 2 % of the move per second: else the rest of the previous move would count;
 * rise time, from 10 to 90 %, and settling time, from the move's begin until the response stays within 2 % of 1, are
-  those of the last such move that is watched for 4 s or more; None without one, or where it does not rise or settle.
+  those of the last such move that is observed for 4 s or more; None without one, or where it does not rise or settle.
 
 Crossings are interpolated between ticks. Errors are actual minus reference; the steady-state error is the mean of the
-last second. A reference without holds (the attitude that the outer loop asks for) has errors only.
+last second. A reference without holds (the attitude target of the outer loop) has errors only.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from flightstack.core.contract import FloatArray, LoopStatus
 from gcs_cli.experiments.paper.flights.types import AxisMetrics, MoveMetrics, Recording
 
 HOLD_S = 0.9
-"""A reference that rests so long is held; what it does between two holds is one move, or none if it comes back."""
+"""Shortest hold of a reference; a change between two holds is one move, or none if the reference returns."""
 SETTLED = 0.02
 AT_REST_PER_S = 0.02
-"""An axis that moves by less of the coming move in a second is at rest."""
+"""Largest speed at rest, as a share of the next move per second."""
 WATCHED_S = 4.0
-"""So long a response is watched to tell when it settles."""
+"""Observation time of a response for its settling time."""
 _SPEED_OVER_S = 0.05
 LOW, HIGH = 0.1, 0.9
 STEADY_S = 1.0
@@ -46,7 +46,7 @@ _BITS = {
 
 
 class Move(NamedTuple):
-    """One move of a reference, in ticks: it begins in ``begin``, and its response is watched until ``end``."""
+    """One move of a reference, in ticks: it begins in ``begin``, and its response is observed until ``end``."""
 
     begin: int
     end: int
@@ -55,29 +55,29 @@ class Move(NamedTuple):
 
 
 class PathMetrics(NamedTuple):
-    """How a flight kept to its path in the horizontal plane [m]."""
+    """Errors of the path in the horizontal plane [m]."""
 
     rms_error_m: float
     """Distance from the reference of the same time."""
     max_error_m: float
     path_rms_m: float
-    """Distance from the nearest point of the path, whenever it was due."""
+    """Distance from the nearest point of the path, at any time."""
     path_max_m: float
     beyond_m: float
-    """How far the flight left the rectangle, along the axes, that holds the whole path: overshoot at its corners."""
+    """Largest distance outside the bounding rectangle of the path: the overshoot at its corners."""
 
 
 class Effort(NamedTuple):
-    """What the rotors had to do."""
+    """Load of the rotors."""
 
     saturated_percent: dict[str, float]
     """Share of the ticks in which the mixer could not follow: roll, pitch, yaw, thrust."""
     torque_rms_n_m: tuple[float, float, float]
-    """Demanded torque: a loop that oscillates shows here first."""
+    """Demanded torque, which shows an oscillating loop first."""
 
 
 def measure(recording: Recording) -> dict[str, AxisMetrics]:
-    """Return the figures of x, y, z (down), roll, pitch and yaw, as far as the trajectory steers them."""
+    """Return the figures of x, y, z (down), roll, pitch and yaw, for the axes that the trajectory controls."""
     time_s = recording.time_s
     signals = {
         "x": (recording.position_ned_m[:, 0], recording.reference[:, 0]),
@@ -100,8 +100,8 @@ def axis_metrics(time_s: FloatArray, actual: FloatArray, reference: FloatArray) 
     steady = error[time_s > time_s[-1] - STEADY_S]
     found = moves(time_s, reference)
     counted = [move for move in found if began_at_rest(time_s, actual, move)]
-    told = [_overshoot(time_s, actual, move, move in counted) for move in found]
-    over = [one.overshoot_percent for one in told if one.overshoot_percent is not None]
+    overshoots = [_overshoot(time_s, actual, move, move in counted) for move in found]
+    over = [one.overshoot_percent for one in overshoots if one.overshoot_percent is not None]
     rise_s, settling_s = None, None
     for move in counted:
         if _watched_s(time_s, move) > WATCHED_S - _SPEED_OVER_S:
@@ -110,15 +110,15 @@ def axis_metrics(time_s: FloatArray, actual: FloatArray, reference: FloatArray) 
     return AxisMetrics(
         max(over, default=None), rise_s, settling_s,
         float(steady.mean()), _rms(error), float(np.abs(error).max()),
-        float(np.median(over)) if over else None, tuple(told),
+        float(np.median(over)) if over else None, tuple(overshoots),
     )  # fmt: skip
 
 
 def began_at_rest(time_s: FloatArray, actual: FloatArray, move: Move) -> bool:
-    """Tell whether the axis was at rest at its place when the move began; ``actual`` has shape (n,)."""
+    """True if the axis was at rest at its start value when the move began; ``actual`` has shape (n,)."""
     size = abs(move.target - move.start)
     since = max(0, int(np.searchsorted(time_s, time_s[move.begin] - _SPEED_OVER_S)))
-    early, late = np.array_split(actual[since : move.begin], 2)  # means, so that a shiver in place is rest
+    early, late = np.array_split(actual[since : move.begin], 2)  # means: a small oscillation counts as rest
     if not early.size or not late.size:
         return abs(float(actual[move.begin - 1]) - move.start) <= SETTLED * size
     moved_s = 0.5 * float(time_s[move.begin] - time_s[since])
@@ -178,7 +178,7 @@ def _crossing_s(time_s: FloatArray, share: FloatArray, after: int, level: float)
 
 
 def settling_time_s(time_s: FloatArray, share: FloatArray) -> float | None:
-    """Return when the response enters the band of 2 % around 1 for good; None where it is outside at the end."""
+    """Return the time from which the response stays within 2 % of 1; None if it ends outside."""
     outside = np.flatnonzero(np.abs(share - 1.0) > SETTLED)
     if not len(outside):
         return 0.0
@@ -190,7 +190,7 @@ def settling_time_s(time_s: FloatArray, share: FloatArray) -> float | None:
 
 
 def path_metrics(recording: Recording) -> PathMetrics | None:
-    """Return the figures of the path in XY; None where the trajectory does not steer the position."""
+    """Return the figures of the path in XY; None if the trajectory does not control the position."""
     here, there = recording.position_ned_m[:, :2], recording.reference[:, :2]
     if not len(there) or np.isnan(there[0, 0]):
         return None
@@ -217,7 +217,7 @@ def _distance_from_path(recording: Recording, there: FloatArray) -> FloatArray:
 
 
 def _polyline(points: FloatArray) -> FloatArray:
-    """Corners of the path, none equal to the one before: one every 5 cm, and one where it comes to rest."""
+    """Distinct corners of the path: one every 5 cm, and one at each rest."""
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     moved = np.flatnonzero(lengths > 0.0)  # the path moves from point i to i + 1
     if not len(moved):
@@ -229,7 +229,7 @@ def _polyline(points: FloatArray) -> FloatArray:
 
 
 def effort(recording: Recording) -> Effort:
-    """Return what the rotors had to do."""
+    """Return the load of the rotors."""
     status, torque = recording.status, recording.wrench[:, 1:]
     shares = {name: 100.0 * float(((status & bit) != 0).mean()) for name, bit in _BITS.items()}
     roll, pitch, yaw = (_rms(torque[:, axis]) for axis in range(3))

@@ -1,6 +1,6 @@
 """Desired trajectories: moves of the axes, added up, read from TOML and sampled with their derivatives. Pure.
 
-A file has a description, the time it takes, what it steers (``kind``: position, or attitude for the inner loop alone)
+A file has a description, a duration, a ``kind`` (position, or attitude for the inner loop alone)
 and moves. A move begins at ``at_s``, takes ``over_s``, and displaces each axis that it names; displacements of moves
 that overlap add up. Its shape is one of
 
@@ -53,7 +53,7 @@ class Move(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """What a vehicle is asked to follow; all axes begin at zero."""
+    """The reference of a flight; all axes begin at zero."""
 
     name: str
     description: str
@@ -63,7 +63,7 @@ class Trajectory(NamedTuple):
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The axes it steers, in the order of the columns of ``sample``."""
+        """The controlled axes, in the order of the columns of ``sample``."""
         return _AXES[self.kind]
 
 
@@ -76,7 +76,7 @@ class Sampled(NamedTuple):
 
 
 def trajectory_names() -> list[str]:
-    """Return the names of the trajectories that come with the package."""
+    """Return the names of the built-in trajectories."""
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
@@ -182,8 +182,8 @@ def setpoints(trajectory: Trajectory, time_s: FloatArray, scale: float = 1.0) ->
 def shaped_setpoints(trajectory: Trajectory, time_s: FloatArray, scale: float = 1.0) -> FloatArray:
     """Return setpoints whose position follows the trajectory's through the reference model, shape (n, 11).
 
-    They are what our own gains are meant to fly: a step becomes a path with a velocity and an acceleration to feed
-    ahead. ``time_s`` is equally spaced; the heading stays as it is.
+    This project's own gains are designed for them: a step becomes a path with velocity and acceleration feedforward.
+    ``time_s`` is equally spaced; the heading is not shaped.
     """
     rows = setpoints(trajectory, time_s, scale)
     step_s = float(time_s[1] - time_s[0]) if len(time_s) > 1 else 0.0

@@ -1,4 +1,4 @@
-"""What the experiments of the paper are made of: a case, what it recorded, and the figures of an axis."""
+"""Data types of the experiments: a case, its recording, and the figures of an axis."""
 
 from __future__ import annotations
 
@@ -42,20 +42,20 @@ class Case(NamedTuple):
     scale: float = 1.0
     """Of all displacements of the trajectory."""
     drive_torque_n_m: float | None = None
-    """The most that a motor can turn its rotor with, on the rigid and the multibody plant; None: the vehicle file's."""
+    """Largest motor torque on the rigid and the multibody plant; None: the vehicle file's."""
     shaped: bool = False
-    """Setpoints pass a reference model that feeds velocity and acceleration ahead, as guidance does in flight."""
+    """Setpoints pass a reference model with velocity and acceleration feedforward, as in guidance."""
     vehicle: str = "paper_quad"
 
 
 class Recording(NamedTuple):
-    """What a case flew: one row for each of n inner ticks, up to the crash if there was one."""
+    """The flight of a case: one row for each of n inner ticks, up to its end or a crash."""
 
     case: Case
     time_s: FloatArray
     """Shape (n,)."""
     reference: FloatArray
-    """Shape (n, 4): north, east, down [m], yaw [rad]; NaN for a position that the trajectory does not steer."""
+    """Shape (n, 4): north, east, down [m], yaw [rad]; NaN for a position that the trajectory does not control."""
     position_ned_m: FloatArray
     """Shape (n, 3)."""
     velocity_ned_m_s: FloatArray
@@ -63,26 +63,26 @@ class Recording(NamedTuple):
     euler_rad: FloatArray
     """Shape (n, 3): roll, pitch, yaw; yaw without jumps."""
     euler_target_rad: FloatArray
-    """Shape (n, 3): what the outer loop asked for."""
+    """Shape (n, 3): target of the outer loop."""
     rates_frd_rad_s: FloatArray
     """Shape (n, 3)."""
     wrench: FloatArray
     """Shape (n, 4), demanded: thrust [N] and torque FRD [N m]."""
     wrench_achieved: FloatArray
-    """Shape (n, 4): what the mixer gave of it."""
+    """Shape (n, 4): wrench achieved by the mixer."""
     rotor_speed_rad_s: FloatArray
     """Shape (n, rotors): true speeds."""
     status: IntArray
     """Shape (n,): bits of ``LoopStatus``."""
     ended_s: float | None
-    """Time of the crash, or of the loss of control; None: flew to its end."""
+    """Time of the crash or the loss of control; None: complete."""
     ended_why: str
     ended_how: str = ""
-    """"crashed" or "lost" (control, though it flew on); empty: flew to its end."""
+    """"crashed" or "lost" (control); empty: complete."""
 
 
 class MoveMetrics(NamedTuple):
-    """One move of an axis and how far the response overshot it."""
+    """One move of an axis and its overshoot."""
 
     at_s: float
     watched_s: float
@@ -90,7 +90,7 @@ class MoveMetrics(NamedTuple):
     by: float
     """Metres or radians."""
     overshoot_percent: float | None
-    """None where the axis was not yet at rest when the move began: what is left of the move before would count."""
+    """None if the axis was not at rest when the move began."""
 
 
 class AxisMetrics(NamedTuple):

@@ -32,9 +32,9 @@ from gcs_cli.experiments.paper.linear.small_signal import (
 LOWEST_HZ, HIGHEST_HZ = 5, 2000
 KICK_RAD_S = 1e-7
 GROWN_RAD_S = 1e-3
-"""Beyond it the rotors' speeds change by per cents, and their lag is no longer linear."""
+"""Upper limit of the linear range: beyond it the rotor speeds change by per cents."""
 DECAYED_RAD_S = 1e-13
-"""A hundred times what rounding leaves."""
+"""A hundred times the rounding error."""
 FEWEST_TICKS, LEAST_S = 1200, 3.0
 
 INNER_HZ = 1000
@@ -44,12 +44,12 @@ OUTER_SETTING = "outer loop: motor lag 5 ms, no delay, inner loop at 1 kHz"
 LARGEST_DIVISOR = 1024
 STEP_M = 1e-7
 GROWN_M_S = 1e-3
-"""Beyond it what is not linear begins to count."""
+"""Upper limit of the linear range."""
 WATCHED_S = 30.0
 
 
 class Setting(NamedTuple):
-    """Under which conditions the onset is sought, and on which axes."""
+    """Rotors, delay, plant and axes of one search."""
 
     name: str
     plant: str
@@ -83,7 +83,7 @@ class Onset(NamedTuple):
 
 
 def find_onset(controller: str, gains: str, setting: Setting, axis: str) -> Onset:
-    """Seek the onset in simulation and by eigenvalues."""
+    """Return the lowest stable rate by simulation and by eigenvalues."""
     return Onset(
         controller,
         gains,
@@ -102,20 +102,20 @@ def onset_case(controller: str, gains: str, setting: Setting, inner_hz: int) -> 
 
 
 def growth(case: Case, axis: str) -> float:
-    """Return by how much, as a logarithm, a small kick about ``axis`` grows in one inner tick, in the end."""
+    """Return the final growth of a small kick about ``axis`` in one inner tick, as a logarithm."""
     ticks = max(FEWEST_TICKS, math.ceil(LEAST_S * case.inner_hz))
     flight = fly_attitude(case, ticks, axis, kick_rad_s=KICK_RAD_S, alone=True, ends_at_rad_s=GROWN_RAD_S)
     return growth_of(np.abs(flight.states[1:, RATES_AT + ATTITUDE_AXES.index(axis)]), KICK_RAD_S)
 
 
 def growth_of(rates: FloatArray, kick: float) -> float:
-    """Return the growth in one tick, as a logarithm, of magnitudes that ``kick`` began, shape (n,).
+    """Return the growth in one tick, as a logarithm, of magnitudes after ``kick``, shape (n,).
 
-    The largest rates of the middle and of the last third are compared, before they decay into rounding.
+    It compares the largest rates of the middle and the last third, before they decay into rounding.
     """
-    audible = np.flatnonzero(rates > DECAYED_RAD_S)
-    third = (int(audible[-1]) + 1) // 3 if audible.size else 0
-    if third < 4:  # too quick for thirds: only the direction counts
+    above = np.flatnonzero(rates > DECAYED_RAD_S)
+    third = (int(above[-1]) + 1) // 3 if above.size else 0
+    if third < 4:  # too fast for thirds: only the sign counts
         return 1.0 if rates[-1] > kick else -1.0
     return math.log(rates[2 * third : 3 * third].max() / rates[third : 2 * third].max()) / third
 
@@ -181,7 +181,7 @@ def lowest_outer_hz(
 
 
 def simulated_outer_hz(controller: str, gains: str, axis: str) -> float | None:
-    """Return the lowest outer rate [Hz] at which the real loops, flying the real plant, forget a small step."""
+    """Return the lowest outer rate [Hz] at which a small step decays with the real loops and plant."""
     case = small_case(controller, gains, INNER_HZ, lag_s=LAG_S)
     ticks, column = round(WATCHED_S * INNER_HZ), VELOCITY_AT + POSITION_AXES.index(axis)
 
@@ -194,7 +194,7 @@ def simulated_outer_hz(controller: str, gains: str, axis: str) -> float | None:
 
 
 def find_outer_onset(controller: str, gains: str, axis: str) -> Onset:
-    """Seek the onset of x, y or z in simulation and by eigenvalues."""
+    """Return the lowest stable outer rate of x, y or z by simulation and by eigenvalues."""
     actuators = actuators_of(small_case(controller, gains, INNER_HZ, lag_s=LAG_S), axis)
     predicted = lowest_outer_hz(flown_gains(controller, gains), axis, actuators)
     return Onset(

@@ -24,8 +24,8 @@ from gcs_cli.experiments.paper.linear.gains import AttitudeGains, Gains, Positio
 class Actuators(NamedTuple):
     """Motors and delay between a demand and its force or torque.
 
-    ``lag_s`` is the motors' first-order lag. ``lead_s`` belongs to yaw on a plant that knows the reaction to the
-    rotors' spinning up, J_r/(2 d Ω_hover): torque/demand = (1 + lead s)/(1 + lag s). It has no effect without a lag.
+    ``lag_s`` is the motors' first-order lag. ``lead_s`` belongs to yaw on a plant with the rotors' spin-up torque:
+    J_r/(2 d Ω_hover): torque/demand = (1 + lead s)/(1 + lag s). It has no effect without a lag.
     """
 
     delay_steps: int = 0
@@ -129,7 +129,7 @@ def _through_delay(line: FloatArray, demand: FloatArray) -> tuple[FloatArray, Fl
 class Period:
     """One outer period of a position axis, in two parts: ``begin`` computes the outer loop, then inner ticks follow.
 
-    An inner tick is linear in the state behind which ``begin`` appends what holds for the period.
+    An inner tick is linear in the state of ``begin``, which appends the value held for the period.
     """
 
     size: int

@@ -1,4 +1,4 @@
-"""Step responses in closed form, and the figures that are read from one.
+"""Step responses in closed form, and their figures.
 
 ``SecondOrder`` is y/r = (wn² + z s)/(s² + 2 ζ wn s + wn²): a PD loop on a double integrator, without a zero when the
 derivative acts on the measurement alone (z = 0), with one when it acts on the error (z = kd = 2 ζ wn).
@@ -27,7 +27,7 @@ _EQUAL = 1e-7  # relative distance of two real poles below which they count as o
 
 
 class StepFigures(NamedTuple):
-    """What is read from a step response; ``peak_s`` is None without overshoot, a time None when not reached."""
+    """Figures of a step response; ``peak_s`` is None without overshoot, a time None if it is not reached."""
 
     overshoot_percent: float
     peak_s: float | None
@@ -72,7 +72,7 @@ class SecondOrder(NamedTuple):
         return 1.0 - 0.5 * ((1.0 + slope / beta) * slow + (1.0 - slope / beta) * fast)
 
     def extremes(self) -> list[float]:
-        """Return the times at which y' = 0, t > 0, as far as they matter: of an oscillation forty.
+        """Return the times at which y' = 0, t > 0; of an oscillation the first forty.
 
         y' is the impulse response e^{−σt} [z C(βt) + (wn² − σ z)/β S(βt)].
         """
