@@ -66,7 +66,7 @@ def _bode(loops: Loops, axis: str, actuators: Actuators, title: str) -> list[Pan
 def _poles(loops: Loops, axis: str) -> Panel:
     """Return the map of the poles of an axis; of x and y those slower than ``_SLOW_RAD_S``."""
     marks = []
-    distinct = own_feedback(loops, axis) if axis in ANGLES else loops
+    distinct = loops if axis in ("x", "y") else own_feedback(loops, axis)
     for index, loop in enumerate(shown_loops(distinct)):
         poles = np.array(loop["axes"][axis]["poles"])
         if axis in ("x", "y"):

@@ -111,8 +111,8 @@ def _plant(claim: Mapping[str, Any]) -> str:
 
 
 def _margins(results: Results, found: list[Mapping[str, Any]]) -> str:
-    nearer = "; ".join(f"{_plant(one)}: {', '.join(one['figures']['nearer']) or 'none'}" for one in found)
-    words = f"closer: {nearer}"
+    axes = "; ".join(f"{_plant(one)}: {', '.join(one['figures']['nearer']) or 'none'}" for one in found)
+    words = f"nearer: {axes}"
     loops = {
         loop["controller"]: of["margins"]["1000"]
         for loop in (results["linear"] or {}).get("loops", ())
