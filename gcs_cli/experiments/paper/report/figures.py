@@ -92,7 +92,7 @@ def desired_figures(recordings: Recordings) -> Iterator[AnyFigure]:
         panels.append(Panel(Axis(AXIS_TITLES[axis], unit(axis)), [wanted]))
     yield Figure("fig-7-time", "Fig. 7: desired trajectory", panels, columns=2, linked=True, height=150)
     path = SpacePath("desired path", _thinned(recording.reference[:, :3]), "s1")
-    yield SpaceFigure("fig-7-space", "Fig. 7: desired path", [path], height=420)
+    yield SpaceFigure("fig-7-space", "Fig. 7: desired path", [path])
 
 
 def response_figures(recordings: Recordings) -> Iterator[Figure]:
