@@ -36,7 +36,20 @@ def options(
 
 
 def _register() -> None:
-    from gcs_cli.commands import actions, fly, log, mission, paper, param, perf, pil, replay, status, watch  # noqa: PLC0415
+    from gcs_cli.commands import (  # noqa: PLC0415
+        actions,
+        compare,
+        fly,
+        log,
+        mission,
+        paper,
+        param,
+        perf,
+        pil,
+        replay,
+        status,
+        watch,
+    )
 
     app.command()(fly.fly)
     app.add_typer(mission.app, name="mission")
@@ -50,6 +63,7 @@ def _register() -> None:
     app.command()(watch.watch)
     app.command()(perf.perf)
     app.command()(replay.replay)
+    app.command()(compare.compare)
 
 
 _register()

@@ -16,7 +16,7 @@ def paper(
     context: typer.Context,
     out: Annotated[
         Path,
-        typer.Option("--out", "-o", help="Directory of the results; those of a run before are replaced."),
+        typer.Option("--out", "-o", help="Directory of the results; replaces those of a previous run."),
     ] = Path("runs/paper"),
     no_pil: Annotated[bool, typer.Option("--no-pil", help="Leave out the loops on a target.")] = False,
     no_multibody: Annotated[
@@ -36,9 +36,10 @@ def paper(
     open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Fly every experiment of the paper, and report on it.
+    """Fly every experiment of the paper and report the results.
 
-    A few minutes: report.html holds figures, tables and verdicts, results.json the numbers, the same in each run.
+    A few minutes: report.html has verdicts, figures and tables, figures/ the figures as PDF and SVG, results.json the
+    numbers, the same in each run.
     """
     from gcs_cli.experiments.paper.printed import print_results  # noqa: PLC0415
     from gcs_cli.experiments.paper.run import HTML_NAME, PaperOptions, run  # noqa: PLC0415

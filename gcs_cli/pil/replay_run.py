@@ -24,7 +24,7 @@ from gcs_cli.errors import NO_ANSWER, USAGE, CliError
 from gcs_cli.pil.compare import compared, deviation
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import Recording, UnfitLogError, as_flight, recording, replayed
-from gcs_cli.pil.report import DeviationChart
+from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.result import (
     Outcome,
     assembled,

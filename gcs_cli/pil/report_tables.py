@@ -1,4 +1,4 @@
-"""The tables of a PIL report, from what ``pil.json`` holds. Pure."""
+"""Tables of a PIL report as HTML, for the paper's report. Pure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
-from gcs_cli.pil.profile import STAGE_TITLES
 from gcs_cli.pil.signals import BY_NAME, STAGES
 from gcs_cli.report.plots import section
 
@@ -16,12 +15,6 @@ UNKNOWN = "–"
 def shown(value: Any, spec: str = "", unit: str = "") -> str:
     """Return a value as text for HTML."""
     return UNKNOWN if value is None else escape(f"{value:{spec}}{unit}")
-
-
-def facts_section(title: str, facts: Sequence[tuple[str, str]], note: str = "") -> str:
-    """Return a card of names and values; the values are HTML."""
-    cells = "".join(f"<div><dt>{escape(name)}</dt><dd>{value}</dd></div>" for name, value in facts)
-    return section(title, f'<dl class="facts">{cells}</dl>', note=note)
 
 
 def checks_section(checks: Sequence[dict[str, Any]]) -> str:
@@ -89,16 +82,3 @@ def _cells(row: dict[str, Any] | None) -> str:
 
 def _figure(value: float | None) -> str:
     return UNKNOWN if value is None else f"{value:.3g}"
-
-
-def profile_table(profile: dict[str, Any]) -> str:
-    """Return the figures of each stage; ``profile`` is that of ``pil.json``."""
-    columns = ("count", "min", "mean", "p99", "max")
-    head = "".join(f'<th class="n">{name}</th>' for name in ("steps", *columns[1:]))
-    rows = "".join(
-        f"<tr><td>{STAGE_TITLES[stage]}</td>"
-        + "".join(f'<td class="n">{figures[name]:.{1 if name == "mean" else 0}f}</td>' for name in columns)
-        + "</tr>"
-        for stage, figures in profile["stages"].items()
-    )
-    return f"<table><tr><th>[{escape(profile['unit'])}]</th>{head}</tr>{rows}</table>"

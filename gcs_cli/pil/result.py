@@ -16,7 +16,7 @@ from gcs_cli.pil.compare import (
 )
 from gcs_cli.pil.flight_samples import FlightSamples
 from gcs_cli.pil.profile import StageProfile, stage_profiles
-from gcs_cli.pil.report import DeviationChart
+from gcs_cli.pil.report_charts import DeviationChart
 from gcs_cli.pil.signals import BY_NAME
 from gcs_cli.pil.target_record import TargetRecord
 from gcs_cli.pil.verdict import (

@@ -86,6 +86,7 @@ class _Reader:
             position=self._series("vehicle_local_position", ["x", "y", "z"]),
             velocity=self._series("vehicle_local_position", ["vx", "vy", "vz"]),
             position_setpoint=self._series("trajectory_setpoint", _elements("position", 3)),
+            velocity_setpoint=self._series("trajectory_setpoint", _elements("velocity", 3)),
             attitude=self._euler("vehicle_attitude", "q"),
             attitude_target=self._euler("vehicle_attitude_setpoint", "q_d"),
             rotor_speed=self._series("rotor_speeds", _elements("speed_rad_s", rotors)),

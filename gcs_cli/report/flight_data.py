@@ -103,6 +103,7 @@ class Flight:
     position: Series = field(default_factory=lambda: empty_series(3))
     velocity: Series = field(default_factory=lambda: empty_series(3))
     position_setpoint: Series = field(default_factory=lambda: empty_series(3))
+    velocity_setpoint: Series = field(default_factory=lambda: empty_series(3))
     attitude: Series = field(default_factory=lambda: empty_series(3))
     attitude_target: Series = field(default_factory=lambda: empty_series(3))
     rotor_speed: Series = field(default_factory=lambda: empty_series(0))
@@ -171,17 +172,23 @@ class Flight:
         touching = np.flatnonzero(height[begin:] <= _TOUCH_M)
         return float(time_s[first + begin + touching[0]]) if len(touching) else landed_s
 
-    def tracking_error(self) -> Series:
-        """Distance [m] between position and setpoint while flying, shape (n, 1)."""
+    def position_error(self) -> Series:
+        """Setpoint minus position NED [m] while flying, shape (n, 3); NaN on an axis that the setpoint leaves free."""
         time_s, position = self.position
         if not len(time_s) or not len(self.position_setpoint.time_s):
-            return empty_series(1)
+            return empty_series(3)
         setpoint = self.position_setpoint.values
         if not np.array_equal(time_s, self.position_setpoint.time_s):
             setpoint = _interpolated(self.position_setpoint, time_s)
-        error = np.linalg.norm(position - setpoint, axis=1)
-        kept = self.flying(time_s) & np.isfinite(error)  # a setpoint may leave an axis free: NaN
-        return series(time_s[kept], error[kept][:, None])
+        flying = self.flying(time_s)
+        return series(time_s[flying], (setpoint - position)[flying])
+
+    def tracking_error(self) -> Series:
+        """Distance [m] between position and setpoint while flying, shape (n, 1)."""
+        time_s, error = self.position_error()
+        distance = np.linalg.norm(error, axis=1)
+        kept = np.isfinite(distance)
+        return series(time_s[kept], distance[kept][:, None])
 
 
 def _step(changes: Iterable[tuple[float, bool]], time_s: FloatArray) -> FlagArray:

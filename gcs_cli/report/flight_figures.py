@@ -10,7 +10,7 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.geometry_bulk import quaternions_from_euler
-from gcs_cli.report.flight_data import Flight, Series, empty_series, series
+from gcs_cli.report.flight_data import Flight, Series, series
 
 _LEAST_LEG_M = 0.1
 _ONWARD = math.cos(math.radians(80.0))
@@ -24,20 +24,30 @@ class Visit(NamedTuple):
     seq: int
 
 
+def attitude_errors_rad(flight: Flight) -> Series:
+    """Setpoint minus attitude in roll, pitch and yaw [rad], −π to π, while flying, shape (n, 3)."""
+    time_s, target, actual = _attitude_pairs(flight)
+    return series(time_s, np.remainder(target - actual + math.pi, 2.0 * math.pi) - math.pi)
+
+
 def attitude_error(flight: Flight) -> Series:
     """Angle [rad] between attitude and attitude setpoint while flying, shape (n, 1), at the times of the setpoint."""
-    time_s, target = flight.attitude_target
-    if not len(time_s) or not len(flight.attitude.time_s):
-        return empty_series(1)
-    at = np.searchsorted(flight.attitude.time_s, time_s, side="right") - 1
-    kept = (at >= 0) & flight.flying(time_s)
-    wanted, is_ = (
-        quaternions_from_euler(euler) for euler in (target[kept], flight.attitude.values[at[kept]])
-    )
+    time_s, *pair = _attitude_pairs(flight)
+    wanted, is_ = (quaternions_from_euler(euler) for euler in pair)
     chord = np.minimum(np.linalg.norm(wanted - is_, axis=1), np.linalg.norm(wanted + is_, axis=1))
     angle = 4.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))  # |q1 - q2| = 2 sin(angle / 4)
     finite = np.isfinite(angle)
-    return series(time_s[kept][finite], angle[finite][:, None])
+    return series(time_s[finite], angle[finite][:, None])
+
+
+def _attitude_pairs(flight: Flight) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return times while flying, attitude setpoints then and the newest attitudes, Euler angles [rad] (n, 3)."""
+    time_s, target = flight.attitude_target
+    if not len(time_s) or not len(flight.attitude.time_s):
+        return np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
+    at = np.searchsorted(flight.attitude.time_s, time_s, side="right") - 1
+    kept = (at >= 0) & flight.flying(time_s)
+    return time_s[kept], target[kept], flight.attitude.values[at[kept]]
 
 
 def rms(values: FloatArray) -> float | None:

@@ -1,15 +1,17 @@
-"""A small run of the paper's experiments for tests of its report: real flights at low rates, the rest made by hand."""
+"""A small run of the paper's experiments for tests of its report: real flights at low rates, other parts by hand."""
 
 from __future__ import annotations
 
 from functools import cache
 from typing import Any
 
-from gcs_cli.experiments.paper import cases
-from gcs_cli.experiments.paper.closed_loop import fly
-from gcs_cli.experiments.paper.experiments import Flown, entry_of
+from gcs_cli.experiments.paper.flights import cases
+from gcs_cli.experiments.paper.flights.closed_loop import fly
+from gcs_cli.experiments.paper.flights.experiments import Flown, entry_of
+from gcs_cli.experiments.paper.flights.types import Case
+from gcs_cli.experiments.paper.linear.onset import SETTINGS
+from gcs_cli.experiments.paper.linear.tables import LOOPS
 from gcs_cli.experiments.paper.results import results_of
-from gcs_cli.experiments.paper.types import Case
 
 INNER_HZ, OUTER_HZ = 250, 125
 CONTENDERS = [one for one in cases.CONTENDERS if one.name in (cases.PID, cases.BACKSTEPPING, cases.POLES)]
@@ -18,7 +20,7 @@ SIMPLE = [one for one in cases.CONDITIONS if one.name in (cases.PLAIN, cases.IDE
 
 @cache
 def small_flights() -> Flown:
-    """Fly three contenders along each trajectory, at rates that make it quick: these are no figures of the paper."""
+    """Fly three contenders along each trajectory at low rates: these are not the paper's figures."""
     chosen = cases.matrix((cases.DESIRED,), (cases.SMALL_ANGLE, cases.RIGID), CONTENDERS, SIMPLE[:1])
     chosen += cases.matrix((cases.SMOOTH, cases.HARD), (cases.SMALL_ANGLE,), CONTENDERS, SIMPLE)
     chosen += cases.matrix(cases.STEPS, (cases.SMALL_ANGLE,), CONTENDERS, SIMPLE[:1])
@@ -33,6 +35,47 @@ def _quick(case: Case) -> Case:
 def small_results() -> dict[str, Any]:
     """Return the content of results.json of these flights; the caller may change it."""
     return results_of(small_flights(), {})
+
+
+def full_results() -> dict[str, Any]:
+    """Return results with every case of ``gcs paper``, with figures of the few flights: for the size of the page."""
+    flown = small_flights()
+    alike = {
+        (name, trajectory): cases.key(name, trajectory)
+        for name in (cases.PID, cases.BACKSTEPPING)
+        for trajectory in (*cases.PATHS, *cases.STEPS)
+    }
+    entries, recordings = {}, {}
+    for case in cases.all_cases(multibody=True):
+        controller = cases.PID if case.controller == "pid" else cases.BACKSTEPPING
+        source = alike[controller, case.trajectory]
+        entries[case.key], recordings[case.key] = flown.entries[source], flown.recordings[source]
+    results = results_of(Flown(entries, recordings), {})
+    linear, onset = linear_part(), onset_part()
+    loop, one = linear["loops"][0], onset[0]
+    linear["loops"] = [
+        {**loop, "controller": controller, "gains": gains, "axes": _distinct(loop["axes"], index)}
+        for index, (controller, gains) in enumerate(LOOPS)
+    ]
+    onset = [
+        {**one, "controller": controller, "gains": gains, "setting": setting.name, "axis": axis}
+        for controller, gains in LOOPS
+        for setting in SETTINGS
+        for axis in setting.axes
+    ]
+    return results | {"linear": linear, "onset": onset, "pil": pil_part()}
+
+
+def _distinct(axes: dict[str, Any], index: int) -> dict[str, Any]:
+    """Return axes whose gains and margins differ from those of other indices."""
+    return {
+        name: {
+            **of,
+            "gains": {**of["gains"], "kp": 100.0 + index},
+            "step": {**of["step"], "overshoot_percent": 1.5 + index},
+        }
+        for name, of in axes.items()
+    }
 
 
 def linear_part() -> dict[str, Any]:

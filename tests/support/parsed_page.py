@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from html.parser import HTMLParser
+from typing import Any
 
 VOID = {"meta", "wbr", "br", "hr", "img", "link", "input"}
 
 
 class Checker(HTMLParser):
-    """Fails on tags that do not match; collects text and attributes."""
+    """Fails on tags that do not match; collects the text that is shown, attributes, and charts by name."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -16,6 +18,7 @@ class Checker(HTMLParser):
         self.tags: list[str] = []
         self.attributes: list[tuple[str, str]] = []
         self.text = ""
+        self.charts: dict[str, dict[str, Any]] = {}
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
@@ -31,7 +34,18 @@ class Checker(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data: str) -> None:
-        self.text += data
+        if self.open[-1:] == ["script"]:
+            if self.attributes[-1] == ("type", "application/json"):
+                chart = json.loads(data)
+                self.charts[chart["file"]] = chart
+        elif self.open[-1:] != ["style"]:
+            self.text += data
+
+
+def own_part(html: str) -> str:
+    """Return a page without plotly.js."""
+    before, _, rest = html.partition("<script>/**")
+    return before + rest.partition("</script>")[2]
 
 
 def parsed(html: str) -> Checker:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich")
+HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich", "jinja2", "plotly")
 LIGHT = (
     "flightstack.core",
     "flightstack.process",

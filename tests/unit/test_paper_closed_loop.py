@@ -14,8 +14,10 @@ from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from flightstack.process.assembly import build
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
-from gcs_cli.experiments.paper import closed_loop
-from gcs_cli.experiments.paper.cases import (
+from gcs_cli.experiments.paper.findings.comparisons import shared_overshoots
+from gcs_cli.experiments.paper.findings.plants import ROUNDING_M, difference
+from gcs_cli.experiments.paper.flights import closed_loop
+from gcs_cli.experiments.paper.flights.cases import (
     BACKSTEPPING,
     CONDITIONS,
     CONTENDERS,
@@ -25,13 +27,11 @@ from gcs_cli.experiments.paper.cases import (
     RATE_FED_PID,
     make_case,
 )
-from gcs_cli.experiments.paper.closed_loop import fly, fly_rows, hover_speeds
-from gcs_cli.experiments.paper.comparisons import shared_overshoots
-from gcs_cli.experiments.paper.experiments import entry_of
-from gcs_cli.experiments.paper.metrics import measure, path_metrics
-from gcs_cli.experiments.paper.plants import ROUNDING_M, difference
-from gcs_cli.experiments.paper.trajectory import Move, Trajectory, load_trajectory, setpoints
-from gcs_cli.experiments.paper.types import Case, Recording
+from gcs_cli.experiments.paper.flights.closed_loop import fly, fly_rows, hover_speeds
+from gcs_cli.experiments.paper.flights.experiments import entry_of
+from gcs_cli.experiments.paper.flights.metrics import measure, path_metrics
+from gcs_cli.experiments.paper.flights.trajectory import Move, Trajectory, load_trajectory, setpoints
+from gcs_cli.experiments.paper.flights.types import Case, Recording
 from sim_bridge.plant.disturbance import Disturbance
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.simulator import Simulator

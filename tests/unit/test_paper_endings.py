@@ -9,7 +9,7 @@ import pytest
 
 from flightstack.core.contract import STATE_SIZE, FloatArray
 from flightstack.core.geometry_bulk import quaternions_from_euler
-from gcs_cli.experiments.paper.endings import Ending, ending
+from gcs_cli.experiments.paper.flights.endings import Ending, ending
 
 HZ = 100.0
 TICKS = 1000

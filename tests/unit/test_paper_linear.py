@@ -12,11 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
-from scipy.linalg import expm
 
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.experiments.paper.linear import continuous, tables
-from gcs_cli.experiments.paper.linear.exponential import exponential
 from gcs_cli.experiments.paper.linear.gains import (
     ATTITUDE_AXES,
     AttitudeGains,
@@ -25,7 +23,6 @@ from gcs_cli.experiments.paper.linear.gains import (
     ReferenceFilter,
     backstepping_gains,
 )
-from gcs_cli.experiments.paper.linear.instability import IDEAL, LAGGING, SPIN_UP, Onset, find_onset
 from gcs_cli.experiments.paper.linear.margins import (
     closed,
     lowest_stable_hz,
@@ -33,13 +30,17 @@ from gcs_cli.experiments.paper.linear.margins import (
     response,
     spectral_radius,
 )
-from gcs_cli.experiments.paper.linear.outer_onset import (
+from gcs_cli.experiments.paper.linear.onset import (
+    IDEAL,
+    LAGGING,
+    SPIN_UP,
+    Onset,
+    find_onset,
     find_outer_onset,
     longest_period,
     lowest_outer_hz,
-    period_of,
 )
-from gcs_cli.experiments.paper.linear.sampled import Actuators, AttitudeTick, Rates
+from gcs_cli.experiments.paper.linear.sampled import Actuators, AttitudeTick, Rates, period_of
 from gcs_cli.experiments.paper.linear.small_signal import (
     STEP_M,
     STEP_RAD,
@@ -343,6 +344,27 @@ def test_longest_period_is_where_growth_passes_zero(limit: float, expected: floa
     assert longest_period(lambda divisor: divisor - limit) == expected
 
 
+@pytest.mark.parametrize("axis", ["x", "z"])
+@pytest.mark.parametrize("divisor", [1, 4, 333])
+def test_matrix_of_an_outer_period_equals_its_ticks(flown, axis: str, divisor: int) -> None:
+    period = period_of(flown["pid", "tuned"], axis, Rates(1000.0, 1000.0 / divisor), Actuators(1, 0.005))
+    unit = np.eye(period.size)
+    state = period.begin(unit, period.demand(unit, 0.0))
+    for _ in range(divisor):
+        state = period.tick(state)
+    expected = state[: period.size]
+    assert np.allclose(period.closed(), expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())  # 5e-15 seen
+
+
+def test_matrix_of_an_outer_period_takes_one_tick(flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    period = period_of(flown["pid", "paper"], "x", Rates(1000.0, 1.0), Actuators(0, 0.005))
+    ticks: list[int] = []
+    tick = period.tick
+    monkeypatch.setattr(period, "tick", lambda state: ticks.append(1) or tick(state))
+    period.closed()
+    assert len(ticks) == 1
+
+
 def test_outer_loop_of_a_damped_double_integrator_ends_at_two_over_its_damping() -> None:
     """v' = −kd v, held over T: 1 − kd T leaves the unit circle at kd T = 2, with kp = 0 nearly so."""
     gains = flown_gains("pid", "paper")
@@ -385,14 +407,6 @@ def test_all_figures_are_plain_and_finite(analysed) -> None:
     loops = json.loads(json.dumps(analysed, allow_nan=False))["loops"]
     assert [(loop["controller"], loop["gains"]) for loop in loops] == list(tables.LOOPS)
     assert all(list(loop["axes"]) == ["roll", "pitch", "yaw", "x", "y", "z"] for loop in loops)
-
-
-@properties
-@given(st.integers(0, 10_000), st.floats(1e-3, 50.0))
-def test_matrix_exponential_is_scipys(seed: int, scale: float) -> None:
-    matrix = scale * np.random.default_rng(seed).uniform(-1.0, 1.0, (5, 5))
-    expected = expm(matrix)
-    assert np.allclose(exponential(matrix), expected, rtol=0.0, atol=1e-11 * np.abs(expected).max())
 
 
 def test_onset_asks_an_inner_loop_once_and_every_outer_loop(monkeypatch: pytest.MonkeyPatch) -> None:

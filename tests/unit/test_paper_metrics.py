@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import FloatArray, LoopStatus
-from gcs_cli.experiments.paper.metrics import axis_metrics, effort, measure, moves, path_metrics
-from gcs_cli.experiments.paper.types import Case, Recording
+from gcs_cli.experiments.paper.flights.metrics import axis_metrics, effort, measure, moves, path_metrics
+from gcs_cli.experiments.paper.flights.types import Case, Recording
 
 STEP_S, BEGIN_S = 1e-3, 0.5
 TIME_S = np.arange(0.0, 12.0, STEP_S)

@@ -13,7 +13,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.plan import Command, MissionItem, check_mission, load_plan, save_plan
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.experiments.paper import pil_section
-from gcs_cli.experiments.paper.trajectory import load_trajectory
+from gcs_cli.experiments.paper.flights.trajectory import load_trajectory
 from gcs_cli.fly.fly_options import DEFAULT_HOME
 from gcs_cli.pil.result import Outcome
 from gcs_cli.pil.run import Finished

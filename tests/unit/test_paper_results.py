@@ -16,9 +16,14 @@ from rich.console import Console
 from flightstack.params.gains_file import BUILT_IN
 from gcs_cli.__main__ import main
 from gcs_cli.errors import CliError
-from gcs_cli.experiments.paper import claims as claims_module
-from gcs_cli.experiments.paper import claims_stability, comparisons, linear, pil_section, plants, run
-from gcs_cli.experiments.paper.cases import (
+from gcs_cli.experiments.paper import linear, pil_section, run
+from gcs_cli.experiments.paper.findings import claims as claims_module
+from gcs_cli.experiments.paper.findings import claims_stability, comparisons, plants
+from gcs_cli.experiments.paper.findings.claims import claims
+from gcs_cli.experiments.paper.findings.comparisons import shared_overshoots
+from gcs_cli.experiments.paper.findings.printed_values import CORRECTIONS, table_1, table_2, table_3
+from gcs_cli.experiments.paper.findings.verdicts import NotFlownError, flight
+from gcs_cli.experiments.paper.flights.cases import (
     BACKSTEPPING,
     CONDITIONS,
     CONTENDERS,
@@ -34,17 +39,12 @@ from gcs_cli.experiments.paper.cases import (
     key,
     matrix,
 )
-from gcs_cli.experiments.paper.claims import claims
-from gcs_cli.experiments.paper.closed_loop import fly
-from gcs_cli.experiments.paper.comparisons import shared_overshoots
-from gcs_cli.experiments.paper.corrections import CORRECTIONS
-from gcs_cli.experiments.paper.experiments import entry_of, run_cases, thinned
+from gcs_cli.experiments.paper.flights.closed_loop import fly
+from gcs_cli.experiments.paper.flights.experiments import entry_of, run_cases, thinned
+from gcs_cli.experiments.paper.flights.trajectory import trajectory_names
 from gcs_cli.experiments.paper.linear.tables import actuator_settings
 from gcs_cli.experiments.paper.results import results_of, text_of
-from gcs_cli.experiments.paper.run import HTML_NAME, JSON_NAME, PaperOptions
-from gcs_cli.experiments.paper.tables import table_1, table_2, table_3
-from gcs_cli.experiments.paper.trajectory import trajectory_names
-from gcs_cli.experiments.paper.verdicts import NotFlownError, flight
+from gcs_cli.experiments.paper.run import FIGURES_NAME, HTML_NAME, JSON_NAME, PaperOptions
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 FEW = [
@@ -403,8 +403,12 @@ def silent() -> Console:
 def test_the_same_command_twice_gives_the_same_files(tmp_path: Path) -> None:
     for name in ("one", "two"):
         run.run(PaperOptions(tmp_path / name, pil=False, multibody=False, jobs=1), silent(), FEW)
-    for name in (JSON_NAME, HTML_NAME):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    figures = sorted(
+        path.relative_to(tmp_path / "one") for path in (tmp_path / "one" / FIGURES_NAME).iterdir()
+    )
+    assert {path.suffix for path in figures} == {".pdf", ".svg"}
+    for path in (Path(JSON_NAME), Path(HTML_NAME), *figures):
+        assert (tmp_path / "one" / path).read_bytes() == (tmp_path / "two" / path).read_bytes(), path
     results = json.loads((tmp_path / "one" / JSON_NAME).read_text(encoding="utf-8"))
     assert results["left_out"] == {"pil": run.NOT_WANTED, MULTIBODY: run.NOT_WANTED}
     assert list(results["cases"]) == [case.key for case in FEW]

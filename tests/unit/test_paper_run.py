@@ -13,10 +13,11 @@ from rich.console import Console
 from flightstack.core.errors import ConfigError
 from gcs_cli.__main__ import main
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.experiments.paper import experiments, linear, run
-from gcs_cli.experiments.paper.experiments import run_cases
-from gcs_cli.experiments.paper.run import HTML_NAME, JSON_NAME, PaperOptions
-from gcs_cli.experiments.paper.types import Case
+from gcs_cli.experiments.paper import linear, run
+from gcs_cli.experiments.paper.flights import experiments
+from gcs_cli.experiments.paper.flights.experiments import run_cases
+from gcs_cli.experiments.paper.flights.types import Case
+from gcs_cli.experiments.paper.run import FIGURES_NAME, HTML_NAME, JSON_NAME, PaperOptions
 
 QUICK = Case("one", "step_roll", inner_hz=250)
 PLAIN = PaperOptions(Path(), pil=False, multibody=False, jobs=1)
@@ -76,7 +77,9 @@ def test_the_loops_on_a_target_of_a_run_before_do_not_stay_beside_new_results(
     for name in ("results", "onset"):
         monkeypatch.setattr(linear, name, dict)
     run.run(PLAIN._replace(out=tmp_path), silent(), [QUICK])
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted((JSON_NAME, HTML_NAME, "pil-mine"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        (JSON_NAME, HTML_NAME, FIGURES_NAME, "pil-mine")
+    )
 
 
 def test_a_bad_file_is_one_sentence_from_another_process_too() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flightstack.core.errors import ConfigError
-from gcs_cli.experiments.paper.trajectory import (
+from gcs_cli.experiments.paper.flights.trajectory import (
     ATTITUDE,
     MODEL_M_S2,
     MODEL_RAD_S,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -68,3 +71,16 @@ def test_every_bin_is_drawn_however_rare(values: list[int]) -> None:
     heights = [float(value) for name, value in chart.attributes if name == "height"]
     assert len(heights) == sum(count > 0 for count in profile.counts)
     assert min(heights) >= 1.5
+
+
+@pytest.mark.parametrize(
+    ("counts", "top"), [((100,), 100), ((996, 4), 100), ((66, 34), 80), ((1, 1, 1, 1), 30)]
+)
+def test_share_axis_ends_at_a_tick_above_the_tallest_bar(counts: tuple[int, ...], top: int) -> None:
+    edges = tuple(float(index) for index in range(len(counts) + 1))
+    chart = histogram_chart(
+        StageProfile("whole", sum(counts), 0.0, 1.0, 1.0, 1.0, edges, counts), "cycles", "s1"
+    )
+    ticks = [float(tick) for tick in re.findall(r'class="tick y"[^>]*>([^<]+)<', chart)]
+    assert max(ticks) == top
+    assert "share of steps [%]" in parsed(chart).text

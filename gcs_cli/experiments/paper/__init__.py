@@ -1,1 +1,1 @@
-"""The paper's experiments, flown, measured and reported; only ``gcs paper`` imports this package."""
+"""The paper's experiments: flights, findings, linear analysis and report. Only ``gcs paper`` imports this package."""

@@ -1,7 +1,7 @@
 """The paper's processor in the loop (Fig. 15): both controllers fly a mission with their loops on a target.
 
-What ``gcs pil`` does, for each controller with the paper's gains at the paper's rates, on a mission whose waypoints are
-the ends of the desired trajectory's moves. What is returned holds no wall-clock time, so that it repeats bit for bit.
+It runs ``gcs pil`` for each controller with the paper's gains and rates, on a mission with a waypoint at the end of
+each move of the desired trajectory. The result holds no wall-clock time, so it repeats bit for bit.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import Command, Frame, MissionItem, Plan, save_plan
 from flightstack.transports.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.experiments.paper.trajectory import Trajectory, load_trajectory, sample
+from gcs_cli.experiments.paper.flights.trajectory import Trajectory, load_trajectory, sample
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.fly_options import DEFAULT_HOME, check_ports, checked_plan
 from gcs_cli.pil.run import JSON_NAME, Finished
@@ -52,7 +52,7 @@ _OF_FLIGHT = ("outcome", "loops", "ticks", "airborne_ticks", "sim_time_s")
 
 
 def left_out(why: str, target: str = EMULATED) -> dict[str, Any]:
-    """Return what stands in ``results.json`` in place of the section, with the sentence why."""
+    """Return the section of ``results.json`` without flights, with the reason."""
     return {
         "target": target,
         "why_left_out": why,
@@ -64,7 +64,7 @@ def left_out(why: str, target: str = EMULATED) -> dict[str, Any]:
 
 
 def problem(target: str = EMULATED) -> str | None:
-    """Say why nothing can be flown on the target; None if it is there. Raise CliError when its name is wrong."""
+    """Return the reason that the target cannot fly, or None. Raise CliError for a wrong name."""
     choice = checked_target(target)
     try:
         for controller in CONTROLLERS:
@@ -82,8 +82,8 @@ def run(
 ) -> dict[str, Any]:
     """Fly MIL, SIL and PIL with both controllers; leave each comparison in a folder that ``folder_name`` names.
 
-    Without the tools of the emulated target the section is left out and says why; a board that was asked for and is
-    not there raises CliError, and Ctrl-C KeyboardInterrupt. ``tell`` hears what is done next; ``instance`` shifts the
+    Without the tools of the emulated target the section has the reason instead. A missing board raises CliError, Ctrl-C
+    raises KeyboardInterrupt. ``tell`` is called with the next step; ``instance`` shifts the
     ports, None chooses free ones.
     """
     why = problem(target)
@@ -116,7 +116,7 @@ def run(
 
 
 def clear(folder: Path) -> None:
-    """Take away what a run before has left in ``folder``: it is not what the new results tell of."""
+    """Delete the comparisons that a previous run left in ``folder``."""
     for controller, plant in FLOWN:
         kept = folder / folder_name(controller, plant)
         if (kept / JSON_NAME).exists():
@@ -124,7 +124,7 @@ def clear(folder: Path) -> None:
 
 
 def mission_along(trajectory: Trajectory) -> Plan:
-    """Return a mission with a takeoff, a waypoint and heading wherever a move of the trajectory ends, and a landing."""
+    """Return a mission: takeoff, a waypoint with heading at the end of each move of the trajectory, landing."""
     ends = sorted({move.at_s + move.over_s for move in trajectory.moves})
     at = sample(trajectory, np.array([*ends, trajectory.duration_s])).value
     corners: list[tuple[float, float, float, float]] = []
@@ -153,14 +153,14 @@ def _about(plan: Plan) -> str:
 
 
 def folder_name(controller: str, plant: str) -> str:
-    """Return the name of the folder in which a comparison is left."""
+    """Return the name of the folder of a comparison."""
     return f"pil-{controller}" if plant == PLANT else f"pil-{controller}-{plant}"
 
 
 def _fly(
     folder: Path, controller: str, target: str, plan: Plan, instance: int | None, plant: str = PLANT
 ) -> Finished:
-    """Fly beside the results of a run before, and replace them when all is there."""
+    """Fly, then replace the results of a previous run at once."""
     kept = folder / folder_name(controller, plant)
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder, prefix=".pil-") as workshop:
@@ -174,7 +174,7 @@ def _fly(
         finished = run_pil(options, checked_plan(options), target, Path(workshop) / "flights", console)
         outcomes = [flight["outcome"] for flight in finished.outcome.result["flights"].values()]
         if Code.INTERRUPTED in outcomes:
-            raise KeyboardInterrupt  # a flight takes Ctrl-C as a wish to land; here it ends the command
+            raise KeyboardInterrupt  # in a flight Ctrl-C lands; here it ends the command
         if (kept / JSON_NAME).exists():
             shutil.rmtree(kept)
         if not kept.exists():
@@ -183,7 +183,7 @@ def _fly(
 
 
 def _free_instance() -> int:
-    """Return an instance whose ports nobody uses: no flight of the user's is disturbed."""
+    """Return an instance with free ports."""
     for instance in range(_FIRST_INSTANCE, _FIRST_INSTANCE + 10):
         options = FlyOptions(Path(), instance=instance)
         try:
@@ -196,7 +196,7 @@ def _free_instance() -> int:
 
 
 def repeatable(result: dict[str, Any]) -> dict[str, Any]:
-    """Return what two runs agree on: neither times of this machine nor counters of the link."""
+    """Return the parts of a result that repeat: without wall-clock times and link counters."""
     flights = {
         stage: {name: flight[name] for name in _OF_FLIGHT} for stage, flight in result["flights"].items()
     }

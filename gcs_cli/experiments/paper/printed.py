@@ -1,4 +1,4 @@
-"""What ``gcs paper`` prints at its end."""
+"""The summary that ``gcs paper`` prints."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PLANTS = {
 
 
 def _chance(found: Mapping[str, Any]) -> str:
-    """Say so where the loops magnify rounding, and two plants cannot be told apart from one."""
+    """Return a remark where the loops amplify rounding, so that the difference is chance; else an empty string."""
     if found.get("bound_decides", True) or found["rounding"] is None:
         return ""
     alone_mm = 1e3 * found["rounding"]["max_position_m"]
@@ -23,7 +23,7 @@ def _chance(found: Mapping[str, Any]) -> str:
 
 
 def print_results(console: Console, results: dict[str, Any], folder: Path) -> None:
-    """Print the claims with their verdicts, the difference of the plants, what is not there, and where the rest is."""
+    """Print the claims with their verdicts, the differences of the plants, missing parts and the output directory."""
     lines = []
     for claim in results["comparisons"]["claims"]:
         verdict = "holds" if claim["holds"] else "does not hold"

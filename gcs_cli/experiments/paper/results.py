@@ -1,8 +1,8 @@
-"""The content of results.json. It holds no time of a clock and no name of a machine. Pure.
+"""The content of results.json, without wall-clock times and host names. Pure.
 
-The same command on the same machine writes the same bits. Another processor, or other versions of the numerical
-libraries, may differ in the last digits of what was flown, and more where a loop magnifies rounding; the linear
-analysis is rounded to ten digits.
+The same command on the same machine writes the same bytes. Another processor or other versions of the numerical
+libraries may change the last digits of the flights, and more where a loop amplifies rounding. The linear analysis is
+rounded to ten digits.
 """
 
 from __future__ import annotations
@@ -12,21 +12,20 @@ from collections.abc import Mapping
 from typing import Any
 
 from flightstack import __version__
-from gcs_cli.experiments.paper import comparisons, plants
-from gcs_cli.experiments.paper.cases import CONDITIONS, CONTENDERS
-from gcs_cli.experiments.paper.claims import claims
-from gcs_cli.experiments.paper.corrections import CORRECTIONS
-from gcs_cli.experiments.paper.experiments import Flown
-from gcs_cli.experiments.paper.tables import Entry, table_1, table_2, table_3
-from gcs_cli.experiments.paper.trajectory import load_trajectory
+from gcs_cli.experiments.paper.findings import comparisons, plants
+from gcs_cli.experiments.paper.findings.claims import claims
+from gcs_cli.experiments.paper.findings.printed_values import CORRECTIONS, Entry, table_1, table_2, table_3
+from gcs_cli.experiments.paper.flights.cases import CONDITIONS, CONTENDERS
+from gcs_cli.experiments.paper.flights.experiments import Flown
+from gcs_cli.experiments.paper.flights.trajectory import load_trajectory
 
 FORMAT = 1
 
 
 def results_of(flown: Flown, left_out: Mapping[str, str]) -> dict[str, Any]:
-    """Return the results of the flights; ``linear``, ``onset`` and ``pil`` are added as they come.
+    """Return the results of the flights; ``linear``, ``onset`` and ``pil`` are added later.
 
-    ``left_out`` tells, by the name of a part, why it is not there.
+    ``left_out`` has the reason for each missing part, by its name.
     """
     names = sorted({entry["trajectory"] for entry in flown.entries.values()})
     return {

@@ -1,7 +1,7 @@
-"""``gcs paper``: fly the experiments, do the analysis, run the loops on the target, and write what came out.
+"""``gcs paper``: fly the experiments, analyse the loops, run them on the target, and write results and report.
 
-Each part is written when it ends, whole or not at all: who interrupts the command keeps the parts that were done, and
-``left_out`` names the others.
+Each part is written atomically when it ends: an interrupted command keeps the finished parts, and ``left_out`` names
+the others.
 """
 
 from __future__ import annotations
@@ -15,39 +15,44 @@ from rich.console import Console
 
 from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.extras import INSTALL_MULTIBODY
-from gcs_cli.errors import FAILED, CliError
-from gcs_cli.experiments.paper import linear, pil_section, report_pictures
-from gcs_cli.experiments.paper.cases import MULTIBODY, all_cases
-from gcs_cli.experiments.paper.checks import check
-from gcs_cli.experiments.paper.claims import claims
-from gcs_cli.experiments.paper.endings import CRASHED
-from gcs_cli.experiments.paper.experiments import Flown, default_jobs, run_cases
-from gcs_cli.experiments.paper.report import render
-from gcs_cli.experiments.paper.report_pictures import Picture
+from flightstack.params.gains_file import open_gains
+from flightstack.params.vehicle import load_vehicle
+from gcs_cli.charts.print_figure import write_figure
+from gcs_cli.errors import FAILED, USAGE, CliError
+from gcs_cli.experiments.paper import linear, pil_section
+from gcs_cli.experiments.paper.findings.claims import claims
+from gcs_cli.experiments.paper.flights.cases import MULTIBODY, all_cases
+from gcs_cli.experiments.paper.flights.endings import CRASHED
+from gcs_cli.experiments.paper.flights.experiments import Flown, default_jobs, run_cases
+from gcs_cli.experiments.paper.flights.trajectory import load_trajectory
+from gcs_cli.experiments.paper.flights.types import Case
+from gcs_cli.experiments.paper.report import pictures
+from gcs_cli.experiments.paper.report.page import render, report_figures
+from gcs_cli.experiments.paper.report.pictures import Picture
 from gcs_cli.experiments.paper.results import results_of, text_of
-from gcs_cli.experiments.paper.types import Case
 from gcs_cli.report.run_directory import results_directory
 from gcs_cli.tui.transfer_bar import step_bar
 
-JSON_NAME, HTML_NAME = "results.json", "report.html"
+JSON_NAME, HTML_NAME, FIGURES_NAME = "results.json", "report.html", "figures"
+PRINT_FORMATS = (".pdf", ".svg")
 NO_MUJOCO = f"the multibody plant needs MuJoCo: {INSTALL_MULTIBODY}"
 NOT_WANTED = "left out on request"
 NOT_REACHED = "not done: the command was ended before"
 
 
 class PaperOptions(NamedTuple):
-    """What the command was asked for."""
+    """Options of the command."""
 
     out: Path
     pil: bool = True
     multibody: bool = True
     target: str = pil_section.EMULATED
     jobs: int | None = None
-    """Processes that fly at once; None: one for each processor."""
+    """Parallel processes; None: one for each processor."""
 
 
 def run(options: PaperOptions, console: Console, cases: Sequence[Case] | None = None) -> dict[str, Any]:
-    """Do it all and return the results; ``cases`` in place of the whole matrix. Raise CliError, ConfigError."""
+    """Run all parts and return the results; ``cases`` replaces the whole matrix. Raise CliError, ConfigError."""
     left_out = {} if options.pil else {"pil": NOT_WANTED}
     if not options.multibody:
         left_out[MULTIBODY] = NOT_WANTED
@@ -59,6 +64,24 @@ def run(options: PaperOptions, console: Console, cases: Sequence[Case] | None = 
         return _run(options, console, chosen, left_out)
 
 
+def check(cases: Sequence[Case], target: str | None) -> None:
+    """Read every file that the cases name and look for the target, None for none; raise CliError, ConfigError.
+
+    An emulated target without its tools is no error: the results then name the reason.
+    """
+    for load, names in (
+        (load_trajectory, {case.trajectory for case in cases}),
+        (open_gains, {case.gains for case in cases}),
+        (load_vehicle, {case.vehicle for case in cases}),
+    ):
+        for name in sorted(names):
+            load(name)
+    if target is not None and target != pil_section.EMULATED:
+        why = pil_section.problem(target)
+        if why is not None:
+            raise CliError(why, USAGE)
+
+
 def _run(
     options: PaperOptions, console: Console, chosen: Sequence[Case], left_out: dict[str, str]
 ) -> dict[str, Any]:
@@ -66,11 +89,11 @@ def _run(
     parts = {part: work for part, work in _parts(options).items() if part not in left_out}
     results = results_of(flown, {**left_out, **dict.fromkeys(parts, NOT_REACHED)})
     _write(options.out, results, flown)
-    pil_section.clear(options.out)  # of a run before
+    pil_section.clear(options.out)  # of the previous run
     for part, (words, work) in parts.items():
         with console.status(words) as status:
             results[part] = found = work(status.update)
-            if part == "linear":  # one of the claims is judged by it
+            if part == "linear":  # one of the claims needs it
                 results["comparisons"]["claims"] = claims(flown.entries, found)
         del results["left_out"][part]
         why = found.get("why_left_out") if isinstance(found, dict) else None
@@ -78,16 +101,19 @@ def _run(
             results["left_out"][part] = why
         _write(options.out, results, flown)
         console.print(f"{words}: {'done' if why is None else 'left out'}", markup=False, highlight=False)
+    taken: list[Picture] = []
     if MULTIBODY not in left_out:
         with console.status("pictures"):
-            pictures = report_pictures.take(flown.recordings)
-        _write(options.out, results, flown, pictures)
+            taken = pictures.take(flown.recordings)
         console.print("pictures: done", markup=False, highlight=False)
+    with console.status("figures"):
+        _write(options.out, results, flown, taken, printed=True)
+    console.print("figures: done", markup=False, highlight=False)
     return results
 
 
 def _parts(options: PaperOptions) -> dict[str, tuple[str, Callable[[Callable[[str], None]], Any]]]:
-    """What follows the flights: a part's name in the results, what is said of it, and its work, which may tell more."""
+    """Return the parts after the flights by their name in the results, each with its title and its work."""
     return {
         "linear": ("linear analysis", lambda tell: linear.results()),
         "onset": ("onset of instability", lambda tell: linear.onset()),
@@ -100,16 +126,28 @@ def _fly(cases: Sequence[Case], jobs: int, console: Console) -> Flown:
         flown = run_cases(cases, jobs, bar.show)
     ended = [entry["ended"]["how"] for entry in flown.entries.values() if entry["ended"] is not None]
     crashed = ended.count(CRASHED)
-    told = f"experiments: {len(flown.entries)} flown, {crashed} crashed, {len(ended) - crashed} lost control"
-    console.print(told, markup=False, highlight=False)
+    words = f"experiments: {len(flown.entries)} flown, {crashed} crashed, {len(ended) - crashed} lost control"
+    console.print(words, markup=False, highlight=False)
     return flown
 
 
-def _write(folder: Path, results: dict[str, Any], flown: Flown, pictures: Sequence[Picture] = ()) -> None:
-    """Write results.json and report.html, each whole or not at all; raise CliError."""
-    html = render(results, flown.recordings, pictures)
+def _write(
+    folder: Path,
+    results: dict[str, Any],
+    flown: Flown,
+    taken: Sequence[Picture] = (),
+    printed: bool = False,
+) -> None:
+    """Write results.json, report.html and, if ``printed``, the figures as PDF and SVG, atomically; raise CliError."""
+    drawn = report_figures(results, flown.recordings)
+    html = render(results, flown.recordings, drawn, taken)
     try:
         write_text_atomically(folder / JSON_NAME, text_of(results))
         write_text_atomically(folder / HTML_NAME, html)
+        if printed:
+            (folder / FIGURES_NAME).mkdir(exist_ok=True)
+            for figure in drawn:
+                for suffix in PRINT_FORMATS:
+                    write_figure(folder / FIGURES_NAME / f"{figure.name}{suffix}", figure)
     except OSError as error:
         raise CliError(f"{folder}: the results cannot be written: {error.strerror}", FAILED) from None

@@ -42,7 +42,7 @@ def ordered(poles: Iterable[complex]) -> list[complex]:
 
 
 def pair_mode(gains: AttitudeGains | PositionGains) -> Mode:
-    """Return what the proportional and derivative gain alone place: s² + kd s + kp. Damping above 1: two real poles."""
+    """Return the mode of the PD gains alone, s² + kd s + kp. Damping above 1: two real poles."""
     natural = float(np.sqrt(gains.kp))
     return Mode(natural, gains.kd / (2.0 * natural))
 
@@ -54,7 +54,7 @@ def slowest_mode(poles: list[complex]) -> Mode:
 
 
 def _pid(gains: AttitudeGains | PositionGains) -> tuple[FloatArray, bool]:
-    """Return kd s + kp, or kd s² + kp s + ki with True: then all is multiplied by s."""
+    """Return kd s + kp, or kd s² + kp s + ki with True: then both sides are multiplied by s."""
     if gains.ki == 0.0:
         return np.array([gains.kd, gains.kp]), False
     return np.array([gains.kd, gains.kp, gains.ki]), True
@@ -103,7 +103,7 @@ def tilt_loop(gains: AttitudeGains, reference: ReferenceFilter) -> TransferFunct
 
 
 DIRECT = TransferFunction(np.array([1.0]), np.array([1.0]))
-"""What the altitude loop acts through: the thrust follows at once."""
+"""Inner loop of the altitude: the thrust follows at once."""
 
 
 def position_loop(gains: PositionGains, inner: TransferFunction = DIRECT) -> TransferFunction:
@@ -120,5 +120,5 @@ def position_loop(gains: PositionGains, inner: TransferFunction = DIRECT) -> Tra
 
 
 def is_stable(poles: list[complex]) -> bool:
-    """Tell whether every pole lies in the left half-plane."""
+    """True if every pole lies in the left half-plane."""
     return all(pole.real < -_AT_ORIGIN for pole in poles)

@@ -1,7 +1,7 @@
-"""The gains of the loops as the linear analysis needs them: one set of numbers for each axis.
+"""The gains of the loops for the linear analysis: one set of numbers for each axis.
 
 All are normalised to accelerations, as the loops themselves use them: rad/s² or m/s² per error. They are read from
-the loops' own parameters, so that what is analysed is what flies.
+the loops' own parameters, so the analysis is that of the flown loops.
 """
 
 from __future__ import annotations

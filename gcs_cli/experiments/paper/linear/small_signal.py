@@ -1,4 +1,4 @@
-"""The real loops and the real plant, moved so little that they are linear: what the analysis is held against."""
+"""The real loops and plant with signals so small that they are linear, to check the analysis."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from flightstack.core.contract import (
 )
 from flightstack.core.geometry import quaternion_from_euler
 from flightstack.params.vehicle import Vehicle, load_vehicle
-from gcs_cli.experiments.paper.closed_loop import Exchange, make_loops
+from gcs_cli.experiments.paper.flights.closed_loop import Exchange, make_loops
+from gcs_cli.experiments.paper.flights.types import Case
 from gcs_cli.experiments.paper.linear.gains import (
     ATTITUDE_AXES,
     BACKSTEPPING,
@@ -27,19 +28,18 @@ from gcs_cli.experiments.paper.linear.gains import (
     gains_from,
 )
 from gcs_cli.experiments.paper.linear.sampled import Actuators
-from gcs_cli.experiments.paper.types import Case
 
 VELOCITY_AT, RATES_AT = 3, 10
 """Columns of the state: velocity NED, body rates FRD."""
 STEP_RAD, STEP_M = 1e-4, 1e-4
-"""Steps small enough that what is not linear stays below a millionth of them."""
+"""Steps so small that nonlinear effects stay below a millionth of them."""
 TRAJECTORY = "step_roll"
-"""A case must name one; nothing here flies it."""
+"""A case must name one; it is not flown here."""
 
 
 def small_case(controller: str, gains: str, inner_hz: int, *, plant: str = "paper", lag_s: float = 0.0,
                delay_steps: int = 0, divisor: int = 1) -> Case:  # fmt: skip
-    """Return a case with rotors without limits, with lag only as asked, and an outer tick in every ``divisor``."""
+    """Return a case with rotors without limits, with the given lag, and an outer tick in every ``divisor``."""
     return Case(
         f"small-{controller}-{gains}-{inner_hz}",
         TRAJECTORY,
@@ -63,15 +63,15 @@ def flown_gains(controller: str, gains: str) -> Gains:
 
 
 def actuators_of(case: Case, axis: str) -> Actuators:
-    """Return what the analysis must know of the case's actuators on one axis."""
+    """Return the actuators of the case on one axis for the analysis."""
     vehicle = load_vehicle(case.vehicle)
     lag_s = vehicle.rotors[0].lag_s if case.lag_s is None else case.lag_s
-    knows_spin_up = axis == "yaw" and case.plant != "paper"
-    return Actuators(case.delay_steps, lag_s, spin_up_lead_s(vehicle) if knows_spin_up else 0.0)
+    has_spin_up = axis == "yaw" and case.plant != "paper"
+    return Actuators(case.delay_steps, lag_s, spin_up_lead_s(vehicle) if has_spin_up else 0.0)
 
 
 def spin_up_lead_s(vehicle: Vehicle) -> float:
-    """Return J_r/(2 d Ω) at hover: by so much the reaction to spinning up leads the rotors' drag torque.
+    """Return J_r/(2 d Ω) at hover, the lead of the spin-up torque over the drag torque of the rotors.
 
     Rotors moved by ε against and along their spin give 2 d Ω ε of drag torque and J_r ε' of reaction each.
     """
@@ -99,11 +99,11 @@ class Flight(NamedTuple):
 
 def fly_attitude(case: Case, ticks: int, axis: str, *, step_rad: float = 0.0, kick_rad_s: float = 0.0,
                  alone: bool = False, ends_at_rad_s: float = math.inf) -> Flight:  # fmt: skip
-    """Let the attitude loop answer a step of its target, or a kick, without the reference filter.
+    """Fly a step of the attitude target, or a kick, without the reference filter.
 
     The kick is a torque over the first tick that turns the vehicle by ``kick_rad_s``. The attitude loop of a case
     whose outer rate is its inner rate gets the step at once. ``alone`` gives the other axes gains that are stable at
-    any rate: an unstable one would grow out of rounding and shake this one. The flight ends where the axis turns
+    any rate, because an unstable axis would disturb this one. The flight ends where the axis turns
     faster than ``ends_at_rad_s``.
     """
     target = np.zeros(ATTITUDE_TARGET_SIZE)
@@ -130,10 +130,10 @@ def _quiet(controller: str, axis: str) -> dict[str, float]:
 
 def fly_position(case: Case, ticks: int, axis: str, step_m: float = STEP_M, *, divisor: int | None = None,
                  alone: bool = False, ends_at_m_s: float = math.inf) -> Flight:  # fmt: skip
-    """Let all loops answer a step of the position setpoint on one axis, with the reference filter.
+    """Fly a step of the position setpoint on one axis with all loops and the reference filter.
 
-    ``divisor`` is how many inner ticks make an outer period, None for the case's: the outer rate need be no whole
-    number. ``alone`` gives height, or x and y, gains that are stable at any rate, whichever the axis is not. The
+    ``divisor`` is the number of inner ticks in an outer period, None for the case's: the outer rate need not be an
+    integer. ``alone`` gives the other axes gains that are stable at any rate. The
     flight ends where the axis moves faster than ``ends_at_m_s``.
     """
     setpoint, column = np.zeros(SETPOINT_SIZE), POSITION_AXES.index(axis)

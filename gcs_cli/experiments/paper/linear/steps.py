@@ -1,4 +1,4 @@
-"""Step responses in closed form, and the figures that are read from one.
+"""Step responses in closed form, and their figures.
 
 ``SecondOrder`` is y/r = (wn² + z s)/(s² + 2 ζ wn s + wn²): a PD loop on a double integrator, without a zero when the
 derivative acts on the measurement alone (z = 0), with one when it acts on the error (z = kd = 2 ζ wn).
@@ -16,18 +16,18 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from flightstack.core.contract import FloatArray
+from gcs_cli.experiments.paper.flights.metrics import HIGH, LOW, SETTLED, rise_time_s, settling_time_s
 from gcs_cli.experiments.paper.linear.continuous import TransferFunction
-from gcs_cli.experiments.paper.linear.exponential import exponential
-from gcs_cli.experiments.paper.metrics import HIGH, LOW, SETTLED, rise_time_s, settling_time_s
 
 _EQUAL = 1e-7  # relative distance of two real poles below which they count as one
 
 
 class StepFigures(NamedTuple):
-    """What is read from a step response; ``peak_s`` is None without overshoot, a time None when not reached."""
+    """Figures of a step response; ``peak_s`` is None without overshoot, a time None if it is not reached."""
 
     overshoot_percent: float
     peak_s: float | None
@@ -72,7 +72,7 @@ class SecondOrder(NamedTuple):
         return 1.0 - 0.5 * ((1.0 + slope / beta) * slow + (1.0 - slope / beta) * fast)
 
     def extremes(self) -> list[float]:
-        """Return the times at which y' = 0, t > 0, as far as they matter: of an oscillation forty.
+        """Return the times at which y' = 0, t > 0; of an oscillation the first forty.
 
         y' is the impulse response e^{−σt} [z C(βt) + (wn² − σ z)/β S(βt)].
         """
@@ -150,7 +150,7 @@ def exact_figures(loop: TransferFunction) -> StepFigures | None:
     start[-1] = 1.0  # the constant input
 
     def state(time_s: float) -> FloatArray:
-        moved: FloatArray = exponential(matrix * time_s) @ start
+        moved: FloatArray = np.asarray(expm(matrix * time_s)) @ start
         return moved
 
     def value(time_s: float) -> float:
@@ -185,7 +185,7 @@ def _companion(loop: TransferFunction) -> tuple[FloatArray, FloatArray]:
 
 def _along(matrix: FloatArray, start: FloatArray, times: FloatArray) -> FloatArray:
     """Return the states at equally spaced times, shape (n, states)."""
-    over, states = exponential(matrix * (times[1] - times[0])), np.empty((len(times), len(start)))
+    over, states = np.asarray(expm(matrix * (times[1] - times[0]))), np.empty((len(times), len(start)))
     states[0] = start
     for index in range(1, len(times)):
         states[index] = over @ states[index - 1]

@@ -1,4 +1,4 @@
-"""All figures of the linear analysis as plain data: what ``results.json`` keeps and the report shows."""
+"""All figures of the linear analysis as plain data, for ``results.json`` and the report."""
 
 from __future__ import annotations
 
@@ -20,10 +20,14 @@ from gcs_cli.experiments.paper.linear.continuous import (
     tilt_loop,
 )
 from gcs_cli.experiments.paper.linear.gains import ATTITUDE_AXES, POSITION_AXES, AttitudeGains, Gains
-from gcs_cli.experiments.paper.linear.instability import SETTINGS, find_onset
 from gcs_cli.experiments.paper.linear.margins import Margins, lowest_stable_hz, margins, spectral_radius
-from gcs_cli.experiments.paper.linear.outer_onset import TILT_OF, find_outer_onset, lowest_outer_hz, period_of
-from gcs_cli.experiments.paper.linear.sampled import Actuators, AttitudeTick, Rates
+from gcs_cli.experiments.paper.linear.onset import (
+    SETTINGS,
+    find_onset,
+    find_outer_onset,
+    lowest_outer_hz,
+)
+from gcs_cli.experiments.paper.linear.sampled import TILT_OF, Actuators, AttitudeTick, Rates, period_of
 from gcs_cli.experiments.paper.linear.small_signal import flown_gains, spin_up_lead_s
 from gcs_cli.experiments.paper.linear.steps import exact_figures
 
@@ -48,7 +52,7 @@ def results() -> dict[str, Any]:
     natural frequency and damping that kp and kd place, the closed form of its step response, and ``sampled``: a list
     of actuators, each with margins at the rates and the lowest stable rate; attitudes also have ``largest_lag_s``, the
     motor lag that ends stability at 1 kHz. Times in seconds, angles in degrees,
-    gains in decibels; None where there is no such figure (margins of an unstable loop).
+    gains in decibels; None for a missing figure (margins of an unstable loop).
     """
     vehicle = load_vehicle(DEFAULT_VEHICLE)
     return {
@@ -63,7 +67,7 @@ def results() -> dict[str, Any]:
 def onset() -> list[dict[str, Any]]:
     """Return the lowest stable rates that simulation finds beside the predicted ones: inner, then outer loops.
 
-    Inner loops with the feedback of one before are left out.
+    An inner loop with the same feedback as an earlier one is left out.
     """
     found: list[dict[str, Any]] = []
     known: set[tuple[float, ...]] = set()
@@ -83,7 +87,7 @@ def _plain(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _rounded(value: Any) -> Any:
-    """Round to ten digits: the last ones of an eigenvalue differ from one linear algebra library to another."""
+    """Round to ten digits, because the last ones of an eigenvalue depend on the linear algebra library."""
     if isinstance(value, float) and math.isfinite(value) and value != 0.0:
         return float(f"{value:.{_DIGITS - 1}e}")
     return value
@@ -141,7 +145,7 @@ def _attitude_axis(law: AttitudeGains, axis: str) -> dict[str, Any]:
 
 
 def _largest_lag_s(law: AttitudeGains) -> float | None:
-    """Return the motor lag that the loop bears at the highest inner rate without delay; None: any up to 1 s.
+    """Return the largest motor lag at which the loop is stable at 1 kHz without delay; None: any up to 1 s.
 
     In continuous time it is kd/kp: s² (lag s + 1) + kd s + kp has all its roots on the left below that.
     """
@@ -206,7 +210,7 @@ def _position_axis(gains: Gains, axis: str) -> dict[str, Any]:
 
 
 def _without_reference_rate() -> dict[str, Any]:
-    """Return what becomes of backstepping's x loop when ẋ_d is not fed in, with and without the reference filter."""
+    """Return backstepping's x loop without the feedforward ẋ_d, with and without the reference filter."""
     gains = flown_gains("backstepping", "paper")
     law = gains.attitude["pitch"]._replace(rate_feedforward=0.0)
     found = {}

@@ -1,0 +1,1 @@
+"""Charts: one description of a figure, drawn on pages by plotly.js and for print by matplotlib."""

@@ -1,0 +1,93 @@
+"""``gcs compare``: flights side by side, as a page and a table."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flightstack.process.console import complain
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.settings import JsonOption, OverwriteOption
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from gcs_cli.report.compare import ComparedRun, Row
+
+
+def compare(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN RUN...", help="Directories of flights, or logs.", show_default=False),
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write.")] = Path("compare.html"),
+    overwrite: OverwriteOption = False,
+    open_page: Annotated[bool, typer.Option("--open", help="Open the page afterwards.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare two or more flights.
+
+    Writes a page with their charts overlaid, and prints their figures side by side.
+    """
+    from flightstack.core.atomic_file import check_new, write_text_atomically  # noqa: PLC0415
+    from gcs_cli.fly.fly_display import FlyConsole  # noqa: PLC0415
+    from gcs_cli.report.compare import comparison, read_runs, render_comparison  # noqa: PLC0415
+
+    if len(runs) < 2:
+        raise CliError("give two flights or more to compare", USAGE)
+    check_new(out, overwrite)
+    read = read_runs(runs)
+    for run in read:
+        if run.flight.damaged:
+            complain(f"gcs: warning: {run.log}: the log is damaged; read up to {run.flight.duration_s:.1f} s")
+    write_text_atomically(out, render_comparison(read))
+    if as_json:
+        print(json.dumps(comparison(read, out), allow_nan=False), flush=True)
+    else:
+        console = FlyConsole(highlight=False)
+        console.print(comparison_table(read))
+        console.print(f"page written to {out}", markup=False, soft_wrap=True)
+    if open_page:
+        import webbrowser  # noqa: PLC0415
+
+        webbrowser.open(out.resolve().as_uri())
+
+
+def comparison_table(runs: Sequence[ComparedRun]) -> Table:
+    """Return conditions and figures, a column for each flight."""
+    from rich import box  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+
+    from gcs_cli.report.compare import condition_rows, figure_rows  # noqa: PLC0415
+
+    summaries = [run.summary for run in runs]
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("")
+    for run in runs:
+        table.add_column(_plain(run.name), justify="right")
+    for row in condition_rows(summaries):
+        table.add_row(*_cells(row, "≠ " if row.differs else ""), style="yellow" if row.differs else None)
+    table.add_section()
+    for row in figure_rows(summaries):
+        table.add_row(*_cells(row, ""))
+    return table
+
+
+def _cells(row: Row, mark: str) -> list[Any]:
+    from rich.text import Text  # noqa: PLC0415
+
+    cells = [
+        Text.assemble(text, (f"  {change}" if change else "", "bright_black"))
+        for text, change in zip(row.texts, row.changes, strict=True)
+    ]
+    return [Text(mark + row.title), *cells]
+
+
+def _plain(name: str) -> Any:
+    from rich.text import Text  # noqa: PLC0415
+
+    return Text(name)

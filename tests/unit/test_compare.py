@@ -1,0 +1,129 @@
+"""``gcs compare``: flights of any length and plan side by side."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flightstack.core.errors import ConfigError
+from gcs_cli.__main__ import main
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.compare import condition_rows, figure_rows, read_runs, render_comparison
+from gcs_cli.report.summary import RunInfo, summarise, write_summary
+from tests.support.parsed_page import own_part, parsed
+from tests.support.square_plan import square_plan
+from tests.support.synthetic_flight import synthetic_flight_bytes
+
+
+def make_run(folder: Path, seconds: float = 36.0, **facts: Any) -> Path:
+    """Write a run directory as ``gcs fly`` does."""
+    folder.mkdir()
+    log = folder / "flight.ulg"
+    log.write_bytes(synthetic_flight_bytes(inner_ms=20, outer_ms=20, seconds=seconds))
+    run = RunInfo("completed", "missions/square.plan", 1.0, **facts)
+    write_summary(folder / "summary.json", summarise(read_flight(log), square_plan(), run))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    base = tmp_path_factory.mktemp("runs")
+    return [make_run(base / "calm", seed=1), make_run(base / "windy", 20.0, seed=1, wind="5,0")]
+
+
+def gcs(*words: object) -> int:
+    return main([str(word) for word in words])
+
+
+def test_differing_conditions_are_marked() -> None:
+    rows = {row.key: row for row in condition_rows([{"seed": 1, "wind_m_s": [5.0, 0.0]}, {"seed": 1}])}
+    assert rows["wind_m_s"].texts == ["5, 0", "–"]
+    assert rows["wind_m_s"].differs
+    assert not rows["seed"].differs
+    assert "gust_m_s" not in rows
+
+
+def test_figures_show_their_change_relative_to_the_first_run() -> None:
+    summaries = [{"rms_tracking_error_m": value} for value in (0.1, 0.15, None)]
+    [row] = [row for row in figure_rows(summaries) if row.key == "rms_tracking_error_m"]
+    assert row.texts == ["0.1000 m", "0.1500 m", "–"]
+    assert row.changes == ["", "+50.0 %", ""]
+
+
+def test_runs_of_different_length_are_overlaid_from_arming(runs: list[Path]) -> None:
+    page = parsed(render_comparison(read_runs(runs)))
+    position = page.charts["position"]
+    by_name = {trace["name"]: trace for trace in position["data"] if trace["yaxis"] == "y"}
+    assert list(by_name) == ["calm: setpoint", "calm", "windy: setpoint", "windy"]
+    assert by_name["calm"]["x"][0] < 0.0 < by_name["windy"]["x"][-1] < by_name["calm"]["x"][-1]
+    assert by_name["calm"]["legendgroup"] == by_name["calm: setpoint"]["legendgroup"] == "calm"
+    assert len({trace["line"]["color"] for trace in by_name.values()}) == 2
+    assert {
+        tuple(chart["layout"]["xaxis"]["range"]) for chart in page.charts.values() if chart["linked"]
+    } == {tuple(position["layout"]["xaxis"]["range"])}
+    rotors = page.charts["rotor-speeds"]
+    assert {trace["yaxis"] for trace in rotors["data"]} == {"y", "y2", "y3", "y4"}
+
+
+def test_the_page_holds_all_it_needs_and_repeats(runs: list[Path]) -> None:
+    first, second = (render_comparison(read_runs(runs)) for _ in range(2))
+    assert first == second
+    assert "http" not in own_part(first)
+
+
+def test_bare_log_without_summary_has_figures(runs: list[Path], tmp_path: Path) -> None:
+    log = tmp_path / "downloaded.ulg"
+    log.write_bytes((runs[0] / "flight.ulg").read_bytes())
+    named, bare = read_runs([runs[0], log])
+    assert (named.name, bare.name) == ("calm", "downloaded")
+    assert bare.summary["outcome"] is None
+    assert bare.summary["rms_tracking_error_m"] == named.summary["rms_tracking_error_m"]
+    assert np.array_equal(bare.flight.position.values, named.flight.position.values)
+
+
+def test_runs_of_one_name_are_numbered(runs: list[Path]) -> None:
+    assert [run.name for run in read_runs([runs[0], runs[1], runs[0]])] == ["calm (1)", "windy", "calm (2)"]
+
+
+def test_command_writes_the_page_once(
+    runs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert gcs("compare", *runs, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [run["name"] for run in told["runs"]] == ["calm", "windy"]
+    assert told["conditions"]["wind_m_s"] == {"values": [None, [5.0, 0.0]], "differs": True}
+    assert told["figures"]["items_reached"] == ["6 of 6", "4 of 6"]
+    assert Path(told["page"]).exists()
+    assert gcs("compare", *runs) == USAGE
+    assert "compare.html: exists already" in capsys.readouterr().err
+    assert gcs("compare", *runs, "--overwrite") == 0
+    printed = capsys.readouterr().out
+    assert "≠ wind" in printed
+    assert "tracking error, rms" in printed
+
+
+def test_bad_runs_are_one_sentence_and_write_nothing(
+    runs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = tmp_path / "text.ulg"
+    text.write_text("no log")
+    for words, sentence in (
+        ([runs[0]], "give two flights or more"),
+        ([runs[0], text], "is not a readable flight log"),
+        ([runs[0], tmp_path / "none"], "there is no such directory or log"),
+        ([runs[0], tmp_path], "text.ulg"),
+    ):
+        assert gcs("compare", *words) == USAGE
+        error = capsys.readouterr().err
+        assert sentence in error
+        assert error.count("\n") == 1
+    assert not Path("compare.html").exists()
+    with pytest.raises((CliError, ConfigError)):
+        read_runs([runs[0], text])
