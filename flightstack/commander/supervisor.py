@@ -29,7 +29,7 @@ from flightstack.commander.state_watch import StateWatch
 from flightstack.commander.takeover import Takeovers, opponents
 from flightstack.commander.transitions import Event, Status
 from flightstack.core.contract import FloatArray
-from flightstack.core.modes import STREAM_MODES, Mode
+from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.guidance.fence import Fence
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle

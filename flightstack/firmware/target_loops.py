@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlags
+from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
-from flightstack.firmware.errors import TargetError, WrongFirmwareError
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
 from flightstack.firmware.pil_operations import PilReport, carried
 from flightstack.firmware.pil_record import COST_UNITS, PilRecord

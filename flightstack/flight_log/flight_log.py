@@ -17,10 +17,9 @@ import numpy as np
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.geodesy import GeoPoint
 from flightstack.flight_log import ulog
-from flightstack.flight_log.event_topics import EVENT_TOPICS
 from flightstack.flight_log.row_block import RowBlock, TimeArray, content_size
-from flightstack.flight_log.topics import OUTER, OUTER_TOPICS, Topic, inner_topics
-from flightstack.mavlink.field_numbers import COUNTERS, fitted
+from flightstack.flight_log.topics import EVENT_TOPICS, OUTER, OUTER_TOPICS, Topic, inner_topics
+from flightstack.mavlink.fields import COUNTERS, fitted
 from flightstack.params.vehicle import Vehicle, system_type
 
 DEFAULT_CAPACITY = 256

@@ -17,11 +17,10 @@ from flightstack.core.contract import (
     LoopRow,
     Vector3,
 )
+from flightstack.core.enums import NAVIGATION_STATE
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.modes import NAVIGATION_STATE
-from flightstack.flight_log.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
 from flightstack.flight_log.flight_log import FlightLog
-from flightstack.flight_log.topics import OUTER, outer_heading
+from flightstack.flight_log.topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED, OUTER, outer_heading
 from flightstack.guidance.navigator import MissionProgress
 
 OpenLog = Callable[[], FlightLog | None]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable
 
-from flightstack.mavlink.field_numbers import fitted, int32
+from flightstack.mavlink.fields import fitted, int32
 
 MAGIC = b"ULog\x01\x12\x35"
 VERSION = 1

@@ -17,7 +17,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.core.portable_math import distance
 from flightstack.plan import FenceShape, MissionItem, fence_shape
-from flightstack.plan.fence_layout import A_EAST, A_END, A_GROUP, A_INCLUSION, A_NORTH, A_RADIUS, A_START
+from flightstack.plan.fence_shape import A_EAST, A_END, A_GROUP, A_INCLUSION, A_NORTH, A_RADIUS, A_START
 
 HYSTERESIS_M = 1.0
 """How far inside a limit the vehicle must be for a breach of it to end, so that it does not flicker."""

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from fastcrc import crc16
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.fitting import PACKING_ERRORS, fit
+from flightstack.mavlink.fields import PACKING_ERRORS, clean_fields, fit
 from flightstack.mavlink.frames import MAGIC_V1, MAGIC_V2, Frame, FrameReader
 from flightstack.mavlink.signing import LinkSigning
-from flightstack.mavlink.text import clean_fields
 
 Message: TypeAlias = Any
 """A pymavlink message object."""
@@ -50,7 +49,7 @@ class Link:
     def encode(self, message: Message) -> bytes:
         """Return the frame of ``message`` with this link's next sequence number.
 
-        Values that their fields cannot hold are brought into range in ``message`` (``fitting.fit``).
+        Values that their fields cannot hold are brought into range in ``message`` (``fields.fit``).
         """
         try:
             frame: bytes = message.pack(self._codec)
@@ -154,3 +153,25 @@ def _unknown(frame: Frame) -> Message:
     header = mavlink.MAVLink_header(frame.message_id, 0, 0, frame.data[1], sequence, system, component)
     message._header = header
     return message
+
+
+class Address(NamedTuple):
+    """A MAVLink system and component; 0 means all."""
+
+    system: int
+    component: int
+
+
+def sender(message: Message) -> Address:
+    """Return who sent ``message``."""
+    return Address(message.get_srcSystem(), message.get_srcComponent())
+
+
+def is_for(message: Message, own: Address) -> bool:
+    """Tell whether a message with a target is for ``own``; 0 is for everyone."""
+    return message.target_system in (0, own.system) and message.target_component in (0, own.component)
+
+
+def is_from(message: Message, peer: Address) -> bool:
+    """Tell whether ``message`` comes from ``peer``, whose component may be 0 for any."""
+    return message.get_srcSystem() == peer.system and peer.component in (0, message.get_srcComponent())

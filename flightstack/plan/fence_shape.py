@@ -14,16 +14,13 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.plan.fence_layout import (
-    A_EAST,
-    A_END,
-    A_GROUP,
-    A_INCLUSION,
-    A_NORTH,
-    A_RADIUS,
-    A_START,
-    AREA_COLUMNS,
-)
+
+A_INCLUSION, A_GROUP, A_START, A_END, A_NORTH, A_EAST, A_RADIUS = range(7)
+"""Inclusion (1) or exclusion (0); group from 0; first vertex and the one behind the last; centre and radius [m].
+
+The radius of a polygon is 0. Vertices lie in an array of their own, shape (m, 2): north and east [m].
+"""
+AREA_COLUMNS = 7
 
 
 class Area(NamedTuple):

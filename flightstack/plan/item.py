@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.vocabulary import (
     ALSO_UNSET_E7,
     GLOBAL_FRAMES,
@@ -125,3 +128,36 @@ def float_coordinate(value: int, is_global: bool) -> float:
     if is_unset(value):
         return math.nan
     return value / 1e7 if is_global else float(value)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Mission items in flying order and the planned home.
+
+    ``document`` is the JSON document that the plan was read from (never changed). Every key that we do not
+    know lives there, and is written back. ``comments`` are those of a waypoint file,
+    each with the number of the line of values before which it stands.
+    """
+
+    items: tuple[MissionItem, ...]
+    home: GeoPoint | None = None
+    document: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    comments: tuple[tuple[int, str], ...] = ()
+    fence: tuple[MissionItem, ...] = ()
+    """The geofence, as items."""
+    rally: tuple[MissionItem, ...] = ()
+    """The rally points, as items."""
+
+    @property
+    def has_fence_or_rally(self) -> bool:
+        """Tell whether there are geofence or rally points, be it of a version that we cannot read."""
+        if self.fence or self.rally:
+            return True
+        fence, rally = self.document.get("geoFence"), self.document.get("rallyPoints")
+        lists = [
+            part.get(key)
+            for part in (fence, rally)
+            if isinstance(part, dict)
+            for key in ("circles", "polygons", "polygon", "points")
+        ]
+        return any(lists)

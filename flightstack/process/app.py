@@ -10,15 +10,13 @@ import time
 from dataclasses import replace
 from types import FrameType
 
-from flightstack.core.errors import ConfigError
-from flightstack.core.modes import Mode
-from flightstack.core.severity import Severity
+from flightstack.core.enums import Mode, Severity
+from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.choice import PYTHON, SERIAL, parse_loops
-from flightstack.firmware.errors import TargetError
 from flightstack.params.config import StackConfig
-from flightstack.process.assembly import Stack
+from flightstack.process.assembly import Stack, carry_over, config_after
 from flightstack.process.clock import DeadlineScheduler, ask_for_punctual_sleeps
-from flightstack.process.ground_end import GroundEnd
+from flightstack.process.connections import GroundEnd, check_deadline, connect, wait_for_state
 from flightstack.process.process_config import (
     EXIT_LOST,
     EXIT_OK,
@@ -30,9 +28,7 @@ from flightstack.process.process_config import (
     complain,
 )
 from flightstack.process.process_files import ProcessFiles
-from flightstack.process.reboot import carry_over, config_after
-from flightstack.process.simulator_end import check_deadline, connect, wait_for_state
-from flightstack.transports.processor import Follower
+from flightstack.transports.cpu_affinity import Follower
 from flightstack.transports.tcp import LinkClosedError, TcpClient
 from flightstack.vehicle.lockstep import Lockstep
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 
 from flightstack import __version__
-from flightstack.core.severity import Severity
-from flightstack.mavlink.addressing import Address
+from flightstack.core.enums import Severity
+from flightstack.mavlink.link import Address
 from flightstack.params.metadata import parameters_json
 from flightstack.services.commands import VehicleContext
 from flightstack.services.commands.command_service import CommandService

@@ -14,7 +14,7 @@ import numpy as np
 from flightstack.core.contract import MAX_ROTORS, STATE_SIZE, FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, mavlink
-from flightstack.mavlink.frame_finder import FrameFinder
+from flightstack.mavlink.frames import FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle, system_type
 from flightstack.simulator_link.battery_frame import UNUSED_CELL, BatteryReport, decode_battery, report_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from flightstack.commander.supervisor import Supervisor
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, LoopFlags, LoopRow, LoopStatus
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.guidance.navigator import Navigator
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.flight_watch import FlightWatch

@@ -9,7 +9,7 @@ the simulator's.
 from __future__ import annotations
 
 from flightstack.core.contract import FloatArray, LoopRow
-from flightstack.core.severity import Severity
+from flightstack.core.enums import Severity
 from flightstack.simulator_link.endpoint import SimulatorLink
 from flightstack.simulator_link.state_steps import is_gap
 from flightstack.vehicle.autopilot import Autopilot

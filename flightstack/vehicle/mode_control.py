@@ -6,8 +6,7 @@ from flightstack.commander.ground_watch import GroundWatch
 from flightstack.commander.supervisor import Supervisor
 from flightstack.commander.transitions import Event, Status, transition
 from flightstack.control.backend import ControlBackend
-from flightstack.core.modes import STREAM_MODES, Mode
-from flightstack.core.severity import Severity
+from flightstack.core.enums import STREAM_MODES, Mode, Severity
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.speeds import SpeedOverrides
 from flightstack.vehicle.area import FlightArea

@@ -9,9 +9,8 @@ import copy
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address, is_for, is_from
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for, is_from
 from flightstack.plan.item import as_float32
 
 _ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED

@@ -10,7 +10,8 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address, is_for, is_from
+from flightstack.mavlink.fields import clean
+from flightstack.mavlink.files import MAX_SIZE, Entry, Missing
 from flightstack.mavlink.ftp_messages import (
     ERROR_TEXTS,
     MAX_DATA,
@@ -22,10 +23,7 @@ from flightstack.mavlink.ftp_messages import (
     next_sequence,
     read_packet,
 )
-from flightstack.mavlink.link import Message
-from flightstack.mavlink.missing import MAX_SIZE, Missing
-from flightstack.mavlink.text import clean
-from flightstack.mavlink.virtual_files import Entry
+from flightstack.mavlink.link import Address, Message, is_for, is_from
 
 RETRY_S = 0.3
 """Silence after which a request is sent again, until answers have shown how long they take."""

@@ -10,11 +10,10 @@ import itertools
 import math
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address, is_from
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.files import MAX_SIZE, Missing
+from flightstack.mavlink.link import Address, Message, is_from
 from flightstack.mavlink.log_messages import BLOCK
-from flightstack.mavlink.missing import MAX_SIZE, Missing
 
 RETRY_S = 0.4
 """Silence after which what is missing is asked for again."""

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol, TypeAlias
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_values import (
     HASH_NAME,
     LARGEST_INTEGER,

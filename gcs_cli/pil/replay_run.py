@@ -12,10 +12,9 @@ import numpy as np
 from rich.console import Console
 
 from flightstack.core.contract import FloatArray
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
-from flightstack.firmware.errors import TargetError
 from flightstack.firmware.numbers import CONTROLLERS
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from flightstack.core.modes import NAVIGATION_STATE
+from flightstack.core.enums import NAVIGATION_STATE
 from flightstack.plan import Plan
 from gcs_cli.report.chart import Band, Level, Line, time_chart
 from gcs_cli.report.flight_data import Flight, LoopTiming, Series

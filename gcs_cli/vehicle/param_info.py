@@ -10,7 +10,7 @@ import lzma
 import math
 from typing import Any, NamedTuple
 
-from flightstack.mavlink.text import clean
+from flightstack.mavlink.fields import clean
 from flightstack.params.spec import shortest
 
 METADATA_PATH = "etc/extras/parameters.json.xz"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 
-from flightstack.transports.processor import Roamer
+from flightstack.transports.cpu_affinity import Roamer
 from sim_bridge.server.connection import Connection, StoppedError, StopSignal
 from sim_bridge.server.lockstep import SimulatorLink
 from sim_bridge.server.pacing import Pacer

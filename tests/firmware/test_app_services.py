@@ -13,9 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightstack.firmware.numbers import TARGET_NUMBERS, default_numbers
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link
+from flightstack.mavlink.link import Address, Link
 from flightstack.plan.item import as_float32
 from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed
 from tests.firmware.app_support import (

@@ -5,12 +5,10 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.files import BytesFile, Entry, FileTree, Missing, fixed
 from flightstack.mavlink.ftp_messages import Opcode, Packet, ftp_message, read_packet
-from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.missing import Missing
-from flightstack.mavlink.virtual_files import BytesFile, Entry, FileTree, fixed
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.services.files.ftp_server import MAX_CLIENTS, FtpServer
 from flightstack.services.files.ftp_sessions import MAX_SESSIONS
 from flightstack.services.logs.log_server import MAX_RANGES, LogServer

@@ -13,10 +13,9 @@ import pytest
 from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
 from flightstack.control.attitude_pid import CONTROLLER as PID
 from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
+from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.firmware.build import host_library
-from flightstack.firmware.c_loops import CLoops, LoopsSetup
-from flightstack.firmware.errors import TargetError, WrongFirmwareError
-from flightstack.firmware.host_library import HostLoops
+from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import FAREWELL_ATTEMPTS, TargetLoops
 from flightstack.firmware.targets import finish_loops

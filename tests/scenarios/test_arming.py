@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack.core.modes import CUSTOM_MODE, Mode
+from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.process.reboot import carry_over
+from flightstack.process.assembly import carry_over
 from tests.support.world import World
 
 DENIED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED

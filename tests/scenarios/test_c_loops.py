@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.build import host_library
-from flightstack.firmware.c_loops import CLoops
-from flightstack.firmware.errors import TargetError
-from flightstack.firmware.host_library import HostLoops
+from flightstack.firmware.c_loops import CLoops, HostLoops
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import StackConfig
 from flightstack.process.assembly import build

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.mavlink.link import Link
 from flightstack.simulator_link.hot_frames import PlantStateFrame
 from sim_bridge.server.hil import HilControls, hil_state

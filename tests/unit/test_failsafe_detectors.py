@@ -31,7 +31,7 @@ from flightstack.commander.fault_watch import FaultWatch
 from flightstack.commander.link_watch import LinkWatch
 from flightstack.commander.transitions import TERMINATED, Need
 from flightstack.core.contract import LoopRow, LoopStatus
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.params.behaviour import Behaviour, with_assignments
 from flightstack.params.vehicle import load_vehicle
 

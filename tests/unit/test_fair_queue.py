@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flightstack.transports.fair_queue import MAX_STRANGERS, MAX_WAITING_OCTETS, FairQueue
+from flightstack.transports.vehicle_ports import MAX_STRANGERS, MAX_WAITING_OCTETS, FairQueue
 
 
 def nobody(_: str) -> bool:

@@ -7,13 +7,12 @@ import random
 
 import pytest
 
+from flightstack.core.enums import Severity
 from flightstack.core.port_numbers import GROUND
-from flightstack.core.severity import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import SILENT_AFTER_S, Link
 from flightstack.params.config import StackConfig
-from flightstack.process.assembly import build
-from flightstack.process.reboot import carry_over
+from flightstack.process.assembly import build, carry_over
 from flightstack.services.routing.hub import FORWARDED_A_POLL, KEPT_TEXTS, MAX_PEERS, PEER_FORGOTTEN_S
 from flightstack.services.routing.peer import PeerAddress
 from tests.support.hub_net import ALICE, BOB, Net

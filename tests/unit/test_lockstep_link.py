@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from flightstack.transports.processor import Follower, Roamer
+from flightstack.transports.cpu_affinity import Follower, Roamer
 from flightstack.transports.tcp import LinkClosedError, TcpClient
 
 PROCESSORS = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()

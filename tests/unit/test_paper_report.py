@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.experiments.paper import cases
 from gcs_cli.experiments.paper.printed import print_results

@@ -13,9 +13,9 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.params.config import StackConfig
+from flightstack.process.assembly import carry_over
 from flightstack.process.process_config import ProcessConfig
 from flightstack.process.process_files import ProcessFiles
-from flightstack.process.reboot import carry_over
 from flightstack.process.signing_file import load_key
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.simulator_link.hot_frames import PlantStateFrame

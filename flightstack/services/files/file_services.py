@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
-from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.link import Address
 from flightstack.mavlink.param_pack import pack_file
 from flightstack.services.commands import VehicleContext
 from flightstack.services.files.component_metadata import ComponentMetadata, vehicle_files

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
+from flightstack.core.enums import Severity
 from flightstack.core.port_numbers import API, GROUND, is_loopback
-from flightstack.core.severity import Severity
-from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.link import Address
 from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.services.routing.signing_setup import SigningSetup

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
-from flightstack.mavlink.addressing import Address, is_for
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for
 from flightstack.mavlink.signing import NO_KEY, Signing
 
 

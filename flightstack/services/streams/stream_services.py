@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from flightstack.core.contract import Vector3
-from flightstack.core.severity import Severity
-from flightstack.mavlink.addressing import Address
+from flightstack.core.enums import Severity
+from flightstack.mavlink.link import Address
 from flightstack.services.service import Service
 from flightstack.services.streams.manual_server import ManualServer
 from flightstack.services.streams.setpoint_messages import Here

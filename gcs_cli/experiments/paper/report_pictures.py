@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.flight_log.poses_file import Poses, write_poses
-from flightstack.process.own_program import own_program
+from flightstack.process.command_line import own_program
 from gcs_cli.experiments.paper import cases
 from gcs_cli.experiments.paper.report_labels import LABELS, PLANTS, anchored
 from gcs_cli.experiments.paper.types import Recording

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 
 from flightstack.core.atomic_file import write_text_atomically
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.experiments.paper import linear, pil_section, report_pictures
 from gcs_cli.experiments.paper.cases import MULTIBODY, all_cases
