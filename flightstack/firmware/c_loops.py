@@ -34,7 +34,7 @@ STAGES = slice(LoopRow.REFERENCE_ATTITUDE.start, LoopRow.ROTOR_SPEED.start)
 NOT_FINITE = LoopStatus.INPUT_NOT_FINITE | LoopStatus.OUTPUT_NOT_FINITE
 
 
-class Computer(Protocol):
+class LoopExecutor(Protocol):
     """What computes a tick of the loops."""
 
     input: FloatArray
@@ -48,7 +48,7 @@ class Computer(Protocol):
         """Change a number from the next step on."""
 
     def get(self, name: str) -> float:
-        """Return a number as the computer has it."""
+        """Return a number as the executor has it."""
 
     def step(self, flags: int) -> None:
         """Compute a tick from ``input`` into ``output``; ``flags`` are ``LoopFlags``."""
@@ -82,11 +82,11 @@ class CLoops:
     A reset takes place in the next step, at that step's state, as on a target that hears of it with the step.
     """
 
-    def __init__(self, name: str, computer: Computer, setup: LoopsSetup) -> None:
-        """Fly on ``computer``, which has been given the numbers of ``setup``; raise ConfigError."""
+    def __init__(self, name: str, executor: LoopExecutor, setup: LoopsSetup) -> None:
+        """Fly on ``executor``, which has been given the numbers of ``setup``; raise ConfigError."""
         self.name = name
-        self.version = computer.version
-        self.computer = computer
+        self.version = executor.version
+        self.executor = executor
         numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
         self.parameter_specs: Sequence[ParamSpec] = numbers.specs
         self._names = frozenset(spec.name for spec in numbers.specs)
@@ -94,22 +94,22 @@ class CLoops:
         self._idle = IdleRow(setup.vehicle)
         self._last: FloatArray = np.zeros(LoopRow.SIZE)
         self._pending = LoopFlags.RESET
-        self._output = computer.output
-        self._state: FloatArray = computer.input[:STATE_SIZE]
-        self._setpoint: FloatArray = computer.input[SETPOINT_AT:TARGET_AT]
-        self._target: FloatArray = computer.input[TARGET_AT:INPUT_SIZE]
+        self._output = executor.output
+        self._state: FloatArray = executor.input[:STATE_SIZE]
+        self._setpoint: FloatArray = executor.input[SETPOINT_AT:TARGET_AT]
+        self._target: FloatArray = executor.input[TARGET_AT:INPUT_SIZE]
 
     def get_parameter(self, name: str) -> float:
         """Return a parameter as the loops use it; raise KeyError if they have none of that name."""
         if name not in self._names:
             raise KeyError(name)
-        return self.computer.get(name)
+        return self.executor.get(name)
 
     def set_parameter(self, name: str, value: float) -> None:
         """Change a parameter from the next tick on; raise KeyError if unknown."""
         if name not in self._names:
             raise KeyError(name)
-        self.computer.set(name, value)
+        self.executor.set(name, value)
 
     def warm_up(self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray) -> None:
         """Begin at ``state``; the core was compiled before, and a target counts only steps that are flown."""
@@ -141,7 +141,7 @@ class CLoops:
         self._setpoint[:] = setpoint
         flags = self._pending | LoopFlags.OUTER_DUE if outer_due else self._pending
         self._pending = 0
-        self.computer.step(flags)
+        self.executor.step(flags)
         output = self._output
         self.attitude_target[:] = output[:ATTITUDE_TARGET_SIZE]
         status = output[-1]
@@ -160,14 +160,14 @@ class CLoops:
 
     def close(self) -> None:
         """End; the loops fly no more."""
-        self.computer.close()
+        self.executor.close()
 
 
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
 class HostLoops:
-    """One set of loops; implements ``c_loops.Computer``. A step allocates nothing."""
+    """One set of loops; implements ``c_loops.LoopExecutor``. A step allocates nothing."""
 
     def __init__(self, library: Path, numbers: Mapping[str, float]) -> None:
         """Load the library that ``build.host_library`` made and give its loops their numbers."""

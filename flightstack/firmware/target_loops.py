@@ -26,7 +26,7 @@ FAREWELL_ATTEMPTS = 6
 
 
 class TargetLoops:
-    """Loops on a target; implements ``c_loops.Computer``.
+    """Loops on a target; implements ``c_loops.LoopExecutor``.
 
     A number that changes is set, and read back, before the next step. Nothing here may hang: every wait is bounded by
     the client's timing, on the line's own clock, which runs on by what a read waited in vain.
@@ -67,7 +67,7 @@ class TargetLoops:
             self.set(name, value)
         self._send_numbers()
 
-    # ------------------------------------------------------------------ Computer
+    # ------------------------------------------------------------------ LoopExecutor
 
     def set(self, name: str, value: float) -> None:
         """Change a number before the next step."""

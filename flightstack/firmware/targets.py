@@ -139,5 +139,5 @@ def connect(link: ByteLink, numbers: dict[str, float], timing: PilTiming = DEFAU
 def finish_loops(loops: ControlBackend, log: Path | None) -> None:
     """End the loops; those of a target leave the record of their link beside ``log``. Raise OSError."""
     loops.close()
-    if log is not None and isinstance(loops, CLoops) and isinstance(loops.computer, TargetLoops):
-        loops.computer.write_record(log)
+    if log is not None and isinstance(loops, CLoops) and isinstance(loops.executor, TargetLoops):
+        loops.executor.write_record(log)

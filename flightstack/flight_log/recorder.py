@@ -60,7 +60,7 @@ class FlightRecorder:
         """Whether a log is being written."""
         return self._log is not None
 
-    def take_back_row(self) -> None:
+    def discard_row(self) -> None:
         """Forget the newest row of ``inner_row``: the loops failed before they filled it."""
         if self._log is not None and self._log.inner.n:
             self._log.inner.n -= 1

@@ -240,8 +240,8 @@ class FenceMonitor:
             return self.text(broken)
         if int(present[F_FLAGS]) & (FenceBreach.OUTSIDE | FenceBreach.EXCLUDED):
             return None
-        ways_out = self.fence.shape.ways_out(np.array([here[:2]]), np.array([there[:2]]))
-        return "is beyond an edge of the geofence" if ways_out else None
+        segments_outside = self.fence.shape.segments_outside(np.array([here[:2]]), np.array([there[:2]]))
+        return "is beyond an edge of the geofence" if segments_outside else None
 
     def _look_at(self, north_m: float, east_m: float, altitude_m: float) -> FloatArray | None:
         """Return flags and margins of a place, as ``fence_step`` writes them; None if it is nowhere."""

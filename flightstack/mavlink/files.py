@@ -135,7 +135,7 @@ MAX_SIZE = 2**30
 """Bytes of the largest file that is fetched: whatever a vehicle says, memory is not without end."""
 
 
-class Missing:
+class PartialFile:
     """A file of known size that arrives in pieces, in any order and any number of times."""
 
     def __init__(self, size: int) -> None:

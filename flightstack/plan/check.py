@@ -184,7 +184,9 @@ def leg_rejection(items: Sequence[MissionItem], home: GeoPoint, fence: FenceShap
     legs = mission_legs(items, home_ne_m, fence)
     if not legs:
         return None
-    outside = fence.ways_out(np.array([leg.begin for leg in legs]), np.array([leg.end for leg in legs]))
+    outside = fence.segments_outside(
+        np.array([leg.begin for leg in legs]), np.array([leg.end for leg in legs])
+    )
     if not outside:
         return None
     index, place = outside[0]

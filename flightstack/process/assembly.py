@@ -29,7 +29,7 @@ from flightstack.services.commands import VehicleContext
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.routing.hub import GroundHub
 from flightstack.services.telemetry.telemetry import Telemetry
-from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.assembly import VehicleParts, assemble
 from flightstack.vehicle.autopilot import Autopilot
@@ -53,7 +53,7 @@ class Stack(NamedTuple):
 
     vehicle: Vehicle
     rates: Rates
-    simulator: SimulatorLink
+    simulator: SimulatorEndpoint
     parts: VehicleParts
     ground: GroundHub
     recorder: FlightRecorder
@@ -152,7 +152,7 @@ def _join(
     params, loaded = load_parameters(config, backend)
     behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
     recorder = FlightRecorder(open_log, log_info, params.values, config.home)
-    simulator = SimulatorLink(vehicle, config.home, config.lockstep, system_id, pace.interval_us)
+    simulator = SimulatorEndpoint(vehicle, config.home, config.lockstep, system_id, pace.interval_us)
     parts = assemble(
         vehicle,
         backend,
@@ -183,7 +183,7 @@ def _join(
     )
 
 
-def config_after(stack: Stack, config: StackConfig) -> StackConfig:
+def reboot_config(stack: Stack, config: StackConfig) -> StackConfig:
     """Return the configuration to boot with: without a parameter file, the values of now are handed on."""
     if config.params_file is not None:
         return config
@@ -191,7 +191,7 @@ def config_after(stack: Stack, config: StackConfig) -> StackConfig:
     return replace(config, params=tuple(f"{name}={stack.params.value(name)!r}" for name in changed))
 
 
-def carry_over(old: Stack, new: Stack) -> None:
+def transfer_state(old: Stack, new: Stack) -> None:
     """Give the new stack what a reboot must not lose: peers, plans, home, and the newest state.
 
     What begins anew: the vehicle's clock, modes and failsafes, sequence numbers, transfers of files and missions,

@@ -16,7 +16,7 @@ from flightstack.transports.tcp import TcpClient
 from flightstack.transports.vehicle_ports import Place, PortsConfig, VehiclePorts
 
 
-class GroundEnd:
+class GroundConnection:
     """Carries bytes between ports and hub, on the machine's clock."""
 
     def __init__(self, ports: PortsConfig, hub: GroundHub) -> None:
@@ -126,7 +126,7 @@ def wait_for_state(
         silent = time.monotonic() - began_s > SECOND_HELLO_S
         if not asked_again and (silent or link.request_refused):
             asked_again = True
-            simulator.send(link.second_hello(interval_us))
+            simulator.send(link.fallback_request(interval_us))
         if not told and time.monotonic() - began_s > SIMULATOR_NOTICE_S:
             told = True
             _tell_silent(stack, process)

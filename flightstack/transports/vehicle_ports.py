@@ -13,11 +13,11 @@ from flightstack.core.port_numbers import API, GROUND, TCP, vehicle_api_port, ve
 from flightstack.transports.tcp_server import TcpServer
 from flightstack.transports.udp import Address, PortBusyError, UdpSocket
 
-MAX_WAITING_OCTETS = 65536
+MAX_QUEUED_BYTES = 65536
 """What one peer may have waiting; the largest datagram still fits."""
-LEAST_COST = 12
+MIN_COST = 12
 """What a piece counts at least, were it empty: the size of the smallest frame."""
-MAX_STRANGERS = 64
+MAX_UNKNOWN_PEERS = 64
 """How many peers that nobody has heard a valid message from may wait at once."""
 
 Key = TypeVar("Key", bound=Hashable)
@@ -26,13 +26,15 @@ Key = TypeVar("Key", bound=Hashable)
 class FairQueue(Generic[Key]):
     """Data of many peers: each peer's in order, the peers in turns, one piece a turn."""
 
-    def __init__(self, max_octets: int = MAX_WAITING_OCTETS, max_strangers: int = MAX_STRANGERS) -> None:
+    def __init__(
+        self, max_octets: int = MAX_QUEUED_BYTES, max_unknown_peers: int = MAX_UNKNOWN_PEERS
+    ) -> None:
         self._max_octets = max_octets
-        self._max_strangers = max_strangers
+        self._max_unknown_peers = max_unknown_peers
         self._waiting: dict[Key, deque[bytes]] = {}  # in the order of turns
         self._octets: dict[Key, int] = {}
         self.dropped = 0
-        """Pieces refused because their peer, or all strangers together, had too much waiting."""
+        """Pieces refused because their peer, or all unknown peers together, had too much waiting."""
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -45,11 +47,11 @@ class FairQueue(Generic[Key]):
 
         ``is_known`` tells who may always join: strangers share a limited number of places.
         """
-        cost = max(len(data), LEAST_COST)
+        cost = max(len(data), MIN_COST)
         pieces = self._waiting.get(key)
         if pieces is None:
             # counting all as strangers is cheap; who is known is asked only when it matters
-            if len(self._waiting) >= self._max_strangers and not is_known(key):
+            if len(self._waiting) >= self._max_unknown_peers and not is_known(key):
                 self.dropped += 1
                 return False
             pieces = self._waiting[key] = deque()
@@ -67,7 +69,7 @@ class FairQueue(Generic[Key]):
             key = next(iter(self._waiting))
             pieces = self._waiting.pop(key)
             data = pieces.popleft()
-            cost = max(len(data), LEAST_COST)
+            cost = max(len(data), MIN_COST)
             octets -= cost
             if pieces:
                 self._waiting[key] = pieces  # to the end of the line

@@ -118,9 +118,9 @@ def fed(replay: Replay, target: str, folder: Path, console: Console) -> tuple[Fl
         with ExitStack() as last:
             last.callback(finish_loops, loops, folder / LOG_NAME)
             for name, value in replay.numbers.items():
-                loops.computer.set(name, value)
+                loops.executor.set(name, value)
             with step_bar(f"replay on {target}", console) as bar:
-                outputs = replayed(replay.record, loops.computer, names.__contains__, bar.show)
+                outputs = replayed(replay.record, loops.executor, names.__contains__, bar.show)
         return outputs, loops.version
     except TargetError as error:
         raise CliError(str(error), NO_ANSWER) from error

@@ -193,7 +193,7 @@ def test_one_step_back_is_told_and_flown_on() -> None:
     world.stamp = lambda t: t - reset_us
     world.run(2.0)
     assert world.told("Simulator time went back by")
-    assert world.stack.simulator.odd_times == 1
+    assert world.stack.simulator.time_jumps == 1
     assert world.land() == 0
     world.until_disarmed(60.0)
 
