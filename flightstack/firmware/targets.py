@@ -10,13 +10,12 @@ from flightstack.control.loops import PythonLoops
 from flightstack.core.errors import INSTALL_FIRMWARE, ConfigError, WrongFirmwareError
 from flightstack.firmware.build import BuildError, host_library, host_program
 from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
-from flightstack.firmware.choice import EMULATED, PYTHON, SERIAL, C, LoopsChoice, parse_loops
+from flightstack.firmware.choice import DEFAULT_BAUD, EMULATED, PYTHON, SERIAL, C, LoopsChoice, parse_loops
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.transports.byte_link import ByteLink, LineError
 from flightstack.transports.serial_port import SerialPort
 
-_BAUD = 115_200
 _PATIENCE_S = 5.0
 
 
@@ -36,7 +35,7 @@ class HostTarget:
         assert self._process.stdout is not None
         device = self._process.stdout.readline().decode(errors="replace").strip()
         try:
-            self._port = SerialPort(device, _BAUD)
+            self._port = SerialPort(device, DEFAULT_BAUD)
         except LineError:
             self._end()
             raise

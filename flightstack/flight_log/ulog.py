@@ -25,21 +25,6 @@ HEADER_SIZE = len(MAGIC) + 1 + 8
 DATA_HEADER = struct.Struct("<HBH")  # size, type 'D', subscription id
 DATA_TYPE = ord("D")
 
-STRUCT_CODES = {
-    "int8_t": "b",
-    "uint8_t": "B",
-    "int16_t": "h",
-    "uint16_t": "H",
-    "int32_t": "i",
-    "uint32_t": "I",
-    "int64_t": "q",
-    "uint64_t": "Q",
-    "float": "f",
-    "double": "d",
-    "bool": "?",
-}
-"""ULog's types as codes of ``struct``; the same codes serve as NumPy's after "<"."""
-
 
 def _message(kind: str, content: bytes) -> bytes:
     if len(content) > _MAX_CONTENT:

@@ -71,10 +71,11 @@ def fitted(value: float, code: str, wraps: bool) -> float:
 PACKING_ERRORS = (struct.error, OverflowError)
 """What ``pack`` raises for a value that its field cannot hold."""
 
-_CODES = {
+STRUCT_CODES = {
     "int8_t": "b", "uint8_t": "B", "int16_t": "h", "uint16_t": "H", "int32_t": "i", "uint32_t": "I",
-    "int64_t": "q", "uint64_t": "Q", "float": "f", "double": "d",
+    "int64_t": "q", "uint64_t": "Q", "float": "f", "double": "d", "bool": "?",
 }  # fmt: skip
+"""Number types of MAVLink and ULog as codes of ``struct``, which are NumPy's after "<"."""
 _TIMES = frozenset({"ns", "us", "ms", "cs", "ds", "s"})
 _CLOCK_CODES = frozenset("IQq")
 
@@ -91,7 +92,7 @@ def _number_fields(kind: Any) -> tuple[_Field, ...]:
     units = kind.fieldunits_by_name
     fields = []
     for name, field_type in zip(kind.fieldnames, kind.fieldtypes, strict=True):
-        code = _CODES.get(field_type)
+        code = STRUCT_CODES.get(field_type)
         if code is not None:
             unit = units.get(name, "")
             is_clock = unit in _TIMES and code in _CLOCK_CODES

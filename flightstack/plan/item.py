@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from flightstack.core.float32 import as_float32
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.vocabulary import (
     ALSO_UNSET_E7,
@@ -18,7 +18,6 @@ from flightstack.plan.vocabulary import (
     UNSET_E7,
 )
 
-_FLOAT = struct.Struct("<f")
 _OUT_OF_RANGE = UNSET_E7 - 1  # no latitude, no longitude, and not the mark of an open one
 
 
@@ -100,14 +99,6 @@ class MissionItem:
 def is_unset(x_or_y: int) -> bool:
     """Tell whether a latitude or longitude [1e-7 deg] is left open."""
     return x_or_y in (UNSET_E7, ALSO_UNSET_E7)
-
-
-def as_float32(value: float) -> float:
-    """Round to a 32-bit float; beyond its range, infinity."""
-    try:
-        return float(_FLOAT.unpack(_FLOAT.pack(value))[0])
-    except OverflowError:
-        return math.copysign(math.inf, value)
 
 
 def integer_coordinate(value: float, is_global: bool) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol, TypeAlias
 
+from flightstack.core.float32 import as_float32
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_values import (
@@ -14,7 +15,6 @@ from flightstack.mavlink.param_values import (
     type_of,
     wire_value,
 )
-from flightstack.plan.item import as_float32
 
 _REASONS = {
     1: "the vehicle has no such parameter",
