@@ -13,6 +13,7 @@ import socket
 import sys
 import time
 
+from flightstack.core.port_numbers import tcp_port, vehicle_ground_port
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 
@@ -24,12 +25,12 @@ class Load:
     """All clients, in one loop."""
 
     def __init__(self, instance: int, stations: int, noise_hz: float, lazy: int) -> None:
-        self._vehicle = (_HOST, 18570 + instance)
+        self._vehicle = (_HOST, vehicle_ground_port(instance))
         self._stations = [_udp() for _ in range(stations)]
         self._links = [Link(255 - index % 50, 190) for index in range(stations)]
         self._received = [0] * stations
         self._index = {station.fileno(): index for index, station in enumerate(self._stations)}
-        self._lazy = [socket.create_connection((_HOST, 5760 + 10 * instance)) for _ in range(lazy)]
+        self._lazy = [socket.create_connection((_HOST, tcp_port(instance))) for _ in range(lazy)]
         for client in self._lazy:
             client.sendall(_heartbeat(Link(240, 190)))
         self._noise = _udp()

@@ -143,7 +143,7 @@ def parts() -> list[Part]:
     state_bytes = memoryview(bytearray(simulator.state_frame()))
     hovering = _hovering(stack.vehicle)
     sim_link = SimulatorLink(hovering, stack.vehicle, stack.area.home)
-    sim_link.receive(memoryview(link.hello(stack.rates.interval_us)))
+    sim_link.receive(memoryview(link.initial_requests(stack.rates.interval_us)))
     make, encode, decode = _telemetry(world)
     messages_per_step = sum(GROUND_RATES_HZ.values()) / 500.0
 

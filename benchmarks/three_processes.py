@@ -17,7 +17,7 @@ from benchmarks.ports import free_instance
 from flightstack.core.port_numbers import simulator_port
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.params.vehicle import load_vehicle
-from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 
 ROOT = Path(__file__).resolve().parent.parent
 PLAN = ROOT / "missions" / "square.plan"
@@ -73,7 +73,7 @@ def _run_s(*arguments: str) -> float:
 def _simulator_s() -> float:
     """Time from the start of ``sim-bridge`` to its first state."""
     port = simulator_port(free_instance())
-    hello = SimulatorLink(load_vehicle("paper_quad"), DEFAULT_HOME, lockstep=True).hello(2000)
+    hello = SimulatorEndpoint(load_vehicle("paper_quad"), DEFAULT_HOME, lockstep=True).initial_requests(2000)
     command = [sys.executable, "-m", "sim_bridge", "--speed=max", f"--port={port}"]
     began_s = time.perf_counter()
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:

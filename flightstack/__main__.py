@@ -55,9 +55,8 @@ def run(
 ) -> None:
     """Fly: connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.core.atomic_file import check_new
-    from flightstack.core.errors import ConfigError
+    from flightstack.core.errors import ConfigError, TargetError
     from flightstack.core.port_numbers import simulator_port, system_id
-    from flightstack.firmware.errors import TargetError
     from flightstack.params.config import DEFAULT_HOME, StackConfig, parse_home
     from flightstack.params.gains_file import hidden_gains
     from flightstack.params.vehicle import hidden_vehicle

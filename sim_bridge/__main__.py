@@ -11,6 +11,7 @@ import typer
 
 from flightstack.core.contract import Vector3
 from flightstack.core.errors import ConfigError
+from flightstack.core.port_numbers import simulator_port, system_id
 from flightstack.process import console
 from flightstack.process.command_line import UsageError, Version, make_app
 from sim_bridge import arguments, options
@@ -96,8 +97,8 @@ def run(
         home=arguments.home(home),
         speed=arguments.speed(speed),
         host=host,
-        port=4560 + instance if port is None else int(arguments.in_range("--port", port, 0, 65535)),
-        system_id=instance + 1,
+        port=simulator_port(instance) if port is None else int(arguments.in_range("--port", port, 0, 65535)),
+        system_id=system_id(instance),
         ideal_rotors=ideal_rotors,
         physics_hz=arguments.physics_hz(physics_hz),
         timeout_s=None if timeout is None else arguments.in_range("--timeout", timeout, 0.001, 1e6),

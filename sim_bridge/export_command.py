@@ -9,7 +9,7 @@ import typer
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.process import console
-from flightstack.process.picture_options import Overwrite
+from flightstack.process.command_line import Overwrite
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.output import complain, load_named_vehicle, print_result
 

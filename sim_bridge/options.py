@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process import simulation_options as shared
+from flightstack.process import command_line as shared
 
 # of both commands
 Vehicle = Annotated[str, shared.VEHICLE]

@@ -1,6 +1,6 @@
 """Names of the plants, for the command line: without loading what they are made of."""
 
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 
 MULTIBODY = "multibody"
 PLANT_NAMES = ("rigid", "paper", MULTIBODY)

@@ -9,11 +9,11 @@ import math
 
 import numpy as np
 
+from flightstack.mavlink.frames import HEADER_V2
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.battery_frame import encode_battery
 from flightstack.simulator_link.hot_frames import (
     GROUND_CONTACT_FLAG,
-    HEADER_SIZE,
     ActuatorsFrame,
     PlantStateFrame,
 )
@@ -32,7 +32,7 @@ LONGEST_INTERVAL_US = 1_000_000
 SLOWEST_PHYSICS_HZ = 100.0
 FASTEST_PHYSICS_HZ = 100_000.0
 
-_STATE_AT = HEADER_SIZE + 8  # after the time
+_STATE_AT = HEADER_V2 + 8  # after the time
 _FLAGS = (0, GROUND_CONTACT_FLAG)
 _NEVER_US = 1 << 64
 

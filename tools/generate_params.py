@@ -10,8 +10,8 @@ from pathlib import Path
 from flightstack.control.controller_loading import load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.params.behaviour import SPECS, Behaviour
+from flightstack.params.config import identity_specs
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
-from flightstack.params.identity import identity_specs
 from flightstack.params.spec import ParamSpec
 from flightstack.params.vehicle import DEFAULT_VEHICLE, load_vehicle
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flightstack.commander.transitions import TERMINATED, Need
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.params.behaviour import Behaviour
 
 THROTTLE_CENTRED = 0.2

@@ -50,7 +50,7 @@ class Freshness(Protocol):
 
 
 class StateSource(Protocol):
-    """Where states come from, and what else is known there; ``SimulatorLink`` is one."""
+    """Where states come from, and what else is known there; ``SimulatorEndpoint`` is one."""
 
     @property
     def battery(self) -> BatteryReading:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from enum import Enum, IntEnum, auto
 from typing import NamedTuple
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.params.behaviour import Behaviour
 
 

@@ -28,7 +28,7 @@ from flightstack.commander.fence_monitor import FenceMonitor
 from flightstack.commander.takeover import Takeovers, opponents
 from flightstack.commander.transitions import Event, Status
 from flightstack.core.contract import FloatArray
-from flightstack.core.modes import STREAM_MODES, Mode
+from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.guidance.fence import Fence
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle

@@ -24,7 +24,7 @@ from flightstack.commander.failsafe import (
     action_of,
     decide,
 )
-from flightstack.core.severity import Severity
+from flightstack.core.enums import Severity
 from flightstack.params.behaviour import Behaviour
 
 CAN_WAIT = (Phase.TAKEOFF, Phase.MISSION, Phase.HOLD, Phase.GOTO, Phase.MANUAL, Phase.OFFBOARD)

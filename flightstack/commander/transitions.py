@@ -9,7 +9,7 @@ from __future__ import annotations
 from enum import Enum, auto
 from typing import NamedTuple
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 
 
 class Event(Enum):

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from flightstack.core.contract import AttitudeReference, Quaternion, Vector3
 from flightstack.core.kernel_cache import is_own
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import Vehicle
 

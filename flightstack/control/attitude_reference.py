@@ -15,7 +15,7 @@ from flightstack.core.geometry import (
     rotation_over,
     rotation_vector,
 )
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 from flightstack.params.tunable import Tunable
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 from flightstack.params.tunable import Tunable, declaration_problem, undeclared
 from flightstack.params.vehicle import Vehicle
 

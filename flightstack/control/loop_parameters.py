@@ -19,7 +19,7 @@ from flightstack.control.position_pid import POSITION_TUNABLES, PositionParams, 
 from flightstack.core.contract import FloatArray
 from flightstack.params.behaviour import SPECS
 from flightstack.params.spec import ParamSpec
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 from flightstack.params.tunable import Tunable, spec_of
 from flightstack.params.vehicle import Vehicle
 

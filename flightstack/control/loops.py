@@ -44,7 +44,7 @@ from flightstack.core.contract import (
 )
 from flightstack.core.geometry import blend, conjugate, quaternion_product, rotation_vector
 from flightstack.core.portable_math import LARGEST_ANGLE_RAD
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 from flightstack.params.vehicle import Vehicle
 
 POSITION_MEMORY_SIZE = 3

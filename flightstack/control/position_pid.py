@@ -8,7 +8,7 @@ from typing import NamedTuple
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import AttitudeTarget, PositionSetpoint, Quaternion, VehicleState
 from flightstack.core.portable_math import sin_cos, tan
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 

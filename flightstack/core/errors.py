@@ -1,6 +1,9 @@
-"""The error of every configuration file: what is wrong, where, and what is allowed."""
+"""Errors whose text is one sentence for the user, and how to install optional packages."""
 
 from __future__ import annotations
+
+INSTALL_MULTIBODY = "pip install mujoco pillow imageio-ffmpeg"
+INSTALL_FIRMWARE = "pip install ziglang unicorn"
 
 
 class ConfigError(Exception):
@@ -14,3 +17,11 @@ class ConfigError(Exception):
     def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
         """Travel between processes: an exception is else made anew from its text alone, and this one takes three."""
         return type(self), self._parts
+
+
+class TargetError(RuntimeError):
+    """The target cannot be flown any further; the text is one sentence for the user."""
+
+
+class WrongFirmwareError(TargetError):
+    """The target answers, but it cannot fly what it is asked to."""

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from flightstack.core.extras import INSTALL_FIRMWARE
+from flightstack.core.errors import INSTALL_FIRMWARE
 from flightstack.firmware.sources import PORTABLE, c_files, digest, files, firmware_root, source_hash
 
 EXACT = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")

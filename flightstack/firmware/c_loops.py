@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ctypes
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -19,8 +21,9 @@ from flightstack.core.contract import (
     LoopStatus,
 )
 from flightstack.firmware.numbers import target_numbers
+from flightstack.firmware.sources import source_hash
 from flightstack.params.spec import ParamSpec
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 from flightstack.params.vehicle import Vehicle
 
 INPUT_SIZE, OUTPUT_SIZE = 29, 32
@@ -31,7 +34,7 @@ STAGES = slice(LoopRow.REFERENCE_ATTITUDE.start, LoopRow.ROTOR_SPEED.start)
 NOT_FINITE = LoopStatus.INPUT_NOT_FINITE | LoopStatus.OUTPUT_NOT_FINITE
 
 
-class Computer(Protocol):
+class LoopExecutor(Protocol):
     """What computes a tick of the loops."""
 
     input: FloatArray
@@ -45,7 +48,7 @@ class Computer(Protocol):
         """Change a number from the next step on."""
 
     def get(self, name: str) -> float:
-        """Return a number as the computer has it."""
+        """Return a number as the executor has it."""
 
     def step(self, flags: int) -> None:
         """Compute a tick from ``input`` into ``output``; ``flags`` are ``LoopFlags``."""
@@ -79,11 +82,11 @@ class CLoops:
     A reset takes place in the next step, at that step's state, as on a target that hears of it with the step.
     """
 
-    def __init__(self, name: str, computer: Computer, setup: LoopsSetup) -> None:
-        """Fly on ``computer``, which has been given the numbers of ``setup``; raise ConfigError."""
+    def __init__(self, name: str, executor: LoopExecutor, setup: LoopsSetup) -> None:
+        """Fly on ``executor``, which has been given the numbers of ``setup``; raise ConfigError."""
         self.name = name
-        self.version = computer.version
-        self.computer = computer
+        self.version = executor.version
+        self.executor = executor
         numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
         self.parameter_specs: Sequence[ParamSpec] = numbers.specs
         self._names = frozenset(spec.name for spec in numbers.specs)
@@ -91,22 +94,22 @@ class CLoops:
         self._idle = IdleRow(setup.vehicle)
         self._last: FloatArray = np.zeros(LoopRow.SIZE)
         self._pending = LoopFlags.RESET
-        self._output = computer.output
-        self._state: FloatArray = computer.input[:STATE_SIZE]
-        self._setpoint: FloatArray = computer.input[SETPOINT_AT:TARGET_AT]
-        self._target: FloatArray = computer.input[TARGET_AT:INPUT_SIZE]
+        self._output = executor.output
+        self._state: FloatArray = executor.input[:STATE_SIZE]
+        self._setpoint: FloatArray = executor.input[SETPOINT_AT:TARGET_AT]
+        self._target: FloatArray = executor.input[TARGET_AT:INPUT_SIZE]
 
     def get_parameter(self, name: str) -> float:
         """Return a parameter as the loops use it; raise KeyError if they have none of that name."""
         if name not in self._names:
             raise KeyError(name)
-        return self.computer.get(name)
+        return self.executor.get(name)
 
     def set_parameter(self, name: str, value: float) -> None:
         """Change a parameter from the next tick on; raise KeyError if unknown."""
         if name not in self._names:
             raise KeyError(name)
-        self.computer.set(name, value)
+        self.executor.set(name, value)
 
     def warm_up(self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray) -> None:
         """Begin at ``state``; the core was compiled before, and a target counts only steps that are flown."""
@@ -138,7 +141,7 @@ class CLoops:
         self._setpoint[:] = setpoint
         flags = self._pending | LoopFlags.OUTER_DUE if outer_due else self._pending
         self._pending = 0
-        self.computer.step(flags)
+        self.executor.step(flags)
         output = self._output
         self.attitude_target[:] = output[:ATTITUDE_TARGET_SIZE]
         status = output[-1]
@@ -157,4 +160,57 @@ class CLoops:
 
     def close(self) -> None:
         """End; the loops fly no more."""
-        self.computer.close()
+        self.executor.close()
+
+
+_DOUBLES = ctypes.POINTER(ctypes.c_double)
+
+
+class HostLoops:
+    """One set of loops; implements ``c_loops.LoopExecutor``. A step allocates nothing."""
+
+    def __init__(self, library: Path, numbers: Mapping[str, float]) -> None:
+        """Load the library that ``build.host_library`` made and give its loops their numbers."""
+        self._functions = functions = ctypes.CDLL(str(library))
+        functions.fs_sil_size.restype = ctypes.c_uint32
+        functions.fs_sil_get.restype = ctypes.c_double
+        functions.fs_sil_get.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
+        functions.fs_sil_set.restype = ctypes.c_uint32
+        functions.fs_sil_set.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_double]
+        functions.fs_sil_init.restype = functions.fs_sil_step.restype = None
+        functions.fs_sil_init.argtypes = [ctypes.c_void_p]
+        functions.fs_sil_step.argtypes = [ctypes.c_void_p, _DOUBLES, ctypes.c_uint32, _DOUBLES]
+        self._memory = (
+            ctypes.c_double * (functions.fs_sil_size() // 8 + 1)
+        )()  # doubles: aligned for all it holds
+        self._loops = ctypes.cast(self._memory, ctypes.c_void_p)
+        self.input: FloatArray = np.zeros(INPUT_SIZE)
+        self.output: FloatArray = np.zeros(OUTPUT_SIZE)
+        self._step = functions.fs_sil_step
+        self._in = self.input.ctypes.data_as(_DOUBLES)
+        self._out = self.output.ctypes.data_as(_DOUBLES)
+        functions.fs_sil_real_size.restype = ctypes.c_uint32
+        real = "double" if functions.fs_sil_real_size() == 8 else "float"
+        self.version = f"C, {real}, sources {source_hash().hex()}"
+        functions.fs_sil_init(self._loops)
+        for name, value in numbers.items():
+            self.set(name, value)
+
+    def step(self, flags: int) -> None:
+        """Run one tick on ``input`` and write ``output``; ``flags`` as in FS_PIL_STEP."""
+        self._step(self._loops, self._in, flags, self._out)
+
+    def set(self, name: str, value: float) -> None:
+        """Change a number; raise KeyError for a name that C has not, ValueError for a value it refuses."""
+        result = self._functions.fs_sil_set(self._loops, name.encode(), value)
+        if result == 2:
+            raise KeyError(name)
+        if result:
+            raise ValueError(f"{name}={value:g} is out of range")
+
+    def get(self, name: str) -> float:
+        """Return a number as C has it; 0 for a name that it has not."""
+        return float(self._functions.fs_sil_get(self._loops, name.encode()))
+
+    def close(self) -> None:
+        """End: the memory goes with the object."""

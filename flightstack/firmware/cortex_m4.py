@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from flightstack.core.extras import INSTALL_FIRMWARE
+from flightstack.core.errors import INSTALL_FIRMWARE
 from flightstack.firmware.build import (
     EXACT,
     BuildError,
@@ -18,7 +18,7 @@ from flightstack.firmware.build import (
     host_compiler,
     includes,
 )
-from flightstack.firmware.emulated import EmulatedTarget
+from flightstack.firmware.emulator import EmulatedTarget
 from flightstack.firmware.sources import PORTABLE, c_files, files, firmware_root
 
 CPU = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")

@@ -21,7 +21,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.params.behaviour import SPECS
 from flightstack.params.config import DEFAULT_INNER_HZ, DEFAULT_OUTER_HZ
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import DEFAULT_VEHICLE, GRAVITY_M_S2, Vehicle, load_vehicle
 

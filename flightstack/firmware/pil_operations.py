@@ -6,15 +6,13 @@ the octets equal.
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from fastcrc import crc16
-
+from flightstack.core.float32 import as_float32
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
-from flightstack.mavlink.frames import HEADER_V1, HEADER_V2, MAGIC_V1, Frame
+from flightstack.mavlink.frames import HEADER_V1, HEADER_V2, MAGIC_V1, Frame, pack_frame
 from flightstack.mavlink.link import Link, Message
 
 TARGET_SYSTEM, TARGET_COMPONENT = 1, 1
@@ -26,9 +24,6 @@ REPEATED, OUT_OF_ORDER, OVERRUN, BAD_INPUT = 1 << 16, 1 << 17, 1 << 18, 1 << 19
 _STEP, _REPORT = LAYOUT_BY_NAME["FS_PIL_STEP"], LAYOUT_BY_NAME["FS_PIL_REPORT"]
 REPORT_ID = _REPORT.message_id
 _STEP_PAYLOAD, _REPORT_PAYLOAD = struct.Struct(_STEP.format), struct.Struct(_REPORT.format)
-_HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, two flags, sequence, system, component, id (24 bits)
-_LARGEST = 3.4028234663852886e38
-_crc16 = crc16.mcrf4xx
 
 
 class PilReport(NamedTuple):
@@ -91,18 +86,14 @@ class Step:
         try:
             payload = _STEP_PAYLOAD.pack(number, flags, *numbers)
         except OverflowError:  # beyond float32, which is infinite for the target
-            payload = _STEP_PAYLOAD.pack(number, flags, *map(carried, numbers))
+            payload = _STEP_PAYLOAD.pack(number, flags, *map(as_float32, numbers))
         self._payload = payload.rstrip(b"\0") or b"\0"
 
     def frame(self, codec: Link, sequence: int) -> bytes:
         """Return the frame of the step."""
-        number, payload = _STEP.message_id, self._payload
-        header = _HEADER.pack(
-            0xFD, len(payload), 0, 0, sequence, OWN_SYSTEM, OWN_COMPONENT, number & 0xFFFF, number >> 16
+        return pack_frame(
+            _STEP.message_id, self._payload, _STEP.crc_extra, sequence, OWN_SYSTEM, OWN_COMPONENT
         )
-        frame = header + payload
-        crc: int = _crc16(b"%b%c" % (frame[1:], _STEP.crc_extra))
-        return frame + crc.to_bytes(2, "little")
 
     def take_report(self, report: PilReport) -> bool:
         """Take a report; return whether it is this step's. ``is_refused``: it shows that the target is elsewhere."""
@@ -136,7 +127,7 @@ class SetNumber:
     def __init__(self, name: str, value: float) -> None:
         self.result: float | None = None
         self.failure: str | None = None
-        self._name, self._value = name, carried(value)
+        self._name, self._value = name, as_float32(value)
         self._told: float | None = None
 
     def frame(self, codec: Link, sequence: int) -> bytes:
@@ -219,13 +210,6 @@ def _is_refusal(message: Message) -> bool:
 def message_of(codec: Link, frame: Frame) -> Message | None:
     """Decode a frame whose checksum is right; None for what the dialect lacks."""
     return next(codec.decode(frame.data), None) if frame.known else None
-
-
-def carried(value: float) -> float:
-    """Return a number as float32 carries it; infinite beyond its range."""
-    if abs(value) > _LARGEST:
-        return math.copysign(math.inf, value)
-    return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
 def _bits(value: float) -> bytes:

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, FloatArray, LoopFlags
+from flightstack.core.errors import TargetError, WrongFirmwareError
+from flightstack.core.float32 import as_float32
 from flightstack.firmware.c_loops import INPUT_SIZE, OUTPUT_SIZE, SETPOINT_AT, TARGET_AT
-from flightstack.firmware.errors import TargetError, WrongFirmwareError
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilClient, PilCounters, PilTiming
-from flightstack.firmware.pil_operations import PilReport, carried
+from flightstack.firmware.pil_operations import PilReport
 from flightstack.firmware.pil_record import COST_UNITS, PilRecord
 from flightstack.firmware.sources import source_hash
 from flightstack.transports.byte_link import ByteLink
@@ -26,7 +27,7 @@ FAREWELL_ATTEMPTS = 6
 
 
 class TargetLoops:
-    """Loops on a target; implements ``c_loops.Computer``.
+    """Loops on a target; implements ``c_loops.LoopExecutor``.
 
     A number that changes is set, and read back, before the next step. Nothing here may hang: every wait is bounded by
     the client's timing, on the line's own clock, which runs on by what a read waited in vain.
@@ -67,11 +68,11 @@ class TargetLoops:
             self.set(name, value)
         self._send_numbers()
 
-    # ------------------------------------------------------------------ Computer
+    # ------------------------------------------------------------------ LoopExecutor
 
     def set(self, name: str, value: float) -> None:
         """Change a number before the next step."""
-        value = carried(value) + 0.0  # no -0: not every target's FPU has one
+        value = as_float32(value) + 0.0  # no -0: not every target's FPU has one
         if self._numbers.get(name) != value:
             self._numbers[name] = value
             self._pending.append((name, value))

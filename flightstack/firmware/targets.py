@@ -2,22 +2,73 @@
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 from flightstack.control.backend import ControlBackend
 from flightstack.control.loops import PythonLoops
-from flightstack.core.errors import ConfigError
-from flightstack.core.extras import INSTALL_FIRMWARE
+from flightstack.core.errors import INSTALL_FIRMWARE, ConfigError, WrongFirmwareError
 from flightstack.firmware.build import BuildError, host_library, host_program
-from flightstack.firmware.c_loops import CLoops, LoopsSetup
-from flightstack.firmware.choice import EMULATED, PYTHON, SERIAL, C, LoopsChoice, parse_loops
-from flightstack.firmware.errors import WrongFirmwareError
-from flightstack.firmware.host_library import HostLoops
-from flightstack.firmware.host_target import HostTarget
+from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
+from flightstack.firmware.choice import DEFAULT_BAUD, EMULATED, PYTHON, SERIAL, C, LoopsChoice, parse_loops
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.transports.byte_link import ByteLink, LineError
 from flightstack.transports.serial_port import SerialPort
+
+_PATIENCE_S = 5.0
+
+
+class HostTarget:
+    """Runs the program of ``build.host_program`` and is the line to it; implements ``ByteLink``."""
+
+    name = "the host program"
+
+    def __init__(self, program: Path) -> None:
+        """Start it; raise LineError. It ends by itself when this process does: its input closes then."""
+        try:
+            self._process = subprocess.Popen(
+                [str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+            )
+        except OSError as error:
+            raise LineError(f"{program}: cannot be started: {error.strerror}") from error
+        assert self._process.stdout is not None
+        device = self._process.stdout.readline().decode(errors="replace").strip()
+        try:
+            self._port = SerialPort(device, DEFAULT_BAUD)
+        except LineError:
+            self._end()
+            raise
+
+    @property
+    def pid(self) -> int:
+        """Process id of the program."""
+        return self._process.pid
+
+    def write(self, data: bytes) -> None:
+        """Send octets; raise LineError when the program is gone."""
+        self._port.write(data)
+
+    def read(self, timeout_s: float) -> bytes:
+        """Return what has come, b"" when nothing does within ``timeout_s``; raise LineError."""
+        return self._port.read(timeout_s)
+
+    def close(self) -> None:
+        """End the program; a second call does nothing."""
+        self._port.close()
+        self._end()
+
+    def _end(self) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        self._process.stdout.close()
+        try:
+            self._process.wait(_PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
 
 EXCHANGE_BITS = 8000.0
 """Bits of a step and its report twice over, in start and stop bits: what a slow line needs on top."""
@@ -59,7 +110,7 @@ def open_link(choice: LoopsChoice) -> ByteLink:
 def _emulated() -> ByteLink:
     try:
         from flightstack.firmware.cortex_m4 import emulated_target  # noqa: PLC0415  # unicorn is an extra
-        from flightstack.firmware.emulated import EmulationError  # noqa: PLC0415
+        from flightstack.firmware.emulator import EmulationError  # noqa: PLC0415
     except ImportError as error:
         raise BuildError(f"unicorn is not installed: {INSTALL_FIRMWARE}") from error
     try:
@@ -87,5 +138,5 @@ def connect(link: ByteLink, numbers: dict[str, float], timing: PilTiming = DEFAU
 def finish_loops(loops: ControlBackend, log: Path | None) -> None:
     """End the loops; those of a target leave the record of their link beside ``log``. Raise OSError."""
     loops.close()
-    if log is not None and isinstance(loops, CLoops) and isinstance(loops.computer, TargetLoops):
-        loops.computer.write_record(log)
+    if log is not None and isinstance(loops, CLoops) and isinstance(loops.executor, TargetLoops):
+        loops.executor.write_record(log)

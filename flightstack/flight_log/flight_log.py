@@ -17,10 +17,9 @@ import numpy as np
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.geodesy import GeoPoint
 from flightstack.flight_log import ulog
-from flightstack.flight_log.event_topics import EVENT_TOPICS
 from flightstack.flight_log.row_block import RowBlock, TimeArray, content_size
-from flightstack.flight_log.topics import OUTER, OUTER_TOPICS, Topic, inner_topics
-from flightstack.mavlink.field_numbers import COUNTERS, fitted
+from flightstack.flight_log.topics import EVENT_TOPICS, OUTER, OUTER_TOPICS, Topic, inner_topics
+from flightstack.mavlink.fields import COUNTERS, STRUCT_CODES, fitted
 from flightstack.params.vehicle import Vehicle, system_type
 
 DEFAULT_CAPACITY = 256
@@ -72,7 +71,7 @@ class _EventTopic:
     def __init__(self, topic: Topic, message_id: int, known: Mapping[str, float]) -> None:
         """``known`` fields have these values in every message that does not give another."""
         self._header = ulog.DATA_HEADER.pack(content_size(topic), ulog.DATA_TYPE, message_id)
-        self._codes = "Q" + "".join(ulog.STRUCT_CODES[field.type] for field in topic.fields)
+        self._codes = "Q" + "".join(STRUCT_CODES[field.type] for field in topic.fields)
         self._wraps = [
             True,
             *(f.type == "uint64_t" or f.name in COUNTERS for f in topic.fields),

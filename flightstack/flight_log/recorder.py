@@ -17,11 +17,10 @@ from flightstack.core.contract import (
     LoopRow,
     Vector3,
 )
+from flightstack.core.enums import NAVIGATION_STATE
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.modes import NAVIGATION_STATE
-from flightstack.flight_log.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
 from flightstack.flight_log.flight_log import FlightLog
-from flightstack.flight_log.topics import OUTER, outer_heading
+from flightstack.flight_log.topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED, OUTER, outer_heading
 from flightstack.guidance.navigator import MissionProgress
 
 OpenLog = Callable[[], FlightLog | None]
@@ -61,7 +60,7 @@ class FlightRecorder:
         """Whether a log is being written."""
         return self._log is not None
 
-    def take_back_row(self) -> None:
+    def discard_row(self) -> None:
         """Forget the newest row of ``inner_row``: the loops failed before they filled it."""
         if self._log is not None and self._log.inner.n:
             self._log.inner.n -= 1

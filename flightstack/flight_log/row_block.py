@@ -10,6 +10,7 @@ import numpy as np
 from flightstack.core.contract import FloatArray
 from flightstack.flight_log import ulog
 from flightstack.flight_log.topics import Derived, Field, Topic
+from flightstack.mavlink.fields import STRUCT_CODES
 
 TimeArray: TypeAlias = np.ndarray[Any, np.dtype[np.uint64]]
 _Records: TypeAlias = np.ndarray[Any, Any]
@@ -23,7 +24,7 @@ def content_size(topic: Topic) -> int:
 
 
 def _field_dtype(field: Field) -> np.dtype[Any]:
-    code = "<" + ulog.STRUCT_CODES[field.type]
+    code = "<" + STRUCT_CODES[field.type]
     return np.dtype((code, (field.length,))) if field.length else np.dtype(code)
 
 

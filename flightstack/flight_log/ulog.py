@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable
 
-from flightstack.mavlink.field_numbers import fitted, int32
+from flightstack.mavlink.fields import fitted, int32
 
 MAGIC = b"ULog\x01\x12\x35"
 VERSION = 1
@@ -24,21 +24,6 @@ HEADER_SIZE = len(MAGIC) + 1 + 8
 """Bytes of the file header, before the first message."""
 DATA_HEADER = struct.Struct("<HBH")  # size, type 'D', subscription id
 DATA_TYPE = ord("D")
-
-STRUCT_CODES = {
-    "int8_t": "b",
-    "uint8_t": "B",
-    "int16_t": "h",
-    "uint16_t": "H",
-    "int32_t": "i",
-    "uint32_t": "I",
-    "int64_t": "q",
-    "uint64_t": "Q",
-    "float": "f",
-    "double": "d",
-    "bool": "?",
-}
-"""ULog's types as codes of ``struct``; the same codes serve as NumPy's after "<"."""
 
 
 def _message(kind: str, content: bytes) -> bytes:

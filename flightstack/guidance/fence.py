@@ -256,8 +256,8 @@ class FenceEvaluator:
             return self.text(broken)
         if present_flags & (FenceBreach.OUTSIDE | FenceBreach.EXCLUDED):
             return None
-        ways_out = self.fence.shape.ways_out(np.array([here[:2]]), np.array([there[:2]]))
-        return "is beyond an edge of the geofence" if ways_out else None
+        segments_outside = self.fence.shape.segments_outside(np.array([here[:2]]), np.array([there[:2]]))
+        return "is beyond an edge of the geofence" if segments_outside else None
 
     def _at(self, north_m: float, east_m: float, altitude_m: float) -> Record | None:
         """Return the ``BREACH`` of a position without looking ahead, or None if it is not finite."""

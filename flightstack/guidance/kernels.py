@@ -23,8 +23,8 @@ from flightstack.core.contract import (
     Vector3,
     VehicleState,
 )
+from flightstack.core.enums import Mode
 from flightstack.core.geometry import blend, euler_from_quaternion
-from flightstack.core.modes import Mode
 from flightstack.core.portable_math import sin_cos
 from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step

@@ -6,7 +6,7 @@ import numpy as np
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import Record, VehicleState
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.trajectory import Goal
 

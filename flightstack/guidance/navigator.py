@@ -9,7 +9,7 @@ import numpy as np
 
 from flightstack.core.compiled import direct
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray, RecordArray
-from flightstack.core.modes import STREAM_MODES, Mode
+from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.core.portable_math import atan2, distance
 from flightstack.guidance.kernels import (
     TRAJECTORY_SIZE,

@@ -8,6 +8,7 @@ behind the faulty start.
 from __future__ import annotations
 
 import re
+import struct
 from typing import NamedTuple
 
 from fastcrc import crc16
@@ -16,6 +17,10 @@ from flightstack.mavlink.dialect import mavlink
 
 MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
 HEADER_V1, HEADER_V2 = 6, 10
+"""Bytes before the payload."""
+HEADER = struct.Struct("<BBBBBBBHB")
+"""Header of version 2: magic, payload length, incompatible and compatible flags, sequence, system, component, and
+the message id as 16 and 8 bits."""
 CHECKSUM_SIZE, SIGNATURE_SIZE = 2, 13
 LARGEST_FRAME = HEADER_V2 + 255 + CHECKSUM_SIZE + SIGNATURE_SIZE
 MAX_FAULTS = 32
@@ -23,7 +28,27 @@ MAX_FAULTS = 32
 
 # a frame begins here: of version 2 only with flags that the specification lets us understand (0x01: signed)
 _BEGINNING = re.compile(rb"\xfd.[\x00\x01]|\xfe|\xfd.?\Z", re.DOTALL)
-_crc16 = crc16.mcrf4xx
+
+
+def checksum(body: bytes, crc_extra: int) -> bytes:
+    """Return the checksum of a frame's bytes between magic and checksum, as two bytes."""
+    return crc16.mcrf4xx(b"%b%c" % (body, crc_extra)).to_bytes(CHECKSUM_SIZE, "little")
+
+
+def pack_frame(
+    message_id: int, payload: bytes, crc_extra: int, sequence: int, system_id: int, component_id: int
+) -> bytes:
+    """Return an unsigned MAVLink 2 frame; ``payload`` has no trailing zeros."""
+    body = HEADER.pack(
+        MAGIC_V2, len(payload), 0, 0, sequence, system_id, component_id, message_id & 0xFFFF, message_id >> 16
+    )
+    frame = body + payload
+    return frame + checksum(frame[1:], crc_extra)
+
+
+def message_id_of(frame: bytes) -> int:
+    """Return the message id in the header of a frame of either version."""
+    return int.from_bytes(frame[7:HEADER_V2], "little") if frame[0] == MAGIC_V2 else frame[5]
 
 
 class Frame(NamedTuple):
@@ -97,16 +122,14 @@ def checked(data: bytes) -> Frame | None:
 
     Unknown messages are frames in version 2 only, where two octets of the header have to fit.
     """
-    if data[0] == MAGIC_V1:
-        message_id, end = data[5], len(data) - CHECKSUM_SIZE
-    else:
-        message_id, end = int.from_bytes(data[7:10], "little"), HEADER_V2 + data[1]
+    message_id = message_id_of(data)
+    end = (HEADER_V1 if data[0] == MAGIC_V1 else HEADER_V2) + data[1]
     kind = mavlink.mavlink_map.get(message_id)
     if data[0] == MAGIC_V1 and (kind is None or data[1] > kind.unpacker.size):
         return None  # one in 256 octets of noise begins such a frame: only a checksum may speak for it
     if kind is None:
         return Frame(data, message_id, known=False)
-    if _crc16(data[1:end] + bytes((kind.crc_extra,))) != data[end] | data[end + 1] << 8:
+    if checksum(data[1:end], kind.crc_extra) != data[end : end + CHECKSUM_SIZE]:
         return None
     return Frame(data, message_id, known=True)
 
@@ -120,3 +143,45 @@ def _begins_with_frame(data: bytes) -> bool:
         return False
     frame = checked(data[:size])
     return frame is not None and frame.known
+
+
+class FrameFinder:
+    """Cuts a stream into known frames whose checksum is right; all other bytes are junk.
+
+    It keeps at most the beginning of one frame.
+    """
+
+    def __init__(self) -> None:
+        self._held = b""
+        self.junk = 0
+        """Stretches of bytes that were no frame."""
+
+    @property
+    def partial_size(self) -> int:
+        """Bytes kept of a frame whose rest has not come; less than one frame."""
+        return len(self._held)
+
+    def find(self, data: bytes | memoryview) -> list[bytes]:
+        """Take ``data`` and return the frames that are complete now."""
+        stream = self._held + bytes(data)
+        frames: list[bytes] = []
+        decided, at = 0, 0
+        incomplete: int | None = None  # the first beginning whose rest has not come
+        while (match := _BEGINNING.search(stream, at)) is not None:
+            start = match.start()
+            size = frame_size(stream, start)
+            at = start + 1
+            if size is None or start + size > len(stream):
+                incomplete = start if incomplete is None else incomplete
+                continue
+            frame = checked(stream[start : start + size])
+            if frame is None or not frame.known:
+                continue
+            self.junk += start > decided
+            frames.append(frame.data)
+            decided = at = start + size
+            incomplete = None
+        keep_from = len(stream) if incomplete is None else incomplete
+        self.junk += keep_from > decided
+        self._held = stream[keep_from:]
+        return frames

@@ -11,9 +11,8 @@ import zlib
 from enum import IntEnum
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message
 
 MAX_DATA = 239
 MAX_SEQUENCE = 0xFFFF

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
-from typing import Any, TypeAlias
-
-from fastcrc import crc16
+from typing import Any, NamedTuple, TypeAlias
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.fitting import PACKING_ERRORS, fit
-from flightstack.mavlink.frames import MAGIC_V1, MAGIC_V2, Frame, FrameReader
+from flightstack.mavlink.fields import PACKING_ERRORS, clean_fields, fit
+from flightstack.mavlink.frames import (
+    CHECKSUM_SIZE,
+    HEADER_V2,
+    MAGIC_V1,
+    MAGIC_V2,
+    Frame,
+    FrameReader,
+    message_id_of,
+    pack_frame,
+)
 from flightstack.mavlink.signing import LinkSigning
-from flightstack.mavlink.text import clean_fields
 
 Message: TypeAlias = Any
 """A pymavlink message object."""
 
 SILENT_AFTER_S = 5.0
 """A peer that sent nothing valid for so long counts as gone: five heartbeats are missing."""
-
-_HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, two flags, sequence, system, component, id (24 bits)
-_crc16 = crc16.mcrf4xx
 
 
 class Link:
@@ -50,7 +52,7 @@ class Link:
     def encode(self, message: Message) -> bytes:
         """Return the frame of ``message`` with this link's next sequence number.
 
-        Values that their fields cannot hold are brought into range in ``message`` (``fitting.fit``).
+        Values that their fields cannot hold are brought into range in ``message`` (``fields.fit``).
         """
         try:
             frame: bytes = message.pack(self._codec)
@@ -77,15 +79,10 @@ class Link:
         if payload is None or not packed:
             return self.encode(message)
         number = message.get_msgId()  # ``id`` may be a field
-        seq, system, component = codec.seq, codec.srcSystem, codec.srcComponent
-        header = _HEADER.pack(
-            MAGIC_V2, len(payload), 0, 0, seq, system, component, number & 0xFFFF, number >> 16
-        )
-        frame = header + payload
-        crc: int = _crc16(b"%b%c" % (frame[1:], message.crc_extra))
-        codec.seq = (seq + 1) % 256
+        frame = pack_frame(number, payload, message.crc_extra, codec.seq, codec.srcSystem, codec.srcComponent)
+        codec.seq = (codec.seq + 1) % 256
         self.sent += 1
-        return self._outgoing(frame + crc.to_bytes(2, "little"), message)
+        return self._outgoing(frame, message)
 
     def is_authentic(self, message: Message) -> bool:
         """Return True if a decoded message carried the signature that this link requires, if any."""
@@ -135,11 +132,12 @@ class Link:
 
     def _is_one_frame(self, data: bytes) -> bool:
         """Tell whether ``data`` is one whole unsigned frame that we know and no beginning of another is held."""
-        if len(data) < 12 or data[0] != MAGIC_V2 or data[2] != 0:
+        payload_size = len(data) - HEADER_V2 - CHECKSUM_SIZE
+        if payload_size < 0 or data[0] != MAGIC_V2 or data[2] != 0:
             return False
-        if data[1] != len(data) - 12 or self.has_partial:
+        if data[1] != payload_size or self.has_partial:
             return False
-        return (data[7] | data[8] << 8 | data[9] << 16) in mavlink.mavlink_map
+        return message_id_of(data) in mavlink.mavlink_map
 
 
 def is_unknown(message: Message) -> bool:
@@ -154,3 +152,25 @@ def _unknown(frame: Frame) -> Message:
     header = mavlink.MAVLink_header(frame.message_id, 0, 0, frame.data[1], sequence, system, component)
     message._header = header
     return message
+
+
+class Address(NamedTuple):
+    """A MAVLink system and component; 0 means all."""
+
+    system: int
+    component: int
+
+
+def sender(message: Message) -> Address:
+    """Return who sent ``message``."""
+    return Address(message.get_srcSystem(), message.get_srcComponent())
+
+
+def is_for(message: Message, own: Address) -> bool:
+    """Tell whether a message with a target is for ``own``; 0 is for everyone."""
+    return message.target_system in (0, own.system) and message.target_component in (0, own.component)
+
+
+def is_from(message: Message, peer: Address) -> bool:
+    """Tell whether ``message`` comes from ``peer``, whose component may be 0 for any."""
+    return message.get_srcSystem() == peer.system and peer.component in (0, message.get_srcComponent())

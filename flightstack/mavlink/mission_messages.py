@@ -11,10 +11,10 @@ import zlib
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address
+from flightstack.core.float32 import as_float32
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
-from flightstack.plan.item import MissionItem, as_float32, float_coordinate, integer_coordinate
+from flightstack.mavlink.link import Address, Message
+from flightstack.plan.item import MissionItem, float_coordinate, integer_coordinate
 from flightstack.plan.vocabulary import GLOBAL_FRAMES
 
 PROTOCOL = frozenset(

@@ -11,9 +11,9 @@ import zlib
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from flightstack.core.float32 import shortest
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from flightstack.params.spec import shortest
 
 INT32: int = mavlink.MAV_PARAM_TYPE_INT32
 REAL32: int = mavlink.MAV_PARAM_TYPE_REAL32

@@ -12,10 +12,15 @@ import hmac
 from collections.abc import Callable
 from typing import NamedTuple
 
-from fastcrc import crc16
-
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2, MAGIC_V2, SIGNATURE_SIZE
+from flightstack.mavlink.frames import (
+    CHECKSUM_SIZE,
+    HEADER_V2,
+    MAGIC_V2,
+    SIGNATURE_SIZE,
+    checksum,
+    message_id_of,
+)
 
 KEY_SIZE = 32
 NO_KEY = bytes(KEY_SIZE)
@@ -33,7 +38,6 @@ MAX_STREAMS = 1024
 _ALWAYS_TAKEN = frozenset({int(mavlink.MAVLINK_MSG_ID_RADIO_STATUS)})
 """Telemetry radios put them on the link, and have no key."""
 _SIGNED = int(mavlink.MAVLINK_IFLAG_SIGNED)
-_crc16 = crc16.mcrf4xx
 
 
 class Counts(NamedTuple):
@@ -127,11 +131,9 @@ class Signing:
     def sign(self, frame: bytes, crc_extra: int, link_id: int) -> bytes:
         """Return an unsigned MAVLink 2 frame as a signed one."""
         body = bytes((*frame[:2], frame[2] | _SIGNED)) + frame[3:-CHECKSUM_SIZE]
-        checksum: int = _crc16(body[1:] + bytes((crc_extra,)))
-        tail = (
-            checksum.to_bytes(2, "little") + bytes((link_id,)) + self.next_timestamp().to_bytes(6, "little")
-        )
-        return body + tail + self._signature(body + tail)
+        tail = bytes((link_id,)) + self.next_timestamp().to_bytes(6, "little")
+        signed = body + checksum(body[1:], crc_extra) + tail
+        return signed + self._signature(signed)
 
     def accepts(self, frame: bytes, trusted: bool = False) -> bool:
         """Tell whether a frame (whole, of either version) may be used, and count it.
@@ -147,7 +149,7 @@ class Signing:
                 self._streams[_stream_of(frame)] = timestamp
                 self._timestamp = max(self._timestamp, timestamp)
         else:
-            taken = trusted or self.allow_unsigned or _message_id(frame) in _ALWAYS_TAKEN
+            taken = trusted or self.allow_unsigned or message_id_of(frame) in _ALWAYS_TAKEN
             outcome = "unsigned_taken" if taken else "unsigned_refused"
         self.counts = self.counts._replace(**{outcome: getattr(self.counts, outcome) + 1})
         return outcome in ("good", "unsigned_taken")
@@ -212,8 +214,7 @@ def without_signature(frame: bytes, crc_extra: int) -> bytes:
     if not is_signed(frame):
         return frame
     body = bytes((*frame[:2], frame[2] & ~_SIGNED)) + frame[3 : HEADER_V2 + frame[1]]
-    checksum: int = _crc16(body[1:] + bytes((crc_extra,)))
-    return body + checksum.to_bytes(2, "little")
+    return body + checksum(body[1:], crc_extra)
 
 
 def is_signed(frame: bytes) -> bool:
@@ -228,7 +229,3 @@ def _timestamp_in(frame: bytes) -> int:
 def _stream_of(frame: bytes) -> bytes:
     """Return system, component and link id of a signed frame."""
     return frame[5:7] + frame[-SIGNATURE_SIZE : -SIGNATURE_SIZE + 1]
-
-
-def _message_id(frame: bytes) -> int:
-    return int.from_bytes(frame[7:10], "little") if frame[0] == MAGIC_V2 else frame[5]

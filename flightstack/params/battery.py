@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 
 MAX_CELLS = 14
 """Cells that BATTERY_STATUS has places for."""

@@ -9,6 +9,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.gains_file import DEFAULT_GAINS
+from flightstack.params.spec import ParamSpec, group_of
 from flightstack.params.vehicle import DEFAULT_VEHICLE
 
 DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
@@ -52,3 +53,22 @@ def parse_home(text: str) -> GeoPoint:
     ):
         raise ConfigError("--home", text, "is not a place on earth")
     return GeoPoint(latitude, longitude, altitude)
+
+
+SYSTEM_ID, AUTOPILOT = "MAV_SYS_ID", "FS_AUTOPILOT"
+PX4_COMPATIBLE, GENERIC = 0, 1
+"""Values of FS_AUTOPILOT."""
+
+
+def identity_specs(system_id: int) -> tuple[ParamSpec, ...]:
+    """Return their declarations; ``system_id`` is the one that the configuration gives by default."""
+    return (
+        ParamSpec(
+            SYSTEM_ID, system_id, 1, 250, "", "MAVLink system id", True, group_of(SYSTEM_ID), 0, (), True
+        ),
+        ParamSpec(
+            AUTOPILOT, PX4_COMPATIBLE, 0, 1, "", "What the vehicle calls itself to ground stations", True,
+            group_of(AUTOPILOT), 0,
+            ((PX4_COMPATIBLE, "PX4, whose modes and altitudes it has"), (GENERIC, "Generic autopilot")), True,
+        ),
+    )  # fmt: skip

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightstack.params.named_file import built_in_names, find_file, hidden_file
-from flightstack.params.toml_reader import Table, read_toml
+from flightstack.params.toml_file import Table, built_in_names, find_file, hidden_file, read_toml
 
 BUILT_IN = Path(__file__).parent / "gains"
 DEFAULT_GAINS = "tuned"

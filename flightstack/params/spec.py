@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import struct
 from typing import NamedTuple
 
-_FLOAT32 = struct.Struct("<f")
-_LARGEST_FLOAT32 = 3.4028234663852886e38
+from flightstack.core.float32 import LARGEST_FLOAT32, shortest
+
 LARGEST_NAME = 16
 """Characters in the name of a parameter: MAVLink's param_id."""
 
@@ -58,7 +57,7 @@ class ParamSpec(NamedTuple):
         0.34999999403953552 and 0.35 read from a file are one value, and the flight is the same. The default keeps its
         own precision, and an end of the range is not missed by the rounding.
         """
-        if abs(value) > _LARGEST_FLOAT32:  # infinities as well, and integers that no float can hold
+        if abs(value) > LARGEST_FLOAT32:  # infinities as well, and integers that no float can hold
             value = math.copysign(math.inf, 1.0 if value > 0 else -1.0)
         refused = self._beyond(value)
         if refused is not None:
@@ -87,15 +86,3 @@ class ParamSpec(NamedTuple):
 def group_of(name: str) -> str:
     """Return the group of a parameter by its name, for declarations that name none."""
     return GROUPS.get(name.partition("_")[0], "Miscellaneous")
-
-
-def shortest(value: float) -> float:
-    """Return the shortest decimal number with the same float32 as ``value``; infinite and NaN stay so."""
-    if not abs(value) <= _LARGEST_FLOAT32:
-        return value
-    (narrow,) = _FLOAT32.unpack(_FLOAT32.pack(value))
-    for digits in range(6, 9):
-        text = f"{narrow:.{digits}g}"
-        if _FLOAT32.pack(float(text)) == _FLOAT32.pack(narrow):
-            return float(text)
-    return float(f"{narrow:.9g}")

@@ -11,10 +11,9 @@ import numpy as np
 from flightstack.core.contract import MAX_ROTORS, FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.core.linear_algebra import pseudo_inverse
-from flightstack.params.assembly import Part, read_parts
 from flightstack.params.battery import Battery, read_battery
-from flightstack.params.named_file import built_in_names, find_file, hidden_file
-from flightstack.params.toml_reader import Table, read_toml
+from flightstack.params.toml_file import Table, built_in_names, find_file, hidden_file, read_toml
+from flightstack.params.vehicle_parts import Part, read_parts
 
 BUILT_IN = Path(__file__).parent / "vehicles"
 DEFAULT_VEHICLE = "paper_quad"

@@ -4,8 +4,7 @@ from flightstack.plan.check import DEFAULT_LIMITS, Limits, check_mission
 from flightstack.plan.fence import check_fence, fence_shape
 from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.files import load_plan, save_plan
-from flightstack.plan.item import MissionItem
-from flightstack.plan.plan import Plan
+from flightstack.plan.item import MissionItem, Plan
 from flightstack.plan.rally import check_rally
 from flightstack.plan.rejection import Rejection
 from flightstack.plan.vocabulary import (

@@ -19,7 +19,7 @@ from flightstack.plan.vocabulary import MAX_FENCE_ITEMS, FenceCommand, MissionRe
 
 _POLYGONS = (FenceCommand.POLYGON_VERTEX_INCLUSION, FenceCommand.POLYGON_VERTEX_EXCLUSION)
 _INCLUSIONS = (FenceCommand.POLYGON_VERTEX_INCLUSION, FenceCommand.CIRCLE_INCLUSION)
-_MAX_GROUP = 2**16
+MAX_GROUP = 2**16
 MIN_VERTICES = 3
 MIN_AREA_M2 = 1.0
 MAX_RADIUS_M = 1e6
@@ -95,7 +95,7 @@ def _item_fault(item: MissionItem) -> Fault | None:
         reason = f"radius {value:g} (parameter 1) must be above 0 and at most {MAX_RADIUS_M:g} m"
         return Fault(MissionResult.INVALID_PARAM1, reason)
     if item.command in _INCLUSIONS and not (
-        math.isnan(group) or (0.0 <= group <= _MAX_GROUP and group == math.floor(group))
+        math.isnan(group) or (0.0 <= group <= MAX_GROUP and group == math.floor(group))
     ):
         reason = f"inclusion group {group:g} (parameter 2) must be a whole number, 0 or more"
         return Fault(MissionResult.INVALID_PARAM2, reason)

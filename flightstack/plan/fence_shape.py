@@ -118,7 +118,7 @@ class FenceShape:
                 inside ^= spans & (north < n1 + (east - e1) * ((n2 - n1) / (e2 - e1)))
         return inside
 
-    def ways_out(self, begins: FloatArray, ends: FloatArray) -> list[tuple[int, tuple[float, float]]]:
+    def segments_outside(self, begins: FloatArray, ends: FloatArray) -> list[tuple[int, tuple[float, float]]]:
         """Return which straight ways from ``begins`` to ``ends``, each of shape (n, 2), are not wholly allowed.
 
         Each is given by its row and a place on it that is not allowed.

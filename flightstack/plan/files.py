@@ -6,9 +6,8 @@ from pathlib import Path
 
 from flightstack.core.atomic_file import write_text_atomically
 from flightstack.core.errors import ConfigError
-from flightstack.plan.plan import Plan
-from flightstack.plan.qgc_plan import read_plan
-from flightstack.plan.qgc_plan_writer import plan_to_json
+from flightstack.plan.item import Plan
+from flightstack.plan.qgc_plan import plan_to_json, read_plan
 from flightstack.plan.waypoints import WAYPOINTS_HEADER, plan_to_waypoints, read_waypoints
 
 MAX_FILE_BYTES = 50_000_000

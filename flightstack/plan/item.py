@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-import struct
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
+from flightstack.core.float32 import as_float32
+from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.vocabulary import (
     ALSO_UNSET_E7,
     GLOBAL_FRAMES,
@@ -15,7 +18,6 @@ from flightstack.plan.vocabulary import (
     UNSET_E7,
 )
 
-_FLOAT = struct.Struct("<f")
 _OUT_OF_RANGE = UNSET_E7 - 1  # no latitude, no longitude, and not the mark of an open one
 
 
@@ -99,14 +101,6 @@ def is_unset(x_or_y: int) -> bool:
     return x_or_y in (UNSET_E7, ALSO_UNSET_E7)
 
 
-def as_float32(value: float) -> float:
-    """Round to a 32-bit float; beyond its range, infinity."""
-    try:
-        return float(_FLOAT.unpack(_FLOAT.pack(value))[0])
-    except OverflowError:
-        return math.copysign(math.inf, value)
-
-
 def integer_coordinate(value: float, is_global: bool) -> int:
     """Return the wire's integer for a latitude, longitude [deg] or plain number, whatever its value.
 
@@ -125,3 +119,36 @@ def float_coordinate(value: int, is_global: bool) -> float:
     if is_unset(value):
         return math.nan
     return value / 1e7 if is_global else float(value)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Mission items in flying order and the planned home.
+
+    ``document`` is the JSON document that the plan was read from (never changed). Every key that we do not
+    know lives there, and is written back. ``comments`` are those of a waypoint file,
+    each with the number of the line of values before which it stands.
+    """
+
+    items: tuple[MissionItem, ...]
+    home: GeoPoint | None = None
+    document: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    comments: tuple[tuple[int, str], ...] = ()
+    fence: tuple[MissionItem, ...] = ()
+    """The geofence, as items."""
+    rally: tuple[MissionItem, ...] = ()
+    """The rally points, as items."""
+
+    @property
+    def has_fence_or_rally(self) -> bool:
+        """Tell whether there are geofence or rally points, be it of a version that we cannot read."""
+        if self.fence or self.rally:
+            return True
+        fence, rally = self.document.get("geoFence"), self.document.get("rallyPoints")
+        lists = [
+            part.get(key)
+            for part in (fence, rally)
+            if isinstance(part, dict)
+            for key in ("circles", "polygons", "polygon", "points")
+        ]
+        return any(lists)

@@ -12,14 +12,13 @@ from typing import Any
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import values
-from flightstack.plan.fence import fence_areas
+from flightstack.plan.fence import MAX_GROUP, MIN_VERTICES, fence_areas
 from flightstack.plan.item import MissionItem, integer_coordinate
 from flightstack.plan.rejection import Rejection
 from flightstack.plan.vocabulary import RALLY_POINT, FenceCommand, Frame
 
 VERSION = 2
 _GROUP = "inclusionGroup"
-_MAX_GROUP = 2**16
 
 
 def fence_items(document: Mapping[str, Any], file: object) -> tuple[MissionItem, ...]:
@@ -30,7 +29,7 @@ def fence_items(document: Mapping[str, Any], file: object) -> tuple[MissionItem,
         where = f"geoFence.polygons[{index}]"
         inclusion, group = _kind(polygon, where, file)
         points = polygon.get("polygon")
-        if not isinstance(points, list) or len(points) < 3:  # corners of a triangle
+        if not isinstance(points, list) or len(points) < MIN_VERTICES:
             raise ConfigError(file, f"{where}.polygon", "must be a list of at least three points")
         code = FenceCommand.POLYGON_VERTEX_INCLUSION if inclusion else FenceCommand.POLYGON_VERTEX_EXCLUSION
         for number, point in enumerate(points):
@@ -129,7 +128,7 @@ def _kind(area: Mapping[str, Any], where: str, file: object) -> tuple[bool, floa
     inclusion = area.get("inclusion")
     if not isinstance(inclusion, bool):
         raise ConfigError(file, f"{where}.inclusion", f"{inclusion!r:.40} must be true or false")
-    return inclusion, float(values.integer(file, f"{where}.{_GROUP}", area.get(_GROUP, 0), _MAX_GROUP))
+    return inclusion, float(values.integer(file, f"{where}.{_GROUP}", area.get(_GROUP, 0), MAX_GROUP))
 
 
 def _numbers(listed: Any, where: str, count: int, file: object) -> list[float]:

@@ -6,8 +6,9 @@ import math
 from typing import Any
 
 from flightstack.core.errors import ConfigError
+from flightstack.core.float32 import as_float32
 from flightstack.core.geodesy import GeoPoint
-from flightstack.plan.item import MissionItem, as_float32, integer_coordinate
+from flightstack.plan.item import MissionItem, integer_coordinate
 from flightstack.plan.vocabulary import (
     GLOBAL_FRAMES,
     MAX_MISSION_ITEMS,

@@ -10,15 +10,13 @@ import time
 from dataclasses import replace
 from types import FrameType
 
-from flightstack.core.errors import ConfigError
-from flightstack.core.modes import Mode
-from flightstack.core.severity import Severity
+from flightstack.core.enums import Mode, Severity
+from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.choice import PYTHON, SERIAL, parse_loops
-from flightstack.firmware.errors import TargetError
 from flightstack.params.config import StackConfig
-from flightstack.process.assembly import Stack
+from flightstack.process.assembly import Stack, reboot_config, transfer_state
 from flightstack.process.clock import DeadlineScheduler, ask_for_punctual_sleeps
-from flightstack.process.ground_end import GroundEnd
+from flightstack.process.connections import GroundConnection, check_deadline, connect, wait_for_state
 from flightstack.process.process_config import (
     EXIT_LOST,
     EXIT_OK,
@@ -30,9 +28,7 @@ from flightstack.process.process_config import (
     complain,
 )
 from flightstack.process.process_files import ProcessFiles
-from flightstack.process.reboot import carry_over, config_after
-from flightstack.process.simulator_end import check_deadline, connect, wait_for_state
-from flightstack.transports.processor import Follower
+from flightstack.transports.cpu_affinity import AffinityFollower
 from flightstack.transports.tcp import LinkClosedError, TcpClient
 from flightstack.vehicle.lockstep import Lockstep
 
@@ -57,14 +53,14 @@ class App:
         self._files.adopt(self.stack, config)
         self.stack.ground.vehicle.prepare_reboot = self._prepare_reboot
         self._next: tuple[Stack, StackConfig] | None = None
-        self._ground = GroundEnd(process.ports, self.stack.ground)
+        self._ground = GroundConnection(process.ports, self.stack.ground)
         self._lockstep = config.lockstep
         self._stop_signal = 0
         self._began_s = time.monotonic()
         self._next_report_s = self._began_s + REPORT_S
         self._next_log_us = 0
         self._next_ground_ns = 0
-        self._follower: Follower | None = None
+        self._follower: AffinityFollower | None = None
 
     # ------------------------------------------------------------------ life
 
@@ -82,7 +78,7 @@ class App:
                 complain(ended)
             code = ended.code
         except TargetError as error:
-            self.stack.recorder.take_back_row()
+            self.stack.recorder.discard_row()
             complain(error)
             code = EXIT_TIMEOUT
         except ConfigError as error:  # at a reboot
@@ -105,7 +101,7 @@ class App:
     def _fly(self, simulator: TcpClient) -> None:
         """Wait for the first state and run the loops until the process ends; a reboot begins anew."""
         holds_time, waits = self._process.wait_for_start, True
-        simulator.send(self.stack.simulator.hello(self.stack.rates.interval_us))
+        simulator.send(self.stack.simulator.initial_requests(self.stack.rates.interval_us))
         while True:
             try:
                 if waits:
@@ -125,7 +121,7 @@ class App:
 
     def _prepare_reboot(self) -> str | None:
         """Build the stack that a reboot begins with; return why it cannot be: then the present one goes on."""
-        config = config_after(self.stack, self._config)
+        config = reboot_config(self.stack, self._config)
         is_exclusive = parse_loops(config.loops).kind == SERIAL  # a line is opened once: the rest must do
         try:
             stack = self._files.build(replace(config, loops=PYTHON) if is_exclusive else config)
@@ -145,7 +141,7 @@ class App:
         self._files.attend()
         self._ground.leave(time.monotonic())  # with the command's answer
         self._files.close_loops()
-        config = config_after(old, self._config)
+        config = reboot_config(old, self._config)
         new, config = self._next or (self._files.build(config), config)
         self._next = None
         self._files.adopt(new, config)
@@ -153,7 +149,7 @@ class App:
         new.ground.vehicle.prepare_reboot = self._prepare_reboot
         self._ground.join(new.ground)
         self._next_log_us = 0
-        carry_over(old, new)
+        transfer_state(old, new)
         new.journal.say(Severity.NOTICE, "Rebooted")
         complain("rebooted")
 
@@ -165,7 +161,7 @@ class App:
         if self._stop_signal:
             return EXIT_OK
         at = f"at t={now.time_us * 1e-6:.3f} s"
-        if self.stack.simulator.peer_said_goodbye and not now.status.armed:
+        if self.stack.simulator.peer_is_shutting_down and not now.status.armed:
             complain(f"the simulator was shut down {at}")
             return EXIT_OK
         complain(f"simulator lost {at}: it closed the connection")
@@ -219,7 +215,7 @@ class App:
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
         lockstep = Lockstep(link, autopilot, self.stack.rates.interval_us)
         receive, clock_ns = simulator.receive, time.monotonic_ns
-        self._follower = Follower(simulator.socket)
+        self._follower = AffinityFollower(simulator.socket)
         divisor, tick = self.stack.rates.divisor, 0
         fresh = True  # the state that came before the start
         while True:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 from flightstack import __version__
@@ -18,19 +19,17 @@ from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
 from flightstack.guidance.safe_places import SafePlaces
-from flightstack.params.config import StackConfig
+from flightstack.params.config import AUTOPILOT, GENERIC, SYSTEM_ID, StackConfig
 from flightstack.params.gains_file import open_gains
-from flightstack.params.identity import AUTOPILOT, GENERIC, SYSTEM_ID
 from flightstack.params.param_file import LoadedParams
 from flightstack.params.store import ParamStore
 from flightstack.params.vehicle import Vehicle, load_vehicle
-from flightstack.process.clock import LoopTiming, Rates, rates
-from flightstack.process.timing_report import TimingReport
+from flightstack.process.clock import LoopTiming, Rates, TimingReport, rates
 from flightstack.services.commands import VehicleContext
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.routing.hub import GroundHub
 from flightstack.services.telemetry.telemetry import Telemetry
-from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.assembly import VehicleParts, assemble
 from flightstack.vehicle.autopilot import Autopilot
@@ -54,7 +53,7 @@ class Stack(NamedTuple):
 
     vehicle: Vehicle
     rates: Rates
-    simulator: SimulatorLink
+    simulator: SimulatorEndpoint
     parts: VehicleParts
     ground: GroundHub
     recorder: FlightRecorder
@@ -153,7 +152,7 @@ def _join(
     params, loaded = load_parameters(config, backend)
     behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
     recorder = FlightRecorder(open_log, log_info, params.values, config.home)
-    simulator = SimulatorLink(vehicle, config.home, config.lockstep, system_id, pace.interval_us)
+    simulator = SimulatorEndpoint(vehicle, config.home, config.lockstep, system_id, pace.interval_us)
     parts = assemble(
         vehicle,
         backend,
@@ -182,3 +181,27 @@ def _join(
     return Stack(
         vehicle, pace, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status
     )
+
+
+def reboot_config(stack: Stack, config: StackConfig) -> StackConfig:
+    """Return the configuration to boot with: without a parameter file, the values of now are handed on."""
+    if config.params_file is not None:
+        return config
+    changed = [name for name in stack.params.specs if not stack.params.is_default(name)]
+    return replace(config, params=tuple(f"{name}={stack.params.value(name)!r}" for name in changed))
+
+
+def transfer_state(old: Stack, new: Stack) -> None:
+    """Give the new stack what a reboot must not lose: peers, plans, home, and the newest state.
+
+    What begins anew: the vehicle's clock, modes and failsafes, sequence numbers, transfers of files and missions,
+    counters, timing. What the process keeps for all stacks: signing with the time stamps of its streams, the number
+    of the next log, the parameter file.
+    """
+    for address, permanent in old.ground.addresses():
+        new.ground.add_peer(address, permanent)
+    new.area.set_home(old.area.home, old.places.home_is_chosen)
+    new.ground.adopt_plans(old.ground)
+    new.ground.last_heard_s = old.ground.last_heard_s
+    new.simulator.resume(old.simulator)
+    new.now.has_state = old.now.has_state

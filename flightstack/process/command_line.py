@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import sys
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -33,3 +35,104 @@ def _print_version(context: typer.Context, wanted: bool) -> None:
 Version = Annotated[
     bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
 ]
+
+
+Png = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Write a picture: of the middle of the flight, or of --at."),
+]
+Sheet = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Write nine moments, or those of --at, in one picture.")
+]
+Video = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Write a film, .mp4 (which needs even sizes) or .gif.")
+]
+View = Annotated[bool, typer.Option("--view", help="Play it in a window.")]
+At = Annotated[
+    str | None,
+    typer.Option(metavar="T1[,T2,…]", help="Moments of the pictures, s; several give numbered files."),
+]
+Camera = Annotated[str, typer.Option(help="chase, fixed, top, side, or whole: all of the way from above.")]
+Size = Annotated[
+    str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 1280x720; 480x270 for a gif]")
+]
+Fps = Annotated[float | None, typer.Option(help="Frames per second.  [default: 30; 12.5 for a gif]")]
+Begin = Annotated[float | None, typer.Option("--from", help="Begin of the film, s.")]
+End = Annotated[float | None, typer.Option("--to", help="End of the film, s.")]
+Speed = Annotated[
+    float | None, typer.Option(help="Show it so many times as fast as it was flown.  [default: 1]")
+]
+NoWords = Annotated[
+    bool, typer.Option("--no-words", help="Leave out figures, numbers of places and the scale.")
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that exist already.")]
+
+
+class PictureOptions(NamedTuple):
+    """What was asked for, as it was given; None where it was not."""
+
+    png: Path | None = None
+    sheet: Path | None = None
+    video: Path | None = None
+    view: bool = False
+    at: str | None = None
+    camera: str = "chase"
+    size: str | None = None
+    fps: float | None = None
+    begin: float | None = None
+    end: float | None = None
+    speed: float | None = None
+    no_words: bool = False
+    overwrite: bool = False
+
+    def arguments(self) -> list[str]:
+        """Return the command line that asks for the same."""
+        given = {
+            "--png": self.png, "--sheet": self.sheet, "--video": self.video, "--at": self.at,
+            "--camera": self.camera, "--size": self.size, "--fps": self.fps, "--from": self.begin,
+            "--to": self.end, "--speed": self.speed,
+        }  # fmt: skip
+        flags = {"--view": self.view, "--no-words": self.no_words, "--overwrite": self.overwrite}
+        return [
+            *(f"{flag}={value}" for flag, value in given.items() if value is not None),
+            *(flag for flag, is_set in flags.items() if is_set),
+        ]
+
+
+VEHICLE = typer.Option(help="Built-in vehicle (paper_quad, x_quad) or a TOML file.")
+PLANT = typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")
+WIND = typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")
+GUST = typer.Option(help="Standard deviation of the gusts, m/s.")
+DRAG = typer.Option("--drag", help="Fly with the optional drag of the vehicle's file, so that wind acts.")
+FORCE = typer.Option(metavar="N,E,D", help="Constant external force, N.")
+TORQUE = typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")
+TORQUE_GUST = typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
+SEED = typer.Option(help="Seed of the gusts.")
+SPEED = typer.Option(metavar="max|N", help="N times real time, or as fast as it goes.")
+IDEAL_ROTORS = typer.Option(
+    "--ideal-rotors", help="Rotors without limits, without lag and without spin-up torque."
+)
+PHYSICS_HZ = typer.Option(help="Lowest rate of the integration steps, Hz.")
+BATTERY_START = typer.Option(metavar="PERCENT", help="Charge at the start.  [default: 100]")
+BATTERY_CAPACITY = typer.Option(metavar="MAH", help="Capacity.  [default: the vehicle's]")
+BATTERY_DRAIN = typer.Option(metavar="FACTOR", help="Let the charge fall so many times as fast.")
+FAULTS = typer.Option(
+    "--fault",
+    metavar="SPEC",
+    help="rotor:N:off, rotor:N:weak=SHARE, rotor:N:stuck=RAD_S, state:freeze, state:nan, state:drop or "
+    "battery:level=SHARE, each with @BEGIN or @BEGIN-END in seconds; may be repeated.",
+)
+VIEW = typer.Option("--view", help="Show the vehicle in a window.")
+
+
+_ROOT = Path(__file__).resolve().parents[2]
+
+
+def own_program(module: str, *arguments: str) -> list[str]:
+    """Return the command that runs a module of this installation.
+
+    Python looks for modules in the working directory first, where a folder of the same name would be run instead; so
+    it must not, unless this installation is there.
+    """
+    safe = [] if Path.cwd() == _ROOT else ["-P"]
+    return [sys.executable, *safe, "-m", module, *arguments]

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flightstack.core.severity import Severity
+from flightstack.core.enums import Severity
 from flightstack.firmware.targets import finish_loops
 from flightstack.flight_log.flight_log import FlightLog
-from flightstack.flight_log.log_tail import FileTail
 from flightstack.mavlink.signing import Signing
-from flightstack.params.config import StackConfig
-from flightstack.params.identity import SYSTEM_ID
+from flightstack.params.config import SYSTEM_ID, StackConfig
 from flightstack.params.param_file import save
 from flightstack.process.assembly import Stack, build
 from flightstack.process.console import say
-from flightstack.process.file_saver import FileSaver
-from flightstack.process.log_files import LogFiles
+from flightstack.process.log_files import FileTail, LogFiles
 from flightstack.process.log_library import LogLibrary
-from flightstack.process.plan_file import PLANS_NAME, PlanFile
 from flightstack.process.process_config import ProcessConfig, complain
 from flightstack.process.signing_file import create_key, open_signing, replace_key
+from flightstack.process.state_directory import PLANS_NAME, FileSaver, PlanFile
 from flightstack.services.logs.log_store import NO_LOGS
 
 

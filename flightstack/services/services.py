@@ -8,9 +8,8 @@ from typing import Protocol
 
 from flightstack import __version__
 from flightstack.core.contract import Vector3
-from flightstack.core.severity import Severity
-from flightstack.mavlink.addressing import Address
-from flightstack.mavlink.link import Message
+from flightstack.core.enums import Severity
+from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_pack import pack_file
 from flightstack.params.metadata import parameters_json
 from flightstack.services.commands import VehicleContext

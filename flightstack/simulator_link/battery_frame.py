@@ -9,11 +9,9 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-from fastcrc import crc16
-
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2, MAGIC_V2, checksum, pack_frame
 from flightstack.mavlink.link import Message
-from flightstack.simulator_link.hot_frames import CHECKSUM_SIZE, HEADER_SIZE
 
 UNUSED_CELL = 0xFFFF
 """A place of ``voltages`` without a cell; in ``voltages_ext`` zero says the same."""
@@ -21,13 +19,10 @@ PLACES, EXTRA_PLACES = 10, 4
 UNKNOWN_TEMPERATURE = 0x7FFF
 
 _KIND = mavlink.MAVLink_battery_status_message
-_HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, two flags, sequence, system, component, id (24 bits)
 _WIRE = struct.Struct("<iih10HhBBBbiB4HBI")
-_EXTRA = bytes((_KIND.crc_extra,))
 _ID = mavlink.MAVLINK_MSG_ID_BATTERY_STATUS.to_bytes(3, "little")
 _TAIL = (0, mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED)  # time remaining
 _MODE = (mavlink.MAV_BATTERY_MODE_UNKNOWN, 0)  # faults
-_crc16 = crc16.mcrf4xx
 
 
 class BatteryReport(NamedTuple):
@@ -49,23 +44,20 @@ def encode_battery(report: BatteryReport, seq: int, system_id: int, component_id
         report.number, mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_TYPE_LIPO,
         report.remaining_percent, *_TAIL, *cells[PLACES:], *_MODE,
     ).rstrip(b"\x00")  # fmt: skip
-    number = mavlink.MAVLINK_MSG_ID_BATTERY_STATUS
-    header = _HEADER.pack(
-        0xFD, len(payload), 0, 0, seq, system_id, component_id, number & 0xFFFF, number >> 16
+    return pack_frame(
+        mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, payload, _KIND.crc_extra, seq, system_id, component_id
     )
-    frame = header + payload
-    return frame + _crc16(frame[1:] + _EXTRA).to_bytes(CHECKSUM_SIZE, "little")
 
 
 def decode_battery(frame: bytes | memoryview) -> BatteryReport | None:
     """Return the report that ``frame`` is: one intact, unsigned BATTERY_STATUS of MAVLink 2, or None."""
     data = bytes(frame)
     end = len(data) - CHECKSUM_SIZE
-    if end <= HEADER_SIZE or data[0] != 0xFD or data[1] != end - HEADER_SIZE or data[2] or data[7:10] != _ID:
+    if end <= HEADER_V2 or data[0] != MAGIC_V2 or data[1] != end - HEADER_V2 or data[2] or data[7:10] != _ID:
         return None
-    if _crc16(data[1:end] + _EXTRA) != data[end] | data[end + 1] << 8:
+    if checksum(data[1:end], _KIND.crc_extra) != data[end:]:
         return None
-    values = _WIRE.unpack(data[HEADER_SIZE:end].ljust(_WIRE.size, b"\x00")[: _WIRE.size])
+    values = _WIRE.unpack(data[HEADER_V2:end].ljust(_WIRE.size, b"\x00")[: _WIRE.size])
     consumed, energy = values[:2]
     current, number, _function, _type, remaining = values[13:18]
     return BatteryReport(number, values[3:13] + values[20:24], current, consumed, energy, remaining)

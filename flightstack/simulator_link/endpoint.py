@@ -14,7 +14,7 @@ import numpy as np
 from flightstack.core.contract import MAX_ROTORS, STATE_SIZE, FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, mavlink
-from flightstack.mavlink.frame_finder import FrameFinder
+from flightstack.mavlink.frames import FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle, system_type
 from flightstack.simulator_link.battery_frame import UNUSED_CELL, BatteryReport, decode_battery, report_of
@@ -55,14 +55,14 @@ class Freshness(NamedTuple):
 NEW_STATE = Freshness(0, 0)
 
 
-class SimulatorLink:
+class SimulatorEndpoint:
     """Takes the simulator's bytes, keeps the newest state, and makes the answer to it.
 
     ``state`` (13,) and ``rotor_speed_rad_s`` (8,) are the same arrays for the link's whole life.
 
     ``time_us`` is the simulated time since the vehicle booted: the first state, whatever its time, is at 0, and
     the steps between the states' times are followed. A step back, or one longer than ``LONGEST_STEP_US`` (a
-    simulator that started anew, or nonsense), is counted in ``odd_times``; the state is taken, and the clock
+    simulator that started anew, or nonsense), is counted in ``time_jumps``; the state is taken, and the clock
     stands still for that step. ``steps`` watches those that are not the loops' own, ``interval_us``.
     """
 
@@ -82,7 +82,7 @@ class SimulatorLink:
         self.state[6] = 1.0
         self.rotor_speed_rad_s = self._plant.rotor_speed_rad_s
         self.time_us = 0
-        self.odd_times = 0
+        self.time_jumps = 0
         self.steps = StateSteps(interval_us)
         self._interval_us = interval_us
         self.battery = NO_BATTERY
@@ -98,20 +98,20 @@ class SimulatorLink:
         self.request_refused = False
         self._requests: list[bytes] = []
         self._failure_result: int | None = None
-        self.peer_said_goodbye = False
+        self.peer_is_shutting_down = False
 
-    def resume(self, other: SimulatorLink) -> None:
+    def resume(self, other: SimulatorEndpoint) -> None:
         """Go on where another link of the same connection was, after a reboot."""
         self.state[:] = other.state
         self.rotor_speed_rad_s[:] = other.rotor_speed_rad_s
         self._state_us = other._state_us  # its clock begins anew
         self.battery, self.has_state, self._speaks_hil = other.battery, other.has_state, other._speaks_hil
 
-    def hello(self, interval_us: int) -> bytes:
+    def initial_requests(self, interval_us: int) -> bytes:
         """Return the bytes to send after connecting: who we are, and our own state message every so often."""
         return self.heartbeat(False) + self._request(FS_PLANT_STATE_ID, interval_us)
 
-    def second_hello(self, interval_us: int) -> bytes:
+    def fallback_request(self, interval_us: int) -> bytes:
         """Return the request to a simulator that does not know our message: PX4's."""
         return self._request(mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION, interval_us)
 
@@ -192,7 +192,7 @@ class SimulatorLink:
             elif message.command == mavlink.MAV_CMD_INJECT_FAILURE:
                 self._failure_result = int(message.result)
         elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-            self.peer_said_goodbye = message.system_status == mavlink.MAV_STATE_POWEROFF
+            self.peer_is_shutting_down = message.system_status == mavlink.MAV_STATE_POWEROFF
 
     def _take_time(self, state_us: int) -> None:
         step_us = state_us - self._state_us
@@ -207,7 +207,7 @@ class SimulatorLink:
             self.has_arrived = True
             self.steps.differs(step_us, self.time_us)
         elif step_us:
-            self.odd_times += 1
+            self.time_jumps += 1
             self.steps.jumps(step_us, self.time_us)
 
     @property

@@ -14,15 +14,13 @@ from fastcrc import crc16
 
 from flightstack.core.contract import MAX_ROTORS, STATE_SIZE, FloatArray
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME
+from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER, HEADER_V2, MAGIC_V2
 
 if sys.byteorder != "little":  # the payload is used in place
     raise ImportError("flightstack needs a little-endian machine")
 
-HEADER_SIZE = 10
-CHECKSUM_SIZE = 2
 _ALIGNMENT = 6  # the payload starts at 16 in the buffer
 _TIME = struct.Struct("<Q")
-_HEADER = struct.Struct("<BBBBBBBHB")  # magic, length, incompat, compat, seq, system, component, id (24 bits)
 _CRC = struct.Struct("<H")
 _crc16 = crc16.mcrf4xx
 
@@ -40,30 +38,30 @@ class _HotFrame:
     def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
         layout = LAYOUT_BY_NAME[self.name]
         self.payload_size = struct.calcsize(layout.format)
-        self.size = HEADER_SIZE + self.payload_size + CHECKSUM_SIZE
+        self.size = HEADER_V2 + self.payload_size + CHECKSUM_SIZE
         self._extra = layout.crc_extra
         self._extra_byte = bytes([layout.crc_extra])
         self._buffer = bytearray(_ALIGNMENT + self.size)
         self.frame = memoryview(self._buffer)[_ALIGNMENT:]
-        _HEADER.pack_into(
-            self.frame, 0, 0xFD, self.payload_size, 0, 0, 0, system_id, component_id,
+        HEADER.pack_into(
+            self.frame, 0, MAGIC_V2, self.payload_size, 0, 0, 0, system_id, component_id,
             layout.message_id & 0xFFFF, layout.message_id >> 16,
         )  # fmt: skip
-        # what is the same in all frames of one message (see _HEADER), time, flags, checksum
+        # what is the same in all frames of one message (see HEADER), time, flags, checksum
         self._unpack = struct.Struct(f"<3s4x3sQ{self.payload_size - 9}xBH").unpack_from
-        self._magic, self._message = bytes(self.frame[:3]), bytes(self.frame[7:HEADER_SIZE])
+        self._magic, self._message = bytes(self.frame[:3]), bytes(self.frame[7:HEADER_V2])
         self._seq = 0
         self.time_us = 0
         """Time of the message held."""
         self.flags = VALID_FLAG
         """Flags of the message held."""
-        self._crc_at = HEADER_SIZE + self.payload_size
+        self._crc_at = HEADER_V2 + self.payload_size
         self._checked = self.frame[1 : self._crc_at + 1]
         self._flags_at = self._crc_at - 1
         self.frame[self._flags_at] = VALID_FLAG
 
     def _doubles(self, offset: int, count: int) -> FloatArray:
-        return np.frombuffer(self._buffer, "<f8", count, _ALIGNMENT + HEADER_SIZE + offset)
+        return np.frombuffer(self._buffer, "<f8", count, _ALIGNMENT + HEADER_V2 + offset)
 
     def seal(self, time_us: int, flags: int) -> memoryview:
         """Complete the frame around the payload in place and return its bytes, valid until the next call."""
@@ -71,7 +69,7 @@ class _HotFrame:
         self.time_us, self.flags = time_us, flags | VALID_FLAG
         frame[4] = self._seq
         self._seq = (self._seq + 1) & 255
-        _TIME.pack_into(frame, HEADER_SIZE, time_us)
+        _TIME.pack_into(frame, HEADER_V2, time_us)
         frame[self._flags_at] = self.flags
         frame[self._crc_at] = self._extra  # the checksum covers one byte more, which is not sent
         _CRC.pack_into(frame, self._crc_at, _crc16(self._checked))
@@ -102,7 +100,7 @@ class PlantStateFrame(_HotFrame):
     def __init__(self, system_id: int = 1, component_id: int = 1) -> None:
         super().__init__(system_id, component_id)
         self.state = self._doubles(8, STATE_SIZE)
-        offset = _ALIGNMENT + HEADER_SIZE + 8 + 8 * STATE_SIZE
+        offset = _ALIGNMENT + HEADER_V2 + 8 + 8 * STATE_SIZE
         self.rotor_speed_rad_s = np.frombuffer(self._buffer, "<f4", MAX_ROTORS, offset)
 
     def set_rotor_count(self, count: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flightstack.mavlink.dialect import mavlink
+from flightstack.core.enums import Severity
 
 LONGEST_FLYABLE_US = 10_000
 """Longest step that loops of a shorter one fly by: both built-in vehicles fly the square at 16 ms, not at 20 ms."""
@@ -95,9 +95,9 @@ class StateSteps:
             f"the loops run every {_ms(self._interval_us)} on the newest one"
         )
         if refusal:
-            self.tell(mavlink.MAV_SEVERITY_ERROR, "Not to be flown: " + refusal)
+            self.tell(Severity.ERROR, "Not to be flown: " + refusal)
         else:
-            self.tell(mavlink.MAV_SEVERITY_NOTICE, text)
+            self.tell(Severity.NOTICE, text)
 
     def jumps(self, step_us: int, time_us: int) -> None:
         """Take a step that the vehicle's clock, at ``time_us``, follows as a gap, or not at all."""
@@ -105,7 +105,7 @@ class StateSteps:
             return
         self._quiet_until_us = time_us + 10_000_000
         way = "went back by" if step_us < 0 else "jumped ahead by"
-        self.tell(mavlink.MAV_SEVERITY_WARNING, f"Simulator time {way} {abs(step_us) * 1e-6:.4g} s")
+        self.tell(Severity.WARNING, f"Simulator time {way} {abs(step_us) * 1e-6:.4g} s")
 
     def compare(self, time_us: int, machine_us: int) -> None:
         """In real time: compare the simulator's clock with the machine's; call from time to time."""
@@ -120,7 +120,7 @@ class StateSteps:
         is_off = abs(pace - 1.0) > PACE_TOLERANCE
         if is_off and not self._pace_is_off:
             says = f"runs at {pace:.2f} times real time" if pace > 0.0 else "clock stands still"
-            self.tell(mavlink.MAV_SEVERITY_WARNING, f"Simulator {says}")
+            self.tell(Severity.WARNING, f"Simulator {says}")
         self._pace_is_off = is_off
 
     def tell(self, severity: int, text: str) -> None:

@@ -4,13 +4,85 @@ from __future__ import annotations
 
 import math
 import select
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from flightstack.core.port_numbers import API, GROUND, TCP, vehicle_api_port, vehicle_ground_port
-from flightstack.transports.fair_queue import FairQueue
 from flightstack.transports.tcp_server import TcpServer
 from flightstack.transports.udp import Address, PortBusyError, UdpSocket
+
+MAX_QUEUED_BYTES = 65536
+"""What one peer may have waiting; the largest datagram still fits."""
+MIN_COST = 12
+"""What a piece counts at least, were it empty: the size of the smallest frame."""
+MAX_UNKNOWN_PEERS = 64
+"""How many peers that nobody has heard a valid message from may wait at once."""
+
+Key = TypeVar("Key", bound=Hashable)
+
+
+class FairQueue(Generic[Key]):
+    """Data of many peers: each peer's in order, the peers in turns, one piece a turn."""
+
+    def __init__(
+        self, max_octets: int = MAX_QUEUED_BYTES, max_unknown_peers: int = MAX_UNKNOWN_PEERS
+    ) -> None:
+        self._max_octets = max_octets
+        self._max_unknown_peers = max_unknown_peers
+        self._waiting: dict[Key, deque[bytes]] = {}  # in the order of turns
+        self._octets: dict[Key, int] = {}
+        self.dropped = 0
+        """Pieces refused because their peer, or all unknown peers together, had too much waiting."""
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def __contains__(self, key: Key) -> bool:
+        return key in self._waiting
+
+    def push(self, key: Key, data: bytes, is_known: Callable[[Key], bool]) -> bool:
+        """Let ``data`` of ``key`` wait for its turn; return False when it is dropped.
+
+        ``is_known`` tells who may always join: strangers share a limited number of places.
+        """
+        cost = max(len(data), MIN_COST)
+        pieces = self._waiting.get(key)
+        if pieces is None:
+            # counting all as strangers is cheap; who is known is asked only when it matters
+            if len(self._waiting) >= self._max_unknown_peers and not is_known(key):
+                self.dropped += 1
+                return False
+            pieces = self._waiting[key] = deque()
+            self._octets[key] = 0
+        elif self._octets[key] + cost > self._max_octets:
+            self.dropped += 1
+            return False
+        pieces.append(data)
+        self._octets[key] += cost
+        return True
+
+    def take(self, octets: int) -> Iterator[tuple[Key, bytes]]:
+        """Yield pieces, with their peers, in turns: ``octets`` of them, and what the last piece has beyond."""
+        while self._waiting and octets > 0:
+            key = next(iter(self._waiting))
+            pieces = self._waiting.pop(key)
+            data = pieces.popleft()
+            cost = max(len(data), MIN_COST)
+            octets -= cost
+            if pieces:
+                self._waiting[key] = pieces  # to the end of the line
+                self._octets[key] -= cost
+            else:
+                del self._octets[key]
+            yield key, data
+
+    def forget(self, key: Key) -> None:
+        """Drop what ``key`` has waiting."""
+        self._waiting.pop(key, None)
+        self._octets.pop(key, None)
+
 
 LOOPBACK = "127.0.0.1"
 OCTETS_A_POLL = 4096

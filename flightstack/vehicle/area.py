@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from flightstack.commander.fence_monitor import FenceMonitor
 from flightstack.core.contract import Vector3
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.modes import Mode
 from flightstack.core.portable_math import distance
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.rally import HOME, ReturnPlace

@@ -5,7 +5,7 @@ from __future__ import annotations
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, LoopFlags, LoopRow, LoopStatus
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.guidance.navigator import Navigator
 from flightstack.vehicle.flight_monitor import FlightMonitor
 from flightstack.vehicle.flight_state import FlightState

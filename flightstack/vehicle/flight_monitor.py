@@ -6,8 +6,7 @@ from flightstack.commander.failsafe import Action, Failsafe, phase_of
 from flightstack.commander.failsafe_monitor import EVENTS_OF_ACTION, FailsafeMonitor
 from flightstack.commander.ground_monitor import GroundMonitor, Standing
 from flightstack.commander.transitions import Event
-from flightstack.core.modes import STREAM_MODES, Mode
-from flightstack.core.severity import Severity
+from flightstack.core.enums import STREAM_MODES, Mode, Severity
 from flightstack.guidance.navigator import Navigator
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.flight_state import FlightState

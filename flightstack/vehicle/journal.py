@@ -6,8 +6,8 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 from flightstack.commander.transitions import Status
 from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.severity import Severity
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.vehicle.flight_state import FlightState
 

@@ -9,8 +9,8 @@ the simulator's.
 from __future__ import annotations
 
 from flightstack.core.contract import FloatArray, LoopRow
-from flightstack.core.severity import Severity
-from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.core.enums import Severity
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.state_steps import is_gap
 from flightstack.vehicle.autopilot import Autopilot
 
@@ -21,7 +21,7 @@ STALL_NS = 1_000_000_000
 class Lockstep:
     """Runs the ticks that are due after each state."""
 
-    def __init__(self, link: SimulatorLink, autopilot: Autopilot, interval_us: int) -> None:
+    def __init__(self, link: SimulatorEndpoint, autopilot: Autopilot, interval_us: int) -> None:
         self._link = link
         self._autopilot = autopilot
         self._now = autopilot.now

@@ -6,8 +6,7 @@ from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.commander.ground_monitor import GroundMonitor
 from flightstack.commander.transitions import Event, Status, transition
 from flightstack.control.backend import ControlBackend
-from flightstack.core.modes import STREAM_MODES, Mode
-from flightstack.core.severity import Severity
+from flightstack.core.enums import STREAM_MODES, Mode, Severity
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import SpeedOverrides
 from flightstack.vehicle.area import FlightArea

@@ -9,8 +9,7 @@ from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import controller_error
 from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.params.behaviour import FIELDS, SPECS, Behaviour
-from flightstack.params.config import StackConfig
-from flightstack.params.identity import identity_specs
+from flightstack.params.config import StackConfig, identity_specs
 from flightstack.params.param_file import NOTHING_LOADED, LoadedParams, load_into
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore, apply_assignments

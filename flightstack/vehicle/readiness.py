@@ -6,7 +6,7 @@ from flightstack.commander.arming_checks import arming_refusals
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.commander.ground_monitor import GroundMonitor
 from flightstack.commander.transitions import Facts, Need
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.mission import Mission
 

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from flightstack.commander.failsafe import PHASE_OF_MODE, Phase
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.commander.transitions import RULES, Event, Need, transition
-from flightstack.core.modes import Mode
-from flightstack.core.severity import Severity
+from flightstack.core.enums import Mode, Severity
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.setpoints import Sticks
 from flightstack.plan import MissionItem

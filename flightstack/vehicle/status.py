@@ -10,8 +10,8 @@ import numpy as np
 from flightstack.commander.failsafe import Action
 from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.contract import FloatArray
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.endpoint import Battery

@@ -9,10 +9,9 @@ import copy
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address, is_for, is_from
+from flightstack.core.float32 import as_float32
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
-from flightstack.plan.item import as_float32
+from flightstack.mavlink.link import Address, Message, is_for, is_from
 
 _ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
 _IN_PROGRESS: int = mavlink.MAV_RESULT_IN_PROGRESS

@@ -10,7 +10,8 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address, is_for, is_from
+from flightstack.mavlink.fields import clean
+from flightstack.mavlink.files import MAX_SIZE, Entry, PartialFile
 from flightstack.mavlink.ftp_messages import (
     ERROR_TEXTS,
     MAX_DATA,
@@ -22,10 +23,7 @@ from flightstack.mavlink.ftp_messages import (
     next_sequence,
     read_packet,
 )
-from flightstack.mavlink.link import Message
-from flightstack.mavlink.missing import MAX_SIZE, Missing
-from flightstack.mavlink.text import clean
-from flightstack.mavlink.virtual_files import Entry
+from flightstack.mavlink.link import Address, Message, is_for, is_from
 
 RETRY_S = 0.3
 """Silence after which a request is sent again, until answers have shown how long they take."""
@@ -71,7 +69,7 @@ class FtpClient:
         self._request: Packet | None = None
         """An open or list request that waits for its answer."""
         self._session: int | None = None
-        self._file: Missing | None = None
+        self._file: PartialFile | None = None
         self._entries: list[Entry] = []
         self._offset = 0
         self._burst: Packet | None = None
@@ -177,7 +175,7 @@ class FtpClient:
             self._end(FtpFailed(f"a file of {size} bytes is too large"))
         else:
             if self._file is None or self._file.size != size:
-                self._file = Missing(size)
+                self._file = PartialFile(size)
             self._fetch(self._file, now_s)
 
     def _on_refusal(self, request: Packet, packet: Packet) -> None:
@@ -201,7 +199,7 @@ class FtpClient:
 
     # -- data
 
-    def _on_data(self, file: Missing, packet: Packet, now_s: float) -> None:
+    def _on_data(self, file: PartialFile, packet: Packet, now_s: float) -> None:
         if packet.request == Opcode.BURST_READ_FILE:
             is_over = self._on_burst(packet)
             if is_over is None:
@@ -237,7 +235,7 @@ class FtpClient:
             return True
         return False
 
-    def _on_nak(self, file: Missing, packet: Packet) -> None:
+    def _on_nak(self, file: PartialFile, packet: Packet) -> None:
         error = packet.data[0] if packet.data else FtpError.FAIL
         if error == FtpError.INVALID_SESSION:  # the vehicle has closed it: open it again, keep what came
             self._reads.clear()
@@ -247,7 +245,7 @@ class FtpClient:
         elif packet.offset < file.size:
             self._end(FtpFailed("the file became shorter while it was read", error))
 
-    def _fetch(self, file: Missing, now_s: float) -> None:
+    def _fetch(self, file: PartialFile, now_s: float) -> None:
         """Ask for what is missing: in a burst if it is much, else piece by piece."""
         self._retry_s = now_s + self._patience_s
         if not file.left:
@@ -261,7 +259,7 @@ class FtpClient:
             else:
                 self._read_pieces(file, now_s)
 
-    def _read_pieces(self, file: Missing, now_s: float) -> None:
+    def _read_pieces(self, file: PartialFile, now_s: float) -> None:
         self._reads = {key: read for key, read in self._reads.items() if now_s < read[2] + self._patience_s}
         asked = {(offset, count) for offset, count, _ in self._reads.values()}
         for offset, count in self._wanted(file, asked):
@@ -272,7 +270,7 @@ class FtpClient:
             min((asked_s for _, _, asked_s in self._reads.values()), default=now_s) + self._patience_s
         )
 
-    def _wanted(self, file: Missing, asked: set[tuple[int, int]]) -> Iterator[tuple[int, int]]:
+    def _wanted(self, file: PartialFile, asked: set[tuple[int, int]]) -> Iterator[tuple[int, int]]:
         room = MAX_READS - len(asked)
         for piece in file.pieces(MAX_DATA):
             if room <= 0:

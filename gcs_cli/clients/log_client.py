@@ -10,11 +10,10 @@ import itertools
 import math
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address, is_from
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.files import MAX_SIZE, PartialFile
+from flightstack.mavlink.link import Address, Message, is_from
 from flightstack.mavlink.log_messages import BLOCK
-from flightstack.mavlink.missing import MAX_SIZE, Missing
 
 RETRY_S = 0.4
 """Silence after which what is missing is asked for again."""
@@ -63,7 +62,7 @@ class LogClient:
         self._entries: dict[int, LogEntry] = {}
         self._ids: range | None = None
         self._log_id: int | None = None
-        self._file: Missing | None = None
+        self._file: PartialFile | None = None
         self._asked_end = 0
         """Where the newest request ends: its last block asks for the next."""
         self._retry_s: float | None = None
@@ -77,7 +76,7 @@ class LogClient:
     def start_download(self, entry: LogEntry) -> None:
         """Fetch a log of the list."""
         self._start()
-        self._log_id, self._file, self._asked_end = entry.log_id, Missing(min(entry.size, MAX_SIZE)), 0
+        self._log_id, self._file, self._asked_end = entry.log_id, PartialFile(min(entry.size, MAX_SIZE)), 0
         if not entry.size:
             self._end(LogDone())
         elif entry.size > MAX_SIZE:
@@ -150,7 +149,7 @@ class LogClient:
 
     # -- download
 
-    def _on_data(self, file: Missing, message: Message, now_s: float) -> None:
+    def _on_data(self, file: PartialFile, message: Message, now_s: float) -> None:
         data = bytes(message.data[: min(message.count, BLOCK)])
         if not data and message.ofs < file.size:
             self._end(LogFailed("the vehicle cannot read the log, or it became shorter"))
@@ -163,7 +162,7 @@ class LogClient:
         elif message.ofs + len(data) >= self._asked_end:
             self._ask_for_data(file, now_s)
 
-    def _ask_for_data(self, file: Missing, now_s: float) -> None:
+    def _ask_for_data(self, file: PartialFile, now_s: float) -> None:
         first = file.first
         end = min(first + WINDOW, file.size)
         if file.within(first, end) > FEW * BLOCK:

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from flightstack.mavlink.addressing import Address, is_for, is_from
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for, is_from
 from flightstack.mavlink.mission_messages import DEFAULT_TIMING, Timing
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionResult, MissionType

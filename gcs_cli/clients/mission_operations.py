@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.mission_messages import Timing, ack_message
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionResult, result_name

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.mission_messages import item_from_message, message_from_item
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionResult

@@ -6,8 +6,7 @@ it ended. One operation at a time; a new ``start_…`` replaces the one under wa
 
 from __future__ import annotations
 
-from flightstack.mavlink.addressing import Address, is_for, is_from
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for, is_from
 from gcs_cli.clients.param_operations import (
     DEFAULT_TIMING,
     ListAll,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol, TypeAlias
 
-from flightstack.mavlink.addressing import Address
+from flightstack.core.float32 import as_float32
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_values import (
     HASH_NAME,
     LARGEST_INTEGER,
@@ -15,7 +15,6 @@ from flightstack.mavlink.param_values import (
     type_of,
     wire_value,
 )
-from flightstack.plan.item import as_float32
 
 _REASONS = {
     1: "the vehicle has no such parameter",

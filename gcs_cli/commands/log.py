@@ -21,7 +21,7 @@ from gcs_cli.settings import (
 )
 
 if TYPE_CHECKING:
-    from flightstack.mavlink.virtual_files import Entry
+    from flightstack.mavlink.files import Entry
     from gcs_cli.clients.log_client import LogEntry
     from gcs_cli.link.connection import Connection
 

@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process import picture_options as asked
+from flightstack.process import command_line as asked
+from flightstack.process.command_line import own_program
 from flightstack.process.console import complain
-from flightstack.process.own_program import own_program
 from gcs_cli.errors import FAILED, CliError
 
 _NAME = "gcs replay"

@@ -18,8 +18,8 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from flightstack.core.port_numbers import ground_station_port, simulator_port
+from flightstack.process import command_line as world
 from flightstack.process import options as stack
-from flightstack.process import simulation_options as world
 from gcs_cli.transfers.plan_files import DEFAULT_PLAN, PlanArgument
 
 

@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.port_numbers import INSTANCES, vehicle_api_port, vehicle_ground_port
 from flightstack.firmware.choice import parse_loops

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from flightstack.process.own_program import own_program
+from flightstack.process.command_line import own_program
 
 _TAIL_BYTES = 4096
 _POLL_S = 0.02

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
+from flightstack.mavlink.link import Address
 from flightstack.plan import MissionItem, MissionResult, MissionType
 from gcs_cli.clients.command_client import CommandClient, CommandResult
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient

@@ -39,7 +39,7 @@ _PROGRESS_STEPS = 500
 
 
 class Loops(Protocol):
-    """What computes the steps; see ``flightstack.firmware.c_loops.Computer``."""
+    """What computes the steps; see ``flightstack.firmware.c_loops.LoopExecutor``."""
 
     input: FloatArray
     output: FloatArray

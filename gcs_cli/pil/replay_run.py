@@ -12,10 +12,9 @@ import numpy as np
 from rich.console import Console
 
 from flightstack.core.contract import FloatArray
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
-from flightstack.firmware.errors import TargetError
 from flightstack.firmware.numbers import CONTROLLERS
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
@@ -119,9 +118,9 @@ def fed(replay: Replay, target: str, folder: Path, console: Console) -> tuple[Fl
         with ExitStack() as last:
             last.callback(finish_loops, loops, folder / LOG_NAME)
             for name, value in replay.numbers.items():
-                loops.computer.set(name, value)
+                loops.executor.set(name, value)
             with step_bar(f"replay on {target}", console) as bar:
-                outputs = replayed(replay.record, loops.computer, names.__contains__, bar.show)
+                outputs = replayed(replay.record, loops.executor, names.__contains__, bar.show)
         return outputs, loops.version
     except TargetError as error:
         raise CliError(str(error), NO_ANSWER) from error

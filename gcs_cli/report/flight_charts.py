@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from flightstack.core.modes import NAVIGATION_STATE
+from flightstack.core.enums import NAVIGATION_STATE
 from gcs_cli.charts.colours import nth_colour
 from gcs_cli.charts.decimate import BUCKETS, is_decimated
 from gcs_cli.charts.figure import Axis, Band, Figure, Level, Panel, Shape

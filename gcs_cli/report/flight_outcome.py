@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from flightstack.core.modes import NAVIGATION_STATE, Mode
+from flightstack.core.enums import NAVIGATION_STATE, Mode
 from flightstack.plan import NAV_COMMANDS, Command, MissionItem
 from gcs_cli.errors import DONE, FAILED
 from gcs_cli.vehicle.view_types import VehicleView

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
-from flightstack.mavlink.addressing import Address
-from flightstack.mavlink.text import REPLACEMENT
-from flightstack.mavlink.virtual_files import Entry
+from flightstack.mavlink.fields import REPLACEMENT
+from flightstack.mavlink.files import Entry
+from flightstack.mavlink.link import Address
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeAlias
 
-from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.link import Address
 from flightstack.mavlink.param_values import Parameter
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed, ParamTiming

@@ -10,8 +10,8 @@ import lzma
 import math
 from typing import Any, NamedTuple
 
-from flightstack.mavlink.text import clean
-from flightstack.params.spec import shortest
+from flightstack.core.float32 import shortest
+from flightstack.mavlink.fields import clean
 
 METADATA_PATH = "etc/extras/parameters.json.xz"
 """Where PX4 and flightstack keep it; fetched over MAVLink FTP."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flightstack.mavlink.text import clean
+from flightstack.mavlink.fields import clean
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, PartialText, StatusText, VehicleView
 
 PIECE_OCTETS = 50

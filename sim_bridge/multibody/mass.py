@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from flightstack.params.assembly import Part
+from flightstack.params.vehicle_parts import Part
 from sim_bridge.multibody.mesh_file import read_mesh
 
 

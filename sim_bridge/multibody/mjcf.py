@@ -13,8 +13,8 @@ from xml.etree.ElementTree import Element, indent, tostring
 import numpy as np
 
 from flightstack.core.geometry import quaternion_from_euler
-from flightstack.params.assembly import Part
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
+from flightstack.params.vehicle_parts import Part
 from sim_bridge.multibody import contact
 from sim_bridge.multibody.actuators import add_actuators
 from sim_bridge.multibody.assembly import Assembly, assemble

@@ -11,8 +11,8 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray, Quaternion, Vector3
 from flightstack.core.geometry import quaternion_from_euler, rotate
-from flightstack.params.assembly import Part
 from flightstack.params.vehicle import Vehicle
+from flightstack.params.vehicle_parts import Part
 from sim_bridge.multibody.mass import MassProperties, placed, solid, together
 
 

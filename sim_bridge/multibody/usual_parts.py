@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flightstack.params.assembly import MATERIALS, Part
 from flightstack.params.vehicle import Rotor, Vehicle
+from flightstack.params.vehicle_parts import MATERIALS, Part
 from sim_bridge.multibody.placing import PlacedPart
 
 

@@ -15,7 +15,7 @@ import math
 from typing import NamedTuple
 
 from flightstack.core.compiled import compiled
-from flightstack.mavlink.field_numbers import int16, int32, whole
+from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.params.battery import Battery
 from flightstack.simulator_link.battery_frame import EXTRA_PLACES, PLACES, UNUSED_CELL, BatteryReport
 from sim_bridge.plant.layout import Record

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flightstack.core.atomic_file import check_new
-from flightstack.core.errors import ConfigError
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY, ConfigError
+from flightstack.process import command_line as asked
 from flightstack.process import console
-from flightstack.process import picture_options as asked
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.render.render_wish import Wish, wish_of
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from flightstack.core.atomic_file import check_new
-from flightstack.process.picture_options import PictureOptions
+from flightstack.process.command_line import PictureOptions
 from sim_bridge import arguments
 from sim_bridge.errors import UsageProblemError
 

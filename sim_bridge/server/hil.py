@@ -15,7 +15,7 @@ from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.core.geometry import conjugate, rotate
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.field_numbers import int16, int32, whole
+from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.link import Message
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame

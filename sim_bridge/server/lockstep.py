@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import FS_ACTUATORS_ID, FS_PLANT_STATE_ID, mavlink
-from flightstack.mavlink.frame_finder import FrameFinder
+from flightstack.mavlink.frames import FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame

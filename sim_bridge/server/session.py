@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 
-from flightstack.transports.processor import Roamer
+from flightstack.transports.cpu_affinity import AffinityLeader
 from sim_bridge.server.connection import Connection, StoppedError, StopSignal
 from sim_bridge.server.lockstep import SimulatorLink
 from sim_bridge.server.pacing import Pacer
@@ -21,7 +21,7 @@ class Session:
         self._speed = speed
         self.pacer = None if math.isinf(speed) else Pacer(speed, stop.is_set)
         # at a given speed there is time to sleep, and the scheduler finds the processor that wakes up first
-        self._roamer = Roamer() if self.pacer is None else None
+        self._leader = AffinityLeader() if self.pacer is None else None
         self._move_at = 1
         self._connection = connection
         self._stop = stop
@@ -59,8 +59,8 @@ class Session:
                 return
         link.step()
         self.exchanges += 1
-        if self.exchanges == self._move_at and self._roamer is not None:
-            self._move_at += self._roamer.step()
+        if self.exchanges == self._move_at and self._leader is not None:
+            self._move_at += self._leader.step()
         if self.pacer is not None:
             self.pacer.wait_until(link.simulator.time_us)
 
@@ -68,9 +68,9 @@ class Session:
         link, connection = self.link, self._connection
         if self.pacer is None:  # as fast as it goes means nothing to a client with a clock of its own
             self.pacer = Pacer(1.0, self._stop.is_set)
-        if self._roamer is not None:
-            self._roamer.leave()
-            self._roamer = None
+        if self._leader is not None:
+            self._leader.leave()
+            self._leader = None
         self.pacer.wait_until(link.simulator.time_us)
         heard = False
         while (data := connection.receive_now()) is not None:

@@ -12,11 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightstack.core.float32 import as_float32
 from flightstack.firmware.numbers import TARGET_NUMBERS, default_numbers
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link
-from flightstack.plan.item import as_float32
+from flightstack.mavlink.link import Address, Link
 from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed
 from tests.firmware.app_support import (
     ABOVE,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Address
 from gcs_cli.clients.command_client import CommandClient
 from gcs_cli.clients.ftp_client import FtpClient
 from gcs_cli.clients.log_client import LogClient, LogEntry

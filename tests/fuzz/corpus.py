@@ -7,7 +7,7 @@ from collections.abc import Callable
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import load_vehicle
-from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
 from gcs_cli.link.session import Service, Session
 from tests.fuzz.clients import SERVICES
@@ -107,12 +107,12 @@ def simulator_scripts() -> list[bytes]:
 
 def bridge_scripts() -> list[bytes]:
     """Return scripts for the simulator's end."""
-    stack = SimulatorLink(load_vehicle("x_quad"), World().config.home, lockstep=True)
+    stack = SimulatorEndpoint(load_vehicle("x_quad"), World().config.home, lockstep=True)
     actuators = ActuatorsFrame()
     actuators.set_rotor_count(4)
     actuators.rotor_speed_rad_s[:4] = 200.0
-    frames = [stack.hello(4_000), *(bytes(actuators.seal(4_000 * n, 4)) for n in range(20))]
-    slow = [stack.second_hello(4_000), stack.failure_request(0, 1, 1)]
+    frames = [stack.initial_requests(4_000), *(bytes(actuators.seal(4_000 * n, 4)) for n in range(20))]
+    slow = [stack.fallback_request(4_000), stack.failure_request(0, 1, 1)]
     return [of_frames(_cut(frames)), of_frames(_cut(slow)), *every_message()]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flightstack.mavlink.frame_finder import FrameFinder
+from flightstack.mavlink.frames import FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.services.routing.peer import PeerAddress
 from tests.support.world import World

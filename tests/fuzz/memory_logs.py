@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flightstack.mavlink.virtual_files import BytesFile, VirtualFile
+from flightstack.mavlink.files import BytesFile, VirtualFile
 from flightstack.services.logs.log_store import LogInfo
 
 

@@ -20,7 +20,7 @@ from flightstack.params.config import DEFAULT_HOME
 from flightstack.params.vehicle import load_vehicle
 from flightstack.services.routing.hub import MAX_TO_FORWARD
 from flightstack.services.routing.peer import PeerAddress
-from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from gcs_cli.link.session import Session
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.plant.plant import PlantOptions
@@ -112,7 +112,7 @@ def answers(world: World, link: Link) -> set[str]:
 
 def simulator(script: bytes) -> int:
     """The vehicle's end of the simulator link."""
-    stack = SimulatorLink(VEHICLE, DEFAULT_HOME, lockstep=True)
+    stack = SimulatorEndpoint(VEHICLE, DEFAULT_HOME, lockstep=True)
     commands, arrivals = np.full(8, 100.0), 0
     for step in steps(script):
         for piece in step.pieces:

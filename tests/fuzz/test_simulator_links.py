@@ -9,7 +9,7 @@ from flightstack.mavlink.frames import LARGEST_FRAME
 from flightstack.mavlink.link import Link
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.params.vehicle import load_vehicle
-from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.plant.plant import PlantOptions
@@ -50,7 +50,7 @@ def plant_state(time_us: int, north_m: float) -> bytes:
 
 
 def test_the_vehicle_s_end_takes_anything_and_then_an_exact_state() -> None:
-    stack = SimulatorLink(VEHICLE, DEFAULT_HOME, lockstep=True)
+    stack = SimulatorEndpoint(VEHICLE, DEFAULT_HOME, lockstep=True)
     state, before = stack.state, held(stack)
     commands = np.full(8, 100.0)
     for piece in arrivals(61, MESSAGES):
@@ -111,7 +111,7 @@ def test_the_simulator_s_end_takes_anything_and_then_a_request_and_actuators() -
 
 
 def test_the_work_is_bounded_by_the_size_of_what_arrives() -> None:
-    stack, end = SimulatorLink(VEHICLE, DEFAULT_HOME, lockstep=True), simulator_end()
+    stack, end = SimulatorEndpoint(VEHICLE, DEFAULT_HOME, lockstep=True), simulator_end()
     for data in LONG:
         assert calls(lambda data=data: stack.receive(memoryview(data))) < 20 * len(data)
         assert calls(lambda data=data: end.receive(memoryview(data))) < 20 * len(data)

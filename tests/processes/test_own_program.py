@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import flightstack
-from flightstack.process.own_program import own_program
+from flightstack.process.command_line import own_program
 
 
 @pytest.mark.parametrize("inside", [False, True], ids=["elsewhere", "in the checkout"])

@@ -15,7 +15,7 @@ import imageio_ffmpeg
 import pytest
 from PIL import Image
 
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.flight_log.poses_file import write_poses
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from flightstack.core.errors import ConfigError
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.plan import MissionItem, load_plan
 from flightstack.process.state_directory import StateDirectory
 from flightstack.transports.udp import UdpSocket

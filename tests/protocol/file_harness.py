@@ -6,9 +6,8 @@ import random
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
-from flightstack.mavlink.addressing import Address
-from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.virtual_files import BytesFile
+from flightstack.mavlink.files import BytesFile
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.services.logs.log_store import LogInfo
 from flightstack.transports.memory import LOSSLESS, Conditions, LossyLink
 

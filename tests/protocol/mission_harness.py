@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from flightstack.mavlink.addressing import Address
-from flightstack.mavlink.link import Link
+from flightstack.mavlink.link import Address, Link
 from flightstack.plan import Command, Frame, MissionItem, MissionType, check_fence, check_mission, check_rally
 from flightstack.services.mission.mission_server import MissionServer
 from flightstack.services.mission.mission_store import MissionEvent

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flightstack.mavlink.addressing import Address
-from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore
 from flightstack.services.params.param_server import ParamServer

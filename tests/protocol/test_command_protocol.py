@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.services.commands.command_server import Command, CommandServer
 from flightstack.transports.memory import LossyLink
 from gcs_cli.clients.command_client import CommandClient, CommandResult

@@ -5,12 +5,10 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.files import BytesFile, Entry, FileTree, PartialFile, fixed
 from flightstack.mavlink.ftp_messages import Opcode, Packet, ftp_message, read_packet
-from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.missing import Missing
-from flightstack.mavlink.virtual_files import BytesFile, Entry, FileTree, fixed
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.services.files.ftp_server import MAX_CLIENTS, FtpServer
 from flightstack.services.files.ftp_sessions import MAX_SESSIONS
 from flightstack.services.logs.log_server import MAX_RANGES, LogServer
@@ -205,7 +203,7 @@ def test_the_log_client_takes_whatever_a_vehicle_sends(
 
 @given(st.integers(0, 300), st.lists(st.tuples(st.integers(0, 400), st.binary(max_size=60)), max_size=30))
 def test_gaps_are_counted_as_a_table_of_bytes_counts_them(size: int, pieces: list[tuple[int, bytes]]) -> None:
-    missing, has = Missing(size), bytearray(size)
+    missing, has = PartialFile(size), bytearray(size)
     for offset, data in pieces:
         came = [n for n in range(offset, min(offset + len(data), size)) if not has[n]]
         assert missing.fill(offset, data) == len(came)

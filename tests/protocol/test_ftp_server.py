@@ -7,11 +7,10 @@ import zlib
 import pytest
 from pymavlink.mavftp_op import FTP_OP
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.files import BytesFile, Entry, FileTree, fixed
 from flightstack.mavlink.ftp_messages import FtpError, Opcode, Packet, ftp_message, mavlink_crc32, read_packet
-from flightstack.mavlink.link import Link
-from flightstack.mavlink.virtual_files import BytesFile, Entry, FileTree, fixed
+from flightstack.mavlink.link import Address, Link
 from flightstack.services.files.ftp_server import MAX_CLIENTS, FtpServer
 from tests.protocol.file_harness import GCS, VEHICLE, content
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.files import Entry, FileTree, fixed
 from flightstack.mavlink.ftp_messages import FtpError
-from flightstack.mavlink.virtual_files import Entry, FileTree, fixed
+from flightstack.mavlink.link import Address
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_store import DatedLogs, FlatLogs
 from flightstack.transports.memory import LOSSLESS, Conditions

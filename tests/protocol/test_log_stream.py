@@ -8,10 +8,9 @@ from io import BytesIO
 import pytest
 from pyulog import ULog
 
-from flightstack.flight_log.log_tail import FileTail
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link
+from flightstack.mavlink.link import Address, Link
+from flightstack.process.log_files import FileTail
 from flightstack.services.logs.log_stream import CHUNK, GIVE_UP_S, NO_MESSAGE_BEGINS, LogStream
 from tests.support.world import World
 

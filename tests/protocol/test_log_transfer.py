@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message
 from flightstack.services.logs.log_server import LogServer
 from flightstack.transports.memory import LOSSLESS, Conditions
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed

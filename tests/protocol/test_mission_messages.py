@@ -9,9 +9,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.mavlink.mission_messages import mission_id
 from flightstack.plan import Command, Frame, MissionItem, MissionResult, MissionType
 from flightstack.plan import vocabulary as words

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.mavlink.mission_messages import message_from_item, mission_id
 from flightstack.plan import MissionItem, MissionResult, MissionType
 from flightstack.services.mission.mission_server import MissionServer

@@ -13,10 +13,9 @@ import pytest
 from flightstack.control.attitude_backstepping import CONTROLLER as BACKSTEPPING
 from flightstack.control.attitude_pid import CONTROLLER as PID
 from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
+from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.firmware.build import host_library
-from flightstack.firmware.c_loops import CLoops, LoopsSetup
-from flightstack.firmware.errors import TargetError, WrongFirmwareError
-from flightstack.firmware.host_library import HostLoops
+from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import FAREWELL_ATTEMPTS, TargetLoops
 from flightstack.firmware.targets import finish_loops
@@ -55,8 +54,8 @@ def device() -> Iterator[Target]:
 
 def connected(line: LossyLine, controller=PID, **options: object) -> CLoops:
     of = setup(controller)
-    computer = TargetLoops(line, of.numbers(), clock_s=line.clock, expected_hash=HASH, **options)  # type: ignore[arg-type]
-    return CLoops("serial:test", computer, of)
+    executor = TargetLoops(line, of.numbers(), clock_s=line.clock, expected_hash=HASH, **options)  # type: ignore[arg-type]
+    return CLoops("serial:test", executor, of)
 
 
 def sil(controller=PID) -> CLoops:
@@ -108,11 +107,11 @@ def test_whatever_the_line_does_the_target_computes_what_c_does_here(device, nam
     assert np.array_equal(drive(loops, 1000), drive(sil(controller), 1000))
     loops.close()
     assert line.is_closed
-    computer = loops.computer
-    assert isinstance(computer, TargetLoops)
-    counters, steps = computer.counters, computer.record.steps
+    executor = loops.executor
+    assert isinstance(executor, TargetLoops)
+    counters, steps = executor.counters, executor.record.steps
     assert steps["step"].tolist() == list(range(1000))  # none skipped, none twice
-    status = computer.record.status
+    status = executor.record.status
     assert status is not None
     assert status["steps"] == 1000
     assert (counters.resent > 0) == (name not in ("fair", "doubles pieces"))
@@ -137,9 +136,9 @@ def test_the_same_seed_gives_the_same_link(device) -> None:
         target = Target()
         loops = connected(LossyLine(target, WEATHERS["does everything"], seed=5))
         drive(loops, 300)
-        computer = loops.computer
-        assert isinstance(computer, TargetLoops)
-        counted.append(computer.counters)
+        executor = loops.executor
+        assert isinstance(executor, TargetLoops)
+        counted.append(executor.counters)
         target.close()
     assert counted[0] == counted[1]
     assert counted[0].resent > 0
@@ -161,8 +160,8 @@ def test_any_vehicle_takes_the_place_of_the_one_built_in(device, name) -> None:
     """Of whose numbers some are -0: they are 0 afterwards."""
     numbers = setup()._replace(vehicle=load_vehicle(name)).numbers()
     line = LossyLine(device)
-    computer = TargetLoops(line, numbers, clock_s=line.clock, expected_hash=HASH)
-    assert computer.get("FS_MASS") == np.float32(numbers["FS_MASS"])
+    executor = TargetLoops(line, numbers, clock_s=line.clock, expected_hash=HASH)
+    assert executor.get("FS_MASS") == np.float32(numbers["FS_MASS"])
 
 
 def test_a_line_that_is_cut_ends_the_flight_with_a_sentence(device) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack.core.modes import CUSTOM_MODE, Mode
+from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.process.reboot import carry_over
+from flightstack.process.assembly import transfer_state
 from tests.support.world import World
 
 DENIED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
@@ -81,7 +81,7 @@ def test_a_reboot_does_not_find_a_lost_ground_station_again() -> None:
     lost.until(lambda: lost.stack.parts.failsafes.links.gcs_lost, 8.0)
     world = World(vehicle="x_quad", params=["NAV_DLL_ACT=2", "COM_DL_LOSS_T=5"])
     world.sends_heartbeats = False
-    carry_over(lost.stack, world.stack)
+    transfer_state(lost.stack, world.stack)
     assert world.arm() == DENIED
     world.run(0.1)
     assert any("ground station" in text for text in world.texts), world.texts

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import pytest
 
 from flightstack.core.contract import Vector3
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
 from gcs_cli.clients.mission_client import Failed

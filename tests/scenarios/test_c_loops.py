@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import LoopFlags, LoopRow, LoopStatus
-from flightstack.core.errors import ConfigError
+from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.build import host_library
-from flightstack.firmware.c_loops import CLoops
-from flightstack.firmware.errors import TargetError
-from flightstack.firmware.host_library import HostLoops
+from flightstack.firmware.c_loops import CLoops, HostLoops
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import StackConfig
 from flightstack.process.assembly import build
@@ -97,14 +95,14 @@ def test_parameters_reach_c_in_flight() -> None:
 def test_c_with_double_computes_what_python_does_over_a_whole_mission() -> None:
     """The backend's own code is in between: inputs, flags, rows."""
     flight = record("square.plan")
-    computer = HostLoops(host_library("double"), flight.numbers)
+    executor = HostLoops(host_library("double"), flight.numbers)
     largest = 0.0
     for row in range(len(flight.flags)):
-        computer.input[:13], computer.input[13:24] = flight.states[row], flight.setpoints[row]
-        computer.input[24:] = flight.targets[row]
-        computer.step(int(flight.flags[row]))
-        assert computer.output[31] == flight.status[row]
-        largest = max(largest, float(np.abs(computer.output[:31] - flight.outputs[row]).max()))
+        executor.input[:13], executor.input[13:24] = flight.states[row], flight.setpoints[row]
+        executor.input[24:] = flight.targets[row]
+        executor.step(int(flight.flags[row]))
+        assert executor.output[31] == flight.status[row]
+        largest = max(largest, float(np.abs(executor.output[:31] - flight.outputs[row]).max()))
     assert len(flight.flags) > 10_000
     assert largest < 1e-7  # rotor commands of some hundred rad/s
 
@@ -139,9 +137,9 @@ def test_a_number_that_c_refuses_is_named() -> None:
     setup_of = build(StackConfig(loops="c"), lambda: None)
     assert isinstance(setup_of.loops, CLoops)
     with pytest.raises(ValueError, match="FS_MASS=-1 is out of range"):
-        setup_of.loops.computer.set("FS_MASS", -1.0)
+        setup_of.loops.executor.set("FS_MASS", -1.0)
     with pytest.raises(KeyError):
-        setup_of.loops.computer.set("NOT_THERE", 1.0)
+        setup_of.loops.executor.set("NOT_THERE", 1.0)
 
 
 @pytest.mark.parametrize(
@@ -245,10 +243,10 @@ def test_a_flight_on_a_target_behind_a_bad_line_is_the_flight_in_c(on_a_bad_line
         logs.append(ULog(str(log)))
         if loops == "host":
             (line,) = on_a_bad_line
-            computer = world.stack.loops.computer
+            executor = world.stack.loops.executor
             world.stack.loops.close()
             assert line.is_closed
-            assert computer.record.status["repeats"] > 10
+            assert executor.record.status["repeats"] > 10
     for there, here in zip(*(log.data_list for log in logs), strict=True):
         assert there.name == here.name
         for name in here.data:

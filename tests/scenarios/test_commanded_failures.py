@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.services.commands.failure_commands import LONGEST_WAIT_S
 from tests.support.world import World

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from sim_bridge.plant.disturbance import Disturbance
 from sim_bridge.plant.plant import PlantOptions

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.plan import MissionType
 from gcs_cli.clients.mission_client import Done
 from tests.support.failsafe_phases import HEIGHT

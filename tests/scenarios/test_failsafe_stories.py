@@ -10,7 +10,7 @@ import pytest
 from pyulog import ULog
 
 from flightstack.commander.failsafe import Action, Failsafe
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from tests.support.failsafe_faults import blow_away, breach_fence
 from tests.support.failsafe_phases import QUICK, hold, landing, mission

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flightstack.commander.failsafe import Action, Failsafe
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.plan import MissionType
 from gcs_cli.clients.mission_client import Done
 from tests.support.failsafe_faults import blow_away, inject, tip_over

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flightstack.commander.failsafe import Failsafe, Phase
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from tests.support.failsafe_faults import (
     begin_setpoints,
     begin_sticks,

@@ -7,8 +7,8 @@ import math
 import pytest
 
 from flightstack.core.contract import Vector3
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.params.config import DEFAULT_HOME

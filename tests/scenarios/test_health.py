@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from tests.support.world import World

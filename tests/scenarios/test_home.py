@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import Vector3
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import MissionItem

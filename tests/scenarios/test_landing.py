@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.vehicle import load_vehicle
 from tests.support.streams import attitude, level, local_point, select, sticks, stream

@@ -7,9 +7,8 @@ import random
 import pytest
 
 from flightstack.core.port_numbers import GROUND
-from flightstack.mavlink.addressing import Address
-from flightstack.mavlink.link import Link
-from flightstack.mavlink.virtual_files import FileTree
+from flightstack.mavlink.files import FileTree
+from flightstack.mavlink.link import Address, Link
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_server import LogServer
 from flightstack.services.logs.log_store import FlatLogs

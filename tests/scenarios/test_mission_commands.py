@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from tests.support.world import World, item
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.plan import load_plan
 from gcs_cli.clients.mission_client import Done
 from gcs_cli.report.analysis import read_flight

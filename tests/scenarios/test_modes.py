@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.clients.mission_client import Failed
 from tests.support.world import World, item

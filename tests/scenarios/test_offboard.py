@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from tests.support.streams import attitude, body_rates, hover_thrust, level, local_point, select, stream
 from tests.support.world import World

@@ -11,7 +11,7 @@ import pytest
 from pyulog import ULog
 
 from flightstack.core.contract import LoopRow
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from tests.support.world import World, item
 

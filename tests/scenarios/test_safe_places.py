@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.plan import MissionType
 from gcs_cli.clients.mission_client import Done, Failed
 from tests.support.fences import circle, polygon, rally_point, square

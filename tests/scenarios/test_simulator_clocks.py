@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.mavlink.link import Link
 from flightstack.simulator_link.hot_frames import PlantStateFrame
 from sim_bridge.server.hil import HilControls, hil_state
@@ -193,7 +193,7 @@ def test_one_step_back_is_told_and_flown_on() -> None:
     world.stamp = lambda t: t - reset_us
     world.run(2.0)
     assert world.told("Simulator time went back by")
-    assert world.stack.simulator.odd_times == 1
+    assert world.stack.simulator.time_jumps == 1
     assert world.land() == 0
     world.until_disarmed(60.0)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.guidance.fence import Fence
 from flightstack.mavlink.dialect import mavlink
 from tests.support.failsafe_phases import select_mode, setpoint

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from flightstack.commander.failsafe import Phase
 from flightstack.core.contract import Vector3
+from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.core.geodesy import LocalFrame
-from flightstack.core.modes import CUSTOM_MODE, Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from tests.support.streams import sticks

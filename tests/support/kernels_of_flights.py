@@ -6,7 +6,7 @@ import gc
 
 from numba.core.dispatcher import Dispatcher
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from tests.support.streams import attitude, hover_thrust, level, local_point, select, sticks, stream
 from tests.support.world import World
 

@@ -8,9 +8,9 @@ import struct
 from dataclasses import dataclass, field
 from typing import Any
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.virtual_files import FileTree, fixed
+from flightstack.mavlink.files import FileTree, fixed
+from flightstack.mavlink.link import Address
 from flightstack.services.files.ftp_server import FtpServer
 from tests.support.fake_vehicle import ACCEPTED, FakeVehicle
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.guidance.land_detector import LandMemory
 from flightstack.guidance.mission import PLAN_ITEM
 from flightstack.guidance.navigator import Navigator

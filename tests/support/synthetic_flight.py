@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from flightstack.core.contract import LoopRow
+from flightstack.core.enums import NAVIGATION_STATE, Mode
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.modes import NAVIGATION_STATE, Mode
-from flightstack.flight_log.event_topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED
 from flightstack.flight_log.flight_log import FlightLog
-from flightstack.flight_log.topics import OUTER
+from flightstack.flight_log.topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED, OUTER
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 CORNERS_NED_M = [(10.0, 0.0, -3.0), (10.0, 10.0, -4.0), (0.0, 10.0, -5.0), (0.0, 0.0, -3.0)]

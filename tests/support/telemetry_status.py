@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from flightstack.commander.failsafe import Action
 from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.contract import LoopRow
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.mavlink.dialect import FsLoopTiming
 from flightstack.mavlink.link import Message

@@ -20,14 +20,13 @@ import numpy as np
 
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import Vector3
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.core.port_numbers import GROUND
 from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import FlightLog
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.params.config import DEFAULT_HOME, StackConfig
 from flightstack.plan import MissionItem, MissionType, load_plan
 from flightstack.process.assembly import Stack, build

@@ -7,9 +7,9 @@ import lzma
 import re
 
 from flightstack import __version__
+from flightstack.mavlink.files import FileTree
 from flightstack.mavlink.ftp_messages import mavlink_crc32
 from flightstack.mavlink.link import Link
-from flightstack.mavlink.virtual_files import FileTree
 from flightstack.services.files.component_metadata import ComponentMetadata, vehicle_files
 from flightstack.services.logs.log_store import NoLogs
 

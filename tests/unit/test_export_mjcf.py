@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import Vector3
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG
 from gcs_cli.errors import CliError

@@ -30,7 +30,7 @@ from flightstack.commander.failsafe import Failsafe
 from flightstack.commander.fault_detector import FaultDetector
 from flightstack.commander.transitions import TERMINATED, Need
 from flightstack.core.contract import LoopRow, LoopStatus
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.params.behaviour import Behaviour, with_assignments
 from flightstack.params.vehicle import load_vehicle
 from flightstack.services.streams.link_loss import SilenceTimer

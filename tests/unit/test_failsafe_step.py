@@ -12,7 +12,7 @@ from flightstack.commander.failsafe_step import (
     failsafe_step,
     override,
 )
-from flightstack.core.severity import Severity
+from flightstack.core.enums import Severity
 from flightstack.params.behaviour import Behaviour, with_assignments
 
 

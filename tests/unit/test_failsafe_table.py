@@ -22,7 +22,7 @@ from flightstack.commander.failsafe import (
     decide,
     phase_of,
 )
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.params.behaviour import FIELDS, SPECS, Behaviour
 
 DEFAULTS = Behaviour()

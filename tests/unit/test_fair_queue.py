@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flightstack.transports.fair_queue import MAX_STRANGERS, MAX_WAITING_OCTETS, FairQueue
+from flightstack.transports.vehicle_ports import MAX_QUEUED_BYTES, MAX_UNKNOWN_PEERS, FairQueue
 
 
 def nobody(_: str) -> bool:
@@ -42,14 +42,14 @@ def test_empty_pieces_do_not_come_for_free() -> None:
     assert len(list(queue.take(4096))) < 400
 
 
-def test_what_waits_is_bounded_for_each_and_for_all_strangers() -> None:
+def test_what_waits_is_bounded_for_each_and_for_all_unknown_peers() -> None:
     queue: FairQueue[str] = FairQueue()
     for _ in range(100):
         queue.push("flood", bytes(2048), nobody)
-    assert queue.dropped == 100 - MAX_WAITING_OCTETS // 2048
+    assert queue.dropped == 100 - MAX_QUEUED_BYTES // 2048
     for number in range(1000):
         queue.push(f"stranger {number}", b"hello", nobody)
-    assert len(queue) == MAX_STRANGERS
+    assert len(queue) == MAX_UNKNOWN_PEERS
     assert not queue.push("one more", b"hello", nobody)
     assert queue.push("station", b"hello", lambda key: key == "station")
 

@@ -145,7 +145,7 @@ def test_ways_out_are_those_that_a_dense_walk_finds(
     walk = np.linspace(begin, end, 400).astype(np.float64)
     fence = Fence(combined)
     clear_m = [min(fence.margins(*place)) for place in walk]
-    found = combined.ways_out(walk[:1], walk[-1:])
+    found = combined.segments_outside(walk[:1], walk[-1:])
     if min(clear_m) < -1e-6:
         assert [index for index, _ in found] == [0]
     elif min(clear_m) > math.dist(begin, end) / 399:  # between two steps nothing can hide

@@ -12,10 +12,7 @@ LIGHT = (
     "flightstack.process.command_line",
     "flightstack.process.console",
     "flightstack.process.options",
-    "flightstack.process.own_program",
-    "flightstack.process.picture_options",
     "flightstack.core.port_numbers",
-    "flightstack.process.simulation_options",
 )
 """Of the flight stack's modules only those that print, or hold words and numbers for the help."""
 

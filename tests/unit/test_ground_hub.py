@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode, Severity
 from flightstack.core.port_numbers import GROUND
-from flightstack.core.severity import Severity
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.link import Link

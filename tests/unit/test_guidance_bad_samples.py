@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import Vector3
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.guidance.setpoints import AttitudeSetpoint, PointSetpoint
 from tests.support.perfect_vehicle import WEIGHT_N, PerfectVehicle
 

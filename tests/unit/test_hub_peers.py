@@ -7,13 +7,12 @@ import random
 
 import pytest
 
+from flightstack.core.enums import Severity
 from flightstack.core.port_numbers import GROUND
-from flightstack.core.severity import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import SILENT_AFTER_S, Link
 from flightstack.params.config import StackConfig
-from flightstack.process.assembly import build
-from flightstack.process.reboot import carry_over
+from flightstack.process.assembly import build, transfer_state
 from flightstack.services.routing.hub import FORWARDED_A_POLL, KEPT_TEXTS, MAX_PEERS, PEER_FORGOTTEN_S
 from flightstack.services.routing.peer import PeerAddress
 from tests.support.hub_net import ALICE, BOB, Net
@@ -243,5 +242,5 @@ def test_who_is_forgotten_or_has_gone_was_heard_nevertheless(net: Net) -> None:
 def test_a_reboot_does_not_forget_when_somebody_was_heard() -> None:
     old, new = (build(StackConfig(), lambda: None) for _ in range(2))
     old.ground.last_heard_s = 12.0
-    carry_over(old, new)
+    transfer_state(old, new)
     assert new.ground.last_heard_s == 12.0

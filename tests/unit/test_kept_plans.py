@@ -23,7 +23,7 @@ from flightstack.plan import MissionItem, MissionType, load_plan
 from flightstack.plan.item import UNSET_E7
 from flightstack.plan.kept_plans import KeptPlans, plans_from_text, plans_to_text
 from flightstack.process.assembly import Stack, build
-from flightstack.process.plan_file import PlanFile
+from flightstack.process.state_directory import PlanFile
 from flightstack.services.routing.peer import PeerAddress
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from flightstack.transports.processor import Follower, Roamer
+from flightstack.transports.cpu_affinity import AffinityFollower, AffinityLeader
 from flightstack.transports.tcp import LinkClosedError, TcpClient
 
 PROCESSORS = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
@@ -72,16 +72,16 @@ def test_a_simulator_that_does_not_come_ends_the_wait() -> None:
 
 @needs_two
 def test_the_roamer_is_free_and_settled_in_turns(free_to_move: None) -> None:
-    roamer = Roamer()
-    free_for = roamer.step()
+    leader = AffinityLeader()
+    free_for = leader.step()
     assert os.sched_getaffinity(0) == PROCESSORS
-    settled_for = roamer.step()
+    settled_for = leader.step()
     assert len(os.sched_getaffinity(0)) == 1
     assert settled_for > 100 * free_for
-    roamer.step()
+    leader.step()
     assert os.sched_getaffinity(0) == PROCESSORS
-    roamer.step()
-    roamer.leave()
+    leader.step()
+    leader.leave()
     assert os.sched_getaffinity(0) == PROCESSORS
 
 
@@ -90,7 +90,7 @@ def test_the_follower_goes_where_the_peer_sends_from(
     free_to_move: None, link: tuple[TcpClient, socket.socket]
 ) -> None:
     client, peer = link
-    follower = Follower(client.socket)
+    follower = AffinityFollower(client.socket)
     for processor in sorted(PROCESSORS)[:2]:
         os.sched_setaffinity(0, {processor})
         peer.sendall(b"x")
@@ -105,7 +105,7 @@ def test_a_system_without_such_calls_is_left_alone(
 ) -> None:
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)
     monkeypatch.delattr(os, "sched_setaffinity", raising=False)
-    roamer = Roamer()
-    assert roamer.step() < roamer.step()
-    roamer.leave()
-    Follower(link[0].socket).follow()
+    leader = AffinityLeader()
+    assert leader.step() < leader.step()
+    leader.leave()
+    AffinityFollower(link[0].socket).follow()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flightstack.mavlink.virtual_files import Entry
+from flightstack.mavlink.files import Entry
 from flightstack.process import log_library
 from flightstack.process.log_files import LogFiles, default_log
 from flightstack.process.log_library import LogLibrary, create_log_file

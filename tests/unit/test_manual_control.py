@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.guidance.manual import shaped
 from flightstack.guidance.setpoints import Sticks
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Address
 from flightstack.services.streams.link_loss import StreamMonitor
 from flightstack.services.streams.manual_server import ManualServer, read_sticks
 from tests.support.perfect_vehicle import PerfectVehicle

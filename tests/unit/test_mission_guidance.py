@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.lib.recfunctions import structured_to_unstructured
 
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.core.modes import Mode
 from flightstack.guidance.mission import LOG_SIZE, plan_table
 from flightstack.plan import MissionItem
 from tests.support.perfect_vehicle import NAN, PerfectVehicle

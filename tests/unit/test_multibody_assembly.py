@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from flightstack.core.errors import ConfigError
-from flightstack.params.assembly import MATERIALS, Part
 from flightstack.params.vehicle import BUILT_IN, Vehicle, load_vehicle
+from flightstack.params.vehicle_parts import MATERIALS, Part
 from sim_bridge.multibody.assembly import TOLERANCE, assemble
 from sim_bridge.multibody.mass import about_point, solid
 from sim_bridge.multibody.mass_table import mass_table, tuned_masses

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from tests.support.perfect_vehicle import PerfectVehicle
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightstack.core.contract import Quaternion, Vector3
-from flightstack.core.modes import Mode
+from flightstack.core.enums import Mode
 from flightstack.guidance.setpoints import (
     NOT_GIVEN,
     AttitudeSetpoint,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import OffboardSetpoint, PointSetpoint
-from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.link import Address
 from flightstack.services.streams.link_loss import StreamMonitor
 from flightstack.services.streams.setpoint_messages import Here
 from flightstack.services.streams.setpoint_server import SetpointServer

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 from gcs_cli.charts.figure import AnyFigure, Figure
 from gcs_cli.experiments.paper.findings.printed_values import CORRECTIONS
 from gcs_cli.experiments.paper.flights import cases

@@ -28,7 +28,7 @@ from flightstack.params.param_file import (
 from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore
 from flightstack.process.assembly import build
-from flightstack.process.file_saver import FileSaver
+from flightstack.process.state_directory import FileSaver
 from tests.support.commands import flightstack_command
 from tests.support.world import PEER
 

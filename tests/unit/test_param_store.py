@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightstack.core.errors import ConfigError
+from flightstack.core.float32 import shortest
 from flightstack.params.behaviour import SPECS
-from flightstack.params.spec import ParamSpec, shortest
+from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore, apply_assignments
 
 GAIN = ParamSpec("GAIN", 1.0 / 3.0, 0.0, 0.7, "1/s", "A computed default, an end that float32 misses")

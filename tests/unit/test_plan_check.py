@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightstack.core.float32 import as_float32
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.behaviour import Behaviour
 from flightstack.plan import UNSET_E7, Command, Frame, Limits, MissionItem, MissionResult, check_mission
-from flightstack.plan.item import as_float32, integer_coordinate
+from flightstack.plan.item import integer_coordinate
 
 NAN = float("nan")
 INF = math.inf

@@ -17,8 +17,7 @@ from pymavlink.mavwp import MAVWPLoader
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import UNSET_E7, Command, Frame, MissionItem, Plan, check_mission, load_plan, save_plan
-from flightstack.plan.qgc_plan import read_plan
-from flightstack.plan.qgc_plan_writer import plan_to_json
+from flightstack.plan.qgc_plan import plan_to_json, read_plan
 from flightstack.plan.waypoints import plan_to_waypoints, read_waypoints
 
 NAN = float("nan")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from flightstack.core.extras import INSTALL_FIRMWARE, INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_FIRMWARE, INSTALL_MULTIBODY
 from gcs_cli.__main__ import main
 from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.fly.fly_flags import FlyOptions

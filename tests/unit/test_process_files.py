@@ -13,9 +13,9 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.params.config import StackConfig
+from flightstack.process.assembly import transfer_state
 from flightstack.process.process_config import ProcessConfig
 from flightstack.process.process_files import ProcessFiles
-from flightstack.process.reboot import carry_over
 from flightstack.process.signing_file import load_key
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.simulator_link.hot_frames import PlantStateFrame
@@ -41,7 +41,7 @@ def test_a_recorded_signed_reboot_is_a_replay_after_the_reboot(tmp_path: Path) -
     assert old.ground.vehicle.reboot_requested
     new = files.build(config)
     files.adopt(new, config)
-    carry_over(old, new)
+    transfer_state(old, new)
     new.ground.receive(PEER, recorded, 1.0)
     assert not new.ground.vehicle.reboot_requested
     new.ground.receive(PEER, station.encode(REBOOT), 1.0)
@@ -54,10 +54,10 @@ def test_vehicle_time_begins_anew_at_a_reboot(tmp_path: Path) -> None:
     for time_us in (1_000_000, 1_002_000, 1_004_000):
         old.simulator.receive(memoryview(bytes(frame.seal(time_us, 0))))
     old.autopilot.tick(old.simulator.time_us)
-    carry_over(old, new)
+    transfer_state(old, new)
     assert (new.simulator.time_us, new.now.time_us) == (0, 0)
     new.simulator.receive(memoryview(bytes(frame.seal(1_006_000, 0))))
-    assert (new.simulator.time_us, new.simulator.odd_times) == (2000, 0)
+    assert (new.simulator.time_us, new.simulator.time_jumps) == (2000, 0)
     assert new.simulator.freshness(2000) == (0, 0)
 
 

@@ -11,7 +11,7 @@ from flightstack.flight_log.flight_log import FlightLog
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.params.config import DEFAULT_HOME
-from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from tests.support.rotor_sets import ring
 
 TYPES = [(4, mavlink.MAV_TYPE_QUADROTOR), (6, mavlink.MAV_TYPE_HEXAROTOR), (8, mavlink.MAV_TYPE_OCTOROTOR)]
@@ -29,7 +29,7 @@ class KeptFile(BytesIO):
 
 @pytest.mark.parametrize(("rotors", "system_type"), TYPES)
 def test_the_simulator_link_announces_the_type(rotors: int, system_type: int) -> None:
-    link = SimulatorLink(ring(rotors), DEFAULT_HOME, lockstep=True)
+    link = SimulatorEndpoint(ring(rotors), DEFAULT_HOME, lockstep=True)
     (beat,) = Link(2, 1).decode(link.heartbeat(armed=False))
     assert beat.type == system_type
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link
+from flightstack.mavlink.link import Address, Link
 from flightstack.services.routing.router import MAX_ADDRESSES, MAX_REMEMBERED, Router
 
 OWN = Address(1, 1)

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from flightstack.core.errors import ConfigError
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Address
 from flightstack.mavlink.signing import KEEP_TICKS, NO_KEY, Signing, timestamp_of
 from flightstack.process.signing_file import (
     create_key,

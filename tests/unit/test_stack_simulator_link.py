@@ -15,7 +15,7 @@ from flightstack.mavlink.dialect import FS_PLANT_STATE_ID, FsPlantState, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.params.vehicle import load_vehicle
-from flightstack.simulator_link.endpoint import SimulatorLink
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 from flightstack.simulator_link.state_steps import is_gap
 
@@ -24,11 +24,11 @@ HOME = GeoPoint(47.397742, 8.545594, 488.0)
 STATE = [1.0, -2.0, -3.5, 0.1, 0.2, -0.3, 0.8, 0.6, 0.0, 0.0, 0.01, 0.02, 0.03]
 
 
-def link(lockstep: bool = True, vehicle=PAPER) -> SimulatorLink:
-    return SimulatorLink(vehicle, HOME, lockstep, system_id=3)
+def link(lockstep: bool = True, vehicle=PAPER) -> SimulatorEndpoint:
+    return SimulatorEndpoint(vehicle, HOME, lockstep, system_id=3)
 
 
-def booted() -> SimulatorLink:
+def booted() -> SimulatorEndpoint:
     """A link whose clock runs since a state of time 0."""
     stack = link()
     assert receive(stack, plant_state(0, [0.0] * 6 + STATE[6:]))
@@ -57,7 +57,7 @@ def heartbeat(status: int = mavlink.MAV_STATE_ACTIVE) -> bytes:
     return Link(1, 1).encode(mavlink.MAVLink_heartbeat_message(30, 8, 0, 0, status, 3))
 
 
-def receive(stack: SimulatorLink, data: bytes) -> bool:
+def receive(stack: SimulatorEndpoint, data: bytes) -> bool:
     return stack.receive(memoryview(data))
 
 
@@ -164,7 +164,7 @@ def test_a_state_that_takes_the_general_way_is_taken_too() -> None:
 
 
 def test_hello_says_who_we_are_and_asks_for_states() -> None:
-    messages = list(Link(1, 51).decode(link().hello(2000)))
+    messages = list(Link(1, 51).decode(link().initial_requests(2000)))
     assert messages[0].get_type() == "HEARTBEAT"
     assert messages[0].get_srcSystem() == 3
     asked = [(m.command, m.param1, m.param2) for m in messages[1:]]
@@ -178,7 +178,7 @@ def test_a_simulator_that_refuses_our_message_is_asked_for_the_standard_one() ->
     assert not stack.request_refused
     receive(stack, Link(1, 1).encode(mavlink.MAVLink_command_ack_message(request, 2)))
     assert stack.request_refused
-    (message,) = Link(1, 51).decode(stack.second_hello(4000))
+    (message,) = Link(1, 51).decode(stack.fallback_request(4000))
     assert (message.param1, message.param2) == (115.0, 4000.0)
 
 
@@ -197,7 +197,7 @@ def test_hil_state_becomes_the_state() -> None:
     assert stack.time_us == 4000
 
 
-def controls(stack: SimulatorLink, speeds, armed: bool = True):
+def controls(stack: SimulatorEndpoint, speeds, armed: bool = True):
     (message,) = Link(1, 51).decode(bytes(stack.answer(np.array(speeds, dtype=float), armed)))
     assert message.get_type() == "HIL_ACTUATOR_CONTROLS"
     return message
@@ -235,9 +235,9 @@ def test_each_state_is_answered_in_its_own_kind() -> None:
 def test_goodbye_is_heard_and_said() -> None:
     stack = link()
     receive(stack, heartbeat())
-    assert not stack.peer_said_goodbye
+    assert not stack.peer_is_shutting_down
     receive(stack, heartbeat(mavlink.MAV_STATE_POWEROFF))
-    assert stack.peer_said_goodbye
+    assert stack.peer_is_shutting_down
     (message,) = Link(1, 51).decode(stack.heartbeat(False, leaving=True))
     assert message.system_status == mavlink.MAV_STATE_POWEROFF
 
@@ -274,7 +274,7 @@ def test_a_battery_and_state_are_the_same_whichever_way_they_come() -> None:
         stack = booted()
         receive(stack, plant_state(2000))
         assert [receive(stack, piece) for piece in way][-1]
-        seen.append((stack.battery, stack.state.tolist(), stack.time_us, stack.odd_times))
+        seen.append((stack.battery, stack.state.tolist(), stack.time_us, stack.time_jumps))
     assert seen == [seen[0]] * len(ways)
     assert seen[0][0].time_us == seen[0][2] == 4000
 
@@ -323,7 +323,7 @@ def test_the_clock_neither_goes_back_nor_jumps(odd: int) -> None:
     receive(stack, plant_state(1_000_000))
     receive(stack, plant_state(1_002_000))
     receive(stack, plant_state(odd, [5.0, *STATE[1:]]))
-    assert (stack.time_us, stack.odd_times, stack.state[0]) == (2_000, 1, 5.0)
+    assert (stack.time_us, stack.time_jumps, stack.state[0]) == (2_000, 1, 5.0)
     assert answer.open(stack.answer(np.zeros(8), True))
     assert answer.time_us == odd
     receive(stack, plant_state((odd + 4000) % 2**64))
@@ -338,7 +338,7 @@ def test_the_clock_counts_from_the_first_state(first_us: int) -> None:
     stack = link()
     for after_us in (0, 2000, 4000):
         receive(stack, plant_state(first_us + after_us))
-        assert (stack.time_us, stack.odd_times) == (after_us, 0)
+        assert (stack.time_us, stack.time_jumps) == (after_us, 0)
 
 
 def test_a_first_time_that_was_nonsense_costs_one_step() -> None:
@@ -346,7 +346,7 @@ def test_a_first_time_that_was_nonsense_costs_one_step() -> None:
     receive(stack, plant_state(2**64 - 1))
     receive(stack, plant_state(2000))
     receive(stack, plant_state(4000))
-    assert (stack.time_us, stack.odd_times) == (2000, 1)
+    assert (stack.time_us, stack.time_jumps) == (2000, 1)
 
 
 def test_a_state_that_comes_again_is_no_new_one() -> None:
@@ -354,11 +354,11 @@ def test_a_state_that_comes_again_is_no_new_one() -> None:
     receive(stack, plant_state(10_000))
     assert stack.freshness(10_000) == (0, 0)
     assert receive(stack, plant_state(10_000, [9.0, *STATE[1:]]))  # it wants an answer
-    assert (stack.time_us, stack.odd_times) == (10_000, 0)
+    assert (stack.time_us, stack.time_jumps) == (10_000, 0)
     assert stack.freshness(20_000).age_us == 10_000
 
 
-def texts(stack: SimulatorLink) -> list[str]:
+def texts(stack: SimulatorEndpoint) -> list[str]:
     return [notice.text for notice in stack.steps.take_notices()]
 
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flightstack.core.enums import NAVIGATION_STATE, Mode
 from flightstack.core.errors import ConfigError
 from flightstack.core.geometry_bulk import euler_from_quaternions
-from flightstack.core.modes import NAVIGATION_STATE, Mode
 from flightstack.plan import Command, Frame, MissionItem, Plan
 from gcs_cli.errors import FAILED
 from gcs_cli.report.analysis import read_flight

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from flightstack.commander.failsafe import Action
 from flightstack.commander.fence_monitor import FenceBreaches
 from flightstack.core.contract import LoopRow
+from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.modes import CUSTOM_MODE, Mode
 from flightstack.guidance.fence import FenceBreach
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.fields import clean
+from flightstack.mavlink.files import FileTree, fixed
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.text import clean
-from flightstack.mavlink.virtual_files import FileTree, fixed
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.transports.udp import Address
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone

@@ -16,7 +16,7 @@ from flightstack.commander.transitions import (
     is_met,
     transition,
 )
-from flightstack.core.modes import CUSTOM_MODE, MODE_OF_CUSTOM, NAVIGATION_STATE, Mode
+from flightstack.core.enums import CUSTOM_MODE, MODE_OF_CUSTOM, NAVIGATION_STATE, Mode
 
 ALL_FACTS = [Facts(*values) for values in itertools.product((False, True), repeat=len(Facts._fields))]
 ALL_STATUSES = [Status(armed, mode) for armed in (False, True) for mode in Mode]

@@ -17,10 +17,9 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.core.geometry import euler_from_quaternion
 from flightstack.core.geometry_bulk import euler_from_quaternions, heading_from_quaternions
 from flightstack.flight_log import ulog
-from flightstack.flight_log.event_topics import EVENT_TOPICS
 from flightstack.flight_log.flight_log import FlightLog, vehicle_fields
 from flightstack.flight_log.row_block import RowBlock
-from flightstack.flight_log.topics import OUTER, OUTER_TOPICS, inner_topics
+from flightstack.flight_log.topics import EVENT_TOPICS, OUTER, OUTER_TOPICS, inner_topics
 from flightstack.params.vehicle import load_vehicle
 from tests.support.synthetic_flight import HOME, INFO, PARAMETERS, KeptBytes, synthetic_flight_bytes
 

@@ -3,7 +3,7 @@
  * It is host memory that the emulator maps at FS_MAILBOX_ADDRESS, so an exchange costs no copy through the
  * emulator's interface: the host fills `received`, sets `received_length` and `now_ms`, runs the target from
  * fs_emulated_exchange to fs_emulated_stop, and finds the answer in `sent`.
- * flightstack/firmware/emulated.py lays out the same fields.
+ * flightstack/firmware/emulator.py lays out the same fields.
  */
 #ifndef FS_MAILBOX_H
 #define FS_MAILBOX_H

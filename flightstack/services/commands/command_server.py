@@ -9,9 +9,8 @@ import math
 from collections.abc import Collection, Hashable
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address, is_for, sender
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.plan.item import is_unset
 
 _REPETITION_S = 4.0  # ground stations repeat after 0.5 s (MAVSDK) to 3 s (QGroundControl)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
-from flightstack.core.severity import Severity
-from flightstack.mavlink.addressing import Address
+from flightstack.core.enums import Severity
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message
 from flightstack.services.commands import HANDLERS, VehicleContext, execute
 from flightstack.services.commands.command_server import Command, CommandServer
 from flightstack.services.commands.context import ACCEPTED, UNSUPPORTED, Answer

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from flightstack.commander.transitions import Event, Need
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.modes import Mode
 from flightstack.core.portable_math import distance
 from flightstack.guidance.safe_places import plan_limits
 from flightstack.mavlink.dialect import mavlink

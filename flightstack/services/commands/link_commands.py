@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable
 
-from flightstack.mavlink.addressing import Address, is_for
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for
 from flightstack.services.commands.command_server import Command
 from flightstack.services.commands.context import ACCEPTED, DENIED, REJECTED, UNSUPPORTED, Answer
 from flightstack.services.files.component_metadata import ComponentMetadata

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from flightstack.commander.transitions import Event
-from flightstack.core.modes import MODE_OF_CUSTOM, Mode
+from flightstack.core.enums import MODE_OF_CUSTOM, Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.services.commands.command_server import Command
 from flightstack.services.commands.context import DENIED, Answer, Handler, VehicleContext, answer_to

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from flightstack.commander.transitions import Need
+from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.severity import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.services.commands.command_server import Command
 from flightstack.services.commands.context import (

@@ -10,9 +10,9 @@ import lzma
 from collections.abc import Callable
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.files import Content, FileTree, fixed
 from flightstack.mavlink.ftp_messages import mavlink_crc32
 from flightstack.mavlink.link import Message
-from flightstack.mavlink.virtual_files import Content, FileTree, fixed
 from flightstack.services.logs.log_store import DatedLogs, FlatLogs, LogStore
 
 FOLDER = "etc/extras"

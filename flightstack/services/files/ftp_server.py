@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Hashable
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address, is_for, sender
+from flightstack.mavlink.files import Entry, VirtualFile, VirtualFiles
 from flightstack.mavlink.ftp_messages import (
     MAX_DATA,
     MAX_OFFSET,
@@ -22,8 +22,7 @@ from flightstack.mavlink.ftp_messages import (
     next_sequence,
     read_packet,
 )
-from flightstack.mavlink.link import Message
-from flightstack.mavlink.virtual_files import Entry, VirtualFile, VirtualFiles
+from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.services.files.ftp_sessions import (
     Checksum,
     FtpRefusal,

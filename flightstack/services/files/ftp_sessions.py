@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from flightstack.mavlink.addressing import Address
+from flightstack.mavlink.files import VirtualFile
 from flightstack.mavlink.ftp_messages import (
     MAX_DATA,
     UINT32,
@@ -14,7 +14,7 @@ from flightstack.mavlink.ftp_messages import (
     mavlink_crc32,
     next_sequence,
 )
-from flightstack.mavlink.virtual_files import VirtualFile
+from flightstack.mavlink.link import Address
 
 MAX_SESSIONS = 4
 ABANDONED_S = 1.0

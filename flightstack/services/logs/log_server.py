@@ -11,11 +11,10 @@ from collections import deque
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 
-from flightstack.mavlink.addressing import Address, is_for, sender
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.files import VirtualFile
+from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.mavlink.log_messages import BLOCK, log_data_message
-from flightstack.mavlink.virtual_files import VirtualFile
 from flightstack.services.logs.log_store import LogInfo, LogStore
 from flightstack.services.rate_limit import RateLimit, always_has_room, in_turn
 

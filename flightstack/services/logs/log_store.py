@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple, Protocol
 
-from flightstack.mavlink.virtual_files import Entry, VirtualFile, clean_path
+from flightstack.mavlink.files import Entry, VirtualFile, clean_path
 
 
 class LogInfo(NamedTuple):

@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from typing import Protocol
 
-from flightstack.mavlink.addressing import Address, is_for, sender
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.services.rate_limit import RateLimit, always_has_room
 
 CHUNK = 249

@@ -9,10 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Mapping
 
-from flightstack.core.severity import Severity
-from flightstack.mavlink.addressing import Address, is_for, sender
+from flightstack.core.enums import Severity
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.mavlink.mission_messages import CHANGES_ALTITUDE, GOES_THERE, ack_message
 from flightstack.plan.vocabulary import MissionResult, MissionType
 from flightstack.services.commands import VehicleContext

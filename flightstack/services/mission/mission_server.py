@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterable, Mapping
 
-from flightstack.mavlink.addressing import Address, is_for, sender
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.mavlink.mission_messages import DEFAULT_TIMING, GOES_THERE, PROTOCOL, Timing, ack_message
 from flightstack.plan.rejection import Rejection
 from flightstack.plan.vocabulary import PLAN_NAMES, MissionResult, MissionType

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 
-from flightstack.core.severity import Severity
-from flightstack.mavlink.addressing import Address
-from flightstack.mavlink.link import Message
+from flightstack.core.enums import Severity
+from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.mission_messages import PROTOCOL
 from flightstack.plan import PLAN_NAMES, MissionType
 from flightstack.plan.kept_plans import KeptPlans

@@ -11,9 +11,8 @@ from collections import deque
 from collections.abc import Callable, Hashable
 from typing import NamedTuple
 
-from flightstack.mavlink.addressing import Address, is_for, sender
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.mavlink.param_values import (
     HASH_NAME,
     LARGEST_INTEGER,

@@ -11,10 +11,9 @@ from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Set
 
 from flightstack.core.port_numbers import API, TCP
-from flightstack.mavlink.addressing import Address
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.frames import FrameReader
-from flightstack.mavlink.link import Link, Message, is_unknown
+from flightstack.mavlink.link import Address, Link, Message, is_unknown
 from flightstack.mavlink.signing import Signing
 from flightstack.plan.kept_plans import KeptPlans
 from flightstack.services.commands import VehicleContext

@@ -12,9 +12,8 @@ from collections import OrderedDict
 from collections.abc import Hashable
 from typing import Generic, NamedTuple, TypeVar
 
-from flightstack.mavlink.addressing import Address, sender
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message, is_unknown
+from flightstack.mavlink.link import Address, Message, is_unknown, sender
 
 MAX_ADDRESSES = 32
 """Systems and components remembered of one peer; the one heard first gives way."""

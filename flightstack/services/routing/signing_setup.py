@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
+from flightstack.core.enums import Severity
 from flightstack.core.port_numbers import API, GROUND, is_loopback
-from flightstack.core.severity import Severity
-from flightstack.mavlink.addressing import Address, is_for
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for
 from flightstack.mavlink.signing import NO_KEY, LinkSigning, Signing
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.vehicle.assembly import VehicleParts

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 
 from flightstack.guidance.setpoints import Sticks
-from flightstack.mavlink.addressing import Address
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message
 from flightstack.services.streams.link_loss import StreamMonitor
 
 _NOT_SUPPLIED = 0x7FFF

@@ -6,8 +6,7 @@ import math
 from collections.abc import Callable, Hashable
 
 from flightstack.guidance.setpoints import OffboardSetpoint
-from flightstack.mavlink.addressing import Address, is_for
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Address, Message, is_for
 from flightstack.services.streams.link_loss import StreamMonitor
 from flightstack.services.streams.setpoint_messages import Here, read_setpoint
 

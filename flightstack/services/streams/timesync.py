@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable
 
-from flightstack.mavlink.addressing import sender
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Message
+from flightstack.mavlink.link import Message, sender
 
 _ANSWERS_A_POLL = 64
 """More requests than this between two polls are a flood: the rest stay unanswered."""

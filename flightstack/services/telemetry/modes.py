@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from flightstack.core.modes import CUSTOM_MODE, Mode
+from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.vehicle.status import VehicleStatus

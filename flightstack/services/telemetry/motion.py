@@ -6,7 +6,7 @@ import math
 
 from flightstack.core.contract import LoopRow, Vector3
 from flightstack.mavlink.dialect import EscStatus, mavlink
-from flightstack.mavlink.field_numbers import int16, int32, whole
+from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.link import Message
 from flightstack.services.telemetry.fields import NAN, boot_ms, euler, floats, heading_deg, singles, wrapped
 from flightstack.vehicle.status import VehicleStatus

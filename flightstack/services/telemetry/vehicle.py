@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from flightstack import __version__
 from flightstack.commander.failsafe import Action
 from flightstack.core.contract import Vector3
-from flightstack.core.modes import CUSTOM_MODE, Mode
+from flightstack.core.enums import CUSTOM_MODE, Mode
 from flightstack.guidance.fence import FenceBreach
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.field_numbers import int16, int32, whole
+from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.link import Message
 from flightstack.params.vehicle import system_type
 from flightstack.services.telemetry.fields import NAN, boot_ms

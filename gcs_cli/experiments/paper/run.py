@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 
 from flightstack.core.atomic_file import write_text_atomically
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
 from gcs_cli.charts.print_figure import write_figure

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from flightstack.control.attitude_controller import AttitudeController, AttitudeInputs
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import Vector3
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 from flightstack.params.vehicle import Vehicle
 
 

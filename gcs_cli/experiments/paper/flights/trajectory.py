@@ -20,7 +20,7 @@ import numpy as np
 
 from flightstack.core.contract import SETPOINT_SIZE, FloatArray
 from flightstack.core.errors import ConfigError
-from flightstack.params.toml_reader import Table, read_toml
+from flightstack.params.toml_file import Table, read_toml
 
 FOLDER = Path(__file__).parent / "trajectories"
 SHAPES = ("step", "ramp", "smooth", "sine", "cosine")

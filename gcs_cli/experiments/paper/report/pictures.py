@@ -10,10 +10,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from flightstack.core.extras import INSTALL_MULTIBODY
+from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.core.geometry_bulk import quaternions_from_euler
 from flightstack.flight_log.poses_file import Poses, write_poses
-from flightstack.process.own_program import own_program
+from flightstack.process.command_line import own_program
 from gcs_cli.experiments.paper.flights import cases
 from gcs_cli.experiments.paper.flights.types import Recording
 

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from pyulog import ULog
 
 from flightstack.commander.fence_monitor import FenceBreaches
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.core.modes import Mode
-from flightstack.flight_log.event_topics import EVENT_TOPICS
 from flightstack.flight_log.flight_log import FlightLog
+from flightstack.flight_log.topics import EVENT_TOPICS
 from flightstack.guidance.fence import FenceBreach
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.mavlink.dialect import FsLoopTiming, mavlink
-from flightstack.mavlink.field_numbers import fitted
+from flightstack.mavlink.fields import fitted
 from flightstack.mavlink.link import Link
 from flightstack.mavlink.log_messages import log_data_message
 from flightstack.params.vehicle import load_vehicle

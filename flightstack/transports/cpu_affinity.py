@@ -35,7 +35,7 @@ def _here() -> int:
     return int(stat.rpartition(")")[2].split()[_PROCESSOR_FIELD])
 
 
-class Roamer:
+class AffinityLeader:
     """The end that chooses the processor for both."""
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class Roamer:
             _move(self._allowed)
 
 
-class Follower:
+class AffinityFollower:
     """The end that moves to the processor of the other."""
 
     def __init__(self, connection: socket.socket) -> None:

@@ -1,4 +1,4 @@
-"""Flight modes, and their numbers in PX4's custom mode and in its logs."""
+"""Enumerations that the autopilot, telemetry and logs share: flight modes and severities of texts."""
 
 from __future__ import annotations
 
@@ -48,3 +48,16 @@ NAVIGATION_STATE: dict[Mode, int] = {
     Mode.LAND: 18,
 }
 """``vehicle_status.nav_state`` of PX4's logs."""
+
+
+class Severity(IntEnum):
+    """MAV_SEVERITY, the levels of RFC 5424; ULog and STATUSTEXT use the same numbers."""
+
+    EMERGENCY = 0
+    ALERT = 1
+    CRITICAL = 2
+    ERROR = 3
+    WARNING = 4
+    NOTICE = 5
+    INFO = 6
+    DEBUG = 7

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from flightstack.params.toml_reader import Table
+from flightstack.params.toml_file import Table
 
 SHAPES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1, "mesh": 0}
 """Names of the shapes and how many numbers ``size_m`` has.

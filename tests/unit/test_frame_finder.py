@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.frame_finder import FrameFinder
-from flightstack.mavlink.frames import LARGEST_FRAME
+from flightstack.mavlink.frames import LARGEST_FRAME, FrameFinder
 from flightstack.mavlink.link import Link
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
 
