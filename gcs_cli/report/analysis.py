@@ -29,10 +29,12 @@ from gcs_cli.report.flight_data import (
     loop_timing,
     series,
 )
-from gcs_cli.report.log_damage import is_whole
 
 __all__ = ["Flight", "read_flight"]
 
+_FILE_HEADER = 16
+_MESSAGE_HEADER = 3  # size of the payload, two bytes, little endian; type
+_TYPES = frozenset(b"BFIMPQADRLCSO")
 _ARMED = 2  # vehicle_status.arming_state
 _TIMING_FIELDS = LoopTiming._fields[2:8]  # execution and lateness
 _DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
@@ -160,3 +162,16 @@ class _Reader:
 
 def _elements(name: str, count: int) -> list[str]:
     return [f"{name}[{index}]" for index in range(count)]
+
+
+def is_whole(log: bytes) -> bool:
+    """Return True if messages of known types fill a ULog file to its last byte. Damage inside one is not detected.
+
+    The format has no end mark and no checksums.
+    """
+    at, end = _FILE_HEADER, len(log)
+    while at + _MESSAGE_HEADER <= end:
+        if log[at + 2] not in _TYPES:
+            return False
+        at += _MESSAGE_HEADER + log[at] + 256 * log[at + 1]
+    return at == end

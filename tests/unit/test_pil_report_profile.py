@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gcs_cli.pil.histogram_chart import histogram_chart
 from gcs_cli.pil.profile import StageProfile, stage_profiles
-from tests.support.parsed_page import parsed
 
 costs = st.lists(st.integers(1, 2**32 - 1), min_size=1, max_size=300)
 
@@ -62,25 +57,3 @@ def test_a_stage_counts_the_steps_in_which_it_ran() -> None:
 def test_a_target_that_counts_nothing_has_no_profile() -> None:
     assert stage_profiles(np.zeros((5, 4))) == []
     assert stage_profiles(np.zeros((0, 4))) == []
-
-
-@given(costs)
-def test_every_bin_is_drawn_however_rare(values: list[int]) -> None:
-    profile = whole(values)
-    chart = parsed(histogram_chart(profile, "instructions", "s1"))
-    heights = [float(value) for name, value in chart.attributes if name == "height"]
-    assert len(heights) == sum(count > 0 for count in profile.counts)
-    assert min(heights) >= 1.5
-
-
-@pytest.mark.parametrize(
-    ("counts", "top"), [((100,), 100), ((996, 4), 100), ((66, 34), 80), ((1, 1, 1, 1), 30)]
-)
-def test_share_axis_ends_at_a_tick_above_the_tallest_bar(counts: tuple[int, ...], top: int) -> None:
-    edges = tuple(float(index) for index in range(len(counts) + 1))
-    chart = histogram_chart(
-        StageProfile("whole", sum(counts), 0.0, 1.0, 1.0, 1.0, edges, counts), "cycles", "s1"
-    )
-    ticks = [float(tick) for tick in re.findall(r'class="tick y"[^>]*>([^<]+)<', chart)]
-    assert max(ticks) == top
-    assert "share of steps [%]" in parsed(chart).text

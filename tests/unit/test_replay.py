@@ -11,9 +11,8 @@ import pytest
 from flightstack.core.errors import ConfigError
 from flightstack.plan import save_plan
 from gcs_cli.errors import CliError
-from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.analysis import is_whole, read_flight
 from gcs_cli.report.flight_data import Flight, series
-from gcs_cli.report.log_damage import is_whole
 from gcs_cli.report.replay import Run, find_run, poses_of
 from tests.support.commands import gcs
 from tests.support.square_plan import square_plan
