@@ -123,20 +123,14 @@ def clean(text: str) -> str:
     return "".join(c if c.isprintable() else " " if c.isspace() else REPLACEMENT for c in text)
 
 
-def clean_fields(message: mavlink.MAVLink_message) -> None:
-    """Clean the texts of a decoded message; its frame and the octets of its texts stay as they are."""
-    kind = type(message)
-    fields = _FIELDS.get(kind)
-    if fields is None:
-        fields = _FIELDS[kind] = _text_fields(kind)
-    for name in fields:
-        setattr(message, name, clean(getattr(message, name)))
+class _TextFields(dict[type[mavlink.MAVLink_message], tuple[str, ...]]):
+    """Computes an entry at its first use."""
+
+    def __missing__(self, kind: type[mavlink.MAVLink_message]) -> tuple[str, ...]:
+        fields = zip(kind.fieldnames, kind.fieldtypes, strict=True)
+        names = self[kind] = tuple(str(name) for name, type_name in fields if type_name == "char")
+        return names
 
 
-_FIELDS: dict[type, tuple[str, ...]] = {}
-"""Names of the text fields, by the class of the message."""
-
-
-def _text_fields(kind: type[mavlink.MAVLink_message]) -> tuple[str, ...]:
-    fields = zip(kind.fieldnames, kind.fieldtypes, strict=True)
-    return tuple(str(name) for name, type_name in fields if type_name == "char")
+TEXT_FIELDS = _TextFields()
+"""Names of the text fields of each class of messages."""

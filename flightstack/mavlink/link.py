@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple, TypeAlias
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.fields import PACKING_ERRORS, clean_fields, fit
+from flightstack.mavlink.fields import PACKING_ERRORS, TEXT_FIELDS, clean, fit
 from flightstack.mavlink.frames import (
     CHECKSUM_SIZE,
     HEADER_V2,
@@ -126,7 +126,8 @@ class Link:
         except mavlink.MAVError:
             self.bad += 1
             return None
-        clean_fields(message)
+        for name in TEXT_FIELDS[type(message)]:  # the frame keeps the bytes as they came
+            setattr(message, name, clean(getattr(message, name)))
         self.received += 1
         return message
 

@@ -24,7 +24,7 @@ from flightstack.services.mission.guided_items import GuidedItems
 from flightstack.services.mission.mission_service import MissionService
 from flightstack.services.params.param_server import ParamServer
 from flightstack.services.routing.peer import Peer
-from flightstack.services.streams.link_loss import GroundLinkMonitor, StreamMonitor
+from flightstack.services.streams.link_loss import GroundLinkMonitor, stream_monitors
 from flightstack.services.streams.manual_server import ManualServer
 from flightstack.services.streams.setpoint_messages import Here
 from flightstack.services.streams.setpoint_server import SetpointServer
@@ -97,23 +97,13 @@ def make_services(
 
 def stream_services(own: Address, parts: VehicleParts, info: VehicleInfo) -> tuple[Service, Service]:
     """Return the services of offboard setpoints and of manual control; each reports the loss of its stream."""
-    now, links = parts.now, parts.failsafes.links
-
-    def vehicle_time_us() -> int:
-        return now.time_us
-
-    def set_offboard_lost(lost: bool) -> None:
-        links.offboard_lost = lost
-
-    def set_manual_lost(lost: bool) -> None:
-        links.manual_lost = lost
+    now = parts.now
 
     def here() -> Here:
         state: list[float] = now.state.tolist()
         return Here(Vector3(*state[:3]), euler(state[6:10])[2], info.frame, parts.area.home.altitude_m)
 
-    offboard = StreamMonitor(vehicle_time_us, lambda: now.behaviour.offboard_loss_s, set_offboard_lost)
-    manual = StreamMonitor(vehicle_time_us, lambda: now.behaviour.manual_loss_s, set_manual_lost)
+    offboard, manual = stream_monitors(now, parts.failsafes.links)
     return (
         SetpointServer(
             own,

@@ -8,6 +8,7 @@ vehicle are read for positions too, as the frames' definition in common.xml says
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 from flightstack.core.contract import Quaternion, Vector3
@@ -45,14 +46,14 @@ class Here(NamedTuple):
     home_altitude_m: float
 
 
-def read_setpoint(message: Message, here: Here) -> OffboardSetpoint | str:
-    """Return the setpoint of a message, or the sentence why it is refused."""
+def read_setpoint(message: Message, here: Callable[[], Here]) -> OffboardSetpoint | str:
+    """Return the setpoint of a message, or the sentence why it is refused; ``here`` returns the vehicle's pose."""
     kind = message.get_type()
     if kind == "SET_ATTITUDE_TARGET":
         return _attitude(message)
     if message.type_mask & FORCE_SET:
         return "a force is not supported"
-    point = _global_point(message, here) if kind.endswith("GLOBAL_INT") else _local_point(message, here)
+    point = _global_point(message, here()) if kind.endswith("GLOBAL_INT") else _local_point(message, here)
     return point if isinstance(point, str) else _checked(point)
 
 
@@ -77,19 +78,20 @@ def _place(position: Vector3) -> Vector3:
     return Vector3(*(value if abs(value) <= _FARTHEST_M else math.nan for value in position))
 
 
-def _local_point(message: Message, here: Here) -> PointSetpoint | str:
+def _local_point(message: Message, here: Callable[[], Here]) -> PointSetpoint | str:
     frame, mask = message.coordinate_frame, message.type_mask
     position = _vector((message.x, message.y, message.z), mask, POSITION_BIT)
     velocity = _vector((message.vx, message.vy, message.vz), mask, VELOCITY_BIT)
     acceleration = _vector((message.afx, message.afy, message.afz), mask, ACCELERATION_BIT)
     if frame not in (_LOCAL, _BODY_NED, *_TRAVELS):
         return f"coordinate frame {frame} is not supported"
-    if frame in _TRAVELS:
+    if frame != _LOCAL:
+        own, yaw_rad, _, _ = here()
         if frame in _TURNS:
-            position = _turned(position, here.yaw_rad)
-        position = Vector3(*(own + offset for own, offset in zip(here.position_ned_m, position, strict=True)))
-    if frame in _TURNS:
-        velocity, acceleration = _turned(velocity, here.yaw_rad), _turned(acceleration, here.yaw_rad)
+            velocity, acceleration = _turned(velocity, yaw_rad), _turned(acceleration, yaw_rad)
+        if frame in _TRAVELS:
+            offset = _turned(position, yaw_rad) if frame in _TURNS else position
+            position = Vector3(own.x + offset.x, own.y + offset.y, own.z + offset.z)
     return PointSetpoint(_place(position), velocity, acceleration, *_heading(message))
 
 

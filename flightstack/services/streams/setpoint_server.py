@@ -40,7 +40,7 @@ class SetpointServer:
         """Take a setpoint; one that is refused neither replaces the last nor keeps the stream alive."""
         if not is_for(message, self._own):
             return
-        setpoint = read_setpoint(message, self._here())
+        setpoint = read_setpoint(message, self._here)
         if not isinstance(setpoint, str):
             self._take(setpoint)
             self._watch.heard(now_s)
