@@ -76,7 +76,7 @@ def installed(site: Path) -> Path:
 
 
 def test_the_documentation_shows_the_example_as_it_is() -> None:
-    page = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "tutorials" / "controller.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```(\w*)\n(.*?)```", page, flags=re.DOTALL)
     assert ("toml", (EXAMPLE / "pyproject.toml").read_text(encoding="utf-8")) in blocks
     assert ("python", MODULE) in blocks
