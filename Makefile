@@ -64,12 +64,16 @@ imports: $(READY)
 generated: $(READY)
 	$(BIN)/python tools/generate_dialect.py --check
 	$(BIN)/python tools/generate_params.py --check
+	$(BIN)/python tools/generate_cli.py --check
+	$(BIN)/python tools/generate_tables.py --check
 	$(BIN)/python firmware/tools/generate_codec.py --check
 	$(BIN)/python firmware/tools/generate_core.py --check
 
 generate: $(READY) ## Regenerate files made from others
 	$(BIN)/python tools/generate_dialect.py
 	$(BIN)/python tools/generate_params.py
+	$(BIN)/python tools/generate_cli.py
+	$(BIN)/python tools/generate_tables.py
 	$(BIN)/python firmware/tools/generate_codec.py
 	$(BIN)/python firmware/tools/generate_core.py
 

@@ -54,13 +54,16 @@ def number(value: float, spec: ParamSpec) -> str:
     return f"{value:d}" if spec.is_integer else f"{value:.6g}"
 
 
+def uncapitalised(text: str) -> str:
+    """Return the text with a small first letter, except for a name such as PX4."""
+    return text if text[:2].isupper() else text[0].lower() + text[1:]
+
+
 def row(spec: ParamSpec) -> str:
     """Return one parameter's line of the table."""
     text = spec.help
     if spec.choices:
-        text += ": " + ", ".join(
-            f"{value} {meaning[0].lower()}{meaning[1:]}" for value, meaning in spec.choices
-        )
+        text += ": " + ", ".join(f"{value} {uncapitalised(meaning)}" for value, meaning in spec.choices)
     if spec.reboot_required:
         text += " (at the next start)"
     limits = f"{number(spec.low, spec)} … {number(spec.high, spec)}"
