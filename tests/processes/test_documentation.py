@@ -26,6 +26,7 @@ SKIPPED = {
     "qgroundcontrol-mavsdk.md": 1,
     "pil.md": 3,
     "faults.md": 1,
+    "film.md": 1,
 }
 """Number of blocks that a page marks as not to be run; 0 for any other page."""
 MODULES = {"sim-bridge": "sim_bridge", "flightstack": "flightstack"}
