@@ -65,6 +65,10 @@ TOPICS = {
 }
 
 FAILSAFES_HEAD = """\
+---
+hide: [toc]
+---
+
 # Failsafes
 
 {note}
@@ -94,6 +98,10 @@ time. Defaults and ranges: [Parameters](parameters.md). How to trigger each one:
 """
 
 TOPICS_HEAD = """\
+---
+hide: [toc]
+---
+
 # Log topics
 
 {note}
