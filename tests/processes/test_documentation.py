@@ -25,7 +25,7 @@ SKIPPED = {
     "controller.md": 1,
     "qgroundcontrol-mavsdk.md": 1,
     "pil.md": 3,
-    "compare.md": 2,
+    "compare.md": 1,
     "faults.md": 1,
     "film.md": 1,
 }
