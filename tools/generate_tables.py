@@ -9,9 +9,8 @@ from pathlib import Path
 
 from flightstack.commander.failsafe import RULES, Action, Rule
 from flightstack.core.contract import LoopFlags, LoopStatus
-from flightstack.core.modes import NAVIGATION_STATE
-from flightstack.flight_log.event_topics import EVENT_TOPICS
-from flightstack.flight_log.topics import OUTER_TOPICS, Field, Topic, inner_topics
+from flightstack.core.enums import NAVIGATION_STATE
+from flightstack.flight_log.topics import EVENT_TOPICS, OUTER_TOPICS, Field, Topic, inner_topics
 from flightstack.params.behaviour import Behaviour
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "reference"
