@@ -14,7 +14,7 @@ WORKERS ?= 3
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 .DEFAULT_GOAL := help
 
-.PHONY: help setup fly test test-all stress check lint types imports generated generate bench fuzz fuzz-firmware firmware-check mutation clean
+.PHONY: help setup fly test test-all stress check lint types imports generated generate docs bench fuzz fuzz-firmware firmware-check mutation clean
 
 help: ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 16
@@ -49,7 +49,7 @@ test-all: $(READY) ## Run every test
 stress: $(READY) ## Run every test beside a program that keeps each core busy
 	@$(BIN)/python tools/beside_load.py $(PYTEST)
 
-check: lint types imports generated test-all ## Everything that CI checks
+check: lint types imports generated docs test-all ## Everything that CI checks
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -64,14 +64,21 @@ imports: $(READY)
 generated: $(READY)
 	$(BIN)/python tools/generate_dialect.py --check
 	$(BIN)/python tools/generate_params.py --check
+	$(BIN)/python tools/generate_cli.py --check
+	$(BIN)/python tools/generate_tables.py --check
 	$(BIN)/python firmware/tools/generate_codec.py --check
 	$(BIN)/python firmware/tools/generate_core.py --check
 
 generate: $(READY) ## Regenerate files made from others
 	$(BIN)/python tools/generate_dialect.py
 	$(BIN)/python tools/generate_params.py
+	$(BIN)/python tools/generate_cli.py
+	$(BIN)/python tools/generate_tables.py
 	$(BIN)/python firmware/tools/generate_codec.py
 	$(BIN)/python firmware/tools/generate_core.py
+
+docs: $(READY) ## Build the documentation as a site into site/
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 bench: $(READY) ## Print speeds beside their floors
 	@$(BIN)/python -m benchmarks
@@ -91,4 +98,4 @@ mutation: $(READY) ## Plant faults into core and codec and count those that test
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.mutation --mutants $(MUTANTS) --least 90
 
 clean: ## Remove the environment and all that was made
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) build dist site .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

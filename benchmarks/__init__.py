@@ -1,1 +1,1 @@
-"""Speeds beside their floors: ``python -m benchmarks``; docs/performance.md says how to read them."""
+"""Speeds beside their floors: ``python -m benchmarks``; docs/explanation/performance.md says how to read them."""

@@ -1,4 +1,4 @@
-"""Write docs/parameters.md from the declarations of the parameters. ``--check`` fails when the page is stale."""
+"""Write docs/reference/parameters.md from the declarations of the parameters. ``--check`` fails if it is stale."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.spec import ParamSpec
 from flightstack.params.vehicle import DEFAULT_VEHICLE, load_vehicle
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "parameters.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "parameters.md"
 CONTROLLERS = ("pid", "backstepping")
 HEAD = """\
 # Parameters
@@ -31,10 +31,11 @@ Values come, each stronger than the one before, from the defaults, the gains fil
 (`--params FILE`, of `flightstack` by default `vehicle.params` in its state directory, `runs/state-<instance>`) and the
 command line (`--param NAME=VALUE`, for this run alone). What a ground station sets is saved in the parameter file, in
 QGroundControl's `.params` format. `gcs fly` starts without one, so that a flight depends on its command line alone.
-The state directory holds the plans, too: docs/mavlink.md, "What survives a restart".
+The state directory holds the plans, too: [What survives a restart](mavlink.md#what-survives-a-restart).
 
 A changed integral gain keeps what the integral contributes at that moment, so it makes no bump. A value has the
-precision of a float32, which MAVLink carries. Parameters of a controller of your own: docs/controllers.md.
+precision of a float32, which MAVLink carries. A controller from another package has parameters of its own:
+[Your own controller](../tutorials/controller.md).
 """
 
 
@@ -53,13 +54,16 @@ def number(value: float, spec: ParamSpec) -> str:
     return f"{value:d}" if spec.is_integer else f"{value:.6g}"
 
 
+def uncapitalised(text: str) -> str:
+    """Return the text with a small first letter, except for a name such as PX4."""
+    return text if text[:2].isupper() else text[0].lower() + text[1:]
+
+
 def row(spec: ParamSpec) -> str:
     """Return one parameter's line of the table."""
     text = spec.help
     if spec.choices:
-        text += ": " + ", ".join(
-            f"{value} {meaning[0].lower()}{meaning[1:]}" for value, meaning in spec.choices
-        )
+        text += ": " + ", ".join(f"{value} {uncapitalised(meaning)}" for value, meaning in spec.choices)
     if spec.reboot_required:
         text += " (at the next start)"
     limits = f"{number(spec.low, spec)} … {number(spec.high, spec)}"
@@ -82,7 +86,7 @@ def main() -> int:
     if "--check" in sys.argv:
         if PAGE.exists() and PAGE.read_text(encoding="utf-8") == text:
             return 0
-        print("docs/parameters.md is stale: run `make generate`", file=sys.stderr)
+        print("docs/reference/parameters.md is stale: run `make generate`", file=sys.stderr)
         return 1
     PAGE.write_text(text, encoding="utf-8")
     return 0

@@ -23,7 +23,7 @@ typedef struct {
 /*
  * Sine and cosine of an angle [rad]; both NaN beyond FS_LARGEST_ANGLE_RAD and for what is not finite.
  *
- * Error: see docs/firmware.md; tests/firmware/test_core_math.py measures it.
+ * Error: see docs/explanation/firmware.md; tests/firmware/test_core_math.py measures it.
  */
 fs_sine_cosine fs_sin_cos(fs_real angle_rad);
 

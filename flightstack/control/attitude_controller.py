@@ -2,7 +2,7 @@
 
 A controller is a value of ``AttitudeController`` in a module, announced by the entry point group
 ``flightstack.attitude_controllers`` (``controller_loading``). A user's package adds one in its own
-``pyproject.toml`` and flies it with ``--controller name``; docs/controllers.md shows an example.
+``pyproject.toml`` and flies it with ``--controller name``; docs/tutorials/controller.md shows an example.
 """
 
 from __future__ import annotations

@@ -41,13 +41,13 @@ GroundStations = Annotated[
 GcsPort = Annotated[
     int | None,
     typer.Option(
-        help="UDP port of the ground station, without --gcs.  [default: 14550 + instance; above 9 see docs/mavlink.md]"
+        help="UDP port of the ground station, without --gcs.  [default: 14550 + instance up to 9; see the MAVLink page]"
     ),
 ]
 ApiPort = Annotated[
     int | None,
     typer.Option(
-        help="UDP port of the API client.  [default: 14540 + instance; above 9 see docs/mavlink.md]"
+        help="UDP port of the API client.  [default: 14540 + instance up to 9; see the MAVLink page]"
     ),
 ]
 TcpPort = Annotated[

@@ -22,7 +22,7 @@ _MOST_WARNINGS = 3
 
 
 class Code(StrEnum):
-    """``outcome`` of summary.json; docs/summary.md says what each means."""
+    """``outcome`` of summary.json; docs/reference/summary.md says what each means."""
 
     COMPLETED = "completed"
     FAILSAFE = "failsafe"

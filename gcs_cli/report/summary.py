@@ -69,7 +69,7 @@ class RunInfo:
 def summarise(flight: Flight, plan: Plan, run: RunInfo) -> dict[str, Any]:
     """Return the content of ``summary.json``: only what JSON can hold; null for what is not known.
 
-    docs/summary.md describes every key. For a run that left no readable log, pass ``Flight()``.
+    docs/reference/summary.md describes every key. For a run that left no readable log, pass ``Flight()``.
     """
     factor = flight.duration_s / run.wall_time_s if run.wall_time_s else None
     settings = {

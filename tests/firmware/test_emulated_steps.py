@@ -116,7 +116,7 @@ def test_instruction_counts_repeat_exactly(emulated: Emulated) -> None:
 @pytest.mark.parametrize("name", COMPILERS)
 @pytest.mark.parametrize("law", LAWS)
 def test_a_step_stays_within_its_instructions(emulated: Emulated, law: int, name: str) -> None:
-    """The gate: docs/firmware.md has what each kind of step takes.
+    """The gate: docs/explanation/firmware.md has what each kind of step takes.
 
     In calm air the costliest step is the first one, which resets; in gusts it is one that limits thrust and yaw in a
     tick of the outer loop.

@@ -124,7 +124,7 @@ class World:
         return answer
 
 
-# without seed 1, which loses an acknowledgement and its five retries: one item in 460, docs/decisions.md
+# without seed 1, which loses an acknowledgement and its five retries: one item in 460, docs/explanation/decisions.md
 LINKS = pytest.mark.parametrize(
     ("conditions", "seed"), [(LOSSLESS, 0), *((LOSSY, seed) for seed in (0, *range(2, 9)))]
 )

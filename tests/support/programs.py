@@ -47,16 +47,22 @@ class Program:
         *,
         listens: bool = False,
         joins_output: bool = False,
+        log: IO[bytes] | None = None,
     ) -> None:
-        """Start ``python -m MODULE ARGUMENTS``; with ``joins_output``, standard error goes to ``stdout``."""
+        """Start ``python -m MODULE ARGUMENTS``.
+
+        With ``joins_output``, standard error goes to ``stdout``; with a ``log``, both go to that file instead.
+        """
         self.args = (module, *arguments)
         self.returncode: int | None = None
         self.stdin: IO[str] | None = None
         input_end, own_end = os.pipe() if listens else (os.open(os.devnull, os.O_RDONLY), None)
         if own_end is not None:
             self.stdin = open(own_end, "w")  # noqa: SIM115
-        output, output_end = os.pipe()
-        errors, errors_end = (None, output_end) if joins_output else os.pipe()
+        output, output_end = (
+            os.pipe() if log is None else (os.open(os.devnull, os.O_RDONLY), os.dup(log.fileno()))
+        )
+        errors, errors_end = (None, output_end) if joins_output or log is not None else os.pipe()
         self._report, report_end = os.pipe()
         request = {
             "module": module,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -30,6 +29,7 @@ from flightstack.params.gains_file import BUILT_IN
 from flightstack.params.tunable import Tunable, undeclared
 from flightstack.process.assembly import build
 from tests.support.commands import flightstack_command
+from tests.support.console_blocks import File, steps
 from tests.support.world import World
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -76,10 +76,9 @@ def installed(site: Path) -> Path:
 
 
 def test_the_documentation_shows_the_example_as_it_is() -> None:
-    page = (ROOT / "docs" / "controllers.md").read_text(encoding="utf-8")
-    blocks = re.findall(r"```(\w*)\n(.*?)```", page, flags=re.DOTALL)
-    assert ("toml", (EXAMPLE / "pyproject.toml").read_text(encoding="utf-8")) in blocks
-    assert ("python", MODULE) in blocks
+    shown = list(steps(ROOT / "docs" / "tutorials" / "controller.md"))
+    assert File("pyproject.toml", (EXAMPLE / "pyproject.toml").read_text(encoding="utf-8")) in shown
+    assert File("lqr_controller.py", MODULE) in shown
 
 
 def test_an_installed_controller_is_listed(installed: Path) -> None:

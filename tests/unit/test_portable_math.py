@@ -123,7 +123,7 @@ LIBM = {
     *("linalg", "random", "default_rng", "Generator", "norm", "interp", "polyfit", "polyval", "cross"),
 }
 NOT_FLIGHT = (
-    "sim_bridge/multibody/",  # MuJoCo's own arithmetic: docs/decisions.md
+    "sim_bridge/multibody/",  # MuJoCo's own arithmetic: docs/explanation/decisions.md
     "sim_bridge/render/",  # pictures
     "flightstack/services/telemetry/",  # what ground stations are shown
     "flightstack/core/geometry_bulk.py",  # reports

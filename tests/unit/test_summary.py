@@ -393,7 +393,7 @@ def test_a_fault_that_begins_after_the_flight_is_named() -> None:
 
 
 def test_every_key_of_the_summary_is_documented(log_path: Path) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "summary.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "reference" / "summary.md").read_text()
     told = set(re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE))
     summary = summarise(read_flight(log_path), square_plan(), RunInfo("completed", "x.plan"))
     assert told == {*summary, *summary["waypoints"][0], *Code, "directory"}

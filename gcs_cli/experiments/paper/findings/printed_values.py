@@ -152,7 +152,7 @@ CORRECTIONS = (
         "the offsets of the centre of gravity alone",
         "m g z added",
         "without it the height has no weight in Lagrange's equations",
-        "docs/paper.md",
+        "docs/explanation/paper.md",
     ),
     Correction(
         "equation 6, pitch",

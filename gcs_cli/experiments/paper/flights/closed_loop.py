@@ -1,9 +1,9 @@
 """Fly one case: plant and control loops in this process, exchanged as in lockstep, without links.
 
-Only this module of the ground station joins the two (docs/decisions.md): the experiments are hundreds of flights, too
-many to start three processes for each. The loops are the flight stack's, the plants the simulator's. A tick is that of
-the lockstep: state to the loops, rotor commands back, held for one period. A test holds a case equal, bit for bit, to
-the same flight through the links.
+Only this module of the ground station joins the two (docs/explanation/decisions.md): the experiments are hundreds of
+flights, too many to start three processes for each. The loops are the flight stack's, the plants the simulator's. A
+tick is that of the lockstep: state to the loops, rotor commands back, held for one period. A test holds a case equal,
+bit for bit, to the same flight through the links.
 
 The vehicle starts in hover, and there is no ground: the paper has none.
 """

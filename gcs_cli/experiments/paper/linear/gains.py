@@ -60,7 +60,7 @@ def backstepping_gains(
 
 
 def gains_from(controller: str, parameters: Mapping[str, float]) -> Gains:
-    """Sort the loops' parameters (name → value, as in docs/parameters.md) by axis; KeyError if one is missing."""
+    """Sort the loops' parameters (names of docs/reference/parameters.md) by axis; KeyError if one is missing."""
     p = parameters
     attitude = {
         axis: _backstepping_axis(p, axis) if controller == BACKSTEPPING else _pid_axis(p, axis)

@@ -146,7 +146,7 @@ def _sections(
             [f"{folder_name(name, plant)}/pil.html" for name, plant, _ in pil_flights(pil)],
         )  # fmt: skip
     yield Section(
-        "corrections", "Corrections of the paper", "Reasons: docs/paper.md.",
+        "corrections", "Corrections of the paper", "Reasons: docs/explanation/paper.md.",
         [tables.corrections_table(results["corrections"])],
     )  # fmt: skip
 

@@ -1,0 +1,121 @@
+"""The commands of the documentation run as the pages say, each page in an empty directory."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import IO, Any
+
+import pytest
+
+import gcs_cli.fly.processes
+from tests.support import commands
+from tests.support.console_blocks import Command, File, Skipped, shows, steps
+from tests.support.free_instance import free_instance
+from tests.support.programs import Program
+
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGES = sorted(page for folder in ("start", "tutorials", "how-to") for page in (DOCS / folder).glob("*.md"))
+SKIPPED = {
+    "install.md": 2,
+    "first-flight.md": 2,
+    "controller.md": 1,
+    "qgroundcontrol-mavsdk.md": 1,
+    "pil.md": 3,
+    "compare.md": 1,
+    "faults.md": 1,
+    "film.md": 1,
+}
+"""Number of blocks that a page marks as not to be run; 0 for any other page."""
+MODULES = {"sim-bridge": "sim_bridge", "flightstack": "flightstack"}
+IN_PROCESS = {
+    "gcs": commands.gcs,
+    "flightstack": commands.flightstack_command,
+    "sim-bridge": commands.sim_bridge_command,
+}
+
+
+def warm_child(arguments: list[str], *, stdout: IO[bytes], **_: Any) -> Program:
+    """Start a child of ``gcs fly`` from the server that has imported the programs."""
+    module = arguments.index("-m") + 1
+    child = Program(arguments[module], arguments[module + 1 :], log=stdout)
+    child.stdout.close()  # all goes to the log
+    return child
+
+
+class Reader:
+    """Does what a page says, on ports of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._instance = str(free_instance())
+        self._beside: list[Program] = []
+        self._last = commands.Ended("", "", 0)
+        self.skipped = 0
+
+    def follow(self, page: Path) -> None:
+        """Do every step of the page; raise AssertionError where it differs from the page."""
+        try:
+            for step in steps(page):
+                if isinstance(step, Skipped):
+                    self.skipped += 1
+                elif isinstance(step, File):
+                    (self._folder / step.name).write_text(step.text, encoding="utf-8")
+                elif step.runs_beside:
+                    self._start(step)
+                else:
+                    self._run(step)
+            self._end()
+        finally:
+            for program in self._beside:
+                program.kill()
+
+    def _start(self, command: Command) -> None:
+        program, *arguments = command.arguments
+        arguments += ["--instance", self._instance]
+        self._beside.append(Program(MODULES[program], arguments, self._folder, joins_output=True))
+        self._beside[-1].stdout.readline()  # written once its ports are open
+
+    def _run(self, command: Command) -> None:
+        if command.arguments == ["echo", "$?"]:
+            assert command.shown == [str(self._last.returncode)]
+            self._last = commands.Ended("", "", 0)
+            return
+        assert self._last.returncode == 0, f"{self._last.stdout}{self._last.stderr}"
+        self._last = self._result(command.arguments)
+        output = self._last.stdout + self._last.stderr
+        for line in command.shown:
+            assert shows(output, line), f"{command.arguments}: {line!r} is not in\n{output}"
+
+    def _result(self, arguments: list[str]) -> commands.Ended:
+        program, *rest = arguments
+        if program == "python":
+            done = subprocess.run([sys.executable, *rest], capture_output=True, text=True, check=False)
+            return commands.Ended(done.stdout, done.stderr, done.returncode)
+        if program == "gcs":
+            starts_processes = rest[0] == "fly" or (rest[0] == "pil" and rest[1] not in ("doctor", "replay"))
+            own = ["--instance", self._instance]
+            rest = rest + own if starts_processes else [*own, "--timeout", "60", *rest]
+        return IN_PROCESS[program](*rest)
+
+    def _end(self) -> None:
+        """Interrupt the vehicle; the simulator, which serves one vehicle, ends after it."""
+        for program in reversed(self._beside):
+            if program.args[0] == "flightstack":
+                program.send_signal(signal.SIGINT)
+            output, _ = program.communicate()
+            assert program.returncode == 0, output
+        assert self._last.returncode == 0, f"{self._last.stdout}{self._last.stderr}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_commands_of_a_page_run_as_shown(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    warm = SimpleNamespace(Popen=warm_child, DEVNULL=subprocess.DEVNULL, STDOUT=subprocess.STDOUT)
+    monkeypatch.setattr(gcs_cli.fly.processes, "subprocess", warm)
+    reader = Reader(tmp_path)
+    reader.follow(page)
+    assert reader.skipped == SKIPPED.get(page.name, 0)
