@@ -6,7 +6,7 @@ and R feet under a mass the whole stands on a spring and damper with
 
     κ = R·d/(1 − d)     ω² = κ/(1 + κ)·k     2·ζ·ω = κ/(1 + κ)·b
 
-from which T and ζ*, MuJoCo's ``solref``, follow for the ω and ζ of ``sim_bridge/plant/ground.py``.
+from which T and ζ*, MuJoCo's ``solref``, follow for the ω and ζ of ``sim_bridge/plant/contact.py``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.plant.ground import DAMPING_RATIO, ground_contact
+from sim_bridge.plant.contact import DAMPING_RATIO, contact_model
 
 _IMPEDANCE = 0.1
 IMPEDANCE = f"{_IMPEDANCE} {_IMPEDANCE} 0.001"
@@ -27,7 +27,7 @@ CREEP_ITERATIONS = 4
 
 def reference(vehicle: Vehicle, step_s: float) -> tuple[float, float]:
     """Return MuJoCo's ``solref`` for an integration step: time constant [s] and damping ratio."""
-    ground = ground_contact(vehicle, step_s, single_point=False)
+    ground = contact_model(vehicle, step_s, single_point=False)
     frequency = math.sqrt(ground.stiffness_n_m / vehicle.mass_kg)
     feet = len(vehicle.rotors) * _IMPEDANCE / (1.0 - _IMPEDANCE)
     share = feet / (1.0 + feet) / _IMPEDANCE

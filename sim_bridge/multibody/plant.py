@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from flightstack.core.errors import ConfigError
 from flightstack.core.geometry import quaternion_from_euler
 from flightstack.params.vehicle import Vehicle
@@ -21,7 +21,7 @@ from sim_bridge.multibody.assembly import assemble
 from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.usual_parts import foot_z_m
 from sim_bridge.plant import rotor_drive
-from sim_bridge.plant.layout import DIVERGED, RecordArray
+from sim_bridge.plant.layout import DIVERGED
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.plant.record_plant import DEFAULT_STEP_S, RecordPlant
 from sim_bridge.plant.rotor_drive import LOST, NEAR

@@ -15,10 +15,10 @@ import math
 from typing import NamedTuple
 
 from flightstack.core.compiled import compiled
+from flightstack.core.contract import Record
 from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.params.battery import Battery
 from flightstack.simulator_link.battery_frame import EXTRA_PLACES, PLACES, UNUSED_CELL, BatteryReport
-from sim_bridge.plant.layout import Record
 
 INTERVAL_US = 100_000
 """Simulated time between two messages."""

@@ -9,7 +9,7 @@ from flightstack.core.contract import FloatArray, Quaternion, Vector3
 from flightstack.core.geometry import quaternion_from_euler, rotate
 from flightstack.core.portable_math import distance
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.plant.ground import Ground, ground_contact
+from sim_bridge.plant.contact import ContactModel, contact_model
 from sim_bridge.plant.integrator import advance_kernel, slope_kernel
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.plant.record_plant import DEFAULT_STEP_S, RecordPlant
@@ -39,25 +39,25 @@ class CompiledPlant(RecordPlant):
         m = self.memory[0]
         attitude = quaternion_from_euler(*initial.euler_rad)
         for index in range(int(m["point_count"])):
-            arm = rotate(attitude, Vector3(*m["point"][index, :3].tolist()))
+            arm = rotate(attitude, Vector3(*m["point"][index].tolist()))
             m["anchor"][index] = (body[0] + arm.x, body[1] + arm.y, initial.euler_rad.z)
 
-    def _set_ground(self, ground: Ground) -> None:
+    def _set_contact(self, contact: ContactModel) -> None:
         m = self.memory[0]
-        count = len(ground.points)
+        count = len(contact.points_frd_m)
         m["point_count"] = count
-        m["point"][:count] = ground.points
-        m["ground_z"] = ground.foot_z_m - ground.rest_depth_m
-        m["reach"] = max(distance(*point) for point in ground.points[:, :3].tolist())
-        m["stiffness"], m["damping"] = ground.stiffness_n_m, ground.damping_n_s_m
-        m["ramp"] = ground.rest_depth_m
+        m["point"][:count], m["point_share"][:count] = contact.points_frd_m, contact.shares
+        m["ground_z"] = contact.foot_z_m - contact.rest_depth_m
+        m["reach"] = max(distance(*point) for point in contact.points_frd_m.tolist())
+        m["stiffness"], m["damping"] = contact.stiffness_n_m, contact.damping_n_s_m
+        m["ramp"] = contact.rest_depth_m
         arms = [distance(*rotor.position_frd_m[:2]) for rotor in self._vehicle.rotors]
         m["lever"] = math.fsum(arms) / len(arms)
 
     def set_step(self, step_s: float) -> None:
         """Choose the fixed step of the integration [s]."""
         super().set_step(step_s)
-        self._set_ground(ground_contact(self._vehicle, step_s, single_point=self._paper))
+        self._set_contact(contact_model(self._vehicle, step_s, single_point=self._paper))
 
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         if command_rad_s is not self._bound:
@@ -90,7 +90,7 @@ class CompiledPlant(RecordPlant):
     def buried_m(self) -> float:
         """How far the lowest contact point lies below the ground (negative above it) in the state shown."""
         m, state = self.memory[0], self.output[0]["state"].tolist()
-        points = m["point"][: int(m["point_count"]), :3].tolist()
+        points = m["point"][: int(m["point_count"])].tolist()
         lowest = max(rotate(Quaternion(*state[6:10]), Vector3(*point)).z for point in points)
         return float(state[2] + lowest - m["ground_z"] - m["ramp"])
 

@@ -12,10 +12,10 @@ from functools import cache
 from typing import Any
 
 from flightstack.core.compiled import compiled, specialise
-from flightstack.core.contract import STATE_SIZE, FloatArray
+from flightstack.core.contract import STATE_SIZE, FloatArray, Record, RecordArray
 from sim_bridge.plant import paper, rigid
 from sim_bridge.plant.battery import discharge
-from sim_bridge.plant.layout import DIVERGED, Record, RecordArray
+from sim_bridge.plant.layout import DIVERGED
 from sim_bridge.plant.rotors import half_step, rotor_forces, take_commands
 
 LARGEST_TURN_RAD = 1.0

@@ -1,18 +1,11 @@
-"""Memory of a compiled plant: one NumPy record, so that a call passes one argument and copies nothing."""
+"""Memory of a plant: one NumPy record, so that a call passes one argument and copies nothing."""
 
 from __future__ import annotations
-
-from typing import Any, TypeAlias
 
 import numpy as np
 
 from flightstack.core.contract import MAX_ROTORS, STATE_SIZE
 from flightstack.params.battery import MAX_CURVE_POINTS
-
-Record: TypeAlias = Any
-"""One element of an array of ``MEMORY`` or ``OUTPUT``, indexed by the names of its fields."""
-
-RecordArray: TypeAlias = np.ndarray[Any, np.dtype[np.void]]
 
 MAX_POINTS = 2 * MAX_ROTORS
 NOISE_ROWS = 1024
@@ -20,8 +13,21 @@ NOISE_ROWS = 1024
 CONTACT = 1  # result bits of ``advance``
 DIVERGED = 2
 
-# columns of "rotor"
-THRUST, ROLL, PITCH, DRAG, MOMENTUM, LAG_RATE, LOWEST, HIGHEST, HALF_STEP_DECAY, MOST_TORQUE = range(10)
+ROTOR = np.dtype(
+    [
+        ("thrust", "f8"),  # N s², thrust over Ω·|Ω|
+        ("roll", "f8"),  # N m s², torque about roll over Ω·|Ω|
+        ("pitch", "f8"),  # N m s², torque about pitch over Ω·|Ω|
+        ("drag", "f8"),  # N m s², torque of the air about yaw over Ω·|Ω|
+        ("momentum", "f8"),  # kg m², angular momentum about yaw over Ω
+        ("lag_rate", "f8"),  # 1/s, infinite without lag
+        ("min_speed", "f8"),  # rad/s, of commands
+        ("max_speed", "f8"),  # rad/s, of commands
+        ("half_step_decay", "f8"),  # of the lag over half a step
+        ("max_torque", "f8"),  # N m, of the drive
+    ]
+)
+"""Constants of one rotor."""
 
 MEMORY = np.dtype(
     [
@@ -47,7 +53,7 @@ MEMORY = np.dtype(
         # what is fixed
         ("step_s", "f8"),
         ("rotor_count", "i8"),
-        ("rotor", "f8", (MAX_ROTORS, 10)),
+        ("rotor", ROTOR, MAX_ROTORS),
         ("mass", "f8"),  # kg
         ("weight", "f8"),  # N
         ("inertia", "f8", 3),  # kg m²
@@ -70,7 +76,8 @@ MEMORY = np.dtype(
         ("ground_z", "f8"),  # m, where the contact springs are relaxed
         ("reach", "f8"),  # m, farthest contact point from the body origin
         ("point_count", "i8"),
-        ("point", "f8", (MAX_POINTS, 4)),  # position FRD m, share of the stiffness
+        ("point", "f8", (MAX_POINTS, 3)),  # contact points FRD, m
+        ("point_share", "f8", MAX_POINTS),  # of the stiffness
         ("stiffness", "f8"),  # N/m, all feet together
         ("damping", "f8"),  # N s/m, all feet together
         ("ramp", "f8"),  # m, depth at which the damping is complete

@@ -16,11 +16,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray, Record, Vector3
 from flightstack.core.geometry import quaternion_from_euler
 from flightstack.core.portable_math import sin_cos
 from sim_bridge.plant.contact import FRICTION, contact_force, limited, move_anchor, normal_force
-from sim_bridge.plant.layout import CONTACT, Record
+from sim_bridge.plant.layout import CONTACT
 from sim_bridge.plant.rotors import RotorForces
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from sim_bridge.plant.battery import FULL, BatteryOptions, BatteryState
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
-from sim_bridge.plant.layout import RecordArray
 
 
 class InitialState(NamedTuple):

@@ -7,20 +7,11 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, RecordArray
 from flightstack.core.portable_math import distance, exp
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.plant.battery import BatteryState, battery_state, set_battery
-from sim_bridge.plant.layout import (
-    DRAG,
-    HALF_STEP_DECAY,
-    HIGHEST,
-    LOWEST,
-    MEMORY,
-    OUTPUT,
-    THRUST,
-    RecordArray,
-)
+from sim_bridge.plant.layout import MEMORY, OUTPUT
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plant.turbulence import Turbulence
 
@@ -67,16 +58,17 @@ class RecordPlant(ABC):
                 # speeds that are imposed need no torque
                 rotor.max_drive_torque_n_m if rotor.lag_s > 0.0 and rotor.inertia_kg_m2 > 0.0 else math.inf,
             )
-        self._healthy: FloatArray = m["rotor"].copy()
+        self._healthy: RecordArray = m["rotor"].copy()
 
     def set_rotor_fault(self, rotor: int, share: float = 1.0, speed_rad_s: float | None = None) -> None:
         """Let a rotor give a share of its thrust and torque, and turn at one speed only; see ``Plant``."""
         m, healthy = self.memory[0], self._healthy[rotor]
-        row = m["rotor"][rotor]
-        row[THRUST : DRAG + 1] = share * healthy[THRUST : DRAG + 1]
-        row[LOWEST], row[HIGHEST] = healthy[LOWEST], healthy[HIGHEST]
+        now = m["rotor"][rotor]
+        for name in ("thrust", "roll", "pitch", "drag"):
+            now[name] = share * healthy[name]
+        now["min_speed"], now["max_speed"] = healthy["min_speed"], healthy["max_speed"]
         if speed_rad_s is not None:
-            row[LOWEST] = row[HIGHEST] = speed_rad_s
+            now["min_speed"] = now["max_speed"] = speed_rad_s
             m["command"][rotor] = speed_rad_s  # also where the next command is not a number
 
     @property
@@ -98,9 +90,8 @@ class RecordPlant(ABC):
         m = self.memory[0]
         m["step_s"] = step_s
         for index, rotor in enumerate(self._vehicle.rotors):
-            m["rotor"][index, HALF_STEP_DECAY] = (
-                exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
-            )
+            decay = exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
+            m["rotor"][index]["half_step_decay"] = decay
         self._turbulence.set_step(step_s)
 
     def rotor_speeds_rad_s(self) -> list[float]:

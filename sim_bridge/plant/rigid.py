@@ -15,10 +15,10 @@ import math
 from typing import NamedTuple
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray, Quaternion, Vector3
+from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
 from flightstack.core.geometry import cross
 from sim_bridge.plant.contact import contact_force, move_anchor, normal_force
-from sim_bridge.plant.layout import CONTACT, Record
+from sim_bridge.plant.layout import CONTACT
 from sim_bridge.plant.rotors import RotorForces
 
 
@@ -76,7 +76,7 @@ def _near_ground(x: FloatArray, m: Record) -> bool:
 def _contact(x: FloatArray, r: Rotation, rates: Vector3, m: Record) -> tuple[Vector3, Vector3]:
     """Return force NED [N] and torque FRD [N m] of all contact points."""
     force, torque = Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)
-    points, anchors = m["point"], m["anchor"]
+    points, shares, anchors = m["point"], m["point_share"], m["anchor"]
     for i in range(m["point_count"]):
         p = Vector3(points[i, 0], points[i, 1], points[i, 2])
         arm = _to_world(r, p)
@@ -84,7 +84,7 @@ def _contact(x: FloatArray, r: Rotation, rates: Vector3, m: Record) -> tuple[Vec
         if depth > 0.0:
             spin = _to_world(r, cross(rates, p))
             velocity = Vector3(x[3] + spin.x, x[4] + spin.y, x[5] + spin.z)
-            stiffness, damping = m["stiffness"] * points[i, 3], m["damping"] * points[i, 3]
+            stiffness, damping = m["stiffness"] * shares[i], m["damping"] * shares[i]
             normal = normal_force(depth, velocity.z, stiffness, damping, m["ramp"])
             position = Vector3(x[0] + arm.x, x[1] + arm.y, 0.0)
             f = contact_force(position, velocity, anchors[i], normal, stiffness, damping)
@@ -131,12 +131,12 @@ def before_step(x: FloatArray, m: Record) -> None:
         return
     r = rotation(x)
     rates = Vector3(x[10], x[11], x[12])
-    points, anchors = m["point"], m["anchor"]
+    points, shares, anchors = m["point"], m["point_share"], m["anchor"]
     for i in range(m["point_count"]):
         p = Vector3(points[i, 0], points[i, 1], points[i, 2])
         arm = _to_world(r, p)
         sink = x[5] + _to_world(r, cross(rates, p)).z
-        stiffness, damping = m["stiffness"] * points[i, 3], m["damping"] * points[i, 3]
+        stiffness, damping = m["stiffness"] * shares[i], m["damping"] * shares[i]
         normal = normal_force(x[2] + arm.z - m["ground_z"], sink, stiffness, damping, m["ramp"])
         move_anchor(anchors[i], x[0] + arm.x, x[1] + arm.y, normal, stiffness)
 

@@ -25,23 +25,12 @@ import math
 import numpy as np
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import MAX_ROTORS, FloatArray, Vector3
+from flightstack.core.contract import MAX_ROTORS, FloatArray, Record, RecordArray, Vector3
 from sim_bridge.plant.battery import discharge
 from sim_bridge.plant.integrator import LARGEST_TURN_RAD, next_gust
-from sim_bridge.plant.layout import (
-    CONTACT,
-    DIVERGED,
-    DRAG,
-    LAG_RATE,
-    MOST_TORQUE,
-    PITCH,
-    ROLL,
-    THRUST,
-    Record,
-    RecordArray,
-)
+from sim_bridge.plant.layout import CONTACT, DIVERGED
 from sim_bridge.plant.rigid import after_step, rotation
-from sim_bridge.plant.rotors import driven, half_step, take_commands
+from sim_bridge.plant.rotors import drive_acceleration, half_step, take_commands
 
 _LARGEST = 1e9  # of any number of the state: beyond it MuJoCo gives up
 _NEAR_M = 0.05
@@ -76,9 +65,9 @@ def _note_speeds(m: Record, d: Record, when: int) -> None:
     rotor, held, speed = m["rotor"], m["command"], m["rotor_speed"]
     for i in range(m["rotor_count"]):
         d["speed"][when, i] = speed[i]
-        rate = rotor[i, LAG_RATE]
-        if rotor[i, MOST_TORQUE] < math.inf:
-            d["wanted"][when, i] = driven(m, i, speed[i])
+        rate = rotor[i]["lag_rate"]
+        if rotor[i]["max_torque"] < math.inf:
+            d["wanted"][when, i] = drive_acceleration(m, i, speed[i])
         else:
             d["wanted"][when, i] = (held[i] - speed[i]) * rate if rate < math.inf else 0.0
 
@@ -141,7 +130,7 @@ def _drive(
     gain, row, wanted, speed, rotors = d["gain"], d["row"], d["wanted"], d["speed"], m["rotor_count"]
     for i in range(rotors):
         w2 = speed[when, i] * abs(speed[when, i])
-        drive_torque = bias[6 + i] - d["spin"][i] * m["rotor"][i, DRAG] * w2
+        drive_torque = bias[6 + i] - d["spin"][i] * m["rotor"][i]["drag"] * w2
         drive_torque += row[i, 0] * force.x + row[i, 1] * force.y + row[i, 2] * force.z
         drive_torque += row[i, 3] * torque.x + row[i, 4] * torque.y + row[i, 5] * torque.z
         for j in range(rotors):
@@ -178,10 +167,10 @@ def apply_forces(
     rotor, speed = m["rotor"], d["speed"]
     for i in range(rotors):
         w2 = speed[when, i] * abs(speed[when, i])
-        thrust, twist = rotor[i, THRUST] * w2, rotor[i, DRAG] * w2
+        thrust, twist = rotor[i]["thrust"] * w2, rotor[i]["drag"] * w2
         on_body[i, 0], on_body[i, 1], on_body[i, 2] = -n.z * thrust, e.z * thrust, z.z * thrust
         on_body[i, 3], on_body[i, 4], on_body[i, 5] = n.z * twist, -e.z * twist, -z.z * twist
-        tx, ty, tz = tx + rotor[i, ROLL] * w2, ty + rotor[i, PITCH] * w2, tz + twist
+        tx, ty, tz = tx + rotor[i]["roll"] * w2, ty + rotor[i]["pitch"] * w2, tz + twist
         north, east, down = north - n.z * thrust, east - e.z * thrust, down - z.z * thrust
     north += contact[0] - bias[0]
     east -= contact[1] - bias[1]
@@ -212,7 +201,7 @@ def _shaft_power(m: Record, d: Record, when: int) -> float:
     power = 0.0
     for i in range(m["rotor_count"]):
         speed = d["speed"][when, i]
-        power += abs(m["rotor"][i, DRAG] * (speed * speed * speed))
+        power += abs(m["rotor"][i]["drag"] * (speed * speed * speed))
     return power
 
 

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from flightstack.core.compiled import compiled
-from flightstack.core.contract import FloatArray
+from flightstack.core.contract import FloatArray, Record
 from flightstack.core.portable_math import exp, log, sin_cos
 from sim_bridge.plant.disturbance import (
     GUST_DOWN_RATIO,
@@ -23,7 +23,7 @@ from sim_bridge.plant.disturbance import (
     TORQUE_GUST_YAW_RATIO,
     Disturbance,
 )
-from sim_bridge.plant.layout import NOISE_ROWS, Record
+from sim_bridge.plant.layout import NOISE_ROWS
 
 
 @compiled
