@@ -19,7 +19,7 @@ from flightstack.services.telemetry.telemetry import MAKERS
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.plant import InitialState, PlantOptions
-from sim_bridge.server.lockstep import SimulatorLink
+from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.simulator import Simulator
 
 Call = Callable[[], object]
@@ -142,7 +142,7 @@ def parts() -> list[Part]:
     actuators_bytes = memoryview(bytearray(link.answer(hover, True)))
     state_bytes = memoryview(bytearray(simulator.state_frame()))
     hovering = _hovering(stack.vehicle)
-    sim_link = SimulatorLink(hovering, stack.vehicle, stack.area.home)
+    sim_link = FlightStackEndpoint(hovering, stack.vehicle, stack.area.home)
     sim_link.receive(memoryview(link.initial_requests(stack.rates.interval_us)))
     make, encode, decode = _telemetry(world)
     messages_per_step = sum(GROUND_RATES_HZ.values()) / 500.0

@@ -1,22 +1,23 @@
-"""The command `sim-bridge`: the simulator as a process, and `sim-bridge open-loop`."""
+"""The command ``sim-bridge``: the simulator process, ``open-loop``, ``export-mjcf`` and ``render``."""
 
 from __future__ import annotations
 
 import json
 import math
 import sys
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.contract import Vector3
 from flightstack.core.errors import ConfigError
 from flightstack.core.port_numbers import simulator_port, system_id
 from flightstack.process import console
-from flightstack.process.command_line import UsageError, Version, make_app
+from flightstack.process.command_line import Overwrite, UsageError, Version, make_app
 from sim_bridge import arguments, options
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
-from sim_bridge.export_command import export_mjcf
 from sim_bridge.output import complain, load_named_vehicle, print_result
 from sim_bridge.render.live_view import LiveView
 from sim_bridge.render.render_command import render, require
@@ -35,15 +36,15 @@ def _disturbance(wind: str, gust: float, force: str, torque: str, torque_gust: f
     from sim_bridge.plant.disturbance import Disturbance  # noqa: PLC0415
 
     return Disturbance(
-        arguments.wind("--wind", wind),
-        arguments.in_range("--gust", gust, 0.0, 50.0),
-        arguments.vector("--force", force),
-        arguments.vector("--torque", torque),
-        arguments.in_range("--torque-gust", torque_gust, 0.0, 100.0),
+        arguments.parse_wind("--wind", wind),
+        arguments.check_range("--gust", gust, 0.0, 50.0),
+        arguments.parse_vector("--force", force),
+        arguments.parse_vector("--torque", torque),
+        arguments.check_range("--torque-gust", torque_gust, 0.0, 100.0),
     )
 
 
-def _vehicle(name: str, plant: str, drag: bool) -> Vehicle:
+def _load_vehicle(name: str, plant: str, drag: bool) -> Vehicle:
     vehicle = load_named_vehicle(name)
     return vehicle.with_drag(plant) if drag else vehicle
 
@@ -73,41 +74,43 @@ def run(
     home: options.Home = "47.397742,8.545594,488.0",
     view: options.View = False,
     timeout: options.Timeout = None,
-    version: Version = False,  # its callback does all
+    version: Version = False,  # handled by its callback
 ) -> None:
-    """Simulate a vehicle for one flight stack that connects over TCP; Ctrl-C ends."""
+    """Simulate a vehicle for one flight stack, which connects over TCP; Ctrl-C ends the simulation."""
     if context.invoked_subcommand is not None:
         return
-    arguments.plant(plant)
-    arguments.in_range("--instance", instance, 0, 250)
-    arguments.in_range("--seed", seed, 0, 2**63)
+    arguments.check_plant(plant)
+    arguments.check_range("--instance", instance, 0, 250)
+    arguments.check_range("--seed", seed, 0, 2**63)
     from sim_bridge.plant.disturbance import check_wind  # noqa: PLC0415
     from sim_bridge.plant.plant import PlantOptions  # noqa: PLC0415
     from sim_bridge.server.server import ServerOptions  # noqa: PLC0415
 
-    loaded = _vehicle(vehicle, plant, drag)
-    battery = arguments.battery(loaded, battery_start, battery_capacity, battery_drain)
+    loaded = _load_vehicle(vehicle, plant, drag)
+    battery = arguments.check_battery(loaded, battery_start, battery_capacity, battery_drain)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
     check_wind(loaded, plant, disturbance)
     served = ServerOptions(
         vehicle=loaded,
         plant=plant,
         plant_options=PlantOptions(disturbance, seed, battery=battery),
-        faults=arguments.faults(fault or [], loaded),
-        home=arguments.home(home),
-        speed=arguments.speed(speed),
+        faults=arguments.parse_faults(fault or [], loaded),
+        home=arguments.parse_home(home),
+        speed=arguments.parse_speed(speed),
         host=host,
-        port=simulator_port(instance) if port is None else int(arguments.in_range("--port", port, 0, 65535)),
+        port=simulator_port(instance)
+        if port is None
+        else int(arguments.check_range("--port", port, 0, 65535)),
         system_id=system_id(instance),
         ideal_rotors=ideal_rotors,
-        physics_hz=arguments.physics_hz(physics_hz),
-        timeout_s=None if timeout is None else arguments.in_range("--timeout", timeout, 0.001, 1e6),
+        physics_hz=arguments.check_physics_hz(physics_hz),
+        timeout_s=None if timeout is None else arguments.check_range("--timeout", timeout, 0.001, 1e6),
     )
     raise typer.Exit(_serve(served, vehicle if view else None))
 
 
 def _serve(served: ServerOptions, viewed: str | None) -> int:
-    """Run the simulator, with a window on the vehicle ``viewed`` if there is one; return the exit code."""
+    """Run the simulator, with a window that shows the vehicle ``viewed`` unless it is None; return the exit code."""
     from sim_bridge.server.server import serve  # noqa: PLC0415
 
     if viewed is None:
@@ -142,25 +145,22 @@ def open_loop(
     seed: options.Seed = 1,
     as_json: options.Json = False,
 ) -> None:
-    """Print the state after a time at given rotor speeds.
-
-    They are constant, and taken as they are given, without limits.
-    """
-    arguments.plant(plant)
-    arguments.in_range("--seconds", seconds, 0.0, 1e5)
-    arguments.in_range("--dt", dt, 1e-6, 1.0)
-    arguments.in_range("--seed", seed, 0, 2**63)
+    """Print the state after a flight at constant rotor speeds, without their limits."""
+    arguments.check_plant(plant)
+    arguments.check_range("--seconds", seconds, 0.0, 1e5)
+    arguments.check_range("--dt", dt, 1e-6, 1.0)
+    arguments.check_range("--seed", seed, 0, 2**63)
     initial = _initial(pos, vel, euler_deg, rates, no_ground)
     from flightstack.process.compile_notice import announce_compilation  # noqa: PLC0415
     from sim_bridge.open_loop import OpenLoop, run_open_loop  # noqa: PLC0415
     from sim_bridge.plants import kernels_of  # noqa: PLC0415
 
-    loaded = _vehicle(vehicle, plant, drag)
+    loaded = _load_vehicle(vehicle, plant, drag)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
     announce_compilation("sim-bridge", kernels_of(plant))
     state = run_open_loop(
         OpenLoop(
-            loaded, plant, arguments.rotor_speeds(rotors, loaded), initial,
+            loaded, plant, arguments.parse_rotor_speeds(rotors, loaded), initial,
             seconds, dt, not no_ground, not no_lag, disturbance, seed,
         ),
         warn=complain,
@@ -171,16 +171,48 @@ def open_loop(
 def _initial(pos: str, vel: str, euler_deg: str, rates: str, no_ground: bool) -> InitialState:
     from sim_bridge.plant.plant import InitialState  # noqa: PLC0415
 
-    roll, pitch, yaw = (math.radians(angle) for angle in arguments.vector("--euler-deg", euler_deg))
-    position = arguments.vector("--pos", pos)
+    roll, pitch, yaw = (math.radians(angle) for angle in arguments.parse_vector("--euler-deg", euler_deg))
+    position = arguments.parse_vector("--pos", pos)
     if position.z > 0.0 and not no_ground:
         raise UsageProblemError(f"--pos: {position.z:g} m down is below the ground; add --no-ground")
-    velocity, rates_frd = arguments.vector("--vel", vel), arguments.vector("--rates", rates)
+    velocity, rates_frd = arguments.parse_vector("--vel", vel), arguments.parse_vector("--rates", rates)
     return InitialState(position, velocity, Vector3(roll, pitch, yaw), rates_frd)
 
 
 app.command()(render)
-app.command()(export_mjcf)
+
+
+@app.command()
+def export_mjcf(
+    vehicle: options.Vehicle = "paper_quad",
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="FILE", help="File to write.  [default: stdout]")
+    ] = None,
+    overwrite: Overwrite = False,
+    scene: Annotated[bool, typer.Option("--scene", help="Add sky, landmarks, light and cameras.")] = False,
+) -> None:
+    """Write a vehicle's multibody model as MJCF, for any MuJoCo.
+
+    A table of the masses goes to stderr.
+    """
+    from sim_bridge.multibody.assembly import TOLERANCE, assemble, mass_table  # noqa: PLC0415
+    from sim_bridge.multibody.mjcf import model_xml  # noqa: PLC0415
+
+    if out is not None:
+        check_new(out, overwrite)
+    loaded = load_named_vehicle(vehicle)
+    text = model_xml(loaded, scene=scene)
+    assembly = assemble(loaded)
+    console.complain(mass_table(loaded, assembly))
+    if assembly.largest_error > TOLERANCE:
+        complain(f"warning: {assembly.summary()}; the model has these errors")
+    if out is None:
+        print_result(text.removesuffix("\n"))
+        return
+    try:
+        write_text_atomically(out, text)
+    except OSError as error:
+        raise UsageProblemError(f"--out {out}: cannot be written: {error.strerror}") from None
 
 
 def _table(state: dict[str, Any]) -> str:

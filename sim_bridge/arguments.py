@@ -1,4 +1,4 @@
-"""Text of the command line -> checked values; a bad one raises UsageProblemError with one sentence."""
+"""Parse and check values of the command line; a bad value raises UsageProblemError with one sentence."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.battery import BatteryOptions
 from sim_bridge.plant.faults import Fault, Kind, parse_fault
-from sim_bridge.plant_names import MULTIBODY, NO_MUJOCO, PLANT_NAMES
+from sim_bridge.plants import MULTIBODY, NO_MUJOCO, PLANT_NAMES
 
 _LONGEST_QUOTE = 60
 
@@ -20,8 +20,8 @@ def _quoted(text: str) -> str:
     return repr(text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…")
 
 
-def numbers(flag: str, text: str, counts: tuple[int, ...]) -> tuple[float, ...]:
-    """Read finite numbers separated by commas, as many as one of ``counts``."""
+def parse_numbers(flag: str, text: str, counts: tuple[int, ...]) -> tuple[float, ...]:
+    """Parse finite numbers separated by commas; their count must be one of ``counts``."""
     wanted = " or ".join(str(count) for count in counts)
     shown = _quoted(text)
     parts = text.split(",")
@@ -29,52 +29,52 @@ def numbers(flag: str, text: str, counts: tuple[int, ...]) -> tuple[float, ...]:
         values = tuple(float(part) for part in parts)
     except ValueError:
         values = ()
-    if not values or "_" in text:  # Python reads 1_000, nobody else does
+    if not values or "_" in text:  # float() accepts 1_000
         raise UsageProblemError(f"{flag}: {shown} is not {wanted} numbers separated by commas")
     if len(values) not in counts:
         has = "1 number" if len(values) == 1 else f"{len(values)} numbers"
         raise UsageProblemError(f"{flag}: {shown} has {has}, {wanted} are needed")
     for value in values:
-        in_range(flag, value, -1e9, 1e9)
+        check_range(flag, value, -1e9, 1e9)
     return values
 
 
-def times(flag: str, text: str, most: int) -> tuple[float, ...]:
-    """Read one or more times [s] separated by commas, at most ``most``."""
+def parse_times(flag: str, text: str, most: int) -> tuple[float, ...]:
+    """Parse one or more times [s] separated by commas, at most ``most``."""
     count = text.count(",") + 1
     if count > most:
-        raise UsageProblemError(f"{flag}: {count} times are too many, at most {most} are allowed")
+        raise UsageProblemError(f"{flag}: {count} times are more than the allowed {most}")
     try:
-        return numbers(flag, text, (count,))
+        return parse_numbers(flag, text, (count,))
     except UsageProblemError:
         raise UsageProblemError(
-            f"{flag}: {_quoted(text)} is not one or more times in seconds, separated by commas"
+            f"{flag}: {_quoted(text)} is not a list of times in seconds, separated by commas"
         ) from None
 
 
-def vector(flag: str, text: str) -> Vector3:
-    """Read three numbers."""
-    x, y, z = numbers(flag, text, (3,))
+def parse_vector(flag: str, text: str) -> Vector3:
+    """Parse three numbers."""
+    x, y, z = parse_numbers(flag, text, (3,))
     return Vector3(x, y, z)
 
 
-def wind(flag: str, text: str) -> Vector3:
-    """Read north, east and, if given, down."""
-    north, east, down = (*numbers(flag, text, (2, 3)), 0.0)[:3]
+def parse_wind(flag: str, text: str) -> Vector3:
+    """Parse north, east and, optionally, down."""
+    north, east, down = (*parse_numbers(flag, text, (2, 3)), 0.0)[:3]
     for value in (north, east, down):
-        in_range(flag, value, -200.0, 200.0)
+        check_range(flag, value, -200.0, 200.0)
     return Vector3(north, east, down)
 
 
-def in_range(flag: str, value: float, low: float, high: float) -> float:
-    """Return ``value`` when it is a number in [low, high]."""
+def check_range(flag: str, value: float, low: float, high: float) -> float:
+    """Return ``value`` if it is in [low, high]."""
     if not math.isfinite(value) or not low <= value <= high:
         raise UsageProblemError(f"{flag}: {value:g} is outside the allowed range {low:g} to {high:g}")
     return value
 
 
-def plant(name: str) -> str:
-    """Check the name of a plant."""
+def check_plant(name: str) -> str:
+    """Return the name of a plant that can be simulated."""
     if name not in PLANT_NAMES:
         raise UsageProblemError(f"--plant: {name!r} is not one of {', '.join(PLANT_NAMES)}")
     if name == MULTIBODY and find_spec("mujoco") is None:
@@ -82,58 +82,58 @@ def plant(name: str) -> str:
     return name
 
 
-def speed(text: str) -> float:
-    """Read a speed; "max" is infinite."""
+def parse_speed(text: str) -> float:
+    """Parse a speed; "max" is infinite."""
     if text == "max":
         return math.inf
     try:
         value = float(text)
     except ValueError:
         raise UsageProblemError(f"--speed: {text!r} is neither a number nor max") from None
-    return in_range("--speed", value, 1e-3, 1e4)
+    return check_range("--speed", value, 1e-3, 1e4)
 
 
-def physics_hz(value: float) -> float:
-    """Check the rate of the integration steps."""
+def check_physics_hz(value: float) -> float:
+    """Return a valid rate of the integration steps."""
     from sim_bridge.simulator import FASTEST_PHYSICS_HZ, SLOWEST_PHYSICS_HZ  # noqa: PLC0415  # slow to load
 
-    return in_range("--physics-hz", value, SLOWEST_PHYSICS_HZ, FASTEST_PHYSICS_HZ)
+    return check_range("--physics-hz", value, SLOWEST_PHYSICS_HZ, FASTEST_PHYSICS_HZ)
 
 
-def home(text: str) -> GeoPoint:
-    """Read latitude and longitude in degrees and altitude in metres."""
-    latitude, longitude, altitude = numbers("--home", text, (3,))
-    in_range("--home latitude", latitude, -89.9, 89.9)
-    in_range("--home longitude", longitude, -180.0, 180.0)
-    in_range("--home altitude", altitude, -1000.0, 20000.0)
+def parse_home(text: str) -> GeoPoint:
+    """Parse latitude and longitude [deg] and altitude [m]."""
+    latitude, longitude, altitude = parse_numbers("--home", text, (3,))
+    check_range("--home latitude", latitude, -89.9, 89.9)
+    check_range("--home longitude", longitude, -180.0, 180.0)
+    check_range("--home altitude", altitude, -1000.0, 20000.0)
     return GeoPoint(latitude, longitude, altitude)
 
 
-def rotor_speeds(text: str, vehicle: Vehicle) -> tuple[float, ...]:
-    """Read one speed [rad/s] for each rotor of the vehicle."""
-    speeds = numbers("--rotors", text, (len(vehicle.rotors),))
+def parse_rotor_speeds(text: str, vehicle: Vehicle) -> tuple[float, ...]:
+    """Parse one speed [rad/s] for each rotor of the vehicle."""
+    speeds = parse_numbers("--rotors", text, (len(vehicle.rotors),))
     for value in speeds:
-        in_range("--rotors", value, -1e5, 1e5)
+        check_range("--rotors", value, -1e5, 1e5)
     return speeds
 
 
-def battery(
+def check_battery(
     vehicle: Vehicle, start_percent: float | None, capacity_mah: float | None, drain: float | None
 ) -> BatteryOptions:
-    """Check the choices about the battery; None is the default of each."""
+    """Return the battery options; None is the default of each."""
     given = {"--battery-start": start_percent, "--battery-capacity": capacity_mah, "--battery-drain": drain}
     flags = [flag for flag, value in given.items() if value is not None]
     if flags and vehicle.battery is None:
         raise UsageProblemError(f"{flags[0]}: the vehicle {vehicle.name} has no [battery]")
-    start = 100.0 if start_percent is None else in_range("--battery-start", start_percent, 0.0, 100.0)
+    start = 100.0 if start_percent is None else check_range("--battery-start", start_percent, 0.0, 100.0)
     if capacity_mah is not None:
-        in_range("--battery-capacity", capacity_mah, 1.0, 1e6)
-    factor = 1.0 if drain is None else in_range("--battery-drain", drain, 0.0, 1e4)
+        check_range("--battery-capacity", capacity_mah, 1.0, 1e6)
+    factor = 1.0 if drain is None else check_range("--battery-drain", drain, 0.0, 1e4)
     return BatteryOptions(start / 100.0, capacity_mah, factor)
 
 
-def faults(texts: list[str], vehicle: Vehicle) -> tuple[Fault, ...]:
-    """Read the faults."""
+def parse_faults(texts: list[str], vehicle: Vehicle) -> tuple[Fault, ...]:
+    """Parse the faults."""
     found = tuple(parse_fault(text, len(vehicle.rotors)) for text in texts)
     if vehicle.battery is None and any(fault.kind is Kind.BATTERY_LEVEL for fault in found):
         raise UsageProblemError(f"--fault battery:level: the vehicle {vehicle.name} has no [battery]")

@@ -1,11 +1,11 @@
-"""The errors that end a command; the text of each is one sentence for the user."""
+"""Errors that end a command; each text is one sentence for the user."""
 
 from __future__ import annotations
 
 
 class UsageProblemError(Exception):
-    """A bad argument."""
+    """An invalid argument."""
 
 
 class PlantDivergedError(Exception):
-    """The state of the plant is no longer finite, or it spins too fast for the step."""
+    """The state of the plant is not finite, or the rotation per step is too large."""

@@ -1,4 +1,4 @@
-"""Fly a plant with constant rotor speeds: the tool with which anyone checks the physics."""
+"""Fly a plant with constant rotor speeds, to check its physics."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from sim_bridge.plant.layout import CONTACT, DIVERGED
 from sim_bridge.plant.plant import InitialState, Plant, PlantOptions
 from sim_bridge.plants import make_plant
 
-MOST_STEPS = 100_000_000  # at most a minute of computing
-_STEPS_AT_ONCE = 100_000  # between two looks at Ctrl-C
-_SOFTEST_GROUND_M = 0.012
+MAX_STEPS = 100_000_000  # about a minute of computing
+_STEPS_AT_ONCE = 100_000  # between two checks for Ctrl-C
+_MAX_REST_DEPTH_M = 0.012
 
 
 class OpenLoop(NamedTuple):
-    """One open-loop flight."""
+    """Configuration of an open-loop flight."""
 
     vehicle: Vehicle
     plant: str
@@ -39,9 +39,9 @@ class OpenLoop(NamedTuple):
 
 
 def split_time(seconds: float, dt_s: float) -> tuple[int, float, float]:
-    """Return the number of whole steps, their length [s], and the length of a last shorter step (or 0).
+    """Return the number of whole steps, their length [s], and the length of a last shorter step, or 0.
 
-    A time that is a multiple of the step but for rounding has no last step.
+    A time that is a multiple of the step within rounding has no last step.
     """
     ratio = seconds / dt_s
     whole = round(ratio)
@@ -52,30 +52,30 @@ def split_time(seconds: float, dt_s: float) -> tuple[int, float, float]:
 
 
 def check_length(seconds: float, dt_s: float) -> None:
-    """Raise UsageProblemError where the flight would take too many steps."""
-    if seconds / dt_s > MOST_STEPS * (1.0 + 1e-9):
+    """Raise UsageProblemError if the flight would take too many steps."""
+    if seconds / dt_s > MAX_STEPS * (1.0 + 1e-9):
         raise UsageProblemError(
             f"--seconds {seconds:g} in steps of {dt_s:g} s are {seconds / dt_s:.3g} steps, more than "
-            f"{MOST_STEPS:g}; raise --dt or lower --seconds"
+            f"{MAX_STEPS:g}; raise --dt or lower --seconds"
         )
 
 
 def start_warning(plant: Plant, ground: bool) -> str | None:
-    """Return a sentence when the vehicle starts in the ground, else None."""
-    buried_m = plant.buried_m()
-    if not ground or buried_m < 1e-6:
+    """Return a warning if the vehicle starts below the ground, else None."""
+    depth_m = plant.penetration_m()
+    if not ground or depth_m < 1e-6:
         return None
     return (
-        f"the vehicle starts {buried_m:.3g} m in the ground, which throws it out: "
+        f"the vehicle starts {depth_m:.3g} m below the ground, whose contact force throws it up; "
         "start higher (--pos) or add --no-ground"
     )
 
 
 def _fly(plant: Plant, command: FloatArray, steps: int, step_s: float, ground: bool) -> None:
-    """Fly ``steps`` equal steps; raise PlantDivergedError, or UsageProblemError on too soft a ground."""
+    """Fly ``steps`` equal steps; raise PlantDivergedError, or UsageProblemError at a contact with too soft a ground."""
     plant.set_step(step_s)
-    soft = ground and plant.ground_softness_m > _SOFTEST_GROUND_M
-    at_once = 1 if soft else _STEPS_AT_ONCE  # a soft ground does no harm before the vehicle is there
+    soft = ground and plant.rest_depth_m > _MAX_REST_DEPTH_M
+    at_once = 1 if soft else _STEPS_AT_ONCE  # a soft ground matters at the contact alone
     result = plant.show()
     for done in range(0, steps, at_once):
         if not (soft and result & CONTACT):
@@ -84,17 +84,16 @@ def _fly(plant: Plant, command: FloatArray, steps: int, step_s: float, ground: b
             raise PlantDivergedError("the plant diverged: forces or rates are too large for --dt")
         if soft and result & CONTACT:
             raise UsageProblemError(
-                f"--dt: in steps of {step_s:g} s the ground gives way by {plant.ground_softness_m:.2g} m, "
-                "and the vehicle meets it; use a smaller --dt or --no-ground"
+                f"--dt: with steps of {step_s:g} s the vehicle sinks {plant.rest_depth_m:.2g} m into the ground; "
+                "use a smaller --dt or --no-ground"
             )
 
 
 def run_open_loop(run: OpenLoop, warn: Callable[[str], None] = lambda _: None) -> dict[str, Any]:
     """Return the state after the flight as plain numbers, keyed by name with unit and frame.
 
-    Rotor speeds are taken as given, without the vehicle's limits. With lag the rotors start at rest, without
-    they are at their speeds from the start. What may surprise is told to ``warn``. Raises PlantDivergedError
-    and, where flags do not fit together, UsageProblemError.
+    Rotor speeds are not limited. With lag the rotors start at rest, without lag at their speeds. ``warn`` takes
+    warnings. Raises PlantDivergedError, and UsageProblemError for options that conflict.
     """
     check_length(run.seconds, run.dt_s)
     vehicle = run.vehicle if run.lag else run.vehicle.with_ideal_rotors()

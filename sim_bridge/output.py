@@ -1,4 +1,4 @@
-"""What ``sim-bridge`` prints."""
+"""Output of ``sim-bridge``."""
 
 from __future__ import annotations
 
@@ -23,10 +23,7 @@ def complain(text: object) -> None:
 
 
 def load_named_vehicle(name: str) -> Vehicle:
-    """Load the vehicle of ``--vehicle``; say when a file in the working directory is not what is meant.
-
-    Raises ConfigError.
-    """
+    """Load the vehicle of ``--vehicle``; warn if a built-in vehicle hides a file of that name. Raises ConfigError."""
     from flightstack.params.vehicle import hidden_vehicle, load_vehicle  # noqa: PLC0415
 
     if (sentence := hidden_vehicle(name)) is not None:
@@ -35,10 +32,10 @@ def load_named_vehicle(name: str) -> Vehicle:
 
 
 def print_result(text: str) -> None:
-    """Print what the command was called for; raise typer.Exit when it cannot be written."""
+    """Print the result of a command; raise typer.Exit if it cannot be written."""
     error = console.say(text)
     if error is None:
         return
-    if not isinstance(error, BrokenPipeError):  # a reader that closed the pipe has read enough
+    if not isinstance(error, BrokenPipeError):  # the reader closed the pipe, which is no error
         complain(f"cannot write the result: {getattr(error, 'strerror', None) or error}")
     raise typer.Exit(1)

@@ -1,6 +1,6 @@
 """The simulator without I/O: one plant, its time, its faults, and the exchange of state and actuators.
 
-Same vehicle, options, faults, seed and commands give the same bytes, at any speed.
+The same vehicle, options, faults, seed and commands give the same bytes at any speed.
 """
 
 from __future__ import annotations
@@ -62,26 +62,26 @@ class Simulator:
         self._battery_due_us = _NEVER_US if self.plant.battery is None else 0
         self._schedule = Schedule()
         self._change_us = _NEVER_US
-        self._faulty: PlantStateFrame | None = None  # what is sent instead of the state while it has a fault
+        self._faulty: PlantStateFrame | None = None  # sent instead of the state during a fault
         self._faulty_flags = 0
         self.drops_state = False
         self._state_fault: Kind | None = None
         self._system_id = system_id
         self.set_interval_us(interval_us)
-        self._note(self.plant.show())
+        self._set_flags(self.plant.show())
 
     @property
     def interval_us(self) -> int:
-        """Simulated time between two exchanges."""
+        """Simulated time between two exchanges [µs]."""
         return self._interval_us
 
     @property
     def on_ground(self) -> bool:
-        """Whether the vehicle touches the ground."""
+        """True if the vehicle touches the ground."""
         return self._flags != 0
 
     def set_interval_us(self, interval_us: int) -> None:
-        """Choose the exchange interval; it is split into equal steps no longer than one physics step."""
+        """Set the exchange interval, which is split into equal steps no longer than a physics step."""
         if not SHORTEST_INTERVAL_US <= interval_us <= LONGEST_INTERVAL_US:
             raise ValueError(f"an interval of {interval_us} µs is outside the allowed 50 µs to 1 s")
         self._interval_us = interval_us
@@ -91,7 +91,7 @@ class Simulator:
     def outgoing(self) -> bytes | memoryview:
         """Return the bytes to send for the present state, valid until the next call of ``apply``.
 
-        FS_PLANT_STATE, ten times a second after BATTERY_STATUS; nothing while ``state:drop`` is active.
+        FS_PLANT_STATE, preceded by BATTERY_STATUS ten times a second. ``state:drop`` drops FS_PLANT_STATE.
         """
         if self.time_us < self._battery_due_us and not self.drops_state:
             return self.state_frame()
@@ -105,7 +105,7 @@ class Simulator:
         return self._frame.seal(self.time_us, self._flags)
 
     def battery_frame(self) -> bytes:
-        """Return the BATTERY_STATUS frame if one is due, else nothing."""
+        """Return the BATTERY_STATUS frame if one is due, else no bytes."""
         battery = self.plant.battery
         if self.time_us < self._battery_due_us or battery is None or self.vehicle.battery is None:
             return b""
@@ -121,32 +121,32 @@ class Simulator:
 
     @property
     def shown(self) -> PlantStateFrame:
-        """The state that is sent, with its faults; read only."""
+        """The state as sent, with its faults; read only."""
         return self._frame if self._faulty is None else self._faulty
 
     # ------------------------------------------------------------------ faults
 
     @property
     def faults(self) -> tuple[Fault, ...]:
-        """The faults that act now or later."""
+        """Active and scheduled faults."""
         return tuple(self._schedule.faults)
 
     def inject(self, fault: Fault) -> None:
-        """Add a fault; it begins at its time, at once if that has passed. Later ones overrule earlier ones."""
+        """Schedule a fault; one in the past begins at once. If two faults affect the same part, the last one wins."""
         self._schedule.faults.append(fault)
-        self._change_faults()
+        self._update_faults()
 
     def clear_faults(self, rotor: int | None = None) -> None:
-        """End all faults, planned ones too; or, with ``rotor``, those that act on it now."""
+        """Remove all faults, scheduled ones too; with ``rotor``, the active faults of this rotor."""
         self._schedule.faults = [
             fault
             for fault in self._schedule.faults
             if rotor is not None and (fault.rotor != rotor or fault.begin_us > self.time_us)
         ]
-        self._change_faults()
+        self._update_faults()
 
-    def _change_faults(self) -> None:
-        """Let the faults of this moment act, and note when the next one begins or ends."""
+    def _update_faults(self) -> None:
+        """Apply the active faults, and find the time of the next change."""
         schedule, now_us = self._schedule, self.time_us
         for rotor in range(len(self.vehicle.rotors)):
             self.plant.set_rotor_fault(rotor)
@@ -154,7 +154,7 @@ class Simulator:
         for fault in schedule.take_due_levels(now_us):
             self.plant.set_charge(fault.value)
             if self.plant.battery is not None:
-                self._battery_due_us = now_us  # news
+                self._battery_due_us = now_us  # report the change at once
         for fault in schedule.active(now_us):
             if fault.kind is Kind.ROTOR_OFF:
                 self.plant.set_rotor_fault(fault.rotor, 1.0, 0.0)
@@ -164,20 +164,20 @@ class Simulator:
                 self.plant.set_rotor_fault(fault.rotor, 1.0, fault.value)
             else:
                 state_fault = fault
-        self._fault_state(None if state_fault is None else state_fault.kind)
-        schedule.forget_past(now_us)
+        self._set_state_fault(None if state_fault is None else state_fault.kind)
+        schedule.remove_past(now_us)
         change_us = schedule.next_change_us(now_us)
         self._change_us = _NEVER_US if change_us is None else change_us
 
-    def _fault_state(self, kind: Kind | None) -> None:
-        """Choose what is sent as the state from now on."""
+    def _set_state_fault(self, kind: Kind | None) -> None:
+        """Select the state that is sent from now on."""
         self.drops_state = kind is Kind.STATE_DROP
         if kind not in (Kind.STATE_FREEZE, Kind.STATE_NAN):
             self._faulty = None
             self._state_fault = kind
             return
         if self._faulty is not None and kind is self._state_fault:
-            return  # another fault began or ended
+            return  # unchanged: another fault began or ended
         self._state_fault = kind
         self._faulty = PlantStateFrame(self._system_id, SIMULATOR_COMPONENT)
         self._faulty.frame[:] = self._frame.frame
@@ -188,16 +188,16 @@ class Simulator:
     # ------------------------------------------------------------------ time
 
     def apply(self, actuators: ActuatorsFrame) -> None:
-        """Advance by one interval with the commands held; raise PlantDivergedError on overflow."""
+        """Advance by one interval with the commands held; raise PlantDivergedError."""
         result = self.plant.advance(actuators.rotor_speed_rad_s, actuators.flags, self._steps)
         self.time_us += self._interval_us
         if result > CONTACT:
-            self._note(result)
+            self._set_flags(result)
         self._flags = _FLAGS[result]
         if self.time_us >= self._change_us:
-            self._change_faults()
+            self._update_faults()
 
-    def _note(self, result: int) -> None:
+    def _set_flags(self, result: int) -> None:
         if result & DIVERGED:
             raise PlantDivergedError(
                 f"the plant diverged at t={self.time_us * 1e-6:.3f} s: forces or rates are too large for the "

@@ -1,1 +1,1 @@
-"""The vehicle as an assembly of bodies on MuJoCo; needs the extra ``multibody``."""
+"""The vehicle as an assembly of bodies on MuJoCo; requires the extra ``multibody``."""

@@ -1,6 +1,6 @@
-"""Mass, centre of gravity and inertia of solids in closed form: what a CAD program shows.
+"""Mass, centre of gravity and inertia of solids in closed form.
 
-All in SI units; inertia matrices are about the centre of gravity, in the axes of their frame.
+SI units; inertia matrices are about the centre of gravity, in the axes of their frame.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sim_bridge.multibody.mesh_file import read_mesh
 
 
 class MassProperties(NamedTuple):
-    """Of a part or of several together."""
+    """Mass properties of one part or of several parts."""
 
     mass_kg: float
     centre_m: FloatArray  # (3,)
@@ -27,7 +27,7 @@ class MassProperties(NamedTuple):
 
 
 def solid(part: Part) -> MassProperties:
-    """Return the properties of a part in its own axes, the origin as its pose has it."""
+    """Return the properties of a part in its own axes, about the origin of its pose."""
     if part.file is not None:
         volume, centre, inertia = mesh_solid(part.file, part.scale)
     else:
@@ -36,14 +36,14 @@ def solid(part: Part) -> MassProperties:
     return MassProperties(part.density_kg_m3 * volume, centre, part.density_kg_m3 * inertia)
 
 
-def placed(own: MassProperties, rotation: FloatArray, position_m: FloatArray) -> MassProperties:
-    """Return the properties in the frame in which a part has this pose; ``rotation`` has shape (3, 3)."""
+def transformed(own: MassProperties, rotation: FloatArray, position_m: FloatArray) -> MassProperties:
+    """Return the properties in the frame of the pose; ``rotation`` has shape (3, 3)."""
     centre = position_m + rotation @ own.centre_m
     return MassProperties(own.mass_kg, centre, rotation @ own.inertia_kg_m2 @ rotation.T)
 
 
-def together(parts: Iterable[MassProperties]) -> MassProperties:
-    """Return the properties of several parts of one frame as one body."""
+def combined(parts: Iterable[MassProperties]) -> MassProperties:
+    """Return the properties of several parts, given in one frame, as one body."""
     known = list(parts)
     if not known:
         return MassProperties(0.0, np.zeros(3), np.zeros((3, 3)))
@@ -59,7 +59,7 @@ def together(parts: Iterable[MassProperties]) -> MassProperties:
 
 
 def about_point(mass_kg: float, away_m: FloatArray) -> FloatArray:
-    """Steiner's share of the inertia of a mass about a point that is ``away_m`` from its centre, shape (3, 3)."""
+    """Return Steiner's term: the inertia of a point mass at a distance ``away_m``, shape (3, 3)."""
     share: FloatArray = mass_kg * (away_m @ away_m * np.eye(3) - np.outer(away_m, away_m))
     return share
 
@@ -84,7 +84,7 @@ def _sphere(radius: float) -> tuple[float, tuple[float, float, float]]:
 def _capsule(radius: float, length: float) -> tuple[float, tuple[float, float, float]]:
     shaft, (across, _, along) = _cylinder(radius, length)
     ends, (round_ends, _, _) = _sphere(radius)
-    # each half sphere has its centre of gravity 3/8 of the radius outside the end of the shaft
+    # the centre of gravity of a half sphere is 3/8 of the radius from its base
     across += round_ends + ends * (length**2 / 4.0 + 3.0 / 8.0 * radius * length)
     return shaft + ends, (across, across, along + round_ends)
 
@@ -101,8 +101,8 @@ _SOLIDS: dict[str, Callable[..., tuple[float, tuple[float, float, float]]]] = {
 def mesh_solid(file: Path, scale: float) -> tuple[float, FloatArray, FloatArray]:
     """Return volume, centre of gravity and inertia at density 1 of the solid within a closed mesh.
 
-    Every triangle makes a tetrahedron with the origin; their signed sums are the solid's (Eberly, Polyhedral
-    Mass Properties). Raises ConfigError where the mesh encloses nothing.
+    Each triangle spans a tetrahedron with the origin; the signed sums are those of the solid (Eberly, Polyhedral
+    Mass Properties). Raises ConfigError if the mesh encloses no volume.
     """
     corners = read_mesh(file) * scale
     volumes = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0

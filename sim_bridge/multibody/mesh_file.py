@@ -19,9 +19,9 @@ _LARGEST_FILE = 100_000_000
 
 
 def read_mesh(file: Path) -> FloatArray:
-    """Return the triangles, shape (n, 3, 3): corner by corner, counter-clockwise seen from outside.
+    """Return the triangles, shape (n, 3, 3), corners counter-clockwise seen from outside.
 
-    Raises ConfigError where the file cannot be read, has no triangles or does not enclose a volume.
+    Raises ConfigError if the file cannot be read, has no triangles or does not enclose a volume.
     """
     try:
         if file.stat().st_size > _LARGEST_FILE:
@@ -34,7 +34,9 @@ def read_mesh(file: Path) -> FloatArray:
     except (ValueError, IndexError, UnicodeDecodeError):
         raise ConfigError(file, "", "is not a mesh in STL or OBJ") from None
     if len(triangles) < 4 or not np.isfinite(triangles).all():
-        raise ConfigError(file, "", "is not a solid: it needs four triangles or more, of finite numbers")
+        raise ConfigError(
+            file, "", "is not a solid: it needs at least four triangles with finite coordinates"
+        )
     _check_closed(file, triangles)
     return triangles
 
@@ -65,19 +67,19 @@ def _read_obj(content: bytes) -> FloatArray:
 
 
 def corners_and_faces(triangles: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return the corners, each once, shape (m, 3), and the faces by their numbers, shape (n, 3)."""
+    """Return the unique corners, shape (m, 3), and the faces as indices of corners, shape (n, 3)."""
     corners, number = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     faces = number.reshape(-1, 3)
-    return corners, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]  # without those that have no area
+    return corners, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]  # without degenerate faces
 
 
 def _check_closed(file: Path, triangles: FloatArray) -> None:
-    """Raise ConfigError unless every edge is passed once in each direction and the inside is inside."""
+    """Raise ConfigError unless each edge occurs once in each direction and the volume is positive."""
     _, faces = corners_and_faces(triangles)
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    there, times = np.unique(edges, axis=0, return_counts=True)
-    back = np.unique(there[:, ::-1], axis=0)
-    if (times != 1).any() or len(there) != len(back) or (there != back).any():
+    directed, times = np.unique(edges, axis=0, return_counts=True)
+    back = np.unique(directed[:, ::-1], axis=0)
+    if (times != 1).any() or len(directed) != len(back) or (directed != back).any():
         raise ConfigError(file, "", "is not a closed surface: every edge must join two triangles")
     volume = np.einsum("ni,ni->n", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])).sum()
     if volume <= 0.0:

@@ -1,4 +1,4 @@
-"""Where each part of an assembly is: copies for arms and rotors, poses relative to the body that carries them."""
+"""Placed parts of an assembly: copies for arms and rotors, poses relative to their body."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from flightstack.core.contract import FloatArray, Quaternion, Vector3
 from flightstack.core.geometry import quaternion_from_euler, rotate
 from flightstack.params.vehicle import Vehicle
 from flightstack.params.vehicle_parts import Part
-from sim_bridge.multibody.mass import MassProperties, placed, solid, together
+from sim_bridge.multibody.mass import MassProperties, combined, solid, transformed
 
 
 class PlacedPart(NamedTuple):
-    """One solid on one body. ``body`` is 0 for the frame, 1 and up for the rotors in the vehicle's order."""
+    """One solid on one body: ``body`` is 0 for the frame, 1 to n for the rotors in the vehicle's order."""
 
-    part: Part  # its name is unique, its pose is the body's
+    part: Part  # with a unique name and its pose in the body
     body: int
-    touches: bool = True  # the ground can hold it
+    has_contact: bool = True  # with the ground
 
     def properties(self) -> MassProperties:
         """Return its mass properties in the axes FRD of its body."""
         own, position = solid(self.part), np.array(self.part.position_frd_m)
         if not any(self.part.euler_rad):
             return own._replace(centre_m=position + own.centre_m)
-        return placed(own, rotation_matrix(quaternion_from_euler(*self.part.euler_rad)), position)
+        return transformed(own, rotation_matrix(quaternion_from_euler(*self.part.euler_rad)), position)
 
     def lowest_z_m(self) -> float:
-        """How far down it reaches in a level vehicle, FRD of its body; of a mesh not known, its origin."""
+        """Return the lowest point in a level vehicle, FRD of its body; of a mesh, its origin."""
         size, (_, _, z) = self.part.size_m, self.part.position_frd_m
         down = rotation_matrix(quaternion_from_euler(*self.part.euler_rad))[2]
         if self.part.shape == "box":
@@ -58,14 +58,14 @@ def place(vehicle: Vehicle, part: Part) -> list[PlacedPart]:
     for number, rotor in enumerate(vehicle.rotors, start=1):
         name = f"{part.name}_{number}"
         if part.mount == "rotor":
-            copies.append(PlacedPart(replace(part, name=name), number, touches=False))
+            copies.append(PlacedPart(replace(part, name=name), number, has_contact=False))
             continue
         x, y, z = rotor.position_frd_m
         azimuth = math.atan2(y, x)
         arm = quaternion_from_euler(0.0, 0.0, azimuth)
         away = rotate(arm, Vector3(*part.position_frd_m))
         roll, pitch, yaw = part.euler_rad
-        # a turn about z before the others adds to yaw: angles are yaw, pitch, roll in this order
+        # a rotation about z before the others adds to yaw: the order is yaw, pitch, roll
         copies.append(
             PlacedPart(
                 replace(
@@ -82,7 +82,7 @@ def place(vehicle: Vehicle, part: Part) -> list[PlacedPart]:
 
 def of_body(parts: Sequence[PlacedPart], body: int) -> MassProperties:
     """Return the mass properties of all parts of one body, in its axes FRD."""
-    return together(item.properties() for item in parts if item.body == body)
+    return combined(item.properties() for item in parts if item.body == body)
 
 
 def of_all(vehicle: Vehicle, parts: Sequence[PlacedPart]) -> MassProperties:
@@ -91,4 +91,4 @@ def of_all(vehicle: Vehicle, parts: Sequence[PlacedPart]) -> MassProperties:
     for number, rotor in enumerate(vehicle.rotors, start=1):
         own = of_body(parts, number)
         bodies.append(own._replace(centre_m=own.centre_m + np.array(rotor.position_frd_m)))
-    return together(bodies)
+    return combined(bodies)

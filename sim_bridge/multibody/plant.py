@@ -1,8 +1,8 @@
 """The multibody plant: frame and spinning rotors as bodies of a MuJoCo model, on legs on the ground.
 
-MuJoCo computes the accelerations of all bodies and the contact with the ground; ``rotor_drive.py`` makes the forces of
-every stage and integrates with the classic Runge-Kutta method, in the same variables as the rigid plant. MuJoCo's own
-``mj_step`` has an RK4 of the same order, but asks for the forces of a stage by a callback that a whole process shares.
+MuJoCo computes the accelerations of all bodies and the contact with the ground; ``rotor_drive.py`` computes the forces
+of each stage and integrates with the classic Runge-Kutta method, in the variables of the rigid plant. ``mj_step`` of
+MuJoCo has an RK4 of the same order, but takes the forces of a stage from a callback that is global to the process.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from flightstack.core.errors import ConfigError
 from flightstack.core.geometry import quaternion_from_euler
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.multibody import contact
 from sim_bridge.multibody.assembly import assemble
-from sim_bridge.multibody.mjcf import model_xml
-from sim_bridge.multibody.usual_parts import foot_z_m
+from sim_bridge.multibody.default_parts import foot_z_m
+from sim_bridge.multibody.mjcf import contact_solref, model_xml
 from sim_bridge.plant import rotor_drive
 from sim_bridge.plant.layout import DIVERGED
 from sim_bridge.plant.plant import InitialState, PlantOptions
@@ -34,12 +33,12 @@ _FRAME = 6  # degrees of freedom
 
 
 def _compiled(vehicle: Vehicle) -> Any:
-    """Return MuJoCo's model of a vehicle; raise ConfigError where its compiler refuses a part."""
+    """Return the MuJoCo model of a vehicle; raise ConfigError if MuJoCo's compiler rejects a part."""
     try:
         return mujoco.MjModel.from_xml_string(model_xml(vehicle, lean=True))
     except ValueError as error:
         first = str(error).partition("\n")[0].removeprefix("Error: ")
-        raise ConfigError(vehicle.name, "part", f"MuJoCo refuses the model: {first}") from None
+        raise ConfigError(vehicle.name, "part", f"MuJoCo rejects the model: {first}") from None
 
 
 class MultibodyPlant(RecordPlant):
@@ -50,45 +49,45 @@ class MultibodyPlant(RecordPlant):
         self.assembly = assemble(vehicle)
         self._model = _compiled(vehicle)
         self.data = mujoco.MjData(self._model)
-        """MuJoCo's state, forces and accelerations, in its own frames; read only."""
-        self._softness_m = 0.0
-        self._watched = NEAR
+        """MuJoCo's state, forces and accelerations, NWU and FLU; read only."""
+        self._rest_depth_m = 0.0
+        self._contact_state = NEAR
         first = 1 + mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
         self._on_rotors: FloatArray = self.data.xfrc_applied[first:]
-        self._views()
+        self._bind_arrays()
         self._drive: RecordArray = np.zeros(1, rotor_drive.DRIVE)
         self._set_drive(len(vehicle.rotors))
         self.memory[0]["ground_z"], self.memory[0]["reach"] = foot_z_m(vehicle), self._reach_m()
         self._set_state(options.initial)
         self.set_step(DEFAULT_STEP_S)
 
-    def _views(self) -> None:
-        """Keep MuJoCo's arrays at hand: looking them up takes as long as a kernel."""
+    def _bind_arrays(self) -> None:
+        """Keep views of MuJoCo's arrays: an attribute lookup takes as long as a kernel."""
         data = self.data
         self._qpos: FloatArray = data.qpos
         self._qvel: FloatArray = data.qvel
         self._qacc: FloatArray = data.qacc
         self._bias: FloatArray = data.qfrc_bias
-        self._held: FloatArray = data.qfrc_constraint
+        self._contact_force: FloatArray = data.qfrc_constraint
         self._applied: FloatArray = data.qfrc_applied
         self._warm_start: FloatArray = data.qacc_warmstart
 
     def _set_drive(self, rotors: int) -> None:
-        """Read the constants of the drives out of MuJoCo's mass matrix at the level attitude."""
+        """Compute the constants of the drives from MuJoCo's mass matrix at the level attitude."""
         model, data, d = self._model, self.data, self._drive[0]
         mujoco.mj_forward(model, data)
         columns = np.eye(model.nv)
         mass = np.zeros((model.nv, model.nv))
         for row, column in zip(mass, columns, strict=True):
             mujoco.mj_mulM(model, data, row, column)
-        self._held[:] = 0.0  # what stood on the ground was the model, not yet the vehicle
+        self._contact_force[:] = 0.0  # the contact of the default pose is not that of the vehicle
         row = np.linalg.solve(mass[:_FRAME, :_FRAME], mass[:_FRAME, _FRAME:]).T
-        d["gain"][:rotors, :rotors] = mass[_FRAME:, _FRAME:] - row @ mass[:_FRAME, _FRAME:]
-        d["row"][:rotors] = row * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # FLU to FRD
+        d["inertia"][:rotors, :rotors] = mass[_FRAME:, _FRAME:] - row @ mass[:_FRAME, _FRAME:]
+        d["coupling"][:rotors] = row * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # FLU to FRD
         d["spin"][:rotors] = [rotor.spin for rotor in self._vehicle.rotors]
 
     def _reach_m(self) -> float:
-        """Distance from the origin to the farthest point that may touch the ground."""
+        """Return the distance from the origin to the farthest point with contact."""
         geoms = [index for index in range(self._model.ngeom) if self._model.geom_contype[index]]
         away = np.linalg.norm(self.data.geom_xpos[geoms] - self.data.qpos[:3], axis=1)
         return float((away + self._model.geom_rbound[geoms]).max(initial=0.0))
@@ -101,21 +100,21 @@ class MultibodyPlant(RecordPlant):
     # ------------------------------------------------------------------ time
 
     def set_step(self, step_s: float) -> None:
-        """Choose the fixed step of the integration [s]."""
+        """Set the fixed integration step [s]."""
         super().set_step(step_s)
         self._model.opt.timestep = step_s
-        self._model.geom_solref[:] = contact.reference(self._vehicle, step_s)
-        self._softness_m = self._rest_depth_m()
-        self._drive[0]["sink"] = self._softness_m
+        self._model.geom_solref[:] = contact_solref(self._vehicle, step_s)
+        self._rest_depth_m = self._find_rest_depth_m()
+        self._drive[0]["sink"] = self._rest_depth_m
 
-    def _rest_depth_m(self) -> float:
-        """How deep a level vehicle stands in the ground, by a secant step: the force is linear in the depth."""
+    def _find_rest_depth_m(self) -> float:
+        """Return the depth at which a level vehicle rests, by one secant step: the force is linear in the depth."""
         if not self.memory[0]["ground"]:
             return 0.0
         model = self._model
         data = mujoco.MjData(model)
-        self._look_for_contacts(True)
-        self._watched = NEAR
+        self._enable_contacts(True)
+        self._contact_state = NEAR
         depths, falls = (_FIRST_DEPTH_M, 2.0 * _FIRST_DEPTH_M), []
         for depth in depths:
             data.qpos[2] = -depth
@@ -134,10 +133,10 @@ class MultibodyPlant(RecordPlant):
         return self.show()
 
     def _step(self) -> int:
-        """Advance by one step; return where the vehicle is."""
+        """Advance by one step; return FLYING, NEAR or LOST."""
         memory, drive, qpos, qvel = self.memory, self._drive, self._qpos, self._qvel
         where = rotor_drive.begin_step(memory, drive, qpos, qvel)
-        self._watch_ground(where)
+        self._update_contacts(where)
         for stage in _STAGES:
             if where == LOST:
                 break
@@ -145,66 +144,66 @@ class MultibodyPlant(RecordPlant):
             where = rotor_drive.end_stage(memory, drive, stage, self._qacc, qpos, qvel)
         return where
 
-    def _watch_ground(self, where: int) -> None:
-        """Let MuJoCo look for contacts only where there may be some."""
-        if where != self._watched:
-            self._watched = where
-            self._look_for_contacts(where == NEAR)
+    def _update_contacts(self, where: int) -> None:
+        """Enable contact detection only near the ground."""
+        if where != self._contact_state:
+            self._contact_state = where
+            self._enable_contacts(where == NEAR)
 
-    def _look_for_contacts(self, wanted: bool) -> None:
+    def _enable_contacts(self, enable: bool) -> None:
         option = self._model.opt
         others = option.disableflags & ~_NO_CONTACT
-        option.disableflags = others if wanted else others | _NO_CONTACT
+        option.disableflags = others if enable else others | _NO_CONTACT
 
     def _accelerations(self, stage: int) -> None:
-        """Let MuJoCo compute the accelerations of the state that was written to it."""
+        """Compute the accelerations of the state in MuJoCo's arrays."""
         model, data = self._model, self.data
         mujoco.mj_step1(model, data)
         rotor_drive.apply_forces(
-            self.memory, self._drive, stage, self._bias, self._held, self._applied, self._on_rotors
+            self.memory, self._drive, stage, self._bias, self._contact_force, self._applied, self._on_rotors
         )
         mujoco.mj_forwardSkip(model, data, _AFTER_VELOCITY, 1)
 
-    # ------------------------------------------------------------------ what is
+    # ------------------------------------------------------------------ state
 
     def show(self) -> int:
-        """Write the present state to ``output``; returns as ``advance``."""
+        """Write the present state to ``output``; return the bits of ``advance``."""
         where = rotor_drive.show_pose(self.memory, self._drive, self._qpos, self._qvel)
         touches = 0
         if where == NEAR:
-            self._watch_ground(where)
+            self._update_contacts(where)
             mujoco.mj_fwdPosition(self._model, self.data)
             touches = int(self.data.ncon > 0)
         return rotor_drive.show_state(self.memory, self.output, touches)
 
     def acceleration_ned_m_s2(self) -> Vector3:
-        """Acceleration at the present state; asking changes nothing of the flight that follows."""
+        """Return the acceleration at the present state, without an effect on the flight."""
         where = rotor_drive.show_pose(self.memory, self._drive, self._qpos, self._qvel)
         if where == LOST:
             return Vector3(0.0, 0.0, 0.0)
-        self._watch_ground(where)
-        # the next stage takes both from the stage before: one more evaluation must not be that stage
-        held, warm_start = self._held.copy(), self._warm_start.copy()
+        self._update_contacts(where)
+        # the next stage uses both from the stage before: restore them after this evaluation
+        force, warm_start = self._contact_force.copy(), self._warm_start.copy()
         self._accelerations(0)
-        self._held[:], self._warm_start[:] = held, warm_start
+        self._contact_force[:], self._warm_start[:] = force, warm_start
         x, y, z = self._qacc[:3].tolist()
         return Vector3(x, -y, -z)
 
     @property
-    def ground_softness_m(self) -> float:
-        """How far the ground gives way under the vehicle's weight; more with longer steps."""
-        return self._softness_m
+    def rest_depth_m(self) -> float:
+        """Depth [m] at which the vehicle rests; it grows with the step."""
+        return self._rest_depth_m
 
-    def buried_m(self) -> float:
-        """How far the vehicle reaches into the ground in the state shown; 0 above it."""
+    def penetration_m(self) -> float:
+        """Return the depth [m] below the rest depth in the present state; 0 without contact."""
         if self.show() & DIVERGED or not self.data.ncon:
             return 0.0
-        return max(0.0, -float(self.data.contact.dist.min()) - self._softness_m)
+        return max(0.0, -float(self.data.contact.dist.min()) - self._rest_depth_m)
 
-    def about(self) -> str | None:
-        """Tell how well the assembly meets the vehicle file."""
-        return self.assembly.worst_line()
+    def description(self) -> str | None:
+        """Return how well the assembly meets the vehicle file."""
+        return self.assembly.summary()
 
     def euler_rad(self) -> Vector3 | None:
-        """Roll, pitch, yaw are no states of this plant."""
+        """Return None: Euler angles are not states of this plant."""
         return None

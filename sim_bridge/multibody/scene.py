@@ -1,7 +1,7 @@
-"""The place where the vehicle flies: sky, ground, landing pad, light, landmarks and cameras, as MJCF.
+"""The scene around the vehicle as MJCF: sky, ground, landing pad, light, landmarks and cameras.
 
-World frame: x north, y west, z up [m]. What cannot be said in MJCF without files, the pixels of grass, pad and clouds,
-``paint.py`` puts into the compiled model; without it they are plain colours.
+World frame NWU [m]. The textures of grass, pad and clouds would need files in MJCF: ``paint.py`` writes them into the
+compiled model, elsewhere they are plain colours.
 """
 
 from __future__ import annotations
@@ -9,22 +9,22 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from flightstack.params.vehicle import Vehicle
-from sim_bridge.multibody import looks
+from sim_bridge.multibody import appearance
+from sim_bridge.multibody.default_parts import foot_z_m
 from sim_bridge.multibody.landmarks import add_landmarks
-from sim_bridge.multibody.usual_parts import foot_z_m
-from sim_bridge.multibody.xml import add, paint_only, section
+from sim_bridge.multibody.xml import add, add_visual, section
 
 PAD_M = 4.0
 """Half the side of the landing pad."""
 GRASS_TILE_M = 20.0
-"""Side of the piece of ground whose picture repeats."""
+"""Side of the ground texture, which repeats."""
 
 _SUN_TOWARDS = (0.45, 0.55, -1.0)
 _SUN_AT = (-18.0, -22.0, 40.0)
 
 
-def decorate(root: Element, vehicle: Vehicle) -> None:
-    """Put the place around the vehicle of a model whose body is called "vehicle", and dress the vehicle."""
+def add_scene(root: Element, vehicle: Vehicle) -> None:
+    """Add the scene to a model with a body named "vehicle", and the appearance of the vehicle."""
     world, body = section(root, "worldbody"), root.find(".//body[@name='vehicle']")
     if body is None:
         raise ValueError("the model has no body called vehicle")
@@ -36,12 +36,12 @@ def decorate(root: Element, vehicle: Vehicle) -> None:
     _pad(world, ground_m)
     add_landmarks(world, ground_m)
     _cameras(world, body, vehicle, ground_m)
-    looks.dress(body, vehicle)
+    appearance.add_appearance(body, vehicle)
 
 
 def _visual(root: Element) -> None:
     statistic = section(root, "statistic")
-    statistic.set("extent", "10")  # znear, zfar and the shadows are shares of it
+    statistic.set("extent", "10")  # unit of znear, zfar and the shadows
     statistic.set("center", "0 0 1")
     visual = section(root, "visual")
     add(visual, "global", offwidth=1280, offheight=720, fovy=45)
@@ -71,7 +71,7 @@ def _materials(asset: Element) -> None:
             asset, "texture", name=name, type="2d", builtin="flat", width=size, height=size,
             rgb1=colour, rgb2=colour,
         )  # fmt: skip
-    repeat = 2.0 / GRASS_TILE_M  # at 1 a picture covers two metres
+    repeat = 2.0 / GRASS_TILE_M  # at 1 a texture covers 2 m
     add(asset, "material", name="grass", texture="grass", texuniform="true", texrepeat=(repeat, repeat),
         specular=0.0, shininess=0.0, reflectance=0.0)  # fmt: skip
     add(asset, "material", name="mown", texture="mown", texrepeat=(8.0, 1.0), specular=0.0, shininess=0.0)
@@ -96,16 +96,16 @@ def _ground(world: Element, ground_m: float) -> None:
 
 
 def _pad(world: Element, ground_m: float) -> None:
-    """The landing pad at home, with marks, and a mown strip through the field."""
-    paint_only(world, "box", size=(32.0, 3.2, 0.004), pos=(0, 0, ground_m - 0.001), material="mown")
-    paint_only(
+    """Add the landing pad at home and a mown strip through the field."""
+    add_visual(world, "box", size=(32.0, 3.2, 0.004), pos=(0, 0, ground_m - 0.001), material="mown")
+    add_visual(
         world, "box", name="pad", size=(PAD_M, PAD_M, 0.01), pos=(0, 0, ground_m - 0.004), material="concrete"
     )
 
 
 def _cameras(world: Element, body: Element, vehicle: Vehicle, ground_m: float) -> None:
-    """Cameras for whoever opens the model; the renderer's own move more smoothly (``cameras.py``)."""
-    far = 4.0 * looks.span_m(vehicle)
+    """Add cameras for other viewers; the renderer has its own, smoother ones (``cameras.py``)."""
+    far = 4.0 * appearance.span_m(vehicle)
     add(
         body,
         "camera",

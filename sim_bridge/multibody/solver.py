@@ -1,4 +1,4 @@
-"""Turn knobs until conditions are met, as little as possible: Newton's method for fewer equations than unknowns."""
+"""Solve an underdetermined system of equations within limits, with the smallest change: damped Gauss-Newton."""
 
 from __future__ import annotations
 
@@ -8,44 +8,52 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 
-_ROUNDS = 40
-_STEP = 1e-6
-_MET = 1e-14
-_GOOD = 1e-6  # less is rounding, or a mesh of single precision
-_SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 1e-3)  # of a step, the first that helps is taken
-_SMALLEST_RATIO = 1e-7  # of singular values: conditions that no knob moves are left alone
+_ITERATIONS = 40
+_DIFFERENCE = 1e-6
+_CONVERGED = 1e-14
+_SOLVED = 1e-6  # less is rounding, or a mesh of single precision
+_DAMPING = (
+    1.0,
+    0.5,
+    0.25,
+    0.1,
+    0.03,
+    0.01,
+    1e-3,
+)  # factors of a step; the first that reduces the residual is taken
+_SMALLEST_RATIO = 1e-7  # of singular values: equations that no unknown affects are ignored
+
+Residual = Callable[[FloatArray], FloatArray]
 
 
-def meet(miss: Callable[[FloatArray], FloatArray], ladder: Sequence[FloatArray]) -> FloatArray:
-    """Return knobs x near zero with miss(x) = 0, or in the least squares where that cannot be.
+def solve(residual: Residual, limits: Sequence[FloatArray]) -> FloatArray:
+    """Return x near zero with residual(x) = 0, or the least-squares solution if there is none.
 
-    ``ladder`` holds limits of |x|, narrow ones first: the first within which all is met are taken, and the last where
-    nothing is. No randomness: the same conditions give the same bits.
+    ``limits`` holds bounds of |x|, narrow ones first: the first bounds with a solution are used, or the last ones.
+    No randomness: the same equations give the same bits.
     """
-    for limits in ladder:
-        x, rest = _newton(miss, np.zeros(len(limits)), limits)
-        if np.abs(rest).max() < _GOOD:
+    for bounds in limits:
+        x, rest = _newton(residual, np.zeros(len(bounds)), bounds)
+        if np.abs(rest).max() < _SOLVED:
             return x
-    # least squares end some 1e-7 beside conditions that can be met after all
-    return _newton(miss, _compromise(miss, x, limits), limits)[0]
+    # least squares stop some 1e-7 away from a solution that exists
+    return _newton(residual, _least_squares(residual, x, bounds), bounds)[0]
 
 
-def _newton(
-    miss: Callable[[FloatArray], FloatArray], x: FloatArray, limits: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return knobs within the limits, from ``x`` on, and what is missed with them.
+def _newton(residual: Residual, x: FloatArray, limits: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return x within the limits, starting from ``x``, and its residual.
 
-    Each step is the shortest one, measured in units of the limits, to where the linearised conditions are met
-    (Gauss-Newton with the pseudo-inverse).
+    Each step is the shortest one, in units of the limits, that solves the linearised equations (Gauss-Newton with
+    the pseudo-inverse).
     """
-    rest = miss(x)
-    for _ in range(_ROUNDS):
-        if np.abs(rest).max() < _MET:
+    rest = residual(x)
+    for _ in range(_ITERATIONS):
+        if np.abs(rest).max() < _CONVERGED:
             break
-        step = _step(_slope(miss, x), rest, x, limits)
-        for share in _SHARES:
-            new = np.clip(x + share * step, -limits, limits)
-            new_rest = miss(new)
+        step = _step(_jacobian(residual, x), rest, x, limits)
+        for factor in _DAMPING:
+            new = np.clip(x + factor * step, -limits, limits)
+            new_rest = residual(new)
             if new_rest @ new_rest < rest @ rest:
                 x, rest = new, new_rest
                 break
@@ -54,23 +62,25 @@ def _newton(
     return x, rest
 
 
-def _compromise(miss: Callable[[FloatArray], FloatArray], x: FloatArray, limits: FloatArray) -> FloatArray:
-    """Return the least squares within the limits, from ``x`` on, for conditions that cannot all be met."""
-    from scipy.optimize import least_squares  # noqa: PLC0415  # slow to load, and seldom needed
+def _least_squares(residual: Residual, x: FloatArray, limits: FloatArray) -> FloatArray:
+    """Return the least-squares solution within the limits, starting from ``x``."""
+    from scipy.optimize import least_squares  # noqa: PLC0415  # slow to load, rarely needed
 
     inside = np.clip(x, -0.99 * limits, 0.99 * limits)
-    found: FloatArray = least_squares(miss, inside, bounds=(-limits, limits), x_scale=limits, max_nfev=60).x
+    found: FloatArray = least_squares(
+        residual, inside, bounds=(-limits, limits), x_scale=limits, max_nfev=60
+    ).x
     return found
 
 
-def _step(slope: FloatArray, rest: FloatArray, x: FloatArray, limits: FloatArray) -> FloatArray:
-    """Shortest step to slope·step = −rest that leaves no knob beyond its limit, in the sense of least squares."""
+def _step(jacobian: FloatArray, rest: FloatArray, x: FloatArray, limits: FloatArray) -> FloatArray:
+    """Return the shortest least-squares step with jacobian·step = −rest that exceeds no limit."""
     step = np.zeros(len(x))
     free = np.ones(len(x), dtype=bool)
     while free.any():
-        weighted = slope[:, free] * limits[free]
+        weighted = jacobian[:, free] * limits[free]
         inverse = np.linalg.pinv(weighted, rcond=_SMALLEST_RATIO)
-        step[free] = limits[free] * (inverse @ -(rest + slope[:, ~free] @ step[~free]))
+        step[free] = limits[free] * (inverse @ -(rest + jacobian[:, ~free] @ step[~free]))
         over = free & (np.abs(x + step) > limits)
         if not over.any():
             break
@@ -79,11 +89,11 @@ def _step(slope: FloatArray, rest: FloatArray, x: FloatArray, limits: FloatArray
     return step
 
 
-def _slope(miss: Callable[[FloatArray], FloatArray], x: FloatArray) -> FloatArray:
-    """Jacobian by central differences, shape (conditions, knobs)."""
+def _jacobian(residual: Residual, x: FloatArray) -> FloatArray:
+    """Return the Jacobian by central differences, shape (equations, unknowns)."""
     columns = []
     for index in range(len(x)):
         step = np.zeros(len(x))
-        step[index] = _STEP
-        columns.append((miss(x + step) - miss(x - step)) / (2.0 * _STEP))
+        step[index] = _DIFFERENCE
+        columns.append((residual(x + step) - residual(x - step)) / (2.0 * _DIFFERENCE))
     return np.array(columns).T

@@ -1,4 +1,4 @@
-"""Small helpers for writing MJCF with ElementTree."""
+"""Helpers to write MJCF with ElementTree."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Value: TypeAlias = str | float | Iterable[float]
 
 
 def text(value: Value) -> str:
-    """Write a value as MJCF has it: numbers with nine digits, several of them separated by spaces."""
+    """Format a value for MJCF: numbers with nine digits, separated by spaces."""
     if isinstance(value, str):
         return value
     if isinstance(value, int | float):
@@ -20,14 +20,14 @@ def text(value: Value) -> str:
 
 
 def exact(values: Iterable[float]) -> str:
-    """Write numbers so that they are read back to the last bit."""
+    """Format numbers without loss."""
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
 def add(parent: Element, tag: str, **attributes: Value) -> Element:
-    """Append an element; a trailing underscore of a name is left out, as in ``class_``.
+    """Append an element; a trailing underscore of a name is dropped, as in ``class_``.
 
-    ``euler`` [rad, x-y-z in the turned axes] is written as ``quat``, which means the same whatever ``compiler`` says.
+    ``euler`` [rad, intrinsic x-y-z] is written as ``quat``, whose meaning does not depend on ``compiler``.
     """
     element = SubElement(parent, tag)
     for name, value in attributes.items():
@@ -39,18 +39,18 @@ def add(parent: Element, tag: str, **attributes: Value) -> Element:
 
 
 def section(root: Element, tag: str) -> Element:
-    """Return the section of the model with this name; it is made if it is not there."""
+    """Return the section of the model with this name; create it if it does not exist."""
     found = root.find(tag)
     return found if found is not None else SubElement(root, tag)
 
 
-def paint_only(parent: Element, kind: str, **attributes: Value) -> Element:
-    """Append a geom that is seen but touches nothing and weighs nothing."""
+def add_visual(parent: Element, kind: str, **attributes: Value) -> Element:
+    """Append a visual geom: no contact, no mass."""
     return add(parent, "geom", type=kind, contype=0, conaffinity=0, mass=0, group=2, **attributes)
 
 
 def _quaternion(x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """Turn about x, then the new y, then the new z, each in rad."""
+    """Return the quaternion of intrinsic rotations about x, y, z [rad]."""
     cx, sx = math.cos(x / 2.0), math.sin(x / 2.0)
     cy, sy = math.cos(y / 2.0), math.sin(y / 2.0)
     cz, sz = math.cos(z / 2.0), math.sin(z / 2.0)

@@ -1,12 +1,12 @@
-"""The battery in the simulator: how fast it empties, and what tells the flight stack.
+"""The battery in the simulator: its discharge, and its report to the flight stack.
 
 An open-circuit voltage E that depends on the charge, behind a resistance R, feeds a constant-power load P:
 
     P = (E − R·I)·I    →    I = (E − √(E² − 4·R·P)) / 2R = 2P / (E + √(E² − 4·R·P))
 
-A load above E²/4R cannot be fed: the current then is that of the largest power, E/2R. An empty battery gives
-nothing, and the rotors stop. P is the shaft power of the rotors, Σ d·|Ω|³, over the efficiency of motors and
-controllers, and what the avionics take.
+A load above E²/4R is limited to the largest power, with the current E/2R. An empty battery supplies no power, and the
+rotors stop. P is the shaft power of the rotors, Σ d·|Ω|³, over the efficiency of motors and controllers, plus the
+power of the avionics.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from flightstack.params.battery import Battery
 from flightstack.simulator_link.battery_frame import EXTRA_PLACES, PLACES, UNUSED_CELL, BatteryReport
 
 INTERVAL_US = 100_000
-"""Simulated time between two messages."""
+"""Simulated time between two reports."""
 
 
 class BatteryOptions(NamedTuple):
-    """What a run of the simulator chooses about the battery."""
+    """Options of the simulated battery."""
 
-    start: float = 1.0  # share of the charge at the beginning
+    start: float = 1.0  # initial share of the charge
     capacity_mah: float | None = None  # None: the vehicle's
-    drain: float = 1.0  # the charge falls so many times as fast as the current says
+    drain: float = 1.0  # factor on the discharge, not on the current
 
 
 FULL = BatteryOptions()
@@ -46,7 +46,7 @@ class BatteryState(NamedTuple):
 
 
 def set_battery(m: Record, battery: Battery, options: BatteryOptions) -> None:
-    """Put the battery into the record of a plant."""
+    """Write the battery to the record of a plant."""
     count = len(battery.cell_voltage_v)
     m["curve_count"] = count
     m["curve"][:count] = [battery.cells * volt for volt in battery.cell_voltage_v]
@@ -62,7 +62,7 @@ def set_battery(m: Record, battery: Battery, options: BatteryOptions) -> None:
 
 @compiled
 def open_circuit_v(m: Record) -> float:
-    """Open-circuit voltage at the present charge, linear between the points of the curve."""
+    """Return the open-circuit voltage at the present charge, linear between the points of the curve."""
     place = m["charge"] * (m["curve_count"] - 1)
     index = min(int(place), m["curve_count"] - 2)
     curve = m["curve"]
@@ -72,7 +72,7 @@ def open_circuit_v(m: Record) -> float:
 
 @compiled
 def settle(m: Record, shaft_w: float) -> None:
-    """Write voltage and current under a load of the rotors [W, mechanical]."""
+    """Update voltage and current for a load of the rotors [W, mechanical]."""
     volt, resistance = open_circuit_v(m), m["resistance"]
     power = shaft_w * m["inverse_efficiency"] + m["avionics"]
     if m["charge"] <= 0.0:
@@ -87,7 +87,7 @@ def settle(m: Record, shaft_w: float) -> None:
 
 @compiled
 def discharge(m: Record, shaft_w: float, step_s: float) -> None:
-    """Take the charge of one step out of the battery; the load [W, mechanical] is the mean over the step."""
+    """Discharge the battery by one step; the load [W, mechanical] is the mean over the step."""
     settle(m, shaft_w)
     m["consumed"] += m["current"] * step_s
     m["energy"] += m["current"] * m["voltage"] * step_s
@@ -95,7 +95,7 @@ def discharge(m: Record, shaft_w: float, step_s: float) -> None:
 
 
 def battery_state(m: Record) -> BatteryState:
-    """Read the battery out of the record of a plant."""
+    """Return the battery state from the record of a plant."""
     return BatteryState(
         float(m["voltage"]),
         float(m["current"]),
@@ -106,7 +106,7 @@ def battery_state(m: Record) -> BatteryState:
 
 
 def battery_report(state: BatteryState, cells: int) -> BatteryReport:
-    """BATTERY_STATUS of a pack whose cells are equal."""
+    """Return the BATTERY_STATUS of a pack with equal cells."""
     in_cell = whole(state.voltage_v / cells * 1e3, 0, UNUSED_CELL - 1)
     first, more = min(cells, PLACES), max(cells - PLACES, 0)
     unused = [UNUSED_CELL] * (PLACES - first) + [in_cell] * more + [0] * (EXTRA_PLACES - more)

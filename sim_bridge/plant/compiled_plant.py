@@ -1,4 +1,4 @@
-"""The plants whose equations are compiled functions over one record."""
+"""The rigid and the paper plant: equations as compiled functions over one record."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class CompiledPlant(RecordPlant):
         super().__init__(vehicle, options)
         self._paper = name == "paper"
         self._kernel = self._call = advance_kernel(name)
-        self._met: FloatArray | None = None
+        self._last_command: FloatArray | None = None
         self._bound: FloatArray | None = None
         self._slope = slope_kernel(name)
         self.set_step(DEFAULT_STEP_S)
@@ -35,7 +35,7 @@ class CompiledPlant(RecordPlant):
             body[6:9], body[9:12] = initial.euler_rad, initial.rates_frd_rad_s
         else:
             body[6:10], body[10:13] = quaternion_from_euler(*initial.euler_rad), initial.rates_frd_rad_s
-        # each friction spring starts relaxed: its anchor lies straight below or above its contact point
+        # each friction spring starts relaxed, with its anchor vertically below or above its contact point
         m = self.memory[0]
         attitude = quaternion_from_euler(*initial.euler_rad)
         for index in range(int(m["point_count"])):
@@ -55,47 +55,47 @@ class CompiledPlant(RecordPlant):
         m["lever"] = math.fsum(arms) / len(arms)
 
     def set_step(self, step_s: float) -> None:
-        """Choose the fixed step of the integration [s]."""
+        """Set the fixed integration step [s]."""
         super().set_step(step_s)
         self._set_contact(contact_model(self._vehicle, step_s, single_point=self._paper))
 
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         if command_rad_s is not self._bound:
-            self._meet(command_rad_s)
+            self._bind(command_rad_s)
         return self._call(self.memory, command_rad_s, flags, steps, self.output)
 
-    def _meet(self, command_rad_s: FloatArray) -> None:
-        """Take the kernel for any array, and at the second meeting with the same one that made for its type."""
+    def _bind(self, command_rad_s: FloatArray) -> None:
+        """Call the kernel through its dispatcher, and directly from the second use of the same array on."""
         self._call, self._bound = self._kernel, None
-        if command_rad_s is self._met:
+        if command_rad_s is self._last_command:
             self._call = direct(self._kernel, self.memory, command_rad_s, 0, 1, self.output)
             self._bound = command_rad_s
-        self._met = command_rad_s
+        self._last_command = command_rad_s
 
     def show(self) -> int:
-        """Write the present state to ``output``; returns as ``advance``."""
+        """Write the present state to ``output``; return the bits of ``advance``."""
         return self._kernel(self.memory, self.memory[0]["command"], 0, 0, self.output)
 
     def acceleration_ned_m_s2(self) -> Vector3:
-        """Acceleration at the present state."""
+        """Return the acceleration at the present state."""
         self._slope(self.memory)
         x, y, z = self.memory[0]["slope"][0, 3:6].tolist()
         return Vector3(x, y, z)
 
     @property
-    def ground_softness_m(self) -> float:
-        """How far the ground gives way under the vehicle's weight; more with longer steps."""
+    def rest_depth_m(self) -> float:
+        """Depth [m] at which the vehicle rests; it grows with the step."""
         return float(self.memory[0]["ramp"])
 
-    def buried_m(self) -> float:
-        """How far the lowest contact point lies below the ground (negative above it) in the state shown."""
+    def penetration_m(self) -> float:
+        """Return the depth [m] of the lowest contact point below its rest depth; negative above it."""
         m, state = self.memory[0], self.output[0]["state"].tolist()
         points = m["point"][: int(m["point_count"])].tolist()
         lowest = max(rotate(Quaternion(*state[6:10]), Vector3(*point)).z for point in points)
         return float(state[2] + lowest - m["ground_z"] - m["ramp"])
 
     def euler_rad(self) -> Vector3 | None:
-        """Roll, pitch, yaw where they are states of the plant, else None."""
+        """Return roll, pitch, yaw if they are states of the plant, else None."""
         if not self._paper:
             return None
         roll, pitch, yaw = self.memory[0]["body"][6:9].tolist()

@@ -1,7 +1,7 @@
-"""What disturbs the flight: wind and gusts, a constant force, a constant and a gusty torque.
+"""Disturbances: wind and gusts, a constant force, a constant and a gusty torque.
 
-Gusts of the wind and of the torque are first-order Gauss-Markov processes: normally distributed, with the
-standard deviation σ that is asked for and the autocorrelation σ²·exp(−|t|/T), T the correlation time.
+Gusts of wind and torque are first-order Gauss-Markov processes: normally distributed with the given standard
+deviation σ and the autocorrelation σ²·exp(−|t|/T), T the correlation time.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ GUST_TIME_S = 1.5
 """Correlation time of the gusts."""
 
 GUST_DOWN_RATIO = 0.5
-"""Vertical over horizontal gusts; near the ground MIL-F-8785C has about this ratio."""
+"""Ratio of vertical to horizontal gusts, about that of MIL-F-8785C near the ground."""
 
 TORQUE_GUST_TIME_S = 0.1
 """Correlation time of the gusty torque.
@@ -25,10 +25,10 @@ MIL-F-8785C gives rolling gusts the corner πV/4b: 10 rad/s for a span b of 0.4 
 """
 
 TORQUE_GUST_YAW_RATIO = 0.1
-"""Gusty torque about yaw over that about roll and pitch.
+"""Ratio of the gusty torque about yaw to that about roll and pitch.
 
-Turbulence at the rotors makes their thrusts unequal. That acts about roll and pitch with the arm, about yaw
-with the rotor's torque over its thrust, which is 0.12 and 0.09 of the arm on the built-in vehicles.
+Turbulence makes the rotor thrusts unequal. The lever is the arm about roll and pitch, and torque over thrust of a
+rotor about yaw, which is 0.12 and 0.09 of the arm on the built-in vehicles.
 """
 
 _STILL = Vector3(0.0, 0.0, 0.0)
@@ -48,7 +48,7 @@ NO_DISTURBANCE = Disturbance()
 
 
 def check_wind(vehicle: Vehicle, plant: str, disturbance: Disturbance) -> None:
-    """Raise UsageProblemError for wind or gusts that cannot act, because the plant or the vehicle has no drag."""
+    """Raise UsageProblemError for wind or gusts on a plant or vehicle without drag."""
     if disturbance.wind_ned_m_s == _STILL and disturbance.gust_m_s == 0.0:
         return
     refusal = vehicle.wind_refusal(plant)

@@ -1,7 +1,7 @@
-"""The integrator that the compiled plants share: classic fixed-step Runge-Kutta of order 4.
+"""The integrator of the compiled plants: classic fixed-step Runge-Kutta of order 4.
 
-The rotors are not part of the Runge-Kutta state: between two commands their first-order lag has an exact
-solution, which gives their speeds at the start, the middle and the end of each step.
+The rotors are not part of the Runge-Kutta state: the exact solution of their first-order lag gives their speeds at the
+start, the middle and the end of each step.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from sim_bridge.plant.layout import DIVERGED
 from sim_bridge.plant.rotors import half_step, rotor_forces, take_commands
 
 LARGEST_TURN_RAD = 1.0
-"""Rotation in one step beyond which the result is not trusted: first the attitude is lost, then the rest."""
+"""Largest valid rotation in one step; beyond it the attitude is not accurate."""
 
-# what ``specialise`` binds in the templates below; these make the templates themselves a valid program
+# defaults of the names that ``specialise`` binds in the templates below
 derivative = rigid.derivative
 before_step = rigid.before_step
 after_step = rigid.after_step
@@ -42,7 +42,7 @@ def _combine(x: FloatArray, h: float, a: FloatArray, b: FloatArray, c: FloatArra
 
 @compiled
 def next_gust(m: Record) -> None:
-    """Gauss-Markov processes of wind and torque, exact for their values at the steps, held over each step."""
+    """Advance the Gauss-Markov processes of wind and torque: exact at the steps, constant within a step."""
     row = m["noise_row"]
     gust, scale, noise = m["gust"], m["gust_scale"], m["noise"]
     twist, twist_scale, twist_noise = m["torque_gust"], m["torque_gust_scale"], m["torque_noise"]
@@ -54,11 +54,22 @@ def next_gust(m: Record) -> None:
     m["noise_row"] += 1
 
 
+@compiled
+def _has_diverged(x: FloatArray, state: FloatArray, h: float) -> bool:
+    """Return True if the state ``x`` is not finite, or the rotation per step is too large."""
+    total = 0.0
+    for i in range(STATE_SIZE):
+        total += abs(x[i])
+    p, q, r = state[10], state[11], state[12]
+    turn = math.sqrt(p * p + q * q + r * r) * h
+    return not (math.isfinite(total) and turn <= LARGEST_TURN_RAD)
+
+
 def _advance(memory: RecordArray, command: FloatArray, flags: int, steps: int, output: RecordArray) -> int:
-    """Advance by ``steps`` steps with the commands [rad/s] held; write the result to ``output``.
+    """Advance by ``steps`` steps with the commands [rad/s] held; write the state to ``output``.
 
     ``memory`` has dtype ``MEMORY``, shape (1,), ``output`` ``OUTPUT``, shape (1,); ``flags`` are those of
-    FS_ACTUATORS. Returns bits CONTACT and DIVERGED (not finite, or spinning too fast for the step).
+    FS_ACTUATORS. Returns the bits CONTACT and DIVERGED (not finite, or too large a rotation per step).
     """
     m, o = memory[0], output[0]
     x, stage, slopes = m["body"], m["stage"], m["slope"]
@@ -90,15 +101,10 @@ def _advance(memory: RecordArray, command: FloatArray, flags: int, steps: int, o
         if has_battery:
             discharge(m, (at_start.power_w + 4.0 * at_middle.power_w + at_end.power_w) / 6.0, h)
     result = show(m, o["state"])
-    total = 0.0
-    for i in range(STATE_SIZE):
-        total += abs(x[i])
-    p, q, r = o["state"][10], o["state"][11], o["state"][12]
-    turn = math.sqrt(p * p + q * q + r * r) * h
     speeds, shown = m["rotor_speed"], o["rotor_speed"]
     for i in range(m["rotor_count"]):
         shown[i] = speeds[i]
-    return result if math.isfinite(total) and turn <= LARGEST_TURN_RAD else result | DIVERGED
+    return result | DIVERGED if _has_diverged(x, o["state"], h) else result
 
 
 def _slope_at(memory: RecordArray) -> None:
@@ -107,7 +113,7 @@ def _slope_at(memory: RecordArray) -> None:
     derivative(m["body"], rotor_forces(m), m, m["slope"][0])
 
 
-@cache  # reading a kernel from the disk takes longer than a second of flight
+@cache  # reading a kernel from disk takes longer than a second of flight
 def _join(template: Callable[..., Any], plant: str) -> Callable[..., Any]:
     module = {"rigid": rigid, "paper": paper}[plant]
     parts = ("derivative", "before_step", "after_step", "show")

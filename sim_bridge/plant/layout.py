@@ -31,26 +31,30 @@ ROTOR = np.dtype(
 
 MEMORY = np.dtype(
     [
-        # what changes
+        # state
         ("body", "f8", STATE_SIZE),  # each plant's own state vector
         ("stage", "f8", STATE_SIZE),  # Runge-Kutta: state of a stage
         ("slope", "f8", (4, STATE_SIZE)),  # Runge-Kutta: derivatives
         ("rotor_speed", "f8", MAX_ROTORS),  # rad/s
         ("command", "f8", MAX_ROTORS),  # last good command after the limits, rad/s
         ("bad_commands", "i8"),
-        ("anchor", "f8", (MAX_POINTS, 3)),  # where the friction spring of each contact point is fastened
+        (
+            "anchor",
+            "f8",
+            (MAX_POINTS, 3),
+        ),  # of the friction spring of each contact point: x, y m, heading rad
         ("gust", "f8", 3),  # m/s NED
         ("torque_gust", "f8", 3),  # N m FRD
         ("torque", "f8", 3),  # external, steady and gusty, N m FRD
         ("noise", "f8", (NOISE_ROWS, 3)),  # unit normal deviates of the wind, one row for each step
-        ("torque_noise", "f8", (NOISE_ROWS, 3)),  # and of the torque
+        ("torque_noise", "f8", (NOISE_ROWS, 3)),  # the same of the torque
         ("noise_row", "i8"),
         ("charge", "f8"),  # of the battery, share of the capacity
         ("voltage", "f8"),  # of the battery, V
         ("current", "f8"),  # A
         ("consumed", "f8"),  # A s since the start
         ("energy", "f8"),  # J since the start
-        # what is fixed
+        # constants
         ("step_s", "f8"),
         ("rotor_count", "i8"),
         ("rotor", ROTOR, MAX_ROTORS),
@@ -64,7 +68,7 @@ MEMORY = np.dtype(
         ("curve", "f8", MAX_CURVE_POINTS),  # V, open circuit, at equal steps of charge from empty to full
         ("resistance", "f8"),  # ohm
         ("capacity", "f8"),  # A s
-        ("drain", "f8"),  # the charge falls so many times as fast as the current says
+        ("drain", "f8"),  # factor on the discharge
         ("inverse_efficiency", "f8"),  # electric over mechanical power of the rotors
         ("avionics", "f8"),  # W
         ("wind", "f8", 3),  # steady, m/s NED
@@ -72,19 +76,19 @@ MEMORY = np.dtype(
         ("gust_scale", "f8", 3),  # m/s, zero without gusts
         ("torque_gust_decay", "f8"),  # over one step
         ("torque_gust_scale", "f8", 3),  # N m, zero without a gusty torque
-        ("ground", "i8"),  # whether there is a ground
-        ("ground_z", "f8"),  # m, where the contact springs are relaxed
+        ("ground", "i8"),  # 1 with a ground
+        ("ground_z", "f8"),  # m, at which the contact springs are relaxed
         ("reach", "f8"),  # m, farthest contact point from the body origin
         ("point_count", "i8"),
         ("point", "f8", (MAX_POINTS, 3)),  # contact points FRD, m
         ("point_share", "f8", MAX_POINTS),  # of the stiffness
         ("stiffness", "f8"),  # N/m, all feet together
         ("damping", "f8"),  # N s/m, all feet together
-        ("ramp", "f8"),  # m, depth at which the damping is complete
+        ("ramp", "f8"),  # m, depth of full damping
         ("lever", "f8"),  # m, mean distance of the feet from the vertical axis
     ],
     align=True,
 )
 
 OUTPUT = np.dtype([("state", "f8", STATE_SIZE), ("rotor_speed", "f4", MAX_ROTORS)])
-"""What a plant shows, laid out as in FS_PLANT_STATE: array form of ``VehicleState``, rotor speeds."""
+"""Output of a plant, laid out as in FS_PLANT_STATE: array form of ``VehicleState``, rotor speeds."""

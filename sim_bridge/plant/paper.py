@@ -1,14 +1,14 @@
 """The paper's small-angle plant: its equation 7, corrected as in the project's errata, in NED/FRD.
 
-State vector: position NED, velocity NED, φ θ ψ, p q r; the thirteenth value is unused. The paper sets φ' = p,
-θ' = q, ψ' = r. U1…U4 are the vehicle's effectiveness matrix times Ω², with the arm inside (l·U2, l·U3 of the
-paper), so that any rotor list flies. As in the paper there is no drag and no spin-up torque.
+State vector: position NED, velocity NED, φ θ ψ, p q r; the thirteenth value is unused. The paper sets φ' = p, θ' = q,
+ψ' = r. U1…U4 are the vehicle's effectiveness matrix times Ω² for any rotor list, arm included (l·U2, l·U3 of the
+paper). As in the paper there is no drag and no spin-up torque.
 
     x'' = −(cφ sθ cψ + sφ sψ) U1/m      y'' = −(cφ sθ sψ − sφ cψ) U1/m      z'' = g − cφ cθ U1/m
     p' = a1 q r + a2 q Ωr + b1 U2       q' = a3 p r − a4 p Ωr + b2 U3       r' = a5 p q + b3 U4
 
-On the ground the vehicle is one point at its origin. Its attitude is held level by a spring and damper as
-strong as the load on the feet allows, its heading by friction.
+On the ground the vehicle is one point at its origin. A spring and damper, limited by the load on the feet, holds the
+attitude level, and friction holds the heading.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def derivative(x: FloatArray, rotors: RotorForces, m: Record, out: FloatArray) -
 
 @compiled
 def before_step(x: FloatArray, m: Record) -> None:
-    """Let the friction anchors slip, that of the heading too."""
+    """Slip the friction anchors of position and heading."""
     if m["ground"] == 0:
         return
     anchor, normal = m["anchor"][0], _normal(x, m)
@@ -91,19 +91,19 @@ def before_step(x: FloatArray, m: Record) -> None:
     if normal == 0.0:
         anchor[2] = x[8]
         return
-    # the angle at which the heading's spring reaches its limit; both grow with the load
+    # angle at which the heading spring reaches its limit; both grow with the load
     largest = FRICTION * m["weight"] * m["lever"] * m["mass"] / (m["inertia"][2] * m["stiffness"])
     anchor[2] = x[8] - limited(x[8] - anchor[2], largest)
 
 
 @compiled
 def after_step(x: FloatArray) -> None:
-    """Nothing to repair after a step: Euler angles have no constraint."""
+    """Do nothing: Euler angles have no constraint."""
 
 
 @compiled
 def show(m: Record, state: FloatArray) -> int:
-    """Write the array form of ``VehicleState`` to ``state``; return CONTACT when on the ground."""
+    """Write the array form of ``VehicleState`` to ``state``; return CONTACT on the ground, else 0."""
     x = m["body"]
     q = quaternion_from_euler(x[6], x[7], x[8])
     for i in range(6):

@@ -1,4 +1,4 @@
-"""What the simulator asks of a plant, and the choices that every plant takes."""
+"""The interface of a plant, and the options of all plants."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ AT_REST = InitialState()
 
 
 class PlantOptions(NamedTuple):
-    """Choices beside the vehicle."""
+    """Options beside the vehicle."""
 
     disturbance: Disturbance = NO_DISTURBANCE
     seed: int = 1
     initial: InitialState = AT_REST
     ground: bool = True
-    limits: bool = True  # of the rotor speeds
-    battery: BatteryOptions | None = FULL  # None: the vehicle flies without one
+    limits: bool = True  # on the rotor speeds
+    battery: BatteryOptions | None = FULL  # None: fly without a battery
 
 
 class Plant(Protocol):
-    """A model of the vehicle and its surroundings that the simulator drives.
+    """A model of the vehicle and its environment.
 
-    ``output`` is an array of dtype ``OUTPUT``, shape (1,), that the simulator sets: the plant writes its
-    state there after each call of ``advance`` and of ``show``.
+    ``output``, an array of dtype ``OUTPUT`` and shape (1,), may be replaced by the caller: ``advance`` and ``show``
+    write the state to it.
     """
 
     output: RecordArray
 
     @property
     def bad_commands(self) -> int:
-        """Commands that were not a number and were replaced by the last good one."""
+        """Number of invalid commands, which the last good one replaced."""
         ...
 
     def set_step(self, step_s: float) -> None:
-        """Choose the fixed step of the integration."""
+        """Set the fixed integration step [s]."""
         ...
 
     def set_rotor_speeds(self, speeds_rad_s: tuple[float, ...]) -> None:
-        """Put the rotors at once at these speeds."""
+        """Set the rotor speeds."""
         ...
 
     def advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
-        """Advance with the rotor speed commands held; ``flags`` as in FS_ACTUATORS.
+        """Advance with the rotor speed commands held, ``flags`` as in FS_ACTUATORS.
 
         Returns the bits CONTACT and DIVERGED of ``layout``.
         """
@@ -63,49 +63,49 @@ class Plant(Protocol):
 
     @property
     def battery(self) -> BatteryState | None:
-        """The battery; None for a vehicle without one."""
+        """State of the battery; None without one."""
         ...
 
     def set_charge(self, share: float) -> None:
-        """Set the charge of the battery."""
+        """Set the charge of the battery, 0 to 1."""
         ...
 
     def set_rotor_fault(self, rotor: int, share: float = 1.0, speed_rad_s: float | None = None) -> None:
-        """Let a rotor (from 0) give a share of its thrust and torque, and turn at one speed only.
+        """Scale thrust and torque of a rotor (from 0), and fix its commanded speed if one is given.
 
-        The defaults make it whole again.
+        The defaults clear the fault.
         """
         ...
 
     def rotor_speeds_rad_s(self) -> list[float]:
-        """Rotor speeds in full precision, in the order of the vehicle file."""
+        """Return the rotor speeds in full precision, in the order of the vehicle file."""
         ...
 
     def show(self) -> int:
-        """Write the present state to ``output``; returns as ``advance``."""
+        """Write the present state to ``output``; return the bits of ``advance``."""
         ...
 
     def acceleration_ned_m_s2(self) -> Vector3:
-        """Acceleration at the present state."""
+        """Return the acceleration at the present state."""
         ...
 
     def airspeed_m_s(self) -> float:
-        """Speed relative to the air."""
+        """Return the airspeed."""
         ...
 
     @property
-    def ground_softness_m(self) -> float:
-        """How far the ground gives way under the vehicle's weight; more with longer steps."""
+    def rest_depth_m(self) -> float:
+        """Depth [m] at which the vehicle rests on the ground; it grows with the step."""
         ...
 
-    def buried_m(self) -> float:
-        """How far the vehicle reaches into the ground in the state shown (negative above it, where known)."""
+    def penetration_m(self) -> float:
+        """Return the depth [m] below the rest depth in the present state; above the ground 0 or negative."""
         ...
 
-    def about(self) -> str | None:
-        """Tell what the user should know of how the plant was made, if anything."""
+    def description(self) -> str | None:
+        """Return a description of the plant for the user, or None."""
         ...
 
     def euler_rad(self) -> Vector3 | None:
-        """Roll, pitch, yaw where they are states of the plant, else None."""
+        """Return roll, pitch, yaw if they are states of the plant, else None."""
         ...

@@ -1,4 +1,4 @@
-"""What all plants share that keep their numbers in one record: rotors and their faults, battery, disturbances."""
+"""Common part of all plants: rotors and their faults, battery and disturbances in one record."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ DEFAULT_STEP_S = 1e-3
 
 
 class RecordPlant(ABC):
-    """The common part of a plant over the record ``MEMORY``; see ``Plant`` for its methods."""
+    """A plant over the record ``MEMORY``; see ``Plant`` for its methods."""
 
     def __init__(self, vehicle: Vehicle, options: PlantOptions) -> None:
         self.output: RecordArray = np.zeros(1, OUTPUT)
         self._vehicle = vehicle
         self.memory: RecordArray = np.zeros(1, MEMORY)
-        """All numbers of the plant, of dtype ``MEMORY`` and shape (1,): state, rotors, faults, disturbances."""
+        """State, rotors, faults and disturbances, dtype ``MEMORY``, shape (1,)."""
         m = self.memory[0]
         disturbance = options.disturbance
         m["wind"], m["force"] = disturbance.wind_ned_m_s, disturbance.force_ned_n
@@ -55,13 +55,13 @@ class RecordPlant(ABC):
                 rotor.min_speed_rad_s if limits else -math.inf,
                 rotor.max_speed_rad_s if limits else math.inf,
                 0.0,  # set with the step
-                # speeds that are imposed need no torque
+                # without lag the speeds are imposed
                 rotor.max_drive_torque_n_m if rotor.lag_s > 0.0 and rotor.inertia_kg_m2 > 0.0 else math.inf,
             )
         self._healthy: RecordArray = m["rotor"].copy()
 
     def set_rotor_fault(self, rotor: int, share: float = 1.0, speed_rad_s: float | None = None) -> None:
-        """Let a rotor give a share of its thrust and torque, and turn at one speed only; see ``Plant``."""
+        """Scale thrust and torque of a rotor, and fix its commanded speed; see ``Plant``."""
         m, healthy = self.memory[0], self._healthy[rotor]
         now = m["rotor"][rotor]
         for name in ("thrust", "roll", "pitch", "drag"):
@@ -69,24 +69,24 @@ class RecordPlant(ABC):
         now["min_speed"], now["max_speed"] = healthy["min_speed"], healthy["max_speed"]
         if speed_rad_s is not None:
             now["min_speed"] = now["max_speed"] = speed_rad_s
-            m["command"][rotor] = speed_rad_s  # also where the next command is not a number
+            m["command"][rotor] = speed_rad_s  # holds also if the next command is invalid
 
     @property
     def battery(self) -> BatteryState | None:
-        """The battery; None for a vehicle without one."""
+        """State of the battery; None without one."""
         return battery_state(self.memory[0]) if self._has_battery else None
 
     def set_charge(self, share: float) -> None:
-        """Set the charge of the battery."""
+        """Set the charge of the battery, 0 to 1."""
         self.memory[0]["charge"] = share
 
     @property
     def bad_commands(self) -> int:
-        """Commands that were not a number and were replaced by the last good one."""
+        """Number of invalid commands, which the last good one replaced."""
         return int(self.memory[0]["bad_commands"])
 
     def set_step(self, step_s: float) -> None:
-        """Choose the fixed step of the integration [s]."""
+        """Set the fixed integration step [s]."""
         m = self.memory[0]
         m["step_s"] = step_s
         for index, rotor in enumerate(self._vehicle.rotors):
@@ -95,17 +95,17 @@ class RecordPlant(ABC):
         self._turbulence.set_step(step_s)
 
     def rotor_speeds_rad_s(self) -> list[float]:
-        """Rotor speeds in full precision, in the order of the vehicle file."""
+        """Return the rotor speeds in full precision, in the order of the vehicle file."""
         speeds: list[float] = self.memory[0]["rotor_speed"][: len(self._vehicle.rotors)].tolist()
         return speeds
 
     def set_rotor_speeds(self, speeds_rad_s: tuple[float, ...]) -> None:
-        """Put the rotors at once at these speeds."""
+        """Set the rotor speeds."""
         self.memory[0]["rotor_speed"][: len(speeds_rad_s)] = speeds_rad_s
 
     @abstractmethod
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
-        """Advance by steps for which there is noise; returns as ``advance``."""
+        """Advance by steps for which noise is available; return the bits of ``advance``."""
 
     def advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         """Advance by ``steps`` steps with the commands (shape (8,), rad/s) held; see ``Plant``."""
@@ -119,10 +119,10 @@ class RecordPlant(ABC):
         return result
 
     def airspeed_m_s(self) -> float:
-        """Speed relative to the air."""
+        """Return the airspeed."""
         m = self.memory[0]
         return distance(*(m["body"][3:6] - m["wind"] - m["gust"]).tolist())
 
-    def about(self) -> str | None:
-        """Tell what the user should know of how the plant was made, if anything."""
+    def description(self) -> str | None:
+        """Return a description of the plant for the user, or None."""
         return None

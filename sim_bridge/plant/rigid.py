@@ -32,7 +32,7 @@ class Rotation(NamedTuple):
 
 @compiled
 def rotation(x: FloatArray) -> Rotation:
-    """Rotation matrix of the quaternion in the state."""
+    """Return the rotation matrix of the quaternion in the state."""
     w, i, j, k = x[6], x[7], x[8], x[9]
     return Rotation(
         Vector3(1.0 - 2.0 * (j * j + k * k), 2.0 * (i * j - w * k), 2.0 * (i * k + w * j)),
@@ -126,7 +126,7 @@ def derivative(x: FloatArray, rotors: RotorForces, m: Record, out: FloatArray) -
 
 @compiled
 def before_step(x: FloatArray, m: Record) -> None:
-    """Let the friction anchors slip."""
+    """Slip the friction anchors."""
     if not _near_ground(x, m):
         return
     r = rotation(x)
@@ -143,14 +143,14 @@ def before_step(x: FloatArray, m: Record) -> None:
 
 @compiled
 def after_step(x: FloatArray) -> None:
-    """Scale the quaternion back to unit length."""
+    """Normalise the quaternion."""
     scale = 1.0 / math.sqrt(x[6] * x[6] + x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
     x[6], x[7], x[8], x[9] = x[6] * scale, x[7] * scale, x[8] * scale, x[9] * scale
 
 
 @compiled
 def show(m: Record, state: FloatArray) -> int:
-    """Write the array form of ``VehicleState`` to ``state``; return CONTACT when it touches the ground."""
+    """Write the array form of ``VehicleState`` to ``state``; return CONTACT on the ground, else 0."""
     x = m["body"]
     for i in range(13):
         state[i] = x[i]

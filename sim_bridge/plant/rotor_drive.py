@@ -1,21 +1,20 @@
-"""Compiled part of the multibody plant: forces of the air, drives of the rotors, and the integration around MuJoCo.
+"""Compiled part of the multibody plant: aerodynamic forces, drives of the rotors, and integration around MuJoCo.
 
-MuJoCo turns forces into accelerations. What acts is made here, at every stage of a classic Runge-Kutta step:
-drag, wind and disturbances on the frame; thrust b·Ω|Ω| and drag torque d·Ω|Ω| of the air on each rotor; and
-between rotor and frame the torque of the drive. Neither gyroscopic torques nor the reactions of drive and
-spin-up are put on the frame: they come out of the mechanics.
+MuJoCo computes accelerations from forces. This module computes the forces in each stage of a classic Runge-Kutta step:
+drag, wind and disturbances on the frame; thrust b·Ω|Ω| and drag torque d·Ω|Ω| of the air on each rotor; and the drive
+torque between rotor and frame. Gyroscopic torques and the reactions to drive and spin-up result from the mechanics.
 
-The speed loop of a drive makes the rotor's speed relative to the frame follow its command with a first-order lag. The
-torque that this takes follows from the equations of motion (b: the frame's six degrees of freedom, h: the hinges):
+The speed loop of a drive makes the rotor speed relative to the frame follow its command with a first-order lag. Its
+torque follows from the equations of motion (b: the frame's six degrees of freedom, h: the hinges):
 
     M_bb a_b + M_bh Ω̇ + c_b = f_b          M_hb a_b + M_hh Ω̇ + c_h = τ + f_h
     τ = (M_hh − M_hb M_bb⁻¹ M_bh) Ω̇ + M_hb M_bb⁻¹ (f_b − c_b) + c_h − f_h
 
-Both matrices are constant in body axes, because rotors are round. With it the hinge accelerates as the lag wants, to
-rounding, and its speed is taken from the lag's exact solution, which stays stable for any lag. A drive of limited
-torque (``rotors.py``) wants less of the same.
+Both matrices are constant in body axes, because rotors are axisymmetric. The hinge then has the acceleration of the
+lag within rounding, and its speed is the exact solution of the lag, which is stable for any lag. A drive of limited
+torque (``rotors.py``) has a smaller Ω̇.
 
-State and memory are those of the rigid plant: NED and FRD. MuJoCo's x-y-z is north-west-up and forward-left-up.
+State and memory are those of the rigid plant, NED and FRD. MuJoCo uses NWU and FLU.
 """
 
 from __future__ import annotations
@@ -32,48 +31,48 @@ from sim_bridge.plant.layout import CONTACT, DIVERGED
 from sim_bridge.plant.rigid import after_step, rotation
 from sim_bridge.plant.rotors import drive_acceleration, half_step, take_commands
 
-_LARGEST = 1e9  # of any number of the state: beyond it MuJoCo gives up
+_LARGEST = 1e9  # of the sum of the state: MuJoCo resets larger states
 _NEAR_M = 0.05
 
 FLYING, NEAR, LOST = 0, 1, 2
-"""What ``begin_step`` and ``end_stage`` return: no contact possible, one possible, numbers that ran away."""
+"""Results of ``begin_step`` and ``end_stage``: no contact possible, contact possible, state diverged."""
 
 DRIVE = np.dtype(
     [
-        ("gain", "f8", (MAX_ROTORS, MAX_ROTORS)),  # M_hh − M_hb M_bb⁻¹ M_bh
-        ("row", "f8", (MAX_ROTORS, 6)),  # M_hb M_bb⁻¹, columns: force and torque FRD
+        ("inertia", "f8", (MAX_ROTORS, MAX_ROTORS)),  # M_hh − M_hb M_bb⁻¹ M_bh
+        ("coupling", "f8", (MAX_ROTORS, 6)),  # M_hb M_bb⁻¹, columns: force and torque FRD
         ("spin", "f8", MAX_ROTORS),
         ("speed", "f8", (3, MAX_ROTORS)),  # at the start, the middle and the end of the step
-        ("wanted", "f8", (3, MAX_ROTORS)),  # accelerations then, rad/s²
+        ("acceleration", "f8", (3, MAX_ROTORS)),  # accelerations at these times, rad/s²
         ("angle", "f8", MAX_ROTORS),
-        ("sink", "f8"),  # m, how far the vehicle stands in the ground: MuJoCo has it so much lower
+        ("sink", "f8"),  # m, rest depth: height offset of MuJoCo's state
     ],
     align=True,
 )
-"""Constants of the drives and what they do within one step."""
+"""Constants of the drives, and their speeds within one step."""
 
 
 @compiled
 def hold_commands(memory: RecordArray, command: FloatArray, flags: int) -> None:
-    """Take new commands [rad/s]; ``flags`` are those of FS_ACTUATORS."""
+    """Store new commands [rad/s]; ``flags`` are those of FS_ACTUATORS."""
     take_commands(memory[0], command, flags)
 
 
 @compiled
-def _note_speeds(m: Record, d: Record, when: int) -> None:
-    """Write speeds and accelerations of the rotors as the lag has them now."""
+def _store_speeds(m: Record, d: Record, when: int) -> None:
+    """Store the present speeds and accelerations of the rotors."""
     rotor, held, speed = m["rotor"], m["command"], m["rotor_speed"]
     for i in range(m["rotor_count"]):
         d["speed"][when, i] = speed[i]
         rate = rotor[i]["lag_rate"]
         if rotor[i]["max_torque"] < math.inf:
-            d["wanted"][when, i] = drive_acceleration(m, i, speed[i])
+            d["acceleration"][when, i] = drive_acceleration(m, i, speed[i])
         else:
-            d["wanted"][when, i] = (held[i] - speed[i]) * rate if rate < math.inf else 0.0
+            d["acceleration"][when, i] = (held[i] - speed[i]) * rate if rate < math.inf else 0.0
 
 
 @compiled
-def _pose(x: FloatArray, d: Record, when: int, rotors: int, qpos: FloatArray, qvel: FloatArray) -> None:
+def _write_pose(x: FloatArray, d: Record, when: int, rotors: int, qpos: FloatArray, qvel: FloatArray) -> None:
     """Write a state to MuJoCo."""
     qpos[0], qpos[1], qpos[2] = x[0], -x[1], -x[2] - d["sink"]
     qpos[3], qpos[4], qpos[5], qpos[6] = x[6], x[7], -x[8], -x[9]
@@ -85,12 +84,12 @@ def _pose(x: FloatArray, d: Record, when: int, rotors: int, qpos: FloatArray, qv
 
 
 @compiled
-def _where(x: FloatArray, m: Record) -> int:
-    """Tell whether the vehicle may touch the ground."""
+def _proximity(x: FloatArray, m: Record) -> int:
+    """Return FLYING, NEAR or LOST."""
     total = 0.0
     for i in range(len(x)):
         total += abs(x[i])
-    if not total < _LARGEST:  # nor where it is not a number
+    if not total < _LARGEST:  # also for NaN
         return LOST
     room = m["ground_z"] - x[2] - m["reach"]
     return NEAR if m["ground"] != 0 and room < _NEAR_M + 2.0 * m["step_s"] * abs(x[5]) else FLYING
@@ -98,43 +97,44 @@ def _where(x: FloatArray, m: Record) -> int:
 
 @compiled
 def show_pose(memory: RecordArray, drive: RecordArray, qpos: FloatArray, qvel: FloatArray) -> int:
-    """Write the present state to MuJoCo, as the first stage of a step has it; tell where the vehicle is."""
+    """Write the present state to MuJoCo, as in the first stage of a step; return FLYING, NEAR or LOST."""
     m, d = memory[0], drive[0]
-    where = _where(m["body"], m)
+    where = _proximity(m["body"], m)
     if where != LOST:
         m["stage"][:] = m["body"]
-        _note_speeds(m, d, 0)
-        _pose(m["body"], d, 0, m["rotor_count"], qpos, qvel)
+        _store_speeds(m, d, 0)
+        _write_pose(m["body"], d, 0, m["rotor_count"], qpos, qvel)
     return where
 
 
 @compiled
 def begin_step(memory: RecordArray, drive: RecordArray, qpos: FloatArray, qvel: FloatArray) -> int:
-    """Blow the next gust, turn the rotors, and write the first stage to MuJoCo; tell where the vehicle is."""
+    """Advance gusts and rotors, and write the first stage to MuJoCo; return FLYING, NEAR or LOST."""
     m, d = memory[0], drive[0]
     if m["gust_scale"][0] > 0.0 or m["torque_gust_scale"][0] > 0.0:
         next_gust(m)
     where = show_pose(memory, drive, qpos, qvel)
     half_step(m)
-    _note_speeds(m, d, 1)
+    _store_speeds(m, d, 1)
     half_step(m)
-    _note_speeds(m, d, 2)
+    _store_speeds(m, d, 2)
     return where
 
 
 @compiled
-def _drive(
+def _write_drive_torques(
     m: Record, d: Record, when: int, force: Vector3, torque: Vector3, bias: FloatArray, applied: FloatArray
 ) -> None:
-    """Write the torques of the drives to ``applied``; ``force`` and ``torque``, FRD, are f_b − c_b of the frame."""
-    gain, row, wanted, speed, rotors = d["gain"], d["row"], d["wanted"], d["speed"], m["rotor_count"]
+    """Write the drive torques to ``applied``; ``force`` and ``torque``, FRD, are f_b − c_b of the frame."""
+    inertia, row, acceleration, speed = d["inertia"], d["coupling"], d["acceleration"], d["speed"]
+    rotors = m["rotor_count"]
     for i in range(rotors):
         w2 = speed[when, i] * abs(speed[when, i])
         drive_torque = bias[6 + i] - d["spin"][i] * m["rotor"][i]["drag"] * w2
         drive_torque += row[i, 0] * force.x + row[i, 1] * force.y + row[i, 2] * force.z
         drive_torque += row[i, 3] * torque.x + row[i, 4] * torque.y + row[i, 5] * torque.z
         for j in range(rotors):
-            drive_torque += gain[i, j] * wanted[when, j]
+            drive_torque += inertia[i, j] * acceleration[when, j]
         applied[6 + i] = drive_torque
 
 
@@ -143,15 +143,14 @@ def apply_forces(
     memory: RecordArray, drive: RecordArray, stage: int, bias: FloatArray, contact: FloatArray,
     applied: FloatArray, on_body: FloatArray,
 ) -> None:  # fmt: skip
-    """Write what acts in a stage (0 to 3) to MuJoCo.
+    """Write the forces of a stage (0 to 3) to MuJoCo.
 
     ``bias`` and ``contact`` are qfrc_bias of this stage and qfrc_constraint of the one before; results are
     ``applied`` (qfrc_applied) and ``on_body`` (xfrc_applied, from the first rotor's row on).
     """
     m, d = memory[0], drive[0]
     x, rotors, when = m["stage"], m["rotor_count"], (stage + 1) // 2
-    r = rotation(x)
-    n, e, z = r.row_n, r.row_e, r.row_d
+    n, e, z = rotation(x)
     wind, gust, push, torque, air_drag = m["wind"], m["gust"], m["force"], m["torque"], m["drag"]
     vn, ve, vd = x[3] - wind[0] - gust[0], x[4] - wind[1] - gust[1], x[5] - wind[2] - gust[2]
     # drag in body axes, then with the external force in the world
@@ -176,14 +175,16 @@ def apply_forces(
     east -= contact[1] - bias[1]
     down -= contact[2] - bias[2]
     tx, ty, tz = tx + contact[3] - bias[3], ty - contact[4] + bias[4], tz - contact[5] + bias[5]
-    fx = n.x * north + e.x * east + z.x * down
-    fy = n.y * north + e.y * east + z.y * down
-    fz = n.z * north + e.z * east + z.z * down
-    _drive(m, d, when, Vector3(fx, fy, fz), Vector3(tx, ty, tz), bias, applied)
+    force = Vector3(
+        n.x * north + e.x * east + z.x * down,
+        n.y * north + e.y * east + z.y * down,
+        n.z * north + e.z * east + z.z * down,
+    )
+    _write_drive_torques(m, d, when, force, Vector3(tx, ty, tz), bias, applied)
 
 
 @compiled
-def _note_slope(x: FloatArray, qacc: FloatArray, out: FloatArray) -> None:
+def _store_slope(x: FloatArray, qacc: FloatArray, out: FloatArray) -> None:
     """Write the derivative of the state ``x`` with MuJoCo's accelerations."""
     out[0], out[1], out[2] = x[3], x[4], x[5]
     out[3], out[4], out[5] = qacc[0], -qacc[1], -qacc[2]
@@ -197,7 +198,7 @@ def _note_slope(x: FloatArray, qacc: FloatArray, out: FloatArray) -> None:
 
 @compiled
 def _shaft_power(m: Record, d: Record, when: int) -> float:
-    """Mechanical power of the rotors against the air: Σ d·|Ω|³."""
+    """Return the mechanical power of the rotors against the air: Σ d·|Ω|³."""
     power = 0.0
     for i in range(m["rotor_count"]):
         speed = d["speed"][when, i]
@@ -207,7 +208,7 @@ def _shaft_power(m: Record, d: Record, when: int) -> float:
 
 @compiled
 def _finish(m: Record, d: Record, h: float) -> None:
-    """Combine the slopes of a step; turn the rotors; take the charge out of the battery."""
+    """Combine the slopes of a step, turn the rotors and discharge the battery."""
     x, slope, speed = m["body"], m["slope"], d["speed"]
     for i in range(len(x)):
         x[i] += h / 6.0 * (slope[0, i] + 2.0 * (slope[1, i] + slope[2, i]) + slope[3, i])
@@ -223,30 +224,30 @@ def _finish(m: Record, d: Record, h: float) -> None:
 def end_stage(
     memory: RecordArray, drive: RecordArray, stage: int, qacc: FloatArray, qpos: FloatArray, qvel: FloatArray
 ) -> int:
-    """Take MuJoCo's accelerations in a stage (0 to 3), write the next stage to MuJoCo or end the step.
+    """Read MuJoCo's accelerations in a stage (0 to 3), and write the next stage to MuJoCo or end the step.
 
-    Returns where the vehicle is.
+    Returns FLYING, NEAR or LOST.
     """
     m, d = memory[0], drive[0]
     x, now, h = m["body"], m["stage"], m["step_s"]
     slope = m["slope"][stage]
-    _note_slope(now, qacc, slope)
+    _store_slope(now, qacc, slope)
     if stage == 3:
         _finish(m, d, h)
-        return _where(x, m)
+        return _proximity(x, m)
     scale = h if stage == 2 else 0.5 * h
     for i in range(len(x)):
         now[i] = x[i] + scale * slope[i]
     after_step(now)
-    where = _where(now, m)
+    where = _proximity(now, m)
     if where != LOST:
-        _pose(now, d, (stage + 2) // 2, m["rotor_count"], qpos, qvel)
+        _write_pose(now, d, (stage + 2) // 2, m["rotor_count"], qpos, qvel)
     return where
 
 
 @compiled
 def show_state(memory: RecordArray, output: RecordArray, touches: int) -> int:
-    """Write state and rotor speeds to ``output``; return the bits CONTACT (as told) and DIVERGED."""
+    """Write state and rotor speeds to ``output``; return the bits CONTACT (if ``touches``) and DIVERGED."""
     m, o = memory[0], output[0]
     x = m["body"]
     for i in range(len(x)):
@@ -255,4 +256,4 @@ def show_state(memory: RecordArray, output: RecordArray, touches: int) -> int:
         o["rotor_speed"][i] = m["rotor_speed"][i]
     turn = math.sqrt(x[10] * x[10] + x[11] * x[11] + x[12] * x[12]) * m["step_s"]
     result = CONTACT if touches != 0 else 0
-    return result if turn <= LARGEST_TURN_RAD and _where(x, m) != LOST else result | DIVERGED
+    return result if turn <= LARGEST_TURN_RAD and _proximity(x, m) != LOST else result | DIVERGED

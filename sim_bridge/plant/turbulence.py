@@ -1,10 +1,10 @@
 """Seeded noise for the gusts of a compiled plant.
 
-Wind and torque draw from streams of their own: turning one on or off leaves the other as it was. A step takes
-one row of each, whatever the number of steps in a call.
+Wind and torque have independent random streams: enabling one does not change the other. A step uses one row of each,
+whatever the number of steps in a call.
 
-Normal deviates are made here from the integers of PCG64, by Box and Muller's method: NumPy's own come from libm's
-functions, whose last bits depend on the processor, and may change with its version.
+Normal deviates come from the integers of PCG64 by Box and Muller's method: those of NumPy depend on libm, whose last
+bits depend on the processor, and may change between versions.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from sim_bridge.plant.layout import NOISE_ROWS
 
 @compiled
 def _box_muller(shares: FloatArray) -> None:
-    """Turn pairs of numbers in [0, 1), shape (n, 2), into pairs of independent normal deviates, in place."""
+    """Replace pairs of uniform numbers in [0, 1), shape (n, 2), by pairs of independent normal deviates."""
     for i in range(len(shares)):
         radius = math.sqrt(-2.0 * log(1.0 - shares[i, 0]))
         sine, cosine = sin_cos(2.0 * math.pi * shares[i, 1])
@@ -36,7 +36,7 @@ def _box_muller(shares: FloatArray) -> None:
 
 
 def normal_deviates(bits: np.random.PCG64, count: int) -> FloatArray:
-    """Return the next ``count`` standard normal deviates, from two integers of 64 bits for each pair."""
+    """Return the next ``count`` standard normal deviates; each pair takes two integers of 64 bits."""
     pairs = (count + 1) // 2
     shares = (bits.random_raw(2 * pairs) >> np.uint64(11)).astype(np.float64) / 2**53
     _box_muller(shares.reshape(pairs, 2))
@@ -44,7 +44,7 @@ def normal_deviates(bits: np.random.PCG64, count: int) -> FloatArray:
 
 
 class _Gust:
-    """One Gauss-Markov process of three components; ``name`` and ``noise`` are its fields in the record."""
+    """A Gauss-Markov process of three components; ``name`` and ``noise`` are its fields in the record."""
 
     def __init__(
         self, record: Record, name: str, noise: str, spread: FloatArray, time_s: float, bits: np.random.PCG64
@@ -64,14 +64,14 @@ class _Gust:
             self._noise[:] = normal_deviates(self._bits, self._noise.size).reshape(self._noise.shape)
 
     def set_step(self, step_s: float) -> None:
-        """Set decay and noise of one step so that spread and correlation time do not depend on it."""
+        """Set decay and noise of one step: spread and correlation time do not depend on the step."""
         decay = exp(-step_s / self._time_s)
         self._record[f"{self._name}_decay"] = decay
         self._record[f"{self._name}_scale"] = self._spread * math.sqrt(1.0 - decay * decay)
 
 
 class Turbulence:
-    """The gusts of wind and torque of one plant, whose record of ``MEMORY`` it fills."""
+    """Gusts of wind and torque of one plant, written to its record of ``MEMORY``."""
 
     def __init__(self, record: Record, disturbance: Disturbance, seed: int) -> None:
         wind = np.array([1.0, 1.0, GUST_DOWN_RATIO]) * disturbance.gust_m_s
@@ -92,12 +92,12 @@ class Turbulence:
         self.active = any(gust.active for gust in self._gusts)
 
     def set_step(self, step_s: float) -> None:
-        """Fit the processes to the plant's step [s]."""
+        """Adapt the processes to the plant's step [s]."""
         for gust in self._gusts:
             gust.set_step(step_s)
 
     def rows_left(self) -> int:
-        """Return for how many steps there is noise, at least one; draws new noise when it is used up."""
+        """Return the number of steps with noise left, at least one; draw new noise if none is left."""
         if int(self._record["noise_row"]) == NOISE_ROWS:
             for gust in self._gusts:
                 gust.refill()

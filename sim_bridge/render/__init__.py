@@ -1,1 +1,1 @@
-"""Pictures and films of a flight; needs the extra ``multibody``."""
+"""Pictures and films of a flight; requires the extra ``multibody``."""

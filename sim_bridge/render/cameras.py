@@ -1,6 +1,6 @@
-"""Where the cameras are: functions of the moment alone, so that a picture equals the frame of a film.
+"""Camera views: functions of the moment alone, so that a picture equals the frame of a film.
 
-World of the scene: x north, y west, z up [m].
+World frame of the scene: NWU [m].
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ Point = tuple[float, float, float]
 
 CAMERAS = ("chase", "fixed", "top", "side", "whole")
 SCALED = ("fixed", "top", "whole")
-"""Cameras that show so much ground that a picture needs an arrow to the north and a scale."""
+"""Cameras whose pictures have a north arrow and a scale bar."""
 FIELD_DEG = 45.0
 """Vertical field of view of all cameras but the fixed one, which zooms."""
 _FIXED_AT = (-11.0, 6.0)
@@ -25,11 +25,11 @@ _LEAST_MARGIN_M, _ROOM = 0.8, 1.08
 _NEAREST_M, _FARTHEST_M = 0.05, 1000.0
 _NARROWEST_DEG = 18.0
 _CHASE_ASIDE_DEG = -24.0
-"""Seen from straight behind, the arms of a plus frame hide each other and the way flown."""
+"""From straight behind, the arms of a plus frame would hide each other and the trail."""
 
 
 class View(NamedTuple):
-    """A camera: it looks at a point from a distance, turned about up (0 looks north, 90 west) and raised [deg]."""
+    """A camera: look-at point, distance, azimuth (0 looks north, 90 west) and elevation [deg]."""
 
     look_at_m: tuple[float, float, float]
     distance_m: float
@@ -38,15 +38,15 @@ class View(NamedTuple):
     field_deg: float = FIELD_DEG
 
     def pixel_m(self, height_px: int) -> float:
-        """Return what a pixel measures where the camera looks at [m], in a picture of this height."""
+        """Return the size of a pixel at the look-at point [m], for a picture of this height."""
         return 2.0 * self.distance_m * math.tan(math.radians(0.5 * self.field_deg)) / height_px
 
 
 class Site(NamedTuple):
-    """What a view depends on beside the moment.
+    """Parameters of a view beside the moment.
 
-    ``span_m`` is half the width of the vehicle, ``ground_m`` the height of the ground in the world of the scene,
-    ``low_m`` and ``high_m`` are the corners of a box around the whole flight, ``aspect`` width by height.
+    ``span_m`` is half the width of the vehicle, ``ground_m`` the height of the ground, ``low_m`` and ``high_m`` are the
+    corners of a box around the whole flight, ``aspect`` is width over height.
     """
 
     span_m: float
@@ -69,12 +69,12 @@ def view(camera: str, moment: Moment, site: Site) -> View:
     if camera == "side":
         return View((at[0], at[1], at[2] + 0.1 * span_m), 8.0 * span_m, -90.0, -6.0)
     if camera == "whole":
-        return _over_the_whole(site)
-    return _from_fixed_place(at, span_m, ground_m)
+        return _whole_view(site)
+    return _fixed_view(at, span_m, ground_m)
 
 
-def _over_the_whole(site: Site) -> View:
-    """Look straight down, north up, on all of the flight; what is lower than its top then fits as well."""
+def _whole_view(site: Site) -> View:
+    """Look straight down, north up, on the whole flight from above its highest point."""
     (north_0, west_0, _), (north_1, west_1, top) = site.low_m, site.high_m
     margin = max(_LEAST_MARGIN_M, 2.0 * site.span_m)
     half_height, half_width = 0.5 * (north_1 - north_0) + margin, 0.5 * (west_1 - west_0) + margin
@@ -84,7 +84,7 @@ def _over_the_whole(site: Site) -> View:
 
 
 def project(seen: View, point_m: Point, size: tuple[int, int]) -> tuple[float, float] | None:
-    """Return where a point of the scene is in a picture of this width and height [px]; None if behind the camera."""
+    """Return the pixel of a point in a picture of this width and height; None if behind the camera."""
     azimuth, elevation = math.radians(seen.azimuth_deg), math.radians(seen.elevation_deg)
     sin_a, cos_a, sin_e, cos_e = (
         math.sin(azimuth),
@@ -102,8 +102,8 @@ def project(seen: View, point_m: Point, size: tuple[int, int]) -> tuple[float, f
     return 0.5 * size[0] + scale * right, 0.5 * size[1] - scale * up
 
 
-def _from_fixed_place(at: tuple[float, float, float], span_m: float, ground_m: float) -> View:
-    """Look from the field's edge and zoom in on a vehicle that is far; it is above the middle, over the field."""
+def _fixed_view(at: tuple[float, float, float], span_m: float, ground_m: float) -> View:
+    """Look from the edge of the field and zoom in on a distant vehicle, which is above the middle of the picture."""
     dx, dy, dz = at[0] - _FIXED_AT[0], at[1] - _FIXED_AT[1], at[2] - (ground_m + _EYE_M)
     flat = math.hypot(dx, dy)
     distance = math.hypot(flat, dz)

@@ -1,4 +1,4 @@
-"""Files of pictures: PNG, a sheet of several, GIF and MP4. Each is there whole or not at all."""
+"""Picture files: PNG, sheets of pictures, GIF and MP4, each written atomically."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from flightstack.core.atomic_file import replacing, write_bytes_atomically
 
 FILMS = (".mp4", ".gif")
 PALETTE_FRAMES = 8
-"""Pictures that a GIF takes its colours from, before the first one is written."""
+"""Number of frames that determine the palette of a GIF, before its first frame is written."""
 
 _COLOURS = 255
 _STRIP_SHARE = 6
-_SELDOM = (
+_RARE_COLOURS = (
     (240, 200, 40), (230, 40, 160), (40, 120, 235), (235, 90, 25),
     (130, 180, 235), (250, 250, 250), (90, 90, 90), (20, 25, 32),
 )  # fmt: skip
 _SHEET_GAP_PX = 6
 _GIF_TICK_S = 0.01
-_GIF_SHORTEST_TICKS = 2  # players take less for a mistake and slow down
+_GIF_SHORTEST_TICKS = 2  # players slow shorter frames down
 
 FrameAt = Callable[[int], Image.Image]
 
@@ -38,7 +38,7 @@ def write_png(path: Path, image: Image.Image) -> None:
 
 
 def sheet(images: Sequence[Image.Image]) -> Image.Image:
-    """Return the pictures, all of one size, side by side in as square an order as can be."""
+    """Return the pictures, all of one size, in a nearly square grid."""
     columns = math.ceil(math.sqrt(len(images)))
     rows = math.ceil(len(images) / columns)
     width, height = images[0].size
@@ -49,20 +49,20 @@ def sheet(images: Sequence[Image.Image]) -> Image.Image:
     return whole
 
 
-def drawn_for(path: Path, count: int) -> int:
-    """Return how many pictures a film of ``count`` frames asks for."""
+def frames_to_draw(path: Path, count: int) -> int:
+    """Return the number of pictures to draw for a film of ``count`` frames."""
     return count + min(PALETTE_FRAMES, count) if path.suffix.lower() == ".gif" else count
 
 
 def write_film(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
-    """Write a film of ``count`` frames by the ending of its name, one of ``FILMS``; raise OSError."""
+    """Write a film of ``count`` frames in the format of its suffix, one of ``FILMS``; raise OSError."""
     with replacing(path) as temporary:
         (_write_gif if path.suffix.lower() == ".gif" else _write_mp4)(temporary, frame_at, count, fps)
 
 
 def _write_mp4(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
-    """H.264 with the colours that every player knows; it needs sides of even length."""
-    import imageio_ffmpeg  # noqa: PLC0415  # brings a program of its own
+    """Write H.264 with yuv420p, which every player supports; it needs even sizes."""
+    import imageio_ffmpeg  # noqa: PLC0415  # contains ffmpeg
 
     first = frame_at(0)
     writer: Any = imageio_ffmpeg.write_frames(
@@ -82,7 +82,7 @@ def _write_mp4(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
 
 
 def _write_gif(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
-    """One palette for all frames, taken from some of them, so that colours do not flicker."""
+    """Write all frames with one palette, so that colours do not flicker."""
     chosen = [frame_at(round(i * (count - 1) / PALETTE_FRAMES)) for i in range(min(PALETTE_FRAMES, count))]
     palette = _palette(chosen)
     flat = (frame_at(index).quantize(palette=palette, dither=Image.Dither.NONE) for index in range(count))
@@ -92,18 +92,18 @@ def _write_gif(path: Path, frame_at: FrameAt, count: int, fps: float) -> None:
 
 
 def _palette(images: Sequence[Image.Image]) -> Image.Image:
-    """Return an image with the colours of all, and those of marks and words, which cover too little to count."""
+    """Return an image with the palette of all images, and the colours of marks and text, which cover too few pixels."""
     pictures = sheet(images)
     strip = max(1, pictures.height // _STRIP_SHARE)
     whole = Image.new("RGB", (pictures.width, pictures.height + strip))
     whole.paste(pictures)
-    for index, colour in enumerate(_SELDOM):
-        begin, end = (pictures.width * place // len(_SELDOM) for place in (index, index + 1))
+    for index, colour in enumerate(_RARE_COLOURS):
+        begin, end = (pictures.width * place // len(_RARE_COLOURS) for place in (index, index + 1))
         whole.paste(colour, (begin, pictures.height, end, pictures.height + strip))
     return whole.quantize(_COLOURS, Image.Quantize.MEDIANCUT)
 
 
 def gif_durations_ms(count: int, fps: float) -> list[int]:
-    """Return how long each frame stays: a GIF counts in hundredths of a second, the errors must not add up."""
+    """Return the duration of each frame: a GIF counts in 0.01 s; rounding errors do not accumulate."""
     ends = [round(index / fps / _GIF_TICK_S) for index in range(count + 1)]
     return [10 * max(_GIF_SHORTEST_TICKS, end - begin) for begin, end in pairwise(ends)]

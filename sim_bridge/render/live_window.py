@@ -1,4 +1,4 @@
-"""The process behind ``sim-bridge --view``: snapshots come by standard input, until its end or the window's."""
+"""The process of ``sim-bridge --view``: shows snapshots from standard input until either is closed."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from sim_bridge.render.live_view import READY, SNAPSHOT
 from sim_bridge.render.poses import Moment
 
 _TRAIL_STEP_M = 0.08
-_LONGEST_STEP_S = 0.1  # of turning rotors between two pictures
+_LONGEST_STEP_S = 0.1  # of rotor rotation between two pictures
 _NICENESS = 10
-"""The window gives way to the flight where there are few processors."""
+"""Lower priority than the flight, for machines with few processors."""
 _NO_MOMENT = Moment(0.0, (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, (), (), None)
 
 
 class LiveFlight:
-    """Turns snapshots into moments, and remembers the way flown. No I/O."""
+    """Converts snapshots to moments, and keeps the trail. No I/O."""
 
     def __init__(self, rotors: int, most_points: int) -> None:
         self.moment = _NO_MOMENT._replace(rotor_speed_rad_s=(0.0,) * rotors, rotor_angle_rad=(0.0,) * rotors)
         self._trail: deque[tuple[float, float, float]] = deque(maxlen=most_points)
 
-    def take(self, snapshot: bytes) -> Moment:
-        """Return the moment of a snapshot; one that is not finite leaves the one before."""
+    def update(self, snapshot: bytes) -> Moment:
+        """Return the moment of a snapshot; a snapshot that is not finite is ignored."""
         time_s, *values = SNAPSHOT.unpack(snapshot)
         rotors = len(self.moment.rotor_speed_rad_s)
         speeds = tuple(abs(speed) if math.isfinite(speed) else 0.0 for speed in values[13 : 13 + rotors])
@@ -56,12 +56,12 @@ class LiveFlight:
         return self.moment
 
     def trail(self, _time_s: float, _most: int) -> FloatArray:
-        """Return the way flown NED [m], shape (n, 3), with where the vehicle is now."""
+        """Return the path flown NED [m], shape (n, 3), up to the present position."""
         return np.array([*self._trail, self.moment.position_ned_m])
 
 
 def newest(buffer: bytearray) -> bytes | None:
-    """Take the whole snapshots out of a buffer and return the last of them."""
+    """Remove the complete snapshots from a buffer and return the last one."""
     whole = len(buffer) // SNAPSHOT.size * SNAPSHOT.size
     if not whole:
         return None
@@ -71,7 +71,7 @@ def newest(buffer: bytearray) -> bytes | None:
 
 
 def _snapshots(file: int) -> Iterator[bytes | None]:
-    """Yield the newest snapshot, or None when there is no new one, until the other side closes."""
+    """Yield the newest snapshot, or None without a new one, until the pipe is closed."""
     buffer = bytearray()
     while True:
         while select.select([file], [], [], 0.0)[0]:
@@ -97,11 +97,11 @@ def main(vehicle: str) -> int:
         return 2
     flight = LiveFlight(len(loaded.rotors), MOST_TRAIL)
     marks = Marks(flight.trail, NO_POINTS, stage.span_m, stage.ground_m)
-    with contextlib.suppress(OSError):  # for the threads that begin from here on; the start is waited for
+    with contextlib.suppress(OSError):  # for threads started from here on: the simulator waits for the start
         os.nice(_NICENESS)
     sys.stdout.buffer.write(READY)
     sys.stdout.flush()
-    moments = (None if snapshot is None else flight.take(snapshot) for snapshot in _snapshots(0))
+    moments = (None if snapshot is None else flight.update(snapshot) for snapshot in _snapshots(0))
     show(stage, moments, marks)
     return 0
 

@@ -1,6 +1,6 @@
-"""A place to render into without a screen: EGL, or OSMesa where EGL does not work.
+"""Off-screen OpenGL context: EGL, or OSMesa if EGL does not work.
 
-The environment variable MUJOCO_GL (egl, osmesa, or disable), which all of MuJoCo's tools know, decides if it is set.
+The environment variable MUJOCO_GL of MuJoCo (egl, osmesa, or disable) takes precedence.
 """
 
 from __future__ import annotations
@@ -15,52 +15,54 @@ from typing import Any
 from sim_bridge.errors import UsageProblemError
 
 NO_RENDERER = "no off-screen renderer: install EGL (libegl1 and a driver) or OSMesa (libosmesa6)"
-_ASKED = "MUJOCO_GL"
+_VARIABLE = "MUJOCO_GL"
 _PLATFORM = "PYOPENGL_PLATFORM"
 _OFF = ("disable", "disabled", "off", "false", "0")
 _ANY = ("", "enable", "enabled", "on", "true", "1", "glfw", "glx")
-"""Values that leave us the choice: a window is no place for pictures that nobody is to see."""
+"""Values that leave the choice to this module; windows are not used off screen."""
 _DEVICE_PLATFORM = 0x313F  # EGL_PLATFORM_DEVICE_EXT
 _MOST_DEVICES = 16
 
 
 def make_context(width: int, height: int) -> Any:
     """Return a current OpenGL context for pictures of this size; raise UsageProblemError without a renderer."""
-    module = choose()
+    module = choose_backend()
     try:
         context = import_module(module).GLContext(width, height)
         context.make_current()
-    except Exception as error:  # whatever a driver or the bindings to it come up with
+    except Exception as error:  # any error of a driver or its bindings
         raise UsageProblemError(f"{NO_RENDERER} ({module}: {_first_line(error)})") from None
     return context
 
 
-def choose() -> str:
-    """Return the module of MuJoCo that makes the context; raise UsageProblemError when none can.
+def choose_backend() -> str:
+    """Return the MuJoCo module that creates the context; raise UsageProblemError if none works.
 
-    To be asked before MuJoCo is imported, which itself trips over a bad MUJOCO_GL.
+    Call it before the import of MuJoCo, which fails on an invalid MUJOCO_GL.
     """
-    asked = os.environ.get(_ASKED, "").lower().strip()
-    if asked in _OFF:
-        raise UsageProblemError(f"no off-screen renderer: {_ASKED}={asked} turns it off; unset it")
-    if asked in ("egl", "osmesa"):
-        return f"mujoco.{asked}"
-    if asked not in _ANY:
-        raise UsageProblemError(f"{_ASKED}={asked} is no renderer: set it to egl or osmesa, or unset it")
+    value = os.environ.get(_VARIABLE, "").lower().strip()
+    if value in _OFF:
+        raise UsageProblemError(f"no off-screen renderer: {_VARIABLE}={value} turns it off; unset it")
+    if value in ("egl", "osmesa"):
+        return f"mujoco.{value}"
+    if value not in _ANY:
+        raise UsageProblemError(
+            f"{_VARIABLE}={value} is not a renderer; set it to egl or osmesa, or unset it"
+        )
     if sys.platform == "darwin":
         return "mujoco.cgl"
-    for name, works in (("egl", _egl_works), ("osmesa", _osmesa_is_there)):
+    for name, works in (("egl", _egl_works), ("osmesa", _has_osmesa)):
         if os.environ.get(_PLATFORM, name) == name and works():
             return f"mujoco.{name}"
     raise UsageProblemError(NO_RENDERER)
 
 
-def _osmesa_is_there() -> bool:
+def _has_osmesa() -> bool:
     return ctypes.util.find_library("OSMesa") is not None
 
 
 def _egl_works() -> bool:
-    """Ask EGL itself, as PyOpenGL cannot take another library once it has tried this one."""
+    """Query EGL directly: PyOpenGL cannot switch to another library after a failure."""
     name = ctypes.util.find_library("EGL")
     if name is None:
         return False

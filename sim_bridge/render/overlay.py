@@ -1,29 +1,44 @@
-"""Words and figures on a picture: what flies, when, how high, how fast, and what its rotors do."""
+"""Text, figures and labels on a picture: time, height, speed, rotor speeds, plan items, north arrow and scale.
+
+The labels are drawn on the finished picture: those of MuJoCo have a fixed size and cover the scene.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
 
 from PIL import Image, ImageDraw, ImageFont
 
-from sim_bridge.render.cameras import View
-from sim_bridge.render.labels import Box, Place, draw_numbers, draw_scale
+from sim_bridge.render.cameras import View, project
 from sim_bridge.render.poses import Moment
 from sim_bridge.render.renderer import Picture
+
+Font: TypeAlias = ImageFont.FreeTypeFont | ImageFont.ImageFont
+Box: TypeAlias = tuple[float, float, float, float]
+Colour: TypeAlias = tuple[int, int, int, int]
+
+_INK, _EDGE, _NORTH = (255, 255, 255, 255), (16, 34, 66, 235), (255, 128, 52, 255)
+_LETTER_SHARE = 0.030  # letter height of labels over picture height
+_LEAST_PX = 11.0
+_ABOVE = 1.05  # letter heights from a point to the middle of its label
+_LENGTHS_M = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
+_BAR_SHARE = 0.055
+"""Smallest length of the scale bar over the width of the picture, unless it is 1 m."""
 
 _PANEL = (14, 20, 28, 178)
 _TEXT, _FAINT = (244, 246, 248, 255), (176, 188, 200, 255)
 _EMPTY = (58, 68, 80, 255)
 _SLOW, _FAST = (120, 176, 226), (255, 116, 40)
-_LEAST_UNIT = 0.5  # of the sizes for 1280x720: smaller letters cannot be read
+_LEAST_UNIT = 0.5  # of the sizes for 1280x720; smaller letters are illegible
 _LEAST_WIDTH_PX, _LEAST_HEIGHT_PX = 480, 260
-"""A picture narrower or lower than this has no room for figures."""
+"""Smaller pictures get no figures."""
 _LONGEST_TITLE = 40
 
 
 class Overlay:
-    """Writes on the pictures of one flight; ``largest_rad_s`` are the speeds of full bars."""
+    """The overlay of one flight; ``largest_rad_s`` are the rotor speeds of full bars."""
 
     def __init__(
         self,
@@ -31,9 +46,9 @@ class Overlay:
         largest_rad_s: Sequence[float],
         width: int,
         height: int,
-        places: Sequence[Place] = (),
+        labels: Sequence[Label] = (),
     ) -> None:
-        self._places = tuple(places)
+        self._labels = tuple(labels)
         self._title = title if len(title) <= _LONGEST_TITLE else f"{title[: _LONGEST_TITLE - 1]}…"
         self._largest = tuple(largest_rad_s)
         self._unit = max(_LEAST_UNIT, min(width / 1280.0, height / 720.0))
@@ -49,20 +64,20 @@ class Overlay:
     ) -> Image.Image:
         """Return the picture with the figures of its moment.
 
-        With the view that it was taken from it gets the numbers of the places, and if wanted a scale.
+        With its ``view`` also the labels and, with ``scale``, north arrow and scale bar.
         """
         image = Image.fromarray(picture)
         layer = Image.new("RGBA", image.size, (0, 0, 0, 0))
         covered = self._panels(ImageDraw.Draw(layer), image.size, moment) if self._fits else []
         if view is not None:
             draw = ImageDraw.Draw(image)
-            draw_numbers(draw, view, self._places, image.size, covered)
+            draw_labels(draw, view, self._labels, image.size, covered)
             if scale and self._fits:
                 draw_scale(draw, view, image.size, self._unit)
         return Image.alpha_composite(image.convert("RGBA"), layer).convert("RGB")
 
     def _panels(self, draw: ImageDraw.ImageDraw, size: tuple[int, int], moment: Moment) -> list[Box]:
-        """Draw all panels; return where they are."""
+        """Draw all panels; return their boxes."""
         return [self._figures(draw, moment), *self._rotors(draw, size, moment)]
 
     def _figures(self, draw: ImageDraw.ImageDraw, moment: Moment) -> Box:
@@ -92,7 +107,7 @@ class Overlay:
         return left, top, left + width, bottom
 
     def _rotors(self, draw: ImageDraw.ImageDraw, size: tuple[int, int], moment: Moment) -> list[Box]:
-        """A bar for each rotor, full at the largest speed."""
+        """Draw a bar for each rotor, full at the largest speed."""
         u, count = self._unit, min(len(self._largest), len(moment.rotor_speed_rad_s))
         if not count:
             return []
@@ -116,3 +131,87 @@ class Overlay:
             shown = f"{speed:.0f}" if math.isfinite(speed) else "—"
             draw.text((right - 16.0 * u, y), shown, font=self._small, fill=_TEXT, anchor="ra")
         return [(left, top, right, bottom)]
+
+
+class Label(NamedTuple):
+    """A labelled point of the plan: name, and position NWU [m]."""
+
+    name: str
+    at_m: tuple[float, float, float]
+
+
+def draw_labels(
+    draw: ImageDraw.ImageDraw,
+    view: View,
+    labels: Sequence[Label],
+    size: tuple[int, int],
+    covered: Sequence[Box] = (),
+) -> None:
+    """Write each label above its point; labels at the same pixel are joined.
+
+    Labels inside the boxes ``covered`` (left, top, right, bottom) are omitted.
+    """
+    letters = max(_LEAST_PX, _LETTER_SHARE * size[1])
+    spots: list[tuple[list[str], float, float]] = []
+    for label in labels:
+        at = project(view, label.at_m, size)
+        if at is None or not _inside(at, (0.0, 0.0, *size)):
+            continue
+        for names, x, y in spots:
+            if math.hypot(at[0] - x, at[1] - y) < letters:
+                names.append(label.name)
+                break
+        else:
+            spots.append(([label.name], *at))
+    font = ImageFont.load_default(size=letters)
+    for names, x, y in spots:
+        at = (x, max(0.6 * letters, y - _ABOVE * letters))
+        if not any(_inside(at, box) for box in covered):
+            write_text(draw, at, ", ".join(dict.fromkeys(names)), font)
+
+
+def _inside(at: tuple[float, float], box: Box) -> bool:
+    return box[0] <= at[0] < box[2] and box[1] <= at[1] < box[3]
+
+
+def write_text(
+    draw: ImageDraw.ImageDraw, at: tuple[float, float], text: str, font: Font, ink: Colour = _INK
+) -> None:
+    """Write outlined text centred on a point."""
+    draw.text(at, text, font=font, fill=ink, anchor="mm", stroke_width=2, stroke_fill=_EDGE)
+
+
+def draw_scale(draw: ImageDraw.ImageDraw, view: View, size: tuple[int, int], unit: float) -> None:
+    """Draw a north arrow and a scale bar, valid at the look-at point, in the lower left corner."""
+    font = ImageFont.load_default(size=max(_LEAST_PX, 17.0 * unit))
+    reach, left, bottom = 26.0 * unit, 26.0 * unit, size[1] - 26.0 * unit
+    turn = math.radians(view.azimuth_deg)
+    ahead = (math.sin(turn), -math.cos(turn))  # in the picture: right, down
+    aside = (-ahead[1], ahead[0])
+    middle = (left + reach, bottom - reach)
+    shape = [
+        (middle[0] + reach * (a * ahead[0] + b * aside[0]), middle[1] + reach * (a * ahead[1] + b * aside[1]))
+        for a, b in ((0.72, 0.0), (-0.72, -0.42), (-0.42, 0.0), (-0.72, 0.42))
+    ]
+    draw.polygon(shape, fill=_NORTH, outline=_EDGE)
+    write_text(
+        draw, (middle[0] + 1.15 * reach * ahead[0], middle[1] + 1.15 * reach * ahead[1]), "N", font, _NORTH
+    )
+    length_m, pixels = scale_bar(view, size)
+    begin = middle[0] + 2.2 * reach
+    ends = (begin, bottom), (begin + pixels, bottom)
+    tick = 5.0 * unit
+    for colour, width in ((_EDGE, 3.0), (_INK, 1.4)):
+        wide = max(1, round(2.0 * width * unit))
+        draw.line(ends, fill=colour, width=wide)
+        for x, y in ends:
+            draw.line(((x, y - tick), (x, y + tick)), fill=colour, width=wide)
+    write_text(draw, (begin + 0.5 * pixels, bottom - 16.0 * unit), f"{length_m:g} m", font)
+
+
+def scale_bar(view: View, size: tuple[int, int]) -> tuple[float, float]:
+    """Return the length of the scale bar [m], 1 m if possible, and in the picture [px]."""
+    metre = 1.0 / view.pixel_m(size[1])
+    fitting = [length for length in _LENGTHS_M if length * metre >= _BAR_SHARE * size[0]] or [_LENGTHS_M[-1]]
+    length = 1.0 if fitting[0] < 1.0 and metre <= 0.3 * size[0] else fitting[0]
+    return length, length * metre

@@ -1,4 +1,4 @@
-"""The pixels of sky, grass and landing pad, made by formula and put into a compiled model's textures."""
+"""Procedural textures of sky, grass and landing pad, written into a compiled model."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ Image: TypeAlias = np.ndarray[Any, np.dtype[np.float64]]
 
 _SEED = 3
 _BAND = 0.35
-"""How far the waves of one noise differ in length; narrower bands look like worms."""
+"""Bandwidth of the noise; narrower bands look regular."""
 
 
 def paint(model: Any) -> None:
-    """Replace the plain colours of a model's textures by pictures; a model without them stays as it is."""
+    """Replace the plain textures of a model; one without them is not changed."""
     import mujoco  # noqa: PLC0415  # an extra
 
     for index in range(model.ntex):
@@ -31,7 +31,7 @@ def paint(model: Any) -> None:
 
 
 def _noise(size: int, cells: int, seed: int) -> Image:
-    """Smooth noise around 0 with ``cells`` waves along each side, which repeats beyond its edges."""
+    """Return smooth periodic noise around 0 with ``cells`` waves along each side."""
     spectrum = np.fft.rfft2(np.random.default_rng(seed).standard_normal((size, size)))
     waves = np.hypot(np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None, :]) * size
     field = np.fft.irfft2(spectrum * np.exp(-((waves / cells - 1.0) ** 2) / _BAND), (size, size))
@@ -43,7 +43,7 @@ def _mix(a: tuple[float, ...], b: tuple[float, ...], share: Image) -> Image:
 
 
 def _grass(height: int, _width: int) -> Image:
-    """Twenty metres of a mown field with a faint metre grid."""
+    """Return 20 m of a field with a faint metre grid."""
     size = height
     coarse = 0.5 * _noise(size, 3, _SEED) + 0.5 * _noise(size, 7, _SEED + 1)
     fine = 0.6 * _noise(size, 60, _SEED + 2) + 0.8 * _noise(size, 260, _SEED + 3)
@@ -59,7 +59,7 @@ def _grass(height: int, _width: int) -> Image:
 
 
 def _mown(height: int, _width: int) -> Image:
-    """A strip of 8 by 6.4 m: columns along it, rows across; the mower went up and down."""
+    """Return a strip of 8 by 6.4 m with mowing lanes: columns along it, rows across."""
     size = height
     lane = np.sin(2.0 * np.pi * 4.0 * (np.arange(size) + 0.5) / size)[:, None] > 0.0
     fine = 0.6 * _noise(size, 40, _SEED + 10) + 0.8 * _noise(size, 130, _SEED + 11)
@@ -68,7 +68,7 @@ def _mown(height: int, _width: int) -> Image:
 
 
 def _concrete(height: int, _width: int) -> Image:
-    """The pad, 8 m wide: slabs, a circle with a cross of arrows, and N where north is.
+    """Return the pad, 8 m wide: slabs, a circle with an H, and an arrow with an N to the north.
 
     Rows run from west to east, columns from south to north: the box's y and x.
     """
@@ -107,7 +107,7 @@ def _letter_n(east: Image, north: Image) -> Any:
 
 
 def _sky(height: int, width: int) -> Image:
-    """Six faces, one under the other: right, left, up, down, front, back."""
+    """Return six faces, stacked: right, left, up, down, front, back."""
     at = 2.0 * ((np.arange(width) + 0.5) / width) - 1.0
     u, v = np.meshgrid(at, at)
     one = np.ones_like(u)
@@ -117,7 +117,7 @@ def _sky(height: int, width: int) -> Image:
 
 @cache
 def _clouds() -> Image:
-    """How thick the layer of clouds is; it repeats beyond its edges."""
+    """Return the thickness of the cloud layer, periodic."""
     size = 512
     return (
         0.75 * _noise(size, 5, _SEED + 7)
@@ -127,12 +127,12 @@ def _clouds() -> Image:
 
 
 def _sky_towards(x: Image, up: Image, z: Image) -> Image:
-    """Colour of the sky in given directions, of any length; ``up`` is away from the ground."""
+    """Return the colour of the sky in directions of any length; ``up`` is away from the ground."""
     length = np.sqrt(x * x + up * up + z * z)
     high = np.clip(up / length, 0.0, 1.0)
     image = _mix((0.80, 0.87, 0.93), (0.42, 0.63, 0.86), np.clip(high * 2.4, 0, 1) ** 0.7)
     image += (np.array([0.20, 0.42, 0.72]) - image) * (np.clip((high - 0.25) / 0.75, 0, 1) ** 1.1)[..., None]
-    # a flat layer of clouds, seen from below
+    # flat cloud layer, seen from below
     reach = 0.30
     layer = _clouds()
     size = len(layer)

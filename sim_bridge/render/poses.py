@@ -1,4 +1,4 @@
-"""A flight between its samples: where the vehicle is at any moment, and the way that it came."""
+"""A flight interpolated between its samples: pose at any time, and the trail."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from flightstack.core.geometry_bulk import heading_from_quaternions
 from flightstack.flight_log.poses_file import Poses
 
 _SMOOTH_S = 0.9
-"""Half the width of the window over which a chasing camera follows the heading."""
+"""Half the width of the window over which the chase camera averages the heading."""
 _TRAIL_STEP_M = 0.02
 _TRAIL_MISS_M = 0.003
 _TRAIL_LONGEST_M = 0.5
-"""A piece of the drawn way misses the flown one by at most so much and is at most so long."""
-_TRAIL_SAMPLES = 20_000  # looked at, so that a long flight begins at once
+"""Largest distance from the flown path, and largest length, of a segment of the trail."""
+_TRAIL_SAMPLES = 20_000  # examined, which bounds the start-up time of a long flight
 
 
 class Moment(NamedTuple):
-    """The vehicle at one moment: NED, FRD, SI; angles of the rotors [rad] grow with their speeds, without a sign."""
+    """The vehicle at one time: NED, FRD, SI; rotor angles [rad] are integrals of the absolute speeds."""
 
     time_s: float
     position_ned_m: tuple[float, float, float]
@@ -35,7 +35,7 @@ class Moment(NamedTuple):
 
 
 class FlightPath:
-    """Poses as functions of time; asking outside their times gives the first or the last one."""
+    """Poses as functions of time, constant before the first and after the last one."""
 
     def __init__(self, poses: Poses) -> None:
         self.poses = poses
@@ -50,7 +50,7 @@ class FlightPath:
         self.low_ned_m, self.high_ned_m = points.min(axis=0), points.max(axis=0)
 
     def at(self, time_s: float) -> Moment:
-        """Return the moment, between two samples by linear interpolation."""
+        """Return the moment at ``time_s`` by linear interpolation."""
         poses = self.poses
         position = self._row(poses.position_ned_m, time_s)
         w, x, y, z = self._row(self._attitude, time_s)
@@ -68,15 +68,15 @@ class FlightPath:
             (target[0], target[1], target[2]) if all(map(math.isfinite, target)) else None,
         )
 
-    def place_names(self) -> list[str]:
-        """Return what the planned places are called."""
+    def waypoint_names(self) -> list[str]:
+        """Return the names of the waypoints."""
         given = self.poses.waypoint_numbers
         return [f"{number:.0f}" for number in given] or [
             str(number) for number in range(1, 1 + len(self.poses.waypoints_ned_m))
         ]
 
     def trail(self, time_s: float, most: int) -> FloatArray:
-        """Return the way flown until ``time_s``, NED [m], shape (n, 3), in at most ``most`` + 1 points."""
+        """Return the path flown until ``time_s``, NED [m], shape (n, 3), in at most ``most`` + 1 points."""
         count = int(np.searchsorted(self.poses.time_s[self._trail], time_s, side="right"))
         rows = self._trail[:count]
         if len(rows) > most:
@@ -84,7 +84,7 @@ class FlightPath:
         return np.vstack((self.poses.position_ned_m[rows], self.at(time_s).position_ned_m))
 
     def _row(self, values: FloatArray, time_s: float) -> tuple[float, ...]:
-        """Return a row of values (n, k) at a time."""
+        """Return a row of values (n, k), interpolated at a time."""
         times = self.poses.time_s
         after = int(np.searchsorted(times, time_s, side="right"))
         if after == 0 or after == len(times):
@@ -95,7 +95,7 @@ class FlightPath:
 
 
 def _continuous(attitude: FloatArray) -> FloatArray:
-    """Choose of q and −q, the same attitude, what lies nearer to the one before."""
+    """Choose the sign of each quaternion that is nearer to the one before."""
     dots = np.sum(attitude[1:] * attitude[:-1], axis=1)
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
     return attitude * np.concatenate(([1.0], signs))[:, None]
@@ -109,7 +109,7 @@ def _speed(time_s: FloatArray, position: FloatArray) -> FloatArray:
 
 
 def _smoothed(time_s: FloatArray, values: FloatArray) -> FloatArray:
-    """Mean over a window of time around each sample."""
+    """Return the mean over a window of time around each sample."""
     total = _integral(time_s, values[:, None])[:, 0]
     begin = np.maximum(time_s - _SMOOTH_S, time_s[0])
     end = np.minimum(time_s + _SMOOTH_S, time_s[-1])
@@ -125,7 +125,7 @@ def _integral(time_s: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _thinned(position: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Numbers of the samples that the way is drawn through: few where it is straight, many where it bends."""
+    """Return the indices of the samples of the trail: few on straight parts, more in curves."""
     along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))))
     step = max(_TRAIL_STEP_M, float(along[-1]) / _TRAIL_SAMPLES)
     near = np.unique(np.floor(along / step), return_index=True)[1]

@@ -1,4 +1,4 @@
-"""Pictures of a flight, made off screen: one moment in, one array of pixels out."""
+"""Off-screen renderer: one moment in, one array of pixels out."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.multibody import looks
+from sim_bridge.multibody import appearance
+from sim_bridge.multibody.default_parts import foot_z_m
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.mjcf import model_xml
-from sim_bridge.multibody.usual_parts import foot_z_m
 from sim_bridge.render.cameras import Site, View, view
-from sim_bridge.render.marks import MOST_TRAIL, Marks, RotorLooks
+from sim_bridge.render.marks import MOST_TRAIL, Marks, RotorAppearance
 from sim_bridge.render.offscreen import make_context
 from sim_bridge.render.paint import paint
 from sim_bridge.render.poses import FlightPath, Moment
@@ -26,18 +26,18 @@ _MARKS = 3 * MOST_TRAIL
 
 
 class Stage:
-    """A vehicle in its place, compiled and painted, that can be put anywhere; it has no dynamics."""
+    """The compiled and painted model of a vehicle in its scene, without dynamics."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         try:
             self.model = mujoco.MjModel.from_xml_string(model_xml(vehicle, scene=True))
-        except ValueError as error:  # a mesh that is not there
+        except ValueError as error:  # a missing mesh
             raise UsageProblemError(f"the vehicle {vehicle.name} cannot be drawn: {error}") from error
         paint(self.model)
         self.data = mujoco.MjData(self.model)
-        self.span_m, self.ground_m = looks.span_m(vehicle), -foot_z_m(vehicle)
-        self.rotors = RotorLooks(self.model, vehicle)
+        self.span_m, self.ground_m = appearance.span_m(vehicle), -foot_z_m(vehicle)
+        self.rotors = RotorAppearance(self.model, vehicle)
         self._free_joint = self._address("vehicle")
         self._hinges = [self._address(f"rotor_{n}") for n in range(1, len(vehicle.rotors) + 1)]
         self.body = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, "vehicle"))
@@ -49,7 +49,7 @@ class Stage:
         return int(self.model.jnt_qposadr[number])
 
     def put(self, moment: Moment) -> None:
-        """Put the vehicle where it is at a moment, with its rotors turned and coloured."""
+        """Set pose, rotor angles and rotor colours of a moment."""
         at, q = self._free_joint, self.data.qpos
         q[at : at + 3] = flip_vector(moment.position_ned_m)
         q[at + 3 : at + 7] = flip_quaternion(moment.attitude)
@@ -62,7 +62,7 @@ class Stage:
 
 
 class Renderer:
-    """Draws moments of one flight; raise UsageProblemError when there is nothing to render with."""
+    """Draws moments of one flight; raises UsageProblemError without an off-screen renderer."""
 
     def __init__(self, vehicle: Vehicle, path: FlightPath, width: int, height: int) -> None:
         self.width, self.height = width, height
@@ -84,7 +84,7 @@ class Renderer:
         self._camera = mujoco.MjvCamera()
 
     def draw(self, moment: Moment, camera: str) -> Picture:
-        """Return the picture of a moment, seen by a camera of ``cameras.CAMERAS``."""
+        """Return the picture of a moment by a camera of ``cameras.CAMERAS``."""
         stage, scene = self._stage, self._scene
         stage.put(moment)
         seen = self.view(moment, camera)
@@ -98,16 +98,15 @@ class Renderer:
             mujoco.mjtCatBit.mjCAT_ALL.value,
             scene,
         )
-        for geom in scene.geoms[
-            : scene.ngeom
-        ]:  # only the vehicle casts a shadow, the ground's have bad edges
+        # only the vehicle casts a shadow: those of the ground have artefacts
+        for geom in scene.geoms[: scene.ngeom]:
             if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid in stage.shadeless:
                 geom.category = mujoco.mjtCatBit.mjCAT_DECOR
         self._marks.draw(scene, moment, seen.pixel_m(self.height))
         return self._read()
 
     def view(self, moment: Moment, camera: str) -> View:
-        """Return where the picture of a moment is taken from."""
+        """Return the view of a moment by a camera of ``cameras.CAMERAS``."""
         return view(camera, moment, self._site)
 
     def _aim(self, seen: View) -> None:
@@ -124,7 +123,7 @@ class Renderer:
         return np.ascontiguousarray(upside_down[::-1])
 
     def close(self) -> None:
-        """Give the context back."""
+        """Free the context."""
         self._context.free()
         self._gl.free()
 

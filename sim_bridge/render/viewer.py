@@ -1,4 +1,4 @@
-"""MuJoCo's window: a flight played back, or a vehicle as it flies."""
+"""MuJoCo's viewer window: playback of a flight, or live view of a vehicle."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from sim_bridge.render.poses import FlightPath, Moment
 from sim_bridge.render.renderer import Stage
 
 _FRAME_S = 1.0 / 60.0
-_SPACE, _RIGHT, _LEFT, _HOME = 32, 262, 263, 268  # GLFW's numbers of keys
+_SPACE, _RIGHT, _LEFT, _HOME = 32, 262, 263, 268  # key codes of GLFW
 _SEEK_S = 2.0
 _DISTANCE_SPANS, _ELEVATION_DEG, _AZIMUTH_DEG = 6.0, -20.0, -24.0
 
-HELP = "space stops and goes on, the arrows go back and forth, Home begins anew; close the window to end"
+HELP = "space pauses, arrows seek, Home restarts; close the window to end"
 
 
 class Playback:
-    """Which moment of a flight is shown: wall time in, time of the flight out. No I/O."""
+    """Playback position: wall time in, flight time out. No I/O."""
 
     def __init__(self, begin_s: float, end_s: float, speed: float) -> None:
         self._begin_s, self._end_s, self._speed = begin_s, end_s, speed
@@ -35,7 +35,7 @@ class Playback:
         self.paused = False
 
     def at(self, wall_s: float) -> float:
-        """Return the time to show; at the end the flight begins anew."""
+        """Return the flight time to show; playback repeats from the start."""
         if self._wall_s is not None and not self.paused:
             self._time_s += (wall_s - self._wall_s) * self._speed
         self._wall_s = wall_s
@@ -44,7 +44,7 @@ class Playback:
         return self._time_s
 
     def press(self, key: int) -> None:
-        """Take a key; others than the four mean nothing."""
+        """Handle space, right, left and Home; ignore other keys."""
         if key == _SPACE:
             self.paused = not self.paused
         elif key in (_RIGHT, _LEFT):
@@ -55,18 +55,18 @@ class Playback:
 
 
 def require_display() -> None:
-    """Raise UsageProblemError when there is no screen to open a window on, or no OpenGL for it."""
+    """Raise UsageProblemError without a display, or without OpenGL on it."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
         raise UsageProblemError(
-            "--view: no display (neither DISPLAY nor WAYLAND_DISPLAY is set): run it in a desktop session, "
+            "--view: no display (neither DISPLAY nor WAYLAND_DISPLAY is set); run it in a desktop session, "
             "or make a film: gcs replay RUN --video FILE"
         )
     import glfw  # noqa: PLC0415
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it warns of what the sentence below says
+        warnings.simplefilter("ignore")  # the error below replaces its warning
         try:
             window = None
             if glfw.init():
@@ -75,13 +75,11 @@ def require_display() -> None:
         finally:
             glfw.terminate()
     if not window:
-        raise UsageProblemError(
-            "--view: the display gives no window with OpenGL: check DISPLAY and its driver"
-        )
+        raise UsageProblemError("--view: the display has no OpenGL; check DISPLAY and its driver")
 
 
 def play(vehicle: Vehicle, path: FlightPath, begin_s: float, end_s: float, speed: float, caller: str) -> None:
-    """Play a flight until the window is closed; ``caller`` is the command that was given."""
+    """Play a flight until the window is closed; ``caller`` is the command for messages."""
     require_display()
     playback = Playback(begin_s, end_s, speed)
     complain(f"{caller.split(maxsplit=1)[0]}: {HELP}")
@@ -91,14 +89,14 @@ def play(vehicle: Vehicle, path: FlightPath, begin_s: float, end_s: float, speed
             yield path.at(playback.at(time.monotonic()))
 
     stage = Stage(vehicle)
-    marks = Marks(path.trail, path.poses.waypoints_ned_m, stage.span_m, stage.ground_m, path.place_names())
+    marks = Marks(path.trail, path.poses.waypoints_ned_m, stage.span_m, stage.ground_m, path.waypoint_names())
     show(stage, moments(), marks, playback.press)
 
 
 def show(
     stage: Stage, moments: Iterable[Moment | None], marks: Marks, press: Callable[[int], None] | None = None
 ) -> None:
-    """Show moments in a window until it is closed or there are no more; None leaves what is shown."""
+    """Show moments in a window until it is closed or they end; None leaves the picture unchanged."""
     from mujoco.viewer import launch_passive  # noqa: PLC0415  # needs a display
 
     others = set(threading.enumerate())
@@ -106,7 +104,7 @@ def show(
         stage.model, stage.data, key_callback=press, show_left_ui=False, show_right_ui=False
     ) as window:
         with window.lock():
-            _aim(window.cam, stage)
+            _set_camera(window.cam, stage)
         for moment in moments:
             if not window.is_running():
                 break
@@ -114,18 +112,18 @@ def show(
                 with window.lock():
                     stage.put(moment)
                     window.user_scn.ngeom = 0
-                    stage.rotors.lift_discs(window.user_scn, stage.data)
+                    stage.rotors.replace_discs(window.user_scn, stage.data)
                     marks.draw(window.user_scn, moment)
                 window.sync()
             time.sleep(_FRAME_S)
-    # The drawing thread is a daemon. If Python ends while it still draws, GLFW is terminated under it and the process
-    # crashes. On a loaded machine without a graphics card its last picture takes many seconds: no limit here.
+    # Wait for the drawing thread, a daemon: the process would crash if Python terminated GLFW while it draws.
+    # Without a timeout: on a loaded machine without a graphics card a picture takes many seconds.
     for thread in set(threading.enumerate()) - others:
         thread.join()
 
 
-def _aim(camera: Any, stage: Stage) -> None:
-    """Follow the vehicle from behind; the mouse turns and zooms."""
+def _set_camera(camera: Any, stage: Stage) -> None:
+    """Let the camera track the vehicle from behind."""
     import mujoco  # noqa: PLC0415
 
     camera.type = mujoco.mjtCamera.mjCAMERA_TRACKING

@@ -1,4 +1,4 @@
-"""The TCP connection of the one client: every wait has a deadline and ends when the user asks to stop."""
+"""The TCP connection to the client: each wait has a deadline and ends at a stop signal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flightstack.transports.tcp import PATIENCE_S, wait_in_kernel
 
 
 class StoppedError(Exception):
-    """The user asked to stop."""
+    """The user requested the end."""
 
 
 class PeerClosedError(Exception):
@@ -21,11 +21,11 @@ class PeerClosedError(Exception):
 
 
 class PeerSilentError(Exception):
-    """Nothing came before the deadline."""
+    """Nothing was received before the deadline."""
 
 
 class StopSignal:
-    """Turns SIGINT and SIGTERM into a flag that also wakes up a waiting ``poll``."""
+    """Turns SIGINT and SIGTERM into a flag that interrupts a ``poll``."""
 
     def __init__(self) -> None:
         self.stopped = False
@@ -39,11 +39,11 @@ class StopSignal:
         self.stopped = True
 
     def is_set(self) -> bool:
-        """Whether the user asked to stop."""
+        """Return True after SIGINT or SIGTERM."""
         return self.stopped
 
     def waiter(self, sock: socket.socket, events: int) -> Waiter:
-        """Return what waits for ``sock`` or this signal."""
+        """Return a waiter for ``sock`` and this signal."""
         poll = select.poll()
         poll.register(sock, events)
         poll.register(self._woken, select.POLLIN)
@@ -51,7 +51,7 @@ class StopSignal:
 
 
 class Waiter:
-    """Waits until a socket is ready or the user asks to stop."""
+    """Waits until a socket is ready or the process is stopped."""
 
     def __init__(self, stop: StopSignal, poll: select.poll) -> None:
         self._stop = stop
@@ -67,10 +67,10 @@ class Waiter:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Return a listening socket; port 0 takes a free one. Raises OSError."""
+    """Return a listening socket; port 0 picks a free one. Raises OSError."""
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
-        # without this, a port stays busy for a minute after each run
+        # otherwise the port stays busy for a minute after each run
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
         listener.listen(1)
@@ -93,10 +93,10 @@ class Connection:
         self._stop = stop
         self._timeout_s = timeout_s
         self._buffer = memoryview(bytearray(65536))
-        self._last_heard_ns = time.monotonic_ns()
+        self._last_received_ns = time.monotonic_ns()
 
     def receive(self) -> memoryview:
-        """Wait for bytes; raise PeerClosedError, PeerSilentError after the timeout, or StoppedError."""
+        """Wait for bytes; raise PeerClosedError, PeerSilentError at the timeout, or StoppedError."""
         waited_s = 0.0
         while (data := self.receive_now(0)) is None:
             waited_s += PATIENCE_S
@@ -107,7 +107,7 @@ class Connection:
         return data
 
     def receive_now(self, flags: int = socket.MSG_DONTWAIT) -> memoryview | None:
-        """Return the bytes that have come, None when there are none; raise PeerClosedError."""
+        """Return the received bytes, or None; raise PeerClosedError."""
         try:
             count = self._receive_into(self._buffer, 0, flags)
         except BlockingIOError:
@@ -118,18 +118,18 @@ class Connection:
             raise PeerClosedError
         return self._buffer[:count]
 
-    def check_alive(self, heard: bool) -> None:
-        """Raise PeerSilentError when nothing was heard for the timeout, for a loop that never waits."""
+    def check_alive(self, received: bool) -> None:
+        """Raise PeerSilentError if nothing was received within the timeout, for a loop that never waits."""
         now_ns = time.monotonic_ns()
-        if heard:
-            self._last_heard_ns = now_ns
-        elif now_ns - self._last_heard_ns > self._timeout_s * 1e9:
+        if received:
+            self._last_received_ns = now_ns
+        elif now_ns - self._last_received_ns > self._timeout_s * 1e9:
             raise PeerSilentError
 
     def send(self, data: bytes | bytearray | memoryview) -> None:
         """Send all of ``data``; raise PeerSilentError or StoppedError.
 
-        A closed connection is left for ``receive`` to report, after what the client said last.
+        ``receive`` reports a closed connection, after the last bytes of the client.
         """
         try:
             sent = self._send(data, socket.MSG_DONTWAIT)
@@ -142,6 +142,6 @@ class Connection:
             self.send(memoryview(data)[sent:])
 
     def send_last(self, data: bytes) -> None:
-        """Send ``data`` if that can be done at once, else not at all."""
+        """Send ``data`` if possible without waiting, else drop it."""
         with contextlib.suppress(OSError):
             self._socket.send(data, socket.MSG_DONTWAIT)

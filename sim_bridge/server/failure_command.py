@@ -1,4 +1,4 @@
-"""MAV_CMD_INJECT_FAILURE: faults that a client asks for while it flies, as PX4's simulators take them."""
+"""MAV_CMD_INJECT_FAILURE: faults that a client requests in flight, as with PX4's simulators."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from sim_bridge.plant.faults import Fault, Kind
 from sim_bridge.simulator import Simulator
 
 NEARLY_EMPTY = 0.03
-"""Charge of a battery that is told to be off: as in PX4 it then reads below every threshold and still feeds the
-rotors, for some of a minute."""
+"""Charge of a battery that is turned off: as in PX4 below each threshold, and enough for part of a minute."""
 
 _ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
 _DENIED = int(mavlink.MAV_RESULT_DENIED)
@@ -16,10 +15,10 @@ _UNSUPPORTED = int(mavlink.MAV_RESULT_UNSUPPORTED)
 
 
 def inject_failure(simulator: Simulator, unit: float, failure: float, instance: float) -> int:
-    """Carry out the command (its parameters 1 to 3, any numbers); return its MAV_RESULT.
+    """Execute the command with its parameters 1 to 3, any numbers; return its MAV_RESULT.
 
-    Motors can be off, stuck at their present speed, slow (half of the thrust) and OK again; instance 0 is all of
-    them. The battery can be off, which means nearly empty, and OK, which means full.
+    Motors: off, stuck at the present speed, slow (half of the thrust) or OK; instance 0 is all motors. Battery: off
+    (nearly empty) or OK (full).
     """
     if unit == mavlink.FAILURE_UNIT_SYSTEM_MOTOR:
         return _fail_motor(simulator, failure, instance)

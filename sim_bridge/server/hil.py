@@ -1,9 +1,8 @@
 """The standard HIL messages, for third parties: HIL_STATE_QUATERNION out, HIL_ACTUATOR_CONTROLS in.
 
-Accelerations are sent as the MAVLink specification has them: specific force, body FRD, in thousandths of
-standard gravity (level at rest: z = −1000). PX4 reads these fields as thousandths of m/s², and jMAVSim and
-Gazebo send that; a reader of theirs must scale by 9.80665. To PX4 they are ground truth for the log and do
-not fly the vehicle.
+Accelerations follow the MAVLink specification: specific force, body FRD, in thousandths of standard gravity (level at
+rest: z = −1000). PX4 reads these fields in thousandths of m/s², as jMAVSim and Gazebo send them, and must scale ours
+by 9.80665. PX4 only logs them as ground truth.
 """
 
 from __future__ import annotations
@@ -27,9 +26,9 @@ _HIL_ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 
 def hil_state(simulator: Simulator, frame: LocalFrame) -> Message:
-    """HIL_STATE_QUATERNION of the present state, positions relative to the origin of ``frame``."""
+    """Return HIL_STATE_QUATERNION of the present state, positions relative to the origin of ``frame``."""
     shown = simulator.shown.state.tolist()
-    # integers cannot say "not a number": then only attitude and rates do
+    # integer fields have no NaN: only attitude and rates show it
     x = shown if all(map(math.isfinite, shown)) else simulator.frame.state.tolist()
     velocity, attitude = x[3:6], Quaternion(*x[6:10])
     geo = frame.to_geo(Vector3(*x[0:3]))
@@ -51,18 +50,18 @@ def hil_state(simulator: Simulator, frame: LocalFrame) -> Message:
 
 
 class HilControls:
-    """Turns HIL_ACTUATOR_CONTROLS into rotor speeds: a control, 0 to 1, is the share of the full thrust.
+    """Converts HIL_ACTUATOR_CONTROLS to rotor speeds: a control, 0 to 1, is a share of full thrust.
 
-    ``vehicle`` is the one with its limits, even when ideal rotors fly: they say what full thrust is.
+    ``vehicle`` has its rotor limits, which define full thrust, also with ideal rotors.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._full_speed = tuple(rotor.max_speed_rad_s for rotor in vehicle.rotors)
 
     def write(self, message: Any, actuators: ActuatorsFrame) -> None:
-        """Put the commands of ``message`` into ``actuators``, with its time and flags.
+        """Write commands, time and flags of ``message`` to ``actuators``.
 
-        Controls that are not a number pass as such: the plant keeps the last good command.
+        NaN is passed on: the plant then holds the last good command.
         """
         for index, full in enumerate(self._full_speed):
             control = message.controls[index]

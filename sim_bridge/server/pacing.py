@@ -1,17 +1,17 @@
-"""Wall-clock deadlines for simulated time, and how late they were met."""
+"""Wall-clock deadlines for simulated time, and their lateness."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 
-_BINS = 100_000  # of 1 µs; later ones count as the last
+_BINS = 100_000  # of 1 µs; the last one also counts longer delays
 _SLIP_NS = 500_000_000
-_NAP_S = 0.1
+_LONGEST_SLEEP_S = 0.1
 
 
 class Lateness:
-    """Distribution of delays behind deadlines, in bins of 1 µs."""
+    """Distribution of the delays after deadlines, in bins of 1 µs."""
 
     def __init__(self) -> None:
         self._bins = [0] * _BINS
@@ -27,11 +27,11 @@ class Lateness:
         self.max_us = max(self.max_us, late_ns / 1000.0)
 
     def mean_us(self) -> float:
-        """Mean delay."""
+        """Return the mean delay."""
         return self._sum_ns / 1000.0 / max(1, self.count)
 
     def percentile_us(self, percent: float) -> float:
-        """Delay that ``percent`` of all do not exceed, to 1 µs."""
+        """Return a percentile of the delays, to 1 µs."""
         wanted, seen = self.count * percent / 100.0, 0
         for us, number in enumerate(self._bins):
             seen += number
@@ -41,7 +41,7 @@ class Lateness:
 
 
 class Pacer:
-    """Holds simulated time to ``speed`` times wall time, by absolute deadlines."""
+    """Paces simulated time at ``speed`` times wall time, by absolute deadlines."""
 
     def __init__(self, speed: float, stopped: Callable[[], bool]) -> None:
         self._ns_per_us = 1000.0 / speed
@@ -52,9 +52,9 @@ class Pacer:
         self.slips = 0
 
     def wait_until(self, time_us: int) -> None:
-        """Sleep until it is time for ``time_us``; the first call sets the origin.
+        """Sleep until the deadline of ``time_us``; the first call sets the origin.
 
-        After more than half a second of delay (a suspended machine, a debugger) the origin is set anew.
+        A delay of more than 0.5 s (a suspended machine, a debugger) resets the origin.
         """
         now = time.monotonic_ns()
         if self._base_ns is None:
@@ -62,7 +62,7 @@ class Pacer:
             return
         deadline = self._base_ns + round((time_us - self._base_us) * self._ns_per_us)
         while now < deadline and not self._stopped():
-            time.sleep(min(_NAP_S, (deadline - now) * 1e-9))
+            time.sleep(min(_LONGEST_SLEEP_S, (deadline - now) * 1e-9))
             now = time.monotonic_ns()
         late = max(0, now - deadline)
         self.lateness.add(late)

@@ -1,4 +1,4 @@
-"""The simulator as a process: one client over TCP, in lockstep or on the wall clock."""
+"""The simulator process: one client over TCP, in lockstep or in real time."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from sim_bridge.server.connection import (
     StopSignal,
     listen,
 )
-from sim_bridge.server.lockstep import SimulatorLink
+from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.session import Session
 from sim_bridge.simulator import Simulator
 
@@ -36,19 +36,19 @@ DEFAULT_TIMEOUT_S = 30.0
 
 
 class ServerOptions(NamedTuple):
-    """Everything a run of the simulator needs."""
+    """Configuration of a run of the simulator."""
 
     vehicle: Vehicle
     plant: str
     plant_options: PlantOptions
     home: GeoPoint
-    speed: float  # math.inf: as fast as it goes
+    speed: float  # math.inf: unlimited
     host: str
     port: int
     system_id: int
     ideal_rotors: bool
     physics_hz: float
-    timeout_s: float | None  # None: wait for a client for ever
+    timeout_s: float | None  # None: wait for a client without a timeout
     faults: tuple[Fault, ...] = ()
     view: LiveView | None = None
 
@@ -65,9 +65,9 @@ def serve(options: ServerOptions) -> int:
         return USAGE
     with listener:
         stop = StopSignal()
-        _introduce(options, listener.getsockname()[1])
+        _print_start(options, listener.getsockname()[1])
         announce_compilation("sim-bridge", kernels_of(options.plant))
-        simulator = _simulator(options)  # compiles where nothing is cached; a client may connect meanwhile
+        simulator = _make_simulator(options)  # may compile kernels; a client may connect meanwhile
         try:
             client = _await_client(listener, stop, options.timeout_s)
         except StoppedError:
@@ -78,14 +78,14 @@ def serve(options: ServerOptions) -> int:
             return NO_PEER
     ask_for_punctual_sleeps()
     timeout_s = DEFAULT_TIMEOUT_S if options.timeout_s is None else options.timeout_s
-    link = SimulatorLink(simulator, options.vehicle, options.home, options.system_id)
-    watching = contextlib.nullcontext() if options.view is None else options.view.watching(simulator)
-    with client, watching:
+    link = FlightStackEndpoint(simulator, options.vehicle, options.home, options.system_id)
+    view = contextlib.nullcontext() if options.view is None else options.view.watching(simulator)
+    with client, view:
         connection = Connection(client, stop, timeout_s)
-        return _fly(Session(link, connection, options.speed, stop), connection, timeout_s)
+        return _run(Session(link, connection, options.speed, stop), connection, timeout_s)
 
 
-def _introduce(options: ServerOptions, port: int) -> None:
+def _print_start(options: ServerOptions, port: int) -> None:
     speed = "max" if math.isinf(options.speed) else f"{options.speed:g}"
     say(
         f"{options.vehicle.name}, {options.plant} plant, {options.host}:{port}, speed {speed}, "
@@ -94,17 +94,17 @@ def _introduce(options: ServerOptions, port: int) -> None:
 
 
 def _await_client(listener: socket.socket, stop: StopSignal, timeout_s: float | None) -> socket.socket:
-    """Return the first client; raise StoppedError, or PeerSilentError after the timeout."""
+    """Return the first client; raise StoppedError, or PeerSilentError at the timeout."""
     waiter = stop.waiter(listener, select.POLLIN)
     while True:
         waiter.wait(timeout_s)
         try:
             return listener.accept()[0]
-        except OSError:  # it went away before we came
+        except OSError:  # the client disconnected before accept
             continue
 
 
-def _simulator(options: ServerOptions) -> Simulator:
+def _make_simulator(options: ServerOptions) -> Simulator:
     vehicle = options.vehicle.with_ideal_rotors() if options.ideal_rotors else options.vehicle
     simulator = Simulator(
         vehicle,
@@ -113,24 +113,23 @@ def _simulator(options: ServerOptions) -> Simulator:
         physics_hz=options.physics_hz,
         system_id=options.system_id,
     )
-    about = simulator.plant.about()
-    if about:
-        say(about)
+    if description := simulator.plant.description():
+        say(description)
     for fault in options.faults:
         simulator.inject(fault)
     return simulator
 
 
-def _fly(session: Session, connection: Connection, timeout_s: float) -> int:
+def _run(session: Session, connection: Connection, timeout_s: float) -> int:
     link = session.link
     problem = ""
     try:
         session.run()
-        problem = link.fault or ""
+        problem = link.error or ""
     except StoppedError:
-        connection.send_last(link.goodbye())
+        connection.send_last(link.poweroff())
     except PeerClosedError:
-        if not link.said_goodbye:
+        if not link.peer_ended:
             problem = (
                 f"flight stack lost at t={link.simulator.time_us * 1e-6:.3f} s: it closed the connection"
             )
@@ -139,7 +138,7 @@ def _fly(session: Session, connection: Connection, timeout_s: float) -> int:
         problem = f"the flight stack did not answer for {timeout_s:g} s (lost at t={at:.3f} s)"
     except PlantDivergedError as error:
         problem = str(error)
-        connection.send_last(link.goodbye())
+        connection.send_last(link.poweroff())
     for line in session.report():
         say(line)
     if problem:

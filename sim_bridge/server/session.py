@@ -1,4 +1,4 @@
-"""One client's flight: exchanges in lockstep, or on the wall clock when the client has a clock of its own."""
+"""The session of one client: exchanges in lockstep, or in real time if the client has a clock of its own."""
 
 from __future__ import annotations
 
@@ -7,35 +7,37 @@ import time
 
 from flightstack.transports.cpu_affinity import AffinityLeader
 from sim_bridge.server.connection import Connection, StoppedError, StopSignal
-from sim_bridge.server.lockstep import SimulatorLink
+from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.server.pacing import Pacer
 
 
 class Session:
-    """One client's flight."""
+    """The session of one client."""
 
-    def __init__(self, link: SimulatorLink, connection: Connection, speed: float, stop: StopSignal) -> None:
+    def __init__(
+        self, link: FlightStackEndpoint, connection: Connection, speed: float, stop: StopSignal
+    ) -> None:
         self.link = link
         self.exchanges = 0
         self.wall_s = 0.0
         self._speed = speed
         self.pacer = None if math.isinf(speed) else Pacer(speed, stop.is_set)
-        # at a given speed there is time to sleep, and the scheduler finds the processor that wakes up first
+        # at a limited speed the process sleeps, and the scheduler chooses the processor
         self._leader = AffinityLeader() if self.pacer is None else None
         self._move_at = 1
         self._connection = connection
         self._stop = stop
 
     def run(self) -> None:
-        """Exchange until the client ends, is lost, or the user stops; the exception says which."""
+        """Exchange until an error of the link; raise an exception if the client ends, is lost, or the user stops."""
         link, connection = self.link, self._connection
         started = time.monotonic()
         try:
-            while link.fault is None:
+            while link.error is None:
                 if self._stop.stopped:
                     raise StoppedError
                 if not link.ready:
-                    self._take(connection.receive())
+                    self._receive(connection.receive())
                 elif link.free_running:
                     self._tick_on_wall_clock()
                 else:
@@ -45,7 +47,7 @@ class Session:
         finally:
             self.wall_s = time.monotonic() - started
 
-    def _take(self, data: memoryview) -> None:
+    def _receive(self, data: memoryview) -> None:
         self.link.receive(data)
         for reply in self.link.replies():
             self._connection.send(reply)
@@ -54,8 +56,8 @@ class Session:
         link, connection = self.link, self._connection
         connection.send(link.state())
         while not link.answered:
-            self._take(connection.receive())
-            if link.free_running or link.fault is not None:
+            self._receive(connection.receive())
+            if link.free_running or link.error is not None:
                 return
         link.step()
         self.exchanges += 1
@@ -66,23 +68,23 @@ class Session:
 
     def _tick_on_wall_clock(self) -> None:
         link, connection = self.link, self._connection
-        if self.pacer is None:  # as fast as it goes means nothing to a client with a clock of its own
+        if self.pacer is None:  # --speed max has no effect on a client with a clock of its own
             self.pacer = Pacer(1.0, self._stop.is_set)
         if self._leader is not None:
             self._leader.leave()
             self._leader = None
         self.pacer.wait_until(link.simulator.time_us)
-        heard = False
+        received = False
         while (data := connection.receive_now()) is not None:
-            heard = True
-            self._take(data)
-        connection.check_alive(heard)
+            received = True
+            self._receive(data)
+        connection.check_alive(received)
         link.step()
         self.exchanges += 1
         connection.send(link.state())
 
     def report(self) -> list[str]:
-        """Return the figures of the session, as lines for the user."""
+        """Return the statistics of the session as lines for the user."""
         simulated_s = self.link.simulator.time_us * 1e-6
         factor = simulated_s / self.wall_s if self.wall_s > 0.0 else 0.0
         lines = [
@@ -91,7 +93,7 @@ class Session:
             f"{self.link.simulator.plant.bad_commands} bad commands"
         ]
         if math.isinf(self._speed) and self.link.free_running:
-            lines.append("the flight stack kept real time, so that --speed max did not act: flown at speed 1")
+            lines.append("--speed max had no effect: the flight stack runs in real time")
         if self.pacer is not None and self.pacer.lateness.count:
             late = self.pacer.lateness
             lines.append(

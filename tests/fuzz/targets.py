@@ -24,7 +24,7 @@ from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from gcs_cli.link.session import Session
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.plant.plant import PlantOptions
-from sim_bridge.server.lockstep import SimulatorLink as SimulatorEnd
+from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.simulator import Simulator
 from tests.fuzz.clients import SERVICES
 from tests.fuzz.memory_logs import MemoryLogs
@@ -127,7 +127,7 @@ def simulator(script: bytes) -> int:
 
 def bridge(script: bytes) -> int:
     """The simulator's end of the simulator link; the plant flies on what it is told."""
-    end = SimulatorEnd(Simulator(VEHICLE, "rigid", PlantOptions()), VEHICLE, DEFAULT_HOME)
+    end = FlightStackEndpoint(Simulator(VEHICLE, "rigid", PlantOptions()), VEHICLE, DEFAULT_HOME)
     arrivals = 0
     for step in steps(script):
         for piece in step.pieces:

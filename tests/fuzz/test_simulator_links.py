@@ -13,7 +13,7 @@ from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.plant.plant import PlantOptions
-from sim_bridge.server.lockstep import SimulatorLink as SimulatorEnd
+from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.simulator import LONGEST_INTERVAL_US, SHORTEST_INTERVAL_US, Simulator
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import calls, held
@@ -68,8 +68,8 @@ def test_the_vehicle_s_end_takes_anything_and_then_an_exact_state() -> None:
     assert answer.time_us == 4_000
 
 
-def simulator_end() -> SimulatorEnd:
-    return SimulatorEnd(Simulator(VEHICLE, "rigid", PlantOptions()), VEHICLE, DEFAULT_HOME)
+def simulator_end() -> FlightStackEndpoint:
+    return FlightStackEndpoint(Simulator(VEHICLE, "rigid", PlantOptions()), VEHICLE, DEFAULT_HOME)
 
 
 def test_the_simulator_s_end_takes_anything_and_then_a_request_and_actuators() -> None:

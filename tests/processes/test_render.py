@@ -1,4 +1,4 @@
-"""``sim-bridge render`` and ``gcs replay`` as processes: files of pictures, and what is said when there are none."""
+"""``sim-bridge render`` and ``gcs replay`` as processes: picture files and error messages."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, Act
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.render import render_command
 from sim_bridge.render.live_view import READY, SNAPSHOT, LiveView
-from sim_bridge.render.offscreen import choose
+from sim_bridge.render.offscreen import choose_backend
 from sim_bridge.render.viewer import show
 from sim_bridge.simulator import Simulator
 from tests.support.commands import gcs, sim_bridge_command
@@ -37,7 +37,7 @@ SMALL = ("--size", "96x54")
 @pytest.fixture(scope="module")
 def poses(tmp_path_factory: pytest.TempPathFactory) -> Path:
     try:
-        choose()
+        choose_backend()
     except UsageProblemError as error:
         missing(str(error))
     path = tmp_path_factory.mktemp("poses") / "poses.npz"
@@ -71,7 +71,7 @@ def frames_of(path: Path) -> tuple[int, tuple[int, int]]:
     return len(heads), (int(heads[0][0]), int(heads[0][1]))
 
 
-def test_pictures_a_sheet_and_films_of_the_asked_size(poses: Path, tmp_path: Path) -> None:
+def test_pictures_sheet_and_films_have_the_requested_size(poses: Path, tmp_path: Path) -> None:
     gif, mp4 = tmp_path / "f.gif", tmp_path / "f.mp4"
     done = render(
         poses, *SMALL, "--png", tmp_path / "p.png", "--at", "0.5,1.5", "--sheet", tmp_path / "s.png",
@@ -114,7 +114,7 @@ def test_a_log_is_replayed_from_end_to_end(
     )
 
 
-def test_a_damaged_log_is_drawn_as_far_as_it_goes_and_said_to_be_damaged(
+def test_damaged_log_is_drawn_up_to_the_damage_with_a_warning(
     poses: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     log = synthetic_flight_bytes(inner_ms=20, outer_ms=20, seconds=4.0)
@@ -141,11 +141,11 @@ def test_a_damaged_log_is_drawn_as_far_as_it_goes_and_said_to_be_damaged(
         (["--video", "f.mp4", "--size", "97x54"], "--size: an mp4 needs even numbers, not 97x54"),
         (["--video", "f.mp4", "--fps", "0"], "--fps: 0 is outside the allowed range 0.1 to 240"),
         (["--video", "f.mp4", "--speed", "nan"], "--speed: nan is outside the allowed range 0.001 to 1000"),
-        (["--png", ""], "--png: the name of a file is missing; it must end in .png"),
-        (["--png", "p.png", "--at", "1,x"], "--at: '1,x' is not one or more times in seconds, separated by commas\n"),
-        (["--png", "p.png", "--at", "1," * 1000 + "1"], "--at: 1001 times are too many, at most 1000 are allowed"),
-        (["--video", "f.mp4", "--at", "1"], "--at is for --png and --sheet: a part of a film is --from and --to"),
-        (["--png", "p.png", "--from", "1"], "--from is for --video, --sheet and --view: the moment of"),
+        (["--png", ""], "--png: the file name is missing; it must end in .png"),
+        (["--png", "p.png", "--at", "1,x"], "--at: '1,x' is not a list of times in seconds, separated by commas\n"),
+        (["--png", "p.png", "--at", "1," * 1000 + "1"], "--at: 1001 times are more than the allowed 1000"),
+        (["--video", "f.mp4", "--at", "1"], "--at is for --png and --sheet; --from and --to select a part of a film"),
+        (["--png", "p.png", "--from", "1"], "--from is for --video, --sheet and --view; --at selects"),
         (["--sheet", "s.png", "--at", "1", "--to", "1"], "--to is for --video, --sheet and --view"),
         (["--png", "p.png", "--fps", "5"], "--fps is for --video"),
         (["--png", "p.png", "--speed", "5"], "--speed is for --video and --view"),
@@ -156,7 +156,7 @@ def test_a_damaged_log_is_drawn_as_far_as_it_goes_and_said_to_be_damaged(
         (["--png", "p.png", "--vehicle", "boat"], "boat: is neither a file nor a built-in vehicle"),
     ],
 )  # fmt: skip
-def test_bad_arguments_get_a_sentence(
+def test_bad_arguments_are_one_sentence(
     poses: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -174,7 +174,7 @@ def test_bad_arguments_get_a_sentence(
     ("arguments", "said"),
     [([], "sim-bridge: render needs MuJoCo"), (["--caller", "gcs replay"], "gcs: replay needs MuJoCo")],
 )
-def test_complaints_name_the_command_that_was_given(
+def test_error_messages_name_the_calling_command(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     arguments: list[str],
@@ -201,7 +201,7 @@ def test_an_interrupted_film_leaves_the_old_one(poses: Path, tmp_path: Path) -> 
     arguments = [poses, *SMALL, "--video", film, "--overwrite", "--fps", "240", "--speed", "0.01"]
     process = Process("sim_bridge", "render", *map(str, arguments))
     begun = threading.Event()
-    while not begun.wait(0.02):  # the film under way has a name of its own
+    while not begun.wait(0.02):  # the unfinished film has a temporary name
         if len(list(tmp_path.iterdir())) > 1:
             begun.set()
         assert process.is_running, process.output
@@ -223,7 +223,7 @@ open(sys.argv[1], "wb").write(data)
 
 
 def climb(simulator: Simulator) -> list[bytes]:
-    """Fly up for three seconds; return all states sent. A second later it would hit the ground."""
+    """Fly up for three seconds; return all states sent. It would reach the ground one second later."""
     actuators, frames = ActuatorsFrame(), []
     actuators.set_rotor_count(4)
     actuators.rotor_speed_rad_s[:4] = (240.0, 240.5, 241.0, 240.2)
@@ -234,8 +234,8 @@ def climb(simulator: Simulator) -> list[bytes]:
     return frames
 
 
-def test_a_live_window_hears_of_the_flight_and_does_not_change_it(tmp_path: Path) -> None:
-    """A program in the window's place keeps what it gets; the states sent are those without it."""
+def test_live_window_receives_states_and_does_not_change_the_flight(tmp_path: Path) -> None:
+    """A program in place of the window records its input; the states sent are the same without it."""
     alone = climb(Simulator(load_vehicle("paper_quad")))
     watched = Simulator(load_vehicle("paper_quad"))
     view = LiveView(str(tmp_path / "heard"), (sys.executable, "-c", _WINDOW))
@@ -251,7 +251,7 @@ def test_a_live_window_hears_of_the_flight_and_does_not_change_it(tmp_path: Path
         assert abs(north) + abs(east) < 50.0
 
 
-def test_a_window_that_goes_away_is_forgotten(tmp_path: Path) -> None:
+def test_closed_window_does_not_stop_the_simulator(tmp_path: Path) -> None:
     view = LiveView("", (sys.executable, "-c", "print('ready', flush=True)"))
     simulator = Simulator(load_vehicle("paper_quad"))
     with view.watching(simulator):
@@ -260,7 +260,7 @@ def test_a_window_that_goes_away_is_forgotten(tmp_path: Path) -> None:
         assert len(climb(simulator)) == 1500
 
 
-def test_a_window_that_cannot_open_says_why() -> None:
+def test_window_that_cannot_open_is_an_error_with_its_reason() -> None:
     program = (sys.executable, "-c", "import sys; print('--view: no display', file=sys.stderr); sys.exit(2)")
     with pytest.raises(UsageProblemError, match=r"^--view: no display$"):
         LiveView("paper_quad", program)
@@ -279,7 +279,7 @@ def test_live_view_without_a_display_ends_before_anything_starts() -> None:
 
 
 def test_the_window_waits_for_its_drawing_thread_however_slow(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A drawing thread that outlives Python crashes in the driver: no time limit may end the wait."""
+    """A drawing thread that outlives Python crashes in the driver: the wait has no timeout."""
     drawn, waits = threading.Event(), list[float | None]()
 
     def launch(*_arguments: object, **_options: object) -> MagicMock:
@@ -299,7 +299,7 @@ def test_the_window_waits_for_its_drawing_thread_however_slow(monkeypatch: pytes
 
 
 def test_a_window_shows_a_flight_on_a_virtual_display(poses: Path) -> None:
-    """Xvfb is a display that nobody sees: the window opens there, takes snapshots and closes in order."""
+    """The window opens on Xvfb, reads snapshots and closes in order."""
     if shutil.which("Xvfb") is None:
         missing("Xvfb is not installed: apt install xvfb")
     read, write = os.pipe()

@@ -1,4 +1,4 @@
-"""`sim-bridge` as a process on real TCP, flown by clients made with pymavlink."""
+"""``sim-bridge`` as a process on real TCP with pymavlink clients."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, Act
 from tests.support.commands import sim_bridge_command
 from tests.support.programs import Program
 
-WAIT_S = 60.0  # the bound of every wait: compiling anew on a loaded machine takes ten seconds
+WAIT_S = 60.0  # of each wait; compilation on a loaded machine takes 10 s
 
 
 class SimBridge:
@@ -105,13 +105,13 @@ def test_lockstep_flight_ends_in_order(bridge: SimBridge) -> None:
     assert "1.000 s simulated" in out
 
 
-def test_goodbye_is_heard_although_a_state_was_left_unread(bridge: SimBridge) -> None:
+def test_poweroff_heartbeat_is_read_with_an_unread_state_pending(bridge: SimBridge) -> None:
     client = Client(bridge.port)
     client.request()
     client.fly(10)
     client.answer(18_000)
     client.heartbeat(mavlink.MAV_STATE_POWEROFF)
-    client.socket.close()  # with unread bytes: a reset, not a tidy end
+    client.socket.close()  # with unread bytes: a connection reset
     assert bridge.end()[0] == 0
 
 
@@ -136,7 +136,7 @@ def test_silent_flight_stack_times_out() -> None:
     assert err == "sim-bridge: the flight stack did not answer for 0.5 s (lost at t=0.004 s)\n"
 
 
-def test_nobody_connects() -> None:
+def test_timeout_without_a_client() -> None:
     bridge = SimBridge("--timeout", "0.05")
     code, _, err = bridge.end()
     assert code == 3
@@ -177,13 +177,13 @@ def test_client_on_its_own_clock_gets_states_at_the_rate() -> None:
         if message.get_type() == "FS_PLANT_STATE":
             times.append(message.time_us)
             if len(times) == 1:
-                client.answer(0, flags=ARMED_FLAG)  # the only answer: nobody waits for more
+                client.answer(0, flags=ARMED_FLAG)  # the only answer: the simulator waits for no other
             elif len(times) == 300:
                 break
     assert times == [2000 * step for step in range(300)]
     client.heartbeat(mavlink.MAV_STATE_POWEROFF)
     client.socket.shutdown(socket.SHUT_WR)
-    rest = list(client.messages())  # until the other side closes
+    rest = list(client.messages())  # until the simulator closes
     client.socket.close()
     code, out, _ = bridge.end()
     assert {message.get_type() for message in rest} <= {"FS_PLANT_STATE", "BATTERY_STATUS"}
@@ -191,19 +191,19 @@ def test_client_on_its_own_clock_gets_states_at_the_rate() -> None:
     assert "lateness mean" in out
 
 
-def test_speed_max_that_did_not_act_is_reported() -> None:
+def test_speed_max_without_effect_is_reported() -> None:
     bridge = SimBridge("--speed", "max")
     with Client(bridge.port) as client:
         client.request()
         states = (message for message in client.messages() if message.get_type() == "FS_PLANT_STATE")
         next(states)
-        client.answer(0, flags=ARMED_FLAG)  # without the flag of lockstep
+        client.answer(0, flags=ARMED_FLAG)  # without the lockstep flag
         for _ in range(5):
             next(states)
         client.heartbeat(mavlink.MAV_STATE_POWEROFF)
     code, out, _ = bridge.end()
     assert code == 0
-    assert "--speed max did not act: flown at speed 1" in out
+    assert "--speed max had no effect" in out
 
 
 def test_same_commands_give_the_same_bytes_at_any_speed() -> None:
@@ -230,7 +230,7 @@ def test_same_commands_give_the_same_bytes_at_any_speed() -> None:
 
 
 def test_third_party_flies_by_hil_messages(bridge: SimBridge) -> None:
-    """pymavlink's own connection, no part of ours: request 115, answer with HIL_ACTUATOR_CONTROLS, climb."""
+    """Climb over pymavlink's own connection: request message 115, answer with HIL_ACTUATOR_CONTROLS."""
     peer = mavutil.mavlink_connection(f"tcp:127.0.0.1:{bridge.port}", source_system=1, source_component=1)
     peer.mav.heartbeat_send(2, 12, 0, 0, 4)
     peer.mav.command_long_send(0, 0, 511, 0, 115, 4000, 0, 0, 0, 0, 0)
@@ -267,7 +267,7 @@ def test_third_party_flies_by_hil_messages(bridge: SimBridge) -> None:
         (["--battery-capacity", "0"], "--battery-capacity: 0 is outside"),
         (["--battery-drain", "-1"], "--battery-drain: -1 is outside"),
         (["--fault", "rotor:9:off"], "--fault rotor:9:off: the vehicle has rotors 1 to 4"),
-        (["--fault", "state:freeze@5-4"], "it ends at 4 s, not after its begin at 5 s"),
+        (["--fault", "state:freeze@5-4"], "its end, 4 s, is not after its begin, 5 s"),
     ],
 )
 def test_usage_errors(arguments: list[str], said: str) -> None:
@@ -277,7 +277,7 @@ def test_usage_errors(arguments: list[str], said: str) -> None:
     assert done.stderr.count("\n") == 1
 
 
-def test_battery_and_faults_act_as_asked_in_a_process() -> None:
+def test_battery_and_fault_options_act_in_a_process() -> None:
     bridge = SimBridge(
         "--speed", "max", "--battery-start", "40", "--fault", "rotor:2:off@0.1", "--fault", "battery:level=0.2@0.2"
     )  # fmt: skip
@@ -323,7 +323,7 @@ def test_dropping_states_in_lockstep_ends_with_a_sentence() -> None:
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("command", [[], ["open-loop", "--rotors", "1,1,1,1", "--seconds", "1"]])
-def test_wind_that_cannot_act_is_a_usage_error(command: list[str], given: list[str], said: str) -> None:
+def test_wind_without_drag_is_a_usage_error(command: list[str], given: list[str], said: str) -> None:
     done = sim_bridge_command(*command, *given)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"sim-bridge: {said}")

@@ -145,10 +145,10 @@ def _snapshot(time_s: float, north: float, speed: float = 100.0) -> bytes:
 
 def test_snapshots_become_moments_and_a_trail() -> None:
     flight = LiveFlight(rotors=4, most_points=3)
-    moment = flight.take(_snapshot(0.01, 0.0))
+    moment = flight.update(_snapshot(0.01, 0.0))
     assert moment.speed_m_s == pytest.approx(5.0)
     for step in range(1, 6):
-        moment = flight.take(_snapshot(0.01 + 0.02 * step, 0.1 * step))
+        moment = flight.update(_snapshot(0.01 + 0.02 * step, 0.1 * step))
     assert moment.position_ned_m == pytest.approx((0.5, 0.0, -1.0))
     assert moment.rotor_angle_rad == pytest.approx((100.0 * 0.11,) * 4)
     assert len(flight.trail(0.0, 99)) == 4  # the newest three and where it is
@@ -156,9 +156,9 @@ def test_snapshots_become_moments_and_a_trail() -> None:
 
 def test_a_snapshot_that_is_not_finite_leaves_the_vehicle_where_it_was() -> None:
     flight = LiveFlight(rotors=4, most_points=3)
-    before = flight.take(_snapshot(0.01, 1.0))
-    assert flight.take(_snapshot(0.02, math.nan)) == before
-    assert flight.take(_snapshot(0.03, 1.0, speed=math.inf)).rotor_speed_rad_s == (0.0,) * 4
+    before = flight.update(_snapshot(0.01, 1.0))
+    assert flight.update(_snapshot(0.02, math.nan)) == before
+    assert flight.update(_snapshot(0.03, 1.0, speed=math.inf)).rotor_speed_rad_s == (0.0,) * 4
 
 
 def test_of_several_snapshots_the_newest_counts_and_a_part_waits() -> None:

@@ -26,8 +26,7 @@ from sim_bridge.plant.contact import FRICTION
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
 from sim_bridge.plant.layout import CONTACT, DIVERGED
 from sim_bridge.plant.plant import AT_REST, InitialState, Plant, PlantOptions
-from sim_bridge.plant_names import PLANT_NAMES
-from sim_bridge.plants import make_plant
+from sim_bridge.plants import PLANT_NAMES, make_plant
 from sim_bridge.server.hil import hil_state
 from sim_bridge.simulator import Simulator
 from tests.support.tools import NIGHTLY
@@ -294,7 +293,7 @@ def test_rests_at_the_origin(vehicle: str, step_s: float) -> None:
     assert flight.result == CONTACT
     flight.plant.advance(STOPPED, 0, min(2000, round(5.0 / step_s)))
     assert np.abs(flight.state - [0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]).max() < 1e-12  # measured: 6e-14
-    assert flight.plant.buried_m() < 1e-12
+    assert flight.plant.penetration_m() < 1e-12
 
 
 @BOTH_VEHICLES
@@ -523,7 +522,7 @@ def test_acceleration_and_airspeed_are_those_of_the_rigid_plant() -> None:
     assert multibody.acceleration_ned_m_s2() == pytest.approx(rigid.acceleration_ned_m_s2(), rel=1e-12)
     assert multibody.airspeed_m_s() == pytest.approx(rigid.airspeed_m_s(), rel=1e-15)
     assert multibody.euler_rad() is None
-    assert "parts meet the vehicle file" in (multibody.about() or "")
+    assert "parts meet the vehicle file" in (multibody.description() or "")
 
 
 @pytest.mark.parametrize("name", PLANT_NAMES)

@@ -1,4 +1,4 @@
-"""The command `sim-bridge open-loop`, in process: arguments in, JSON or a table or one sentence out."""
+"""The command ``sim-bridge open-loop``, in process: JSON, table and errors."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_json_has_the_documented_keys(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 @pytest.mark.parametrize("plant", ["rigid", "paper", "multibody"])
-def test_start_is_given_back_after_no_time(capsys: pytest.CaptureFixture[str], plant: str) -> None:
+def test_zero_duration_returns_the_initial_state(capsys: pytest.CaptureFixture[str], plant: str) -> None:
     state = fly(
         capsys, "--plant", plant, "--rotors", "-5,6,7,8", "--seconds", "0", "--no-lag", "--pos", "1,2,-3",
         "--vel", "-4,5,6", "--euler-deg", "10,-20,30", "--rates", "0.1,0.2,0.3",
@@ -39,14 +39,14 @@ def test_start_is_given_back_after_no_time(capsys: pytest.CaptureFixture[str], p
     assert state["rotor_speed_rad_s"] == [-5.0, 6.0, 7.0, 8.0]
 
 
-def test_rotors_lag_unless_told_otherwise(capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_lag_option_starts_rotors_at_speed(capsys: pytest.CaptureFixture[str]) -> None:
     common = ("--vehicle", "x_quad", "--rotors", "600,600,600,600", "--seconds", "0.02")
     lagging = fly(capsys, *common)["rotor_speed_rad_s"]
     assert lagging == pytest.approx([600.0 * (1.0 - math.exp(-1.0))] * 4, rel=1e-12)
     assert fly(capsys, *common, "--no-lag")["rotor_speed_rad_s"] == [600.0] * 4
 
 
-def test_ground_holds_unless_removed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_ground_holds_unless_disabled(capsys: pytest.CaptureFixture[str]) -> None:
     common = ("--rotors", "0,0,0,0", "--seconds", "1")
     assert fly(capsys, *common)["pos_ned_m"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
     assert fly(capsys, *common, "--no-ground")["pos_ned_m"] == pytest.approx([0.0, 0.0, 4.905], abs=1e-12)
@@ -70,14 +70,14 @@ def test_split_time(seconds: float, dt_s: float, expected: tuple[int, float, flo
     assert split_time(seconds, dt_s) == expected
 
 
-def test_figures_are_those_of_a_sheet_of_paper(capsys: pytest.CaptureFixture[str]) -> None:
+def test_acceleration_agrees_with_a_hand_calculation(capsys: pytest.CaptureFixture[str]) -> None:
     """Paper vehicle: m 0.55, b 2.93e-5, d 7.2e-7, l 0.2, J_r 6.3e-5, I 7.2e-3, 7.2e-3, 1.1e-2."""
     air = ("--no-ground", "--no-lag", "--seconds")
     hover = ",".join([repr(math.sqrt(0.55 * 9.81 / (4 * 2.93e-5)))] * 4)
     assert fly(capsys, *air, "10", "--rotors", hover)["pos_ned_m"] == pytest.approx([0, 0, 0], abs=1e-12)
     yawing = fly(capsys, *air, "1", "--rotors", "200,210,200,210")["rates_frd_rad_s"]
     assert yawing == pytest.approx([0.0, 0.0, 2 * 7.2e-7 * (210**2 - 200**2) / 1.1e-2], abs=1e-12)
-    # for a short time: roll by a4 q Ωr and U2, pitch as it was
+    # over a short time: roll by a4 q Ωr and U2, constant pitch
     turning = fly(capsys, *air, "1e-4", "--rotors", "0,300,0,310", "--rates", "0,1,0")["rates_frd_rad_s"]
     roll = (6.3e-5 * (300 + 310) * 1.0 + 0.2 * 2.93e-5 * (310**2 - 300**2)) / 7.2e-3
     assert turning[0] == pytest.approx(1e-4 * roll, rel=1e-4)  # measured: 3.1e-5
@@ -90,9 +90,9 @@ def test_gusty_torque_is_the_same_for_the_same_seed(capsys: pytest.CaptureFixtur
     assert min(abs(rate) for rate in first) > 1e-3
 
 
-def test_who_starts_in_the_ground_is_warned(capsys: pytest.CaptureFixture[str]) -> None:
+def test_start_below_the_ground_is_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
     common = ["open-loop", "--rotors", "0,0,0,0", "--seconds", "0", "--euler-deg", "90,0,0"]
-    for more, said in (([], "0.1 m in the ground"), (["--pos", "0,0,-0.11"], ""), (["--no-ground"], "")):
+    for more, said in (([], "0.1 m below the ground"), (["--pos", "0,0,-0.11"], ""), (["--no-ground"], "")):
         assert main([*common, *more]) == 0
         shown = capsys.readouterr()
         assert said in shown.err
@@ -100,15 +100,15 @@ def test_who_starts_in_the_ground_is_warned(capsys: pytest.CaptureFixture[str]) 
         assert shown.out
 
 
-def test_long_steps_do_not_meet_the_ground(capsys: pytest.CaptureFixture[str]) -> None:
-    """Springs that are stable in long steps are soft; high above them, long steps do no harm."""
+def test_ground_contact_with_long_steps_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    """Springs that are stable at long steps are soft; in the air long steps are allowed."""
     common = ["--rotors", "0,0,0,0", "--dt", "0.1", "--pos", "0,0,-100", "--json", "--seconds"]
     fallen = fly(capsys, *common, "4")["pos_ned_m"]
     assert fallen[2] == pytest.approx(-100.0 + 0.5 * 9.81 * 16.0, abs=1e-9)
     assert main(["open-loop", *common, "5"]) == 2
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert "--dt: in steps of 0.1 s the ground gives way by 1 m" in shown.err
+    assert "--dt: with steps of 0.1 s the vehicle sinks 1 m into the ground" in shown.err
 
 
 def test_disturbances_act(capsys: pytest.CaptureFixture[str]) -> None:
@@ -178,7 +178,7 @@ def test_bad_vehicle_file_is_one_sentence(capsys: pytest.CaptureFixture[str], tm
 
 @pytest.mark.parametrize("more", [["--torque", "1e9,1e9,1e9"], ["--rates", "1100,0,0"]])
 def test_divergence_is_a_failure_not_a_number(capsys: pytest.CaptureFixture[str], more: list[str]) -> None:
-    """Also where all stays finite: more than a radian in a step is not resolved."""
+    """Also with a finite state: more than 1 rad per step is not resolved."""
     common = ["open-loop", "--rotors", "0,0,0,0", "--seconds", "9", "--no-ground"]
     assert main([*common, *more]) == 1
     assert "diverged" in capsys.readouterr().err

@@ -16,7 +16,7 @@ from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.faults import Fault, Kind, parse_fault
-from sim_bridge.server.lockstep import HIL_STATE_QUATERNION_ID, SimulatorLink
+from sim_bridge.server.endpoint import HIL_STATE_QUATERNION_ID, FlightStackEndpoint
 from sim_bridge.simulator import Simulator
 
 PAPER = load_vehicle("paper_quad")
@@ -231,13 +231,13 @@ def test_faults_are_the_same_in_every_run() -> None:
 # ---------------------------------------------------------------------- the link
 
 
-def linked(*specs: str) -> SimulatorLink:
-    link = SimulatorLink(flown(*specs, seconds=0.0), PAPER, HOME)
+def linked(*specs: str) -> FlightStackEndpoint:
+    link = FlightStackEndpoint(flown(*specs, seconds=0.0), PAPER, HOME)
     send(link, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 53000, 2000)
     return link
 
 
-def send(link: SimulatorLink, number: int, *params: float) -> int:
+def send(link: FlightStackEndpoint, number: int, *params: float) -> int:
     filled = [*params, *[0.0] * (7 - len(params))]
     link.receive(
         memoryview(Link(1, 1).encode(mavlink.MAVLink_command_long_message(1, 1, number, 0, *filled)))
@@ -248,7 +248,7 @@ def send(link: SimulatorLink, number: int, *params: float) -> int:
     return int(ack.result)
 
 
-def inject(link: SimulatorLink, *params: float) -> int:
+def inject(link: FlightStackEndpoint, *params: float) -> int:
     return send(link, mavlink.MAV_CMD_INJECT_FAILURE, *params)
 
 
@@ -256,10 +256,10 @@ def test_dropping_states_is_refused_in_lockstep_with_a_sentence() -> None:
     link = linked("state:drop@100-101")
     link.state()
     link.receive(memoryview(bytes(command(flags=ARMED_FLAG | LOCKSTEP_FLAG).frame)))
-    assert "state:drop needs a flight stack on its own clock" in (link.fault or "")
+    assert "state:drop needs a flight stack on its own clock" in (link.error or "")
     free = linked("state:drop@0-0.1")
     free.receive(memoryview(bytes(command(flags=ARMED_FLAG).frame)))
-    assert free.fault is None
+    assert free.error is None
     assert [m.get_type() for m in Link(1, 1).decode(bytes(free.state()))] == ["BATTERY_STATUS"]
     assert bytes(free.state()) == b""
 
@@ -315,7 +315,7 @@ def test_repeated_failures_do_not_pile_up() -> None:
 
 
 def test_third_parties_see_the_faults_too() -> None:
-    link = SimulatorLink(flown("state:nan@0-0.01", "state:freeze@0.01-0.02", seconds=0.0), PAPER, HOME)
+    link = FlightStackEndpoint(flown("state:nan@0-0.01", "state:freeze@0.01-0.02", seconds=0.0), PAPER, HOME)
     send(link, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, HIL_STATE_QUATERNION_ID, 2000)
     rows = []
     for _ in range(15):

@@ -18,7 +18,7 @@ from flightstack.mavlink.signing import LinkSigning, Signing
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from sim_bridge.errors import PlantDivergedError
-from sim_bridge.server.lockstep import HIL_STATE_QUATERNION_ID, SimulatorLink
+from sim_bridge.server.endpoint import HIL_STATE_QUATERNION_ID, FlightStackEndpoint
 from sim_bridge.simulator import Simulator
 
 PAPER = load_vehicle("paper_quad")
@@ -29,7 +29,7 @@ class Client:
     """A flight stack's end of the link, by pymavlink's codec."""
 
     def __init__(self) -> None:
-        self.sim = SimulatorLink(Simulator(PAPER), PAPER, HOME)
+        self.sim = FlightStackEndpoint(Simulator(PAPER), PAPER, HOME)
         self.codec = Link(1, 1)
 
     def send(self, *messages) -> None:
@@ -156,15 +156,15 @@ def test_client_on_its_own_clock_is_never_waited_for(client: Client) -> None:
 def test_wrong_rotor_count_is_a_fault(client: Client) -> None:
     client.request(FS_PLANT_STATE_ID, 2000)
     client.sim.receive(memoryview(actuators(0, count=6)))
-    assert "commands 6 rotors" in (client.sim.fault or "")
+    assert "commands 6 rotors" in (client.sim.error or "")
 
 
 def test_heartbeat_says_goodbye_both_ways(client: Client) -> None:
     client.send(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
-    assert not client.sim.said_goodbye
+    assert not client.sim.peer_ended
     client.send(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, mavlink.MAV_STATE_POWEROFF, 3))
-    assert client.sim.said_goodbye
-    (goodbye,) = client.codec.decode(client.sim.goodbye())
+    assert client.sim.peer_ended
+    (goodbye,) = client.codec.decode(client.sim.poweroff())
     assert goodbye.system_status == mavlink.MAV_STATE_POWEROFF
 
 

@@ -1,4 +1,4 @@
-"""The scene: the vehicle in it turns as the flight does, in the model and in the pixels of a picture."""
+"""The scene: attitude and position of the vehicle in the model and in the pixels of a picture."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from sim_bridge.errors import UsageProblemError
 from sim_bridge.multibody.frames import flip_vector
 from sim_bridge.render import offscreen
 from sim_bridge.render.cameras import CAMERAS, Site, View, project, view
-from sim_bridge.render.labels import Place, bar
-from sim_bridge.render.overlay import Overlay
+from sim_bridge.render.overlay import Label, Overlay, scale_bar
 from sim_bridge.render.pictures import announcement, film_of
 from sim_bridge.render.poses import FlightPath, Moment
 from sim_bridge.render.renderer import Picture, Renderer, Stage
@@ -51,32 +50,32 @@ def standing(
 
 
 def rotors(path: FlightPath, vehicle: str = "paper_quad") -> np.ndarray:
-    """Where the rotors are in the scene: north, west, up [m], front, right, back, left for the plus frame."""
+    """Rotor positions NWU [m]: front, right, back, left for the plus frame."""
     place = stage(vehicle)
     place.put(path.at(0.0))
     return np.array([place.data.body(f"rotor_{number}").xpos for number in range(1, 5)])
 
 
-def test_the_nose_points_north_and_the_right_side_east() -> None:
+def test_nose_points_north_and_right_side_east() -> None:
     front, right, back, left = rotors(standing())
     assert front == pytest.approx((0.2, 0.0, 2.0), abs=1e-9)
     assert right == pytest.approx((0.0, -0.2, 2.0), abs=1e-9)
     assert back[0] < 0.0 < left[1]
 
 
-def test_a_vehicle_rolled_right_has_its_right_side_low() -> None:
+def test_roll_right_lowers_the_right_side() -> None:
     _, right, _, left = rotors(standing(roll_deg=30.0))
     assert right[2] - left[2] == pytest.approx(-0.4 * math.sin(math.radians(30.0)))
 
 
-def test_a_vehicle_pitched_up_has_its_nose_high_and_one_turned_right_looks_east() -> None:
+def test_pitch_up_raises_the_nose_and_yaw_right_turns_it_east() -> None:
     front, _, back, _ = rotors(standing(pitch_deg=20.0))
     assert front[2] - back[2] == pytest.approx(0.4 * math.sin(math.radians(20.0)))
     front = rotors(standing(yaw_deg=90.0))[0]
     assert front == pytest.approx((0.0, -0.2, 2.0), abs=1e-9)
 
 
-def test_rotors_turn_in_their_own_sense() -> None:
+def test_rotors_turn_in_their_sense_of_rotation() -> None:
     """Seen from above, rotor 1 of the paper's vehicle turns clockwise, rotor 2 counter-clockwise."""
     place = stage("paper_quad")
     turns = []
@@ -90,7 +89,7 @@ def test_rotors_turn_in_their_own_sense() -> None:
 
 @pytest.mark.parametrize("vehicle", built_in_vehicles())
 def test_a_standing_vehicle_stands_on_the_pad(vehicle: str) -> None:
-    """Its lowest part is within a centimetre of the top of the pad, and the scene keeps out of its way."""
+    """Its lowest part is within 1 cm of the top of the pad, and no part of the scene is near."""
     place = stage(vehicle)
     place.put(standing(height=0.0).at(0.0))
     model, data = place.model, place.data
@@ -104,7 +103,7 @@ def test_a_standing_vehicle_stands_on_the_pad(vehicle: str) -> None:
     assert not model.geom_contype[[g for g in place.shadeless if model.geom(g).name != "ground"]].any()
 
 
-def test_fast_rotors_blur_and_faster_ones_are_redder() -> None:
+def test_rotor_discs_appear_and_redden_with_speed() -> None:
     place = stage("paper_quad")
     place.rotors.show((0.0, 150.0, 300.0, math.nan))
     disc = [place.model.geom(f"disc_{n}").rgba for n in range(1, 5)]
@@ -138,12 +137,12 @@ def seen(renderer: Renderer, moment: Moment, camera: str = "chase") -> Picture:
 
 
 def over_grass(path: FlightPath) -> Moment:
-    """Far from all else that is orange."""
+    """A moment far from other orange objects."""
     return path.at(0.0)._replace(position_ned_m=(15.0, 12.0, -3.0))
 
 
 def arm_heights(picture: Picture) -> tuple[float, float]:
-    """How high in the picture the left and the right one of the front arms are [pixels above the middle]."""
+    """Heights of the left and the right front arm in the picture [pixels above the middle]."""
     rows, columns = orange(picture)
     assert len(rows) > 20
     middle = np.median(columns)
@@ -153,7 +152,7 @@ def arm_heights(picture: Picture) -> tuple[float, float]:
     )
 
 
-def test_a_vehicle_rolled_right_looks_rolled_right(renderer: Renderer) -> None:
+def test_picture_shows_a_roll_to_the_right(renderer: Renderer) -> None:
     difference = {}
     for roll in (-25.0, 0.0, 25.0):
         left, right = arm_heights(seen(renderer, over_grass(standing(roll_deg=roll))))
@@ -162,7 +161,7 @@ def test_a_vehicle_rolled_right_looks_rolled_right(renderer: Renderer) -> None:
     assert difference[-25.0] < difference[0.0] - 5.0
 
 
-def test_from_above_north_is_up_and_the_nose_is_where_the_heading_says(renderer: Renderer) -> None:
+def test_top_view_has_north_up_and_shows_the_heading(renderer: Renderer) -> None:
     for yaw, row_sign, column_sign in ((0.0, -1, 0), (90.0, 0, 1), (180.0, 1, 0), (-90.0, 0, -1)):
         rows, columns = orange(seen(renderer, over_grass(standing(yaw_deg=yaw)), "top"))
         down, right = rows.mean() - HEIGHT / 2, columns.mean() - WIDTH / 2
@@ -175,8 +174,8 @@ def test_from_above_north_is_up_and_the_nose_is_where_the_heading_says(renderer:
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_every_camera_shows_a_place(renderer: Renderer, camera: str) -> None:
-    """Not a void: many colours, and grass or concrete somewhere."""
+def test_every_camera_shows_the_scene(renderer: Renderer, camera: str) -> None:
+    """Many colours, and grass or concrete."""
     picture = seen(renderer, FlightPath(sample_poses(4.0)).at(2.0), camera)
     assert picture.shape == (HEIGHT, WIDTH, 3)
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 500
@@ -191,7 +190,7 @@ def test_the_same_moment_gives_the_same_picture(renderer: Renderer) -> None:
     np.testing.assert_array_equal(seen(renderer, path.at(1.5)), first)
 
 
-def test_words_are_written_where_there_is_room_for_them(renderer: Renderer) -> None:
+def test_figures_need_a_minimum_picture_size(renderer: Renderer) -> None:
     moment = FlightPath(sample_poses(4.0)).at(2.0)
     picture = seen(renderer, moment)
     with_words = np.asarray(Overlay("a title", (300.0,) * 4, WIDTH, HEIGHT).write(picture, moment))
@@ -200,10 +199,10 @@ def test_words_are_written_where_there_is_room_for_them(renderer: Renderer) -> N
     np.testing.assert_array_equal(np.asarray(Overlay("", (300.0,) * 4, 64, 64).write(small, moment)), small)
 
 
-def test_places_are_numbered_even_where_figures_have_no_room(renderer: Renderer) -> None:
+def test_small_pictures_have_waypoint_labels_but_no_figures(renderer: Renderer) -> None:
     moment = standing().at(0.0)
     picture, seen_from = seen(renderer, moment, "side"), renderer.view(moment, "side")
-    places = [Place("7", (0.5, 0.0, 2.3)), Place("8", (9.0, 60.0, 2.3))]
+    places = [Label("7", (0.5, 0.0, 2.3)), Label("8", (9.0, 60.0, 2.3))]
     written = np.asarray(Overlay("", (), 300, HEIGHT, places).write(picture, moment, seen_from))
     rows, columns = np.nonzero((written != picture).any(axis=2))
     x, y = project(seen_from, places[0].at_m, (WIDTH, HEIGHT)) or (0.0, 0.0)
@@ -212,8 +211,8 @@ def test_places_are_numbered_even_where_figures_have_no_room(renderer: Renderer)
     assert y - 30.0 < rows.mean() < y
 
 
-def test_what_is_projected_is_where_it_is_drawn(renderer: Renderer) -> None:
-    """The target's ball, in its own colour, lies where the formula of the numbers puts it."""
+def test_projection_agrees_with_the_renderer(renderer: Renderer) -> None:
+    """The pixels of the target sphere are at its projected position."""
     for camera in CAMERAS:
         place = (0.3, 0.2, -2.2) if camera != "whole" else (0.0, 0.0, -2.0)
         moment = standing().at(0.0)._replace(target_ned_m=place)
@@ -227,7 +226,7 @@ def test_what_is_projected_is_where_it_is_drawn(renderer: Renderer) -> None:
         assert np.hypot(columns - x, rows - y).min() < 5.0, camera
 
 
-def test_what_is_behind_the_camera_has_no_place_in_the_picture() -> None:
+def test_points_behind_the_camera_are_not_projected() -> None:
     seen = View((0.0, 0.0, 2.0), 3.0, 0.0, 0.0)
     assert project(seen, (0.0, 0.0, 2.0), (WIDTH, HEIGHT)) == pytest.approx((WIDTH / 2, HEIGHT / 2))
     assert project(seen, (-3.0, 0.0, 2.0), (WIDTH, HEIGHT)) is None
@@ -236,7 +235,7 @@ def test_what_is_behind_the_camera_has_no_place_in_the_picture() -> None:
     assert east[0] - WIDTH / 2 == pytest.approx(1.0 / seen.pixel_m(HEIGHT))
 
 
-def test_the_whole_way_is_in_the_picture_of_it() -> None:
+def test_whole_view_contains_the_whole_path() -> None:
     site = Site(0.5, 0.0, (-3.0, -20.0, 0.0), (7.0, 5.0, 6.0), WIDTH / HEIGHT)
     seen = view("whole", standing().at(0.0), site)
     for x in (-3.0, 7.0):
@@ -248,19 +247,21 @@ def test_the_whole_way_is_in_the_picture_of_it() -> None:
                 assert 0.0 < at[1] < HEIGHT
 
 
-def test_a_scale_is_a_metre_long_where_that_can_be_shown() -> None:
+def test_scale_bar_is_1_m_if_possible() -> None:
     near, far = View((0.0, 0.0, 0.0), 5.0, 0.0, -90.0), View((0.0, 0.0, 0.0), 500.0, 0.0, -90.0)
-    assert bar(near, (WIDTH, HEIGHT)) == pytest.approx((1.0, HEIGHT / (10.0 * math.tan(math.radians(22.5)))))
-    length_m, pixels = bar(far, (WIDTH, HEIGHT))
+    assert scale_bar(near, (WIDTH, HEIGHT)) == pytest.approx(
+        (1.0, HEIGHT / (10.0 * math.tan(math.radians(22.5))))
+    )
+    length_m, pixels = scale_bar(far, (WIDTH, HEIGHT))
     assert length_m == 50.0
     assert pixels == pytest.approx(50.0 * HEIGHT / (1000.0 * math.tan(math.radians(22.5))))
 
 
-def test_discs_of_the_window_are_marks_that_cast_no_shadow() -> None:
+def test_discs_of_the_window_cast_no_shadow() -> None:
     place = stage("x_quad")
     place.put(standing(speed=200.0).at(0.0))
     scene = mujoco.MjvScene(place.model, maxgeom=100)
-    place.rotors.lift_discs(scene, place.data)
+    place.rotors.replace_discs(scene, place.data)
     drawn = scene.geoms[: scene.ngeom]
     assert len(drawn) == 4
     for geom, disc in zip(drawn, sorted(place.rotors.discs), strict=True):
@@ -271,11 +272,11 @@ def test_discs_of_the_window_are_marks_that_cast_no_shadow() -> None:
         assert geom.rgba[3] > 0.0 == place.model.geom_rgba[disc][3]
     place.put(standing(speed=0.0).at(0.0))
     scene.ngeom = 0
-    place.rotors.lift_discs(scene, place.data)
+    place.rotors.replace_discs(scene, place.data)
     assert scene.ngeom == 0
 
 
-def test_the_drawn_way_keeps_to_the_flown_one_with_few_points() -> None:
+def test_trail_follows_the_path_with_few_points() -> None:
     path = FlightPath(sample_poses(20.0))
     flown, drawn = path.poses.position_ned_m, path.trail(20.0, 10_000)
     assert len(drawn) < len(flown) / 4
@@ -286,11 +287,11 @@ def test_the_drawn_way_keeps_to_the_flown_one_with_few_points() -> None:
         assert np.linalg.norm(begin + share[:, None] * chord - point, axis=1).min() < 0.015
 
 
-def test_a_film_is_announced_when_it_takes_long() -> None:
+def test_long_film_is_announced() -> None:
     film = film_of(Path("a/f.mp4"), 0.0, 25.0, 30.0, 1.0)
     assert announcement(film, 44.0) == ""
     assert announcement(film, 170.0) == (
-        "f.mp4: 750 frames, about 3 min; --from, --to, --size and --fps make it shorter"
+        "f.mp4: 750 frames, about 3 min; --from, --to, --size and --fps reduce the time"
     )
 
 
@@ -301,34 +302,32 @@ def test_a_film_is_announced_when_it_takes_long() -> None:
     ("value", "said"),
     [
         ("disable", "no off-screen renderer: MUJOCO_GL=disable turns it off; unset it"),
-        ("nonsense", "MUJOCO_GL=nonsense is no renderer: set it to egl or osmesa, or unset it"),
+        ("nonsense", "MUJOCO_GL=nonsense is not a renderer; set it to egl or osmesa, or unset it"),
     ],
 )
-def test_the_users_choice_of_a_renderer_is_respected(
-    monkeypatch: pytest.MonkeyPatch, value: str, said: str
-) -> None:
+def test_mujoco_gl_selects_the_renderer(monkeypatch: pytest.MonkeyPatch, value: str, said: str) -> None:
     monkeypatch.setenv("MUJOCO_GL", value)
     with pytest.raises(UsageProblemError) as caught:
-        offscreen.choose()
+        offscreen.choose_backend()
     assert str(caught.value) == said
 
 
-def test_without_any_renderer_the_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_without_a_renderer_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     monkeypatch.setattr(offscreen.ctypes.util, "find_library", lambda _name: None)
     with pytest.raises(UsageProblemError) as caught:
-        offscreen.choose()
+        offscreen.choose_backend()
     assert str(caught.value) == offscreen.NO_RENDERER
 
 
-def test_a_renderer_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(offscreen, "choose", lambda: "sim_bridge.errors")  # has no GLContext
+def test_failing_renderer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(offscreen, "choose_backend", lambda: "sim_bridge.errors")  # has no GLContext
     with pytest.raises(UsageProblemError, match="no off-screen renderer: install EGL"):
         offscreen.make_context(10, 10)
 
 
-def test_the_scene_is_a_model_that_plain_mujoco_reads(tmp_path: Path) -> None:
+def test_plain_mujoco_reads_the_scene(tmp_path: Path) -> None:
     from sim_bridge.multibody.mjcf import model_xml  # noqa: PLC0415
 
     file = tmp_path / "scene.xml"

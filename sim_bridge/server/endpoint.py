@@ -1,9 +1,9 @@
-"""The simulator's side of the simulator link, without I/O: bytes in, bytes out, and when a step is due.
+"""The simulator's end of the simulator link, sans-IO: bytes in, bytes out.
 
-The flight stack asks for a message and an interval with SET_MESSAGE_INTERVAL: FS_PLANT_STATE, answered by
-FS_ACTUATORS, or the standard HIL_STATE_QUATERNION, answered by HIL_ACTUATOR_CONTROLS. In lockstep each state
-is answered by actuators of the same time. Actuators without the lockstep flag say that the flight stack runs
-on its own clock: then the simulator does so too and uses the newest commands.
+The flight stack requests a message and an interval with SET_MESSAGE_INTERVAL: FS_PLANT_STATE, answered by
+FS_ACTUATORS, or the standard HIL_STATE_QUATERNION, answered by HIL_ACTUATOR_CONTROLS. In lockstep each state is
+answered by actuators with the same timestamp. Actuators without the lockstep flag mean that the flight stack runs on
+its own clock: the simulator then runs in real time with the newest commands.
 """
 
 from __future__ import annotations
@@ -37,41 +37,41 @@ _INJECT_FAILURE = mavlink.MAV_CMD_INJECT_FAILURE
 _SET_INTERVAL = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
 
 
-class SimulatorLink:
-    """One client's session. ``vehicle`` is the vehicle with its limits, for the HIL controls."""
+class FlightStackEndpoint:
+    """The link to one client. ``vehicle`` has its rotor limits, which scale the HIL controls."""
 
     def __init__(self, simulator: Simulator, vehicle: Vehicle, home: GeoPoint, system_id: int = 1) -> None:
         self.simulator = simulator
         self.actuators = ActuatorsFrame()
         self._spare = ActuatorsFrame()
-        self.answered = False  # in lockstep: the actuators for the present state have come
+        self.answered = False  # in lockstep: actuators for the present state were received
         self.free_running = False  # the flight stack runs on its own clock
-        self.ready = False  # the flight stack has asked for a state message
-        self.said_goodbye = False
-        self.fault: str | None = None
+        self.ready = False  # the flight stack has requested a state message
+        self.peer_ended = False  # the flight stack sent a POWEROFF heartbeat
+        self.error: str | None = None
         self.stale = 0
         self._link = Link(system_id, SIMULATOR_COMPONENT)
         self._frame = LocalFrame(home)
         self._controls = HilControls(vehicle)
         self._rotor_count = len(vehicle.rotors)
-        self._requested = 0  # id of the message asked for
+        self._requested = 0  # id of the requested message
         self.finder = FrameFinder()
-        """Cuts what is received into frames."""
+        """Splits the received bytes into frames."""
         self._replies: list[bytes] = []
-        self._may_drop = False  # in lockstep: looked through the faults for one that it cannot do
+        self._faults_checked = False  # against lockstep
 
     @property
     def bad(self) -> int:
-        """Frames that were no message, and stretches of bytes that were no frame."""
+        """Number of frames without a valid message and of byte sequences without a frame."""
         return self._link.bad + self.finder.junk
 
     def receive(self, data: memoryview) -> None:
-        """Take in what arrived: any bytes, cut anywhere.
+        """Handle received bytes, split anywhere.
 
-        Whole actuators are taken at once, whatever came before them: in lockstep lost ones would be the last.
+        An intact actuator frame is handled whatever precedes it: in lockstep a lost one would stop the exchange.
         """
         if self.actuators.open(data):
-            self._take_actuators()
+            self._on_actuators()
             return
         for frame in self.finder.find(data):
             if self._is_answered():
@@ -79,26 +79,26 @@ class SimulatorLink:
                     self.stale += 1
                     continue
             elif self.actuators.open(frame):
-                self._take_actuators()
+                self._on_actuators()
                 continue
             for message in self._link.decode(frame):
-                self._take(message)
+                self._handle(message)
 
     def _is_answered(self) -> bool:
-        """Whether further actuators would replace an answer that still has to be applied."""
+        """Return True if further actuators would replace an answer that is not applied yet."""
         return self.answered and not self.free_running
 
     def replies(self) -> Sequence[bytes]:
-        """Return the frames to send besides the state, once."""
+        """Return the pending replies, once."""
         if not self._replies:
             return ()
         replies, self._replies = self._replies, []
         return replies
 
     def state(self) -> Bytes:
-        """Return the bytes to send for the present state; it awaits its answer from now on.
+        """Return the bytes to send for the present state, whose answer is pending from now on.
 
-        Nothing but a due BATTERY_STATUS while the fault ``state:drop`` is active.
+        During the fault ``state:drop`` only a due BATTERY_STATUS.
         """
         self.answered = False
         simulator = self.simulator
@@ -115,8 +115,8 @@ class SimulatorLink:
         """Advance the plant with the newest commands; raise PlantDivergedError."""
         self.simulator.apply(self.actuators)
 
-    def goodbye(self) -> bytes:
-        """Return the heartbeat that says that the simulator ends in order."""
+    def poweroff(self) -> bytes:
+        """Return the POWEROFF heartbeat, which announces an orderly end."""
         heartbeat = mavlink.MAVLink_heartbeat_message(
             mavlink.MAV_TYPE_GENERIC,
             mavlink.MAV_AUTOPILOT_INVALID,
@@ -127,47 +127,47 @@ class SimulatorLink:
         )
         return self._link.encode(heartbeat)
 
-    def _take_actuators(self) -> None:
+    def _on_actuators(self) -> None:
         actuators = self.actuators
         if actuators.rotor_count != self._rotor_count:
-            self.fault = (
+            self.error = (
                 f"the flight stack commands {actuators.rotor_count} rotors, the simulated vehicle has "
-                f"{self._rotor_count}: start both with the same --vehicle"
+                f"{self._rotor_count}; start both with the same --vehicle"
             )
         self.free_running = not actuators.flags & LOCKSTEP_FLAG
-        if not self.free_running and not self._may_drop:
-            self._refuse_drops()
+        if not self.free_running and not self._faults_checked:
+            self._reject_drops()
         if self.ready and actuators.time_us == self.simulator.time_us:
             self.answered = True
         elif not self.free_running:
             self.stale += 1
 
-    def _refuse_drops(self) -> None:
-        """End the session when a fault asks for what lockstep cannot do; looked at once after each new fault."""
-        self._may_drop = True
+    def _reject_drops(self) -> None:
+        """Set an error for the fault ``state:drop``, which is impossible in lockstep; checked once."""
+        self._faults_checked = True
         if any(fault.kind is Kind.STATE_DROP for fault in self.simulator.faults):
-            self.fault = (
-                "state:drop needs a flight stack on its own clock (--clock realtime): in lockstep it would wait "
-                "for the state for ever; use state:freeze or state:nan"
+            self.error = (
+                "state:drop needs a flight stack on its own clock (--clock realtime): in lockstep both sides "
+                "would wait for ever; use state:freeze or state:nan"
             )
 
-    def _take(self, message: Message) -> None:
+    def _handle(self, message: Message) -> None:
         kind, by = message.get_msgId(), message.get_srcSystem()
         is_actuators = kind in (FS_ACTUATORS_ID, HIL_ACTUATOR_CONTROLS_ID)
         if is_actuators and self._is_answered():
             self.stale += 1
-        elif kind == FS_ACTUATORS_ID:  # signed or cut short
+        elif kind == FS_ACTUATORS_ID:  # signed or truncated
             self.actuators.rotor_speed_rad_s[:] = message.rotor_speed_rad_s
             self.actuators.set_rotor_count(message.rotor_count)
             self.actuators.seal(message.time_us, message.flags)
-            self._take_actuators()
+            self._on_actuators()
         elif kind == HIL_ACTUATOR_CONTROLS_ID:
             self._controls.write(message, self.actuators)
-            self._take_actuators()
+            self._on_actuators()
         elif kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-            self.said_goodbye = message.system_status == mavlink.MAV_STATE_POWEROFF
+            self.peer_ended = message.system_status == mavlink.MAV_STATE_POWEROFF
         elif kind in (mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT):
-            result = self._command(message)
+            result = self._handle_command(message)
             self._replies.append(
                 self._link.encode(
                     mavlink.MAVLink_command_ack_message(
@@ -176,8 +176,8 @@ class SimulatorLink:
                 )
             )
 
-    def _command(self, message: Any) -> int:
-        """Carry out SET_MESSAGE_INTERVAL and INJECT_FAILURE; return the MAV_RESULT of any command."""
+    def _handle_command(self, message: Any) -> int:
+        """Execute SET_MESSAGE_INTERVAL or INJECT_FAILURE; return the MAV_RESULT of any command."""
         if message.command == _INJECT_FAILURE:
             return inject_failure(self.simulator, message.param1, message.param2, message.param3)
         if message.command != _SET_INTERVAL:
@@ -188,8 +188,8 @@ class SimulatorLink:
         if kind not in (FS_PLANT_STATE_ID, HIL_STATE_QUATERNION_ID):
             return int(mavlink.MAV_RESULT_DENIED)
         if kind != FS_PLANT_STATE_ID and self._requested == FS_PLANT_STATE_ID:
-            return int(mavlink.MAV_RESULT_DENIED)  # one state message; who asks for both gets the exact one
-        if interval == -1.0:  # MAVLink: no longer
+            return int(mavlink.MAV_RESULT_DENIED)  # one state message at a time: the precise one has priority
+        if interval == -1.0:  # MAVLink: stop
             self.ready, self._requested = False, 0
             return int(mavlink.MAV_RESULT_ACCEPTED)
         if interval == 0.0:  # MAVLink: the default rate
