@@ -1,4 +1,4 @@
-"""``sim-bridge export-mjcf``, and what the command line says where MuJoCo or the plant is missing."""
+"""``sim-bridge export-mjcf``, and the errors for a missing MuJoCo or plant."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ from sim_bridge.plant.plant import InitialState, PlantOptions
 SQUARE = Path(__file__).resolve().parents[2] / "missions" / "square.plan"
 
 
-def test_the_file_loads_and_stands_on_its_feet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_exported_model_loads_and_stands_on_its_feet(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "paper.xml"
     assert main(["export-mjcf", "-o", str(file)]) == 0
     out, table = capsys.readouterr()
@@ -41,7 +43,7 @@ def test_the_file_loads_and_stands_on_its_feet(tmp_path: Path, capsys: pytest.Ca
     assert data.ncon == 4
 
 
-def test_names_are_those_that_are_promised(capsys: pytest.CaptureFixture[str]) -> None:
+def test_exported_model_has_the_documented_names(capsys: pytest.CaptureFixture[str]) -> None:
     for scene in ([], ["--scene"]):
         assert main(["export-mjcf", "--vehicle", "x_quad", *scene]) == 0
         model = mujoco.MjModel.from_xml_string(capsys.readouterr().out)
@@ -58,8 +60,8 @@ def test_names_are_those_that_are_promised(capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
-def test_any_mujoco_hovers_with_the_keyframe(vehicle: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """Nothing but MuJoCo and the file: the controls of the keyframe carry the vehicle and keep its rotors turning."""
+def test_plain_mujoco_hovers_from_the_keyframe(vehicle: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """In plain MuJoCo the controls of the keyframe hold the vehicle and its rotor speeds."""
     assert main(["export-mjcf", "--vehicle", vehicle]) == 0
     model = mujoco.MjModel.from_xml_string(capsys.readouterr().out)
     data = mujoco.MjData(model)
@@ -75,7 +77,7 @@ def test_any_mujoco_hovers_with_the_keyframe(vehicle: str, capsys: pytest.Captur
         mujoco.mj_step(model, data)
     assert np.abs(data.qpos[:7] - start).max() < 1e-8  # measured: 1.4e-11
     assert np.abs(data.qvel[6:] - speeds).max() < 1e-6
-    # a newton less, and it sinks
+    # with 1 N less it sinks
     data.ctrl[0] -= 1.0
     for _ in range(200):
         mujoco.mj_step(model, data)
@@ -83,8 +85,8 @@ def test_any_mujoco_hovers_with_the_keyframe(vehicle: str, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize("vehicle", ["paper_quad", "x_quad"])
-def test_the_actuators_do_to_the_model_what_the_plant_does(vehicle: str) -> None:
-    """In a wild state, rotors speeding up: thrusts b·Ω² and the plant's own drive torques give its accelerations."""
+def test_actuators_give_the_accelerations_of_the_plant(vehicle: str) -> None:
+    """In a random state, thrusts b·Ω² and the drive torques of the plant give its accelerations."""
     loaded = replace(load_vehicle(vehicle), linear_drag_n_s_m=(0.0, 0.0, 0.0))
     speeds = (300.0, 250.0, 350.0, 280.0)
     wild = InitialState(
@@ -111,17 +113,17 @@ def test_the_actuators_do_to_the_model_what_the_plant_does(vehicle: str) -> None
     assert np.allclose(data.qacc, flown.qacc, rtol=1e-9, atol=1e-9)
 
 
-def test_a_file_that_cannot_be_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unwritable_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export-mjcf", "-o", str(tmp_path / "none" / "x.xml")]) == 2
     assert "cannot be written: No such file or directory" in capsys.readouterr().err
 
 
-def test_an_unknown_vehicle(capsys: pytest.CaptureFixture[str]) -> None:
+def test_unknown_vehicle_is_a_usage_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export-mjcf", "--vehicle", "boat"]) == 2
     assert "neither a file nor a built-in vehicle" in capsys.readouterr().err
 
 
-def test_without_mujoco_both_commands_say_what_to_install(
+def test_error_without_mujoco_names_the_extra(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for module in ("sim_bridge.arguments", "gcs_cli.fly.fly_options"):
@@ -132,6 +134,6 @@ def test_without_mujoco_both_commands_say_what_to_install(
         checked_plan(FlyOptions(SQUARE, plant="multibody"))
 
 
-def test_an_unknown_plant_is_told_all_that_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+def test_error_for_unknown_plant_lists_all_plants(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--plant", "flat"]) == 2
     assert "'flat' is not one of rigid, paper, multibody" in capsys.readouterr().err

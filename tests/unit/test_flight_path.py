@@ -1,4 +1,4 @@
-"""A flight between its samples, the cameras that follow it, and how long a film of it is."""
+"""Interpolated poses, camera views and the duration of films."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _poses(time_s: list[float], **values: list[list[float]]) -> Poses:
     return poses._replace(**{name: np.array(value) for name, value in values.items()})
 
 
-def test_between_two_samples_everything_moves_evenly() -> None:
+def test_poses_are_interpolated_between_samples() -> None:
     half = math.sqrt(0.5)
     path = FlightPath(
         _poses(
@@ -53,12 +53,12 @@ def test_between_two_samples_everything_moves_evenly() -> None:
     assert moment.target_ned_m is None
 
 
-def test_the_same_attitude_with_the_other_sign_does_not_spin_the_vehicle() -> None:
+def test_quaternion_sign_flips_do_not_spin_the_vehicle() -> None:
     path = FlightPath(_poses([0.0, 1.0], attitude=[[1.0, 0.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0]]))
     assert abs(path.at(0.5).attitude[0]) == pytest.approx(1.0)
 
 
-def test_beyond_its_ends_a_flight_stands_still() -> None:
+def test_poses_are_constant_outside_the_flight() -> None:
     path = FlightPath(sample_poses(2.0))
     assert path.at(-5.0).position_ned_m == path.at(0.0).position_ned_m
     assert path.at(99.0).position_ned_m == path.at(path.end_s).position_ned_m
@@ -79,7 +79,7 @@ def test_the_trail_ends_at_the_vehicle_and_never_has_too_many_points() -> None:
         np.testing.assert_array_equal(trail[0], path.poses.position_ned_m[0])
 
 
-def test_the_chasing_camera_turns_smoothly_through_a_jump_of_the_heading() -> None:
+def test_chase_camera_smooths_a_jump_of_the_heading() -> None:
     time_s = np.arange(0.0, 10.0, 0.02)
     yaw = np.where(time_s < 5.0, 0.0, 2.0)
     attitude = np.column_stack((np.cos(yaw / 2), 0 * yaw, 0 * yaw, np.sin(yaw / 2)))
@@ -114,7 +114,7 @@ def test_each_camera_has_the_vehicle_in_its_picture(camera: str) -> None:
         assert seen.field_deg <= FIELD_DEG
 
 
-def test_the_chasing_camera_is_behind_the_vehicle() -> None:
+def test_chase_camera_is_behind_the_vehicle() -> None:
     path = FlightPath(_poses([0.0], attitude=[[math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]]))  # nose east
     eye = _eye(view("chase", path.at(0.0), SITE))
     assert eye[1] > 1.0  # west of it
@@ -126,7 +126,7 @@ def test_the_frames_of_a_gif_last_as_long_as_the_film() -> None:
         assert sum(gif_durations_ms(300, fps)) == pytest.approx(1000.0 * 300 / fps, abs=10.0)
 
 
-def test_names_of_several_pictures_are_numbered() -> None:
+def test_file_names_of_several_pictures_are_numbered() -> None:
     assert numbered(Path("a/b.png"), 1) == [Path("a/b.png")]
     assert numbered(Path("a/b.png"), 3) == [Path("a/b-1.png"), Path("a/b-2.png"), Path("a/b-3.png")]
     assert numbered(Path("b.png"), 10)[0] == Path("b-01.png")
@@ -151,17 +151,17 @@ def test_snapshots_become_moments_and_a_trail() -> None:
         moment = flight.update(_snapshot(0.01 + 0.02 * step, 0.1 * step))
     assert moment.position_ned_m == pytest.approx((0.5, 0.0, -1.0))
     assert moment.rotor_angle_rad == pytest.approx((100.0 * 0.11,) * 4)
-    assert len(flight.trail(0.0, 99)) == 4  # the newest three and where it is
+    assert len(flight.trail(0.0, 99)) == 4  # the newest three and the present position
 
 
-def test_a_snapshot_that_is_not_finite_leaves_the_vehicle_where_it_was() -> None:
+def test_snapshot_that_is_not_finite_is_ignored() -> None:
     flight = LiveFlight(rotors=4, most_points=3)
     before = flight.update(_snapshot(0.01, 1.0))
     assert flight.update(_snapshot(0.02, math.nan)) == before
     assert flight.update(_snapshot(0.03, 1.0, speed=math.inf)).rotor_speed_rad_s == (0.0,) * 4
 
 
-def test_of_several_snapshots_the_newest_counts_and_a_part_waits() -> None:
+def test_newest_complete_snapshot_is_used() -> None:
     one, two, three = (_snapshot(time_s, 0.0) for time_s in (1.0, 2.0, 3.0))
     buffer = bytearray(one + two + three[:10])
     assert newest(buffer) == two

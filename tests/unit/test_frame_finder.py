@@ -1,4 +1,4 @@
-"""Finding frames at once: against what was put in, cut anywhere, among any junk."""
+"""The frame finder: byte streams split anywhere, with junk."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_a_clean_stream_cut_anywhere_gives_each_frame_once(frames: list[bytes], 
     st.lists(st.tuples(st.one_of(st.sampled_from(STARTS), st.binary(max_size=20)), st.sampled_from(FRAMES)))
 )
 def test_a_frame_is_found_in_the_piece_that_completes_it(pairs: list[tuple[bytes, bytes]]) -> None:
-    """Whatever came before. (No junk here is by chance a frame: the frames found are those put in.)"""
+    """Whatever precedes it. (No junk here is a frame by chance.)"""
     finder = FrameFinder()
     for junk, frame in pairs:
         assert finder.find(junk + frame)[-1] == frame

@@ -1,4 +1,4 @@
-"""The assembly: closed forms against MuJoCo's compiler, tuning to the vehicle file, meshes, and what can be wrong."""
+"""The assembly: closed forms against MuJoCo's compiler, tuning to the vehicle file, meshes, and errors."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def with_parts(folder: Path, parts: str, head: str = "") -> Vehicle:
 
 
 def compiled_whole(vehicle: Vehicle) -> tuple[float, np.ndarray, np.ndarray]:
-    """Mass, centre of gravity and inertia about the origin in FRD, as MuJoCo has them of the whole vehicle."""
+    """Mass, centre of gravity and inertia about the origin in FRD, of the whole vehicle in MuJoCo."""
     model = mujoco.MjModel.from_xml_string(model_xml(vehicle))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -91,7 +91,7 @@ SHAPES = [
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: shape.shape)
 @pytest.mark.parametrize("mount", ["body", "arm"])
-def test_a_part_has_the_mass_and_inertia_that_mujoco_gives_it(shape: Part, mount: str) -> None:
+def test_part_properties_agree_with_mujoco(shape: Part, mount: str) -> None:
     tilted = replace(shape, position_frd_m=(0.02, -0.03, 0.04), euler_rad=(0.3, -0.5, 0.9), mount=mount)
     vehicle = replace(PAPER, parts=(tilted,), default_parts=False)
     ours = assemble(vehicle).whole
@@ -102,7 +102,7 @@ def test_a_part_has_the_mass_and_inertia_that_mujoco_gives_it(shape: Part, mount
     assert np.allclose(inertia, about_origin, rtol=1e-12, atol=1e-17)
 
 
-def test_a_box_and_a_cylinder_by_the_book() -> None:
+def test_box_and_cylinder_inertia_are_the_closed_forms() -> None:
     box = solid(part("box", (0.1, 0.2, 0.3)))
     assert box.mass_kg == pytest.approx(700.0 * 0.006, rel=1e-15)
     assert box.inertia_kg_m2[0, 0] == pytest.approx(box.mass_kg / 12.0 * (0.04 + 0.09), rel=1e-14)
@@ -111,7 +111,7 @@ def test_a_box_and_a_cylinder_by_the_book() -> None:
 
 
 @BOTH_VEHICLES
-def test_the_tuned_assembly_meets_the_vehicle_file(name: str) -> None:
+def test_tuned_assembly_meets_the_vehicle_file(name: str) -> None:
     vehicle = load_vehicle(name)
     assert assemble(vehicle).largest_error < 1e-12  # measured: 4e-15
     mass, centre, inertia = compiled_whole(vehicle)
@@ -123,11 +123,11 @@ def test_the_tuned_assembly_meets_the_vehicle_file(name: str) -> None:
         body = model.body(f"rotor_{number}")
         about = sorted(body.inertia)
         assert about[2] == pytest.approx(rotor.inertia_kg_m2, rel=1e-13)
-        assert about[0] == pytest.approx(about[1], rel=1e-12)  # round: it may turn without shaking the frame
+        assert about[0] == pytest.approx(about[1], rel=1e-12)  # axisymmetric: balanced rotors
 
 
 @BOTH_VEHICLES
-def test_no_inertia_is_written_by_hand_and_materials_keep_their_density(name: str) -> None:
+def test_inertia_comes_from_geoms_with_material_densities(name: str) -> None:
     vehicle = load_vehicle(name)
     assert "<inertial" not in model_xml(vehicle)
     densities = {placed.part.density_kg_m3 for placed in assemble(vehicle).parts if placed.body == 0}
@@ -135,38 +135,38 @@ def test_no_inertia_is_written_by_hand_and_materials_keep_their_density(name: st
 
 
 @pytest.mark.parametrize(("name", "most"), [("paper_quad", 1.6), ("x_quad", 3.0)])
-def test_masses_are_tuned_no_more_than_they_must(name: str, most: float) -> None:
-    """The paper's vehicle keeps every part near its usual mass; x_quad cannot, which the table shows."""
+def test_masses_are_tuned_as_little_as_possible(name: str, most: float) -> None:
+    """The parts of the paper's vehicle stay near their default mass; those of x_quad cannot."""
     vehicle = load_vehicle(name)
     assembly = assemble(vehicle)
     factors = tuned_masses(vehicle, assembly)
     on_frame = [factors[placed.part.name] for placed in assembly.parts if placed.body == 0]
     assert max(on_frame) < most
     assert min(on_frame) > 0.999 / most
-    assert max(on_frame) / min(on_frame) > 1.5  # not a table of ones
+    assert max(on_frame) / min(on_frame) > 1.5  # some parts are tuned
     assert factors["column"] == pytest.approx(1.0)  # which is not tuned
     table = mass_table(vehicle, assembly)
     for part in ("plate", "motor_1", "propeller_1"):
         line = next(line for line in table.splitlines() if line.startswith(part))
         assert f" {factors[part]:.2f} " in line
-    # what turns has the density that its inertia asks for, whatever its material
+    # propeller densities follow from the rotor inertia
     propeller = next(placed for placed in assembly.parts if placed.part.name == "propeller_1")
     assert propeller.part.density_kg_m3 == pytest.approx(factors["propeller_1"] * MATERIALS["propeller"])
     assert "the densities of the propellers are set by the inertia J" in table
 
 
 @pytest.mark.parametrize(("mass", "inertia"), [(1.2, 1.0), (1.0, 0.7), (1.0, 1.3)])
-def test_heavier_and_slower_vehicles_are_met_as_well(mass: float, inertia: float) -> None:
+def test_other_masses_and_inertias_are_met(mass: float, inertia: float) -> None:
     wanted = tuple(inertia * value for value in PAPER.inertia_kg_m2)
     changed = replace(PAPER, mass_kg=mass * PAPER.mass_kg, inertia_kg_m2=wanted)  # type: ignore[arg-type]
     assert assemble(changed).largest_error < 1e-12
 
 
-def test_tells_what_no_assembly_of_this_kind_can_have() -> None:
-    vehicle = replace(PAPER, leg_height_m=0.0)  # its moments ask for masses far above and below the rotors
+def test_unreachable_inertia_is_reported_with_its_error() -> None:
+    vehicle = replace(PAPER, leg_height_m=0.0)  # its inertia needs masses far above and below the rotors
     assembly = assemble(vehicle)
     assert assembly.largest_error > 10.0 * TOLERANCE
-    _, centre, inertia = compiled_whole(vehicle)  # it flies as it is built, and tells by how much it misses
+    _, centre, inertia = compiled_whole(vehicle)  # the model has the reported errors
     wanted = np.array(vehicle.inertia_kg_m2)
     for axis, miss in zip("xyz", np.abs(np.diag(inertia) / wanted - 1.0), strict=True):
         assert miss == pytest.approx(assembly.errors[f"I{axis}"], abs=1e-12)
@@ -176,7 +176,7 @@ def test_tells_what_no_assembly_of_this_kind_can_have() -> None:
     assert f"{assembly.errors['Ix']:.1e}" in mass_table(vehicle, assembly)
 
 
-def test_rotors_at_odd_places_are_met_by_moving_battery_and_avionics() -> None:
+def test_asymmetric_rotors_are_balanced_by_battery_and_avionics() -> None:
     vehicle = multirotor([(0.25, 0.2), (-0.2, -0.25), (0.22, -0.2), (-0.25, 0.18)], [-1, -1, 1, 1])
     assert (
         assemble(vehicle).largest_error < 1e-9
@@ -187,7 +187,7 @@ def test_rotors_at_odd_places_are_met_by_moving_battery_and_avionics() -> None:
     assert np.allclose(inertia, np.diag(vehicle.inertia_kg_m2), rtol=0.0, atol=1e-10)
 
 
-def test_parts_do_not_touch_the_ground_before_the_feet() -> None:
+def test_feet_are_the_lowest_parts() -> None:
     for name in ("paper_quad", "x_quad"):
         vehicle = load_vehicle(name)
         lowest = {
@@ -199,7 +199,7 @@ def test_parts_do_not_touch_the_ground_before_the_feet() -> None:
 
 
 @pytest.mark.parametrize("write", [write_stl, write_text_stl, write_obj])
-def test_a_mesh_weighs_what_its_volume_does(tmp_path: Path, write: object) -> None:
+def test_mesh_mass_follows_from_its_volume(tmp_path: Path, write: object) -> None:
     file = write(tmp_path / ("wedge.obj" if write is write_obj else "wedge.stl"))  # type: ignore[operator]
     own = solid(part("mesh", (), file=file))
     assert own.mass_kg == pytest.approx(700.0 * WEDGE_M3, rel=1e-6)  # STL has seven digits
@@ -213,7 +213,7 @@ def test_a_mesh_weighs_what_its_volume_does(tmp_path: Path, write: object) -> No
 
 
 @pytest.mark.parametrize("write", [write_stl, write_text_stl, write_obj])
-def test_a_mesh_replaces_a_shape_and_the_rest_is_tuned_around_it(tmp_path: Path, write: object) -> None:
+def test_other_parts_are_tuned_around_a_mesh(tmp_path: Path, write: object) -> None:
     name = "wedge.obj" if write is write_obj else "wedge.stl"
     write(tmp_path / name)  # type: ignore[operator]
     vehicle = with_parts(
@@ -230,14 +230,14 @@ def test_a_mesh_replaces_a_shape_and_the_rest_is_tuned_around_it(tmp_path: Path,
     assert np.allclose(inertia, np.diag(vehicle.inertia_kg_m2), rtol=0.0, atol=1e-9)
 
 
-def test_what_mujocos_compiler_refuses_is_one_sentence(tmp_path: Path) -> None:
+def test_model_rejected_by_mujoco_is_one_sentence(tmp_path: Path) -> None:
     write_obj(tmp_path / "wedge.obj")
     speck = '[[part]]\nname = "speck"\nshape = "mesh"\nfile = "wedge.obj"\nscale = 1e-5\nmaterial = "wood"\n'
     with pytest.raises(ConfigError, match="paper_quad: part: MuJoCo rejects the model: "):
         make_plant(with_parts(tmp_path, speck), "multibody", PlantOptions())
 
 
-def test_parts_of_ones_own_are_taken_as_they_are(tmp_path: Path) -> None:
+def test_own_parts_are_not_changed(tmp_path: Path) -> None:
     vehicle = with_parts(
         tmp_path,
         '[[part]]\nname = "ball"\nshape = "sphere"\nsize_m = [0.05]\ndensity_kg_m3 = 1000.0\n'
@@ -255,7 +255,7 @@ def test_parts_of_ones_own_are_taken_as_they_are(tmp_path: Path) -> None:
     assert parts["tip_2"].properties().inertia_kg_m2[1, 1] == pytest.approx(tip[0, 0], rel=1e-12)
 
 
-def test_a_part_may_be_let_go(tmp_path: Path) -> None:
+def test_density_of_a_tuned_part_may_change(tmp_path: Path) -> None:
     ball = '[[part]]\nname = "ball"\nshape = "sphere"\nsize_m = [0.05]\nmaterial = "plastic"\n'
     fixed = assemble(with_parts(tmp_path, ball, head="default_parts = false"))
     tuned = assemble(with_parts(tmp_path, ball + "tune = true\n", head="default_parts = false"))
@@ -283,14 +283,14 @@ BAD = [
 
 
 @pytest.mark.parametrize(("part_text", "problem"), BAD)
-def test_says_what_is_wrong_with_a_part(tmp_path: Path, part_text: str, problem: str) -> None:
+def test_invalid_part_is_named(tmp_path: Path, part_text: str, problem: str) -> None:
     with pytest.raises(ConfigError, match=re.escape(problem)) as caught:
         with_parts(tmp_path, f"[[part]]\n{part_text}\n")
     assert "part" in str(caught.value)
     assert "my.toml" in str(caught.value)
 
 
-def test_a_frame_without_parts_is_refused(tmp_path: Path) -> None:
+def test_frame_without_parts_is_rejected(tmp_path: Path) -> None:
     disc = '[[part]]\nname = "disc"\nshape = "sphere"\nsize_m = [0.02]\nmaterial = "wood"\nmount = "rotor"\n'
     with pytest.raises(ConfigError, match="the frame has no mass"):
         assemble(with_parts(tmp_path, disc, head="default_parts = false"))
@@ -299,7 +299,7 @@ def test_a_frame_without_parts_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "problem"), [("ground", "is a reserved name"), ("motor_2", "is the name of two parts")]
 )
-def test_a_name_that_is_taken(tmp_path: Path, name: str, problem: str) -> None:
+def test_reserved_or_repeated_part_name_is_rejected(tmp_path: Path, name: str, problem: str) -> None:
     ball = f'[[part]]\nname = "{name}"\nshape = "sphere"\nsize_m = [0.01]\nmaterial = "wood"\n'
     motors = (
         '[[part]]\nname = "motor"\nshape = "sphere"\nsize_m = [0.01]\nmaterial = "motor"\nmount = "arm"\n'
@@ -308,7 +308,7 @@ def test_a_name_that_is_taken(tmp_path: Path, name: str, problem: str) -> None:
         assemble(with_parts(tmp_path, ball + motors))
 
 
-def test_two_parts_of_one_name(tmp_path: Path) -> None:
+def test_duplicate_part_name_is_rejected(tmp_path: Path) -> None:
     ball = '[[part]]\nname = "ball"\nshape = "sphere"\nsize_m = [0.05]\nmaterial = "wood"\n'
     with pytest.raises(ConfigError, match="'ball' is the name of two parts"):
         with_parts(tmp_path, ball + ball)
@@ -323,13 +323,13 @@ def test_two_parts_of_one_name(tmp_path: Path) -> None:
         (b"vertex nan 0 0 " * 12, "is not a solid"),
     ],
 )
-def test_says_what_is_wrong_with_a_mesh_file(tmp_path: Path, content: bytes, problem: str) -> None:
+def test_invalid_mesh_file_is_named(tmp_path: Path, content: bytes, problem: str) -> None:
     (tmp_path / "bad.stl").write_bytes(content)
     with pytest.raises(ConfigError, match=problem):
         solid(part("mesh", (), file=tmp_path / "bad.stl"))
 
 
-def test_a_mesh_must_be_closed_and_the_right_way_out(tmp_path: Path) -> None:
+def test_mesh_must_be_closed_with_outward_faces(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="is not a closed surface"):
         solid(part("mesh", (), file=write_stl(tmp_path / "open.stl", FACES[1:])))
     inside_out = [(a, c, b) for a, b, c in FACES]

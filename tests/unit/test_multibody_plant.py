@@ -38,7 +38,7 @@ TOLD = Disturbance(Vector3(2.0, 1.0, -0.5), 0.0, Vector3(0.1, 0.2, 0.3), Vector3
 
 
 class Flight:
-    """A plant in the air whose rotors may give no thrust, so that nothing but mechanics is left."""
+    """A plant in the air, optionally without aerodynamic forces."""
 
     def __init__(
         self, name: str, vehicle: Vehicle, initial: InitialState = AT_REST, speeds: tuple[float, ...] = (),
@@ -71,7 +71,7 @@ def hover(vehicle: Vehicle) -> float:
 
 
 class Conditions:
-    """A random state, rotors that are on their way to other speeds, wind, a force and a torque."""
+    """A random state with accelerating rotors, wind, a force and a torque."""
 
     def __init__(self, vehicle: str, seed: int) -> None:
         random = np.random.default_rng(seed)
@@ -93,8 +93,8 @@ class Conditions:
 
 @BOTH_VEHICLES
 @pytest.mark.parametrize("seed", [1, 3] if NIGHTLY else [1])
-def test_flies_as_the_rigid_plant_and_nearer_with_shorter_steps(vehicle: str, seed: int) -> None:
-    """Against the rigid plant at 20 µs: fourth order, so that half the step leaves a sixteenth of the error."""
+def test_multibody_converges_to_the_rigid_plant(vehicle: str, seed: int) -> None:
+    """Against the rigid plant at 20 µs the error is of fourth order."""
     conditions = Conditions(vehicle, seed)
     truth = conditions.end("rigid", 2e-5)
     steps = (4e-3, 2e-3, 1e-3)
@@ -104,13 +104,13 @@ def test_flies_as_the_rigid_plant_and_nearer_with_shorter_steps(vehicle: str, se
     orders = [math.log2(coarse / fine) for coarse, fine in pairwise(errors)]
     assert min(orders) > 3.9  # measured: 3.97
     same_step = np.abs(conditions.end("multibody", 1e-3) - conditions.end("rigid", 1e-3)).max()
-    assert same_step < 1e-9  # measured: at most 4e-11; the same equations in other hands
+    assert same_step < 1e-9  # measured: at most 4e-11; the same equations, implemented twice
 
 
 def model_state(
     vehicle: Vehicle, state: np.ndarray, speeds: list[float]
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """The exported model in this state: a second opinion on momentum and energy."""
+    """The exported model in this state: independent momentum and energy."""
     model = mujoco.MjModel.from_xml_string(model_xml(vehicle))
     data = mujoco.MjData(model)
     data.qpos[:3], data.qvel[:3] = flip_vector(state[:3]), flip_vector(state[3:6])
@@ -123,7 +123,7 @@ def model_state(
 
 
 class TorqueFree:
-    """A vehicle without air that tumbles in the dark, its rotors at different speeds."""
+    """A tumbling vehicle without aerodynamic forces, its rotors at different speeds."""
 
     def __init__(self, name: str, step_s: float = 1e-3) -> None:
         # three different moments of inertia, so that the yaw rate changes
@@ -133,7 +133,7 @@ class TorqueFree:
         self.flight = Flight(name, self.vehicle, spin, speeds, step_s=step_s, thrust=False)
 
     def momentum_and_energy(self) -> tuple[np.ndarray, float]:
-        """Angular momentum in space and kinetic energy of frame and rotors, as MuJoCo has them, but for the fall."""
+        """Inertial angular momentum and rotational energy of frame and rotors by MuJoCo."""
         model, data = model_state(self.vehicle, self.flight.state, self.flight.plant.rotor_speeds_rad_s())
         fall = 0.5 * self.vehicle.mass_kg * float(self.flight.state[3:6] @ self.flight.state[3:6])
         return data.subtree_angmom[model.body("vehicle").id].copy(), float(data.energy[1]) - fall
@@ -169,12 +169,12 @@ def test_torque_free_spin_conserves_momentum_and_energy(name: str) -> None:
         work = float(free.rotor_momenta().sum() * (free.flight.state[12] - yaw_rate))
         assert abs(now_energy - energy - work) < 1e-11 * energy  # measured: 4e-14
         largest_work = max(largest_work, abs(work))
-    assert largest_work > 1e-4 * energy  # it is more than nothing
+    assert largest_work > 1e-4 * energy  # not negligible
 
 
 @BOTH_PLANTS
-def test_spin_up_keeps_momentum_and_takes_its_energy_from_the_drives(name: str) -> None:
-    """While rotors speed up the momentum stays, and ΔT = Σ ∫ τ·Ω dt with τ = J_r·(Ω̇ + s·ṙ)."""
+def test_spin_up_conserves_momentum_and_takes_energy_from_the_drives(name: str) -> None:
+    """While rotors speed up the momentum is constant, and ΔT = Σ ∫ τ·Ω dt with τ = J_r·(Ω̇ + s·ṙ)."""
     free = TorqueFree(name, step_s=1e-4)
     free.flight.command[:4] = (300.0, 100.0, 250.0, 50.0)
     momentum, energy = free.momentum_and_energy()
@@ -194,12 +194,12 @@ def test_spin_up_keeps_momentum_and_takes_its_energy_from_the_drives(name: str) 
     )
     middle = 0.5 * (np.array(spun[1:]) + np.array(spun[:-1]))
     of_yaw = float((middle * np.diff(yaw_rates)[:, None]).sum())
-    assert abs(of_yaw) > 0.01 * abs(of_speed)  # neither may be left out
+    assert abs(of_yaw) > 0.01 * abs(of_speed)  # neither is negligible
     assert now_energy - energy == pytest.approx(of_speed + of_yaw, rel=1e-8)  # measured: 4e-10
 
 
-def test_what_the_drives_of_the_model_work_is_what_the_energy_grows_by() -> None:
-    """The torques that MuJoCo gets at the hinges, times the speeds, by Simpson's rule: not a formula of ours."""
+def test_kinetic_energy_grows_by_the_work_of_the_drives() -> None:
+    """The work is the integral of MuJoCo's hinge torques times speeds by Simpson's rule."""
     free = TorqueFree("multibody", step_s=1e-4)
     free.flight.command[:4] = (300.0, 100.0, 250.0, 50.0)
     plant = free.flight.plant
@@ -209,7 +209,7 @@ def test_what_the_drives_of_the_model_work_is_what_the_energy_grows_by() -> None
     for tick in range(1001):
         if tick:
             free.flight.fly(1e-4)
-        else:  # a step of no length takes the commands
+        else:  # zero steps store the commands
             plant.advance(free.flight.command, ARMED_FLAG, 0)
         plant.acceleration_ned_m_s2()
         power.append(float(plant.data.qfrc_applied[6:] @ plant.data.qvel[6:]))
@@ -242,11 +242,11 @@ def test_free_precession_of_a_gyrostat() -> None:
         last = q
     periods = np.diff(crossings)
     assert len(periods) >= 5
-    assert 2.0 * math.pi / periods.mean() == pytest.approx(rate, rel=1e-5)  # asked for: 1 %
+    assert 2.0 * math.pi / periods.mean() == pytest.approx(rate, rel=1e-5)  # required: 1 %
     assert np.hypot(*flight.state[10:12]) == pytest.approx(0.5, rel=1e-9)
 
 
-def test_constant_torque_makes_a_gyrostat_precess_and_nod() -> None:
+def test_constant_torque_makes_a_gyrostat_precess_and_nutate() -> None:
     """I ṗ = τ − h q, I q̇ = h p from rest: p = τ/h·sin(h t/I), q = τ/h·(1 − cos(h t/I))."""
     torque = 1e-3
     flight, rate = gyrostat(Vector3(0.0, 0.0, 0.0), Vector3(torque, 0.0, 0.0))
@@ -263,8 +263,8 @@ def test_constant_torque_makes_a_gyrostat_precess_and_nod() -> None:
     assert mean / 4000 == pytest.approx(amplitude, rel=0.1)  # the precession of the textbooks, τ/h
 
 
-def test_the_hinges_accelerate_as_the_lag_wants() -> None:
-    """MuJoCo's own accelerations of the hinges, from the torques of the drives, in a wild state."""
+def test_hinge_accelerations_are_those_of_the_lag() -> None:
+    """MuJoCo's own accelerations of the hinges, from the drive torques, in a random state."""
     conditions = Conditions("paper_quad", 4)
     flight = Flight("multibody", conditions.vehicle, conditions.initial, conditions.speeds, TOLD)
     flight.command[:4] = 1.3 * np.array(conditions.speeds)
@@ -277,7 +277,7 @@ def test_the_hinges_accelerate_as_the_lag_wants() -> None:
 
 
 def test_spin_up_turns_the_vehicle_the_other_way() -> None:
-    """Σ J_r·ΔΩ of the clockwise rotors is what the frame gets, and I_z holds the rotors too."""
+    """Σ J_r·ΔΩ of the clockwise rotors is transferred to the frame, and I_z includes the rotors."""
     vehicle = load_vehicle("paper_quad")
     flight = Flight("multibody", vehicle, InitialState(Vector3(0.0, 0.0, -9.0)), (100.0,) * 4, thrust=False)
     flight.command[:4] = (200.0, 100.0, 200.0, 100.0)
@@ -297,7 +297,7 @@ def test_rests_at_the_origin(vehicle: str, step_s: float) -> None:
 
 
 @BOTH_VEHICLES
-def test_touches_down_without_bouncing_away(vehicle: str) -> None:
+def test_touchdown_has_a_small_bounce(vehicle: str) -> None:
     start = InitialState(Vector3(0.0, 0.0, -0.02), Vector3(0.1, 0.0, 1.0))
     flight = Flight("multibody", load_vehicle(vehicle), start, ground=True)
     heights = []
@@ -324,11 +324,11 @@ def test_hard_landing_stays_finite_and_above_ground(vehicle: str, sink_m_s: floa
         assert np.linalg.norm(flight.state[3:6]) < math.hypot(sink_m_s, 5.0) + 5.0
     assert result == CONTACT
     assert np.abs(flight.state[3:6]).max() < 1e-3
-    assert flight.state[2] < 0.25  # no deeper than legs and arms allow
+    assert flight.state[2] < 0.25  # within legs and arms
 
 
 @pytest.mark.parametrize("euler_deg", [(180.0, 0.0, 0.0), (140.0, 20.0, 0.0)])
-def test_a_tumbled_vehicle_lies_still(euler_deg: tuple[float, ...]) -> None:
+def test_tumbled_vehicle_lies_still(euler_deg: tuple[float, ...]) -> None:
     start = InitialState(Vector3(0.0, 0.0, -1.0), euler_rad=Vector3(*np.radians(euler_deg)))
     flight = Flight("multibody", load_vehicle("paper_quad"), start, ground=True)
     flight.plant.advance(STOPPED, 0, 9000)
@@ -383,7 +383,7 @@ def test_ideal_rotors_are_at_their_speeds_at_once() -> None:
     flight.command[:4] = (100.0, 200.0, 300.0, 400.0)
     flight.fly(1e-3)
     assert flight.plant.rotor_speeds_rad_s() == [100.0, 200.0, 300.0, 400.0]
-    flight.plant.set_rotor_speeds((50.0,) * 4)  # which is not what they are told
+    flight.plant.set_rotor_speeds((50.0,) * 4)  # not the commanded speeds
     assert flight.plant.acceleration_ned_m_s2().z == pytest.approx(
         9.81 - 4.0 * 2500.0 * 2.93e-5 / 0.55, rel=1e-3
     )  # the frame is tilted a little
@@ -392,7 +392,7 @@ def test_ideal_rotors_are_at_their_speeds_at_once() -> None:
 @BOTH_PLANTS
 @pytest.mark.parametrize("lag_s", [0.0, 0.005])
 def test_rotors_without_lag_have_no_spin_up_torque(name: str, lag_s: float) -> None:
-    """A convention: without lag the speeds are imposed, and the frame feels nothing of Σ s·J_r·ΔΩ.
+    """A convention: without lag the speeds are imposed, without the reaction Σ s·J_r·ΔΩ on the frame.
 
     The reaction to a jump of the speed would be an impulse of a motor of infinite torque in every tick, and no yaw
     loop is stable with it. So momentum is not conserved, by exactly that sum; with a lag, however short, it is.
@@ -430,8 +430,8 @@ def with_weak_drives() -> Vehicle:
 
 
 @BOTH_PLANTS
-def test_a_drive_of_limited_torque_follows_its_equation(name: str) -> None:
-    """J·Ω̇ = the lag's wish, clipped so that with the drag it stays within the torque; scipy's solution beside it."""
+def test_limited_drive_follows_its_equation(name: str) -> None:
+    """J·Ω̇ of the lag, limited so that its sum with the drag is within the torque, against SciPy."""
     vehicle = with_weak_drives()
     rotor = vehicle.rotors[0]
     inertia, drag, lag = rotor.inertia_kg_m2, rotor.torque_coefficient_n_m_s2, rotor.lag_s
@@ -455,10 +455,10 @@ def test_a_drive_of_limited_torque_follows_its_equation(name: str) -> None:
     assert np.abs(np.array(speeds) - truth).max() < 0.05  # of 200 rad/s; measured: 0.011
     assert speeds[-1] == pytest.approx(commands, abs=0.05)
     unlimited = 330.0 - 130.0 * math.exp(-4.0)
-    assert speeds[19][0] < unlimited - 50.0  # four lags later it would nearly be there
+    assert speeds[19][0] < unlimited - 50.0  # an unlimited drive is nearly there after four lags
 
 
-def test_limited_drives_turn_both_plants_alike_and_keep_the_momentum() -> None:
+def test_limited_drives_agree_on_both_plants_and_conserve_momentum() -> None:
     ends = []
     for name in ("rigid", "multibody"):
         spin = InitialState(Vector3(0.0, 0.0, -50.0), rates_frd_rad_s=Vector3(1.0, -2.0, 0.5))
@@ -479,7 +479,7 @@ def test_limited_drives_turn_both_plants_alike_and_keep_the_momentum() -> None:
     assert np.abs(ends[0] - ends[1]).max() < 1e-9
 
 
-def test_numbers_that_run_away_end_the_flight_with_a_sentence() -> None:
+def test_divergence_ends_the_flight_with_one_sentence() -> None:
     push = PlantOptions(Disturbance(torque_frd_n_m=Vector3(1e6, 0.0, 0.0)), ground=False)
     simulator = Simulator(load_vehicle("paper_quad"), "multibody", push)
     actuators = ActuatorsFrame()
@@ -509,7 +509,7 @@ def test_faults_battery_and_gusts_act_as_on_the_rigid_plant() -> None:
         assert plant.battery is not None
         ends.append(np.array([*plant.output[0]["state"], *plant.rotor_speeds_rad_s(), *plant.battery]))
     assert np.abs(ends[0] - ends[1]).max() < 1e-9
-    assert max(ends[0][13:17]) < 60.0  # without power all run down
+    assert max(ends[0][13:17]) < 60.0  # without power all rotors run down
 
 
 def test_acceleration_and_airspeed_are_those_of_the_rigid_plant() -> None:
@@ -526,8 +526,8 @@ def test_acceleration_and_airspeed_are_those_of_the_rigid_plant() -> None:
 
 
 @pytest.mark.parametrize("name", PLANT_NAMES)
-def test_standard_messages_leave_the_flight_as_it_is(name: str) -> None:
-    """HIL_STATE_QUATERNION asks for the acceleration in every step: landing, rest and takeoff stay the same bytes."""
+def test_hil_messages_do_not_change_the_flight(name: str) -> None:
+    """HIL_STATE_QUATERNION evaluates the acceleration in each step without a change of any byte of the flight."""
 
     def flight(hil: bool) -> list[bytes]:
         vehicle = load_vehicle("paper_quad")
@@ -556,6 +556,6 @@ def no_mujoco(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("no_mujoco")
-def test_says_what_to_install() -> None:
+def test_error_names_the_missing_extra() -> None:
     with pytest.raises(UsageProblemError, match=r"needs MuJoCo: pip install mujoco pillow imageio-ffmpeg$"):
         plants.make_plant(load_vehicle("paper_quad"), "multibody", PlantOptions())

@@ -1,4 +1,4 @@
-"""The plants against solutions that one can write down, and against conserved quantities."""
+"""The plants against closed-form solutions and conserved quantities."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def test_spin_up_turns_body_the_other_way_and_conserves_momentum() -> None:
         for r, w in zip(vehicle.rotors, flight.plant.rotor_speeds_rad_s(), strict=True)
     )
     assert flight.rates[2] < -1e-3
-    # measured: 2.2e-9 (the lag is exact, the body's fourth order sees its exponential)
+    # measured: 2.2e-9 (the lag is exact, the body integrates its exponential with fourth order)
     assert vehicle.inertia_kg_m2[2] * flight.rates[2] == pytest.approx(-momentum, rel=1e-8)
 
 
@@ -212,7 +212,7 @@ def correlation(samples: np.ndarray, lag: int) -> np.ndarray:
     return (samples[lag:] * samples[:-lag]).mean(axis=0) / samples.var(axis=0)
 
 
-def test_gusts_have_the_asked_for_spread_and_memory() -> None:
+def test_gusts_have_the_given_deviation_and_correlation_time() -> None:
     """A weightless vehicle too heavy to be moved much: its acceleration is drag over mass times the gust.
 
     20 000 samples, each a sixth of the correlation time after the last, are worth 3300 for the spread:
@@ -227,7 +227,7 @@ def test_gusts_have_the_asked_for_spread_and_memory() -> None:
 
 
 @BOTH
-def test_gusty_torque_has_the_asked_for_spread_and_memory(plant: str) -> None:
+def test_gusty_torque_has_the_given_deviation_and_correlation_time(plant: str) -> None:
     """A body with three equal inertias has no gyroscopic torque: I·ω' is the torque on it.
 
     20 000 samples, each a fifth of the correlation time after the last, are worth 3900 for the spread:

@@ -1,4 +1,4 @@
-"""The compiled plants against SciPy's solution of the same equations, written here anew with matrices."""
+"""The compiled plants against SciPy's solution of the same equations, written independently with matrices."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ PLANTS = [("paper_quad", "rigid"), ("x_quad", "rigid"), ("paper_quad", "paper")]
 
 
 def vehicle_of(name: str, plant: str) -> Vehicle:
-    """Return the vehicle, with drag where it has none and the plant takes it."""
+    """Return the vehicle, with drag if it has none and the plant supports it."""
     vehicle = load_vehicle(name)
     return vehicle.with_drag(plant) if (name, plant) == ("paper_quad", "rigid") else vehicle
 
@@ -157,7 +157,7 @@ def test_integrator_has_order_four(vehicle_name: str, plant: str) -> None:
 
 
 def test_random_cases_exercise_every_term() -> None:
-    """The comparison is worth little if drag, rates or torques were too small to matter."""
+    """Drag, rates and torques are large enough to affect the comparison."""
     vehicle = load_vehicle("x_quad")
     case = random_case(0, vehicle, rates_rad_s=3.0)
     without = case._replace(disturbance=NO_DISTURBANCE)

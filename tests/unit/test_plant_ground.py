@@ -82,7 +82,7 @@ def test_hard_landing_stays_finite_and_above_ground(vehicle: str, plant: str, si
     assert max(speeds) < math.hypot(sink_m_s, 5.0) + 5.0
     assert ground.result == CONTACT
     assert speeds[-1] < 1e-9  # measured: 3.3e-13
-    assert ground.state[2] < 0.25  # no deeper than legs and arms allow
+    assert ground.state[2] < 0.25  # within legs and arms
 
 
 @BOTH_VEHICLES
@@ -104,7 +104,7 @@ def test_friction_holds_below_its_limit_without_creep(vehicle: str, plant: str) 
     push = Disturbance(force_ned_n=Vector3(0.3 * weight, 0.0, 0.0))
     ground = OnGround(vehicle, plant, disturbance=push).wait(5.0)
     before = ground.state
-    assert 0.0 < before[0] < 2e-3  # the springs give way a little
+    assert 0.0 < before[0] < 2e-3  # deflection of the springs
     assert np.abs(ground.wait(60.0).state - before).max() < 1e-12  # measured: 1.8e-15
 
 

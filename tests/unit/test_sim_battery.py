@@ -35,7 +35,7 @@ def command(speed: float, flags: int = ARMED) -> ActuatorsFrame:
 
 
 def with_battery(battery: Battery | None) -> Vehicle:
-    """The paper's vehicle, whose rotors follow at once: a constant command is a constant load."""
+    """The paper's vehicle without rotor lag: a constant command is a constant load."""
     return replace(PAPER, battery=battery).with_ideal_rotors()
 
 
@@ -91,7 +91,7 @@ def test_constant_load_follows_the_differential_equation() -> None:
     assert state.voltage_v * state.current_a == pytest.approx(power, rel=1e-9)
 
 
-def test_a_load_that_the_battery_cannot_feed_gets_the_largest_power() -> None:
+def test_overload_is_limited_to_the_largest_power() -> None:
     battery = Battery(3, 1000.0, 2.0, (4.0, 4.0))
     state = after(with_battery(battery), 0.1)
     assert state.current_a == pytest.approx(12.0 / 4.0)
@@ -185,7 +185,7 @@ def test_a_vehicle_without_a_battery_sends_none() -> None:
 
 
 def test_built_in_batteries_hover_for_a_usual_time() -> None:
-    """Twenty to forty minutes; the model is what says so, by its own energy."""
+    """Twenty to forty minutes, computed from the energy of the model."""
     for name in ("paper_quad", "x_quad"):
         vehicle = load_vehicle(name)
         assert vehicle.battery is not None

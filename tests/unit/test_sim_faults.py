@@ -1,4 +1,4 @@
-"""Faults of the simulator: their text, what they do and when, in file, in code and by MAVLink command."""
+"""Faults of the simulator: syntax, effect and schedule, from options, code and MAVLink commands."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def speeds(simulator: Simulator) -> list[float]:
         ("rotor:4:off", Fault(Kind.ROTOR_OFF, 3)),
     ],
 )
-def test_a_fault_is_read(text: str, fault: Fault) -> None:
+def test_fault_is_parsed(text: str, fault: Fault) -> None:
     assert parse_fault(text, 4) == fault
 
 
@@ -92,7 +92,7 @@ def test_a_bad_fault_is_named_in_one_sentence(text: str, said: str) -> None:
 
 @settings(max_examples=300)
 @given(st.one_of(st.text(max_size=40), st.from_regex(r"(rotor:\d*:|state:|battery:)\w*=?[\d.e-]*@?[\d.e-]*")))
-def test_any_text_is_read_or_refused(text: str) -> None:
+def test_any_fault_text_is_parsed_or_rejected(text: str) -> None:
     try:
         fault = parse_fault(text, 4)
     except UsageProblemError:
@@ -113,7 +113,7 @@ def test_a_rotor_without_power_runs_down_with_its_lag() -> None:
     assert speeds(simulator)[0] == pytest.approx(LAG_SPEED, rel=1e-6)
 
 
-def test_a_fault_ends_at_its_time_and_the_rotor_is_whole_again() -> None:
+def test_rotor_recovers_at_the_end_of_a_fault() -> None:
     simulator = flown("rotor:2:off@0.1-0.2", seconds=0.2)
     assert speeds(simulator)[1] < 1e-3
     assert simulator.faults == ()
@@ -141,7 +141,7 @@ def test_a_stuck_rotor_turns_at_its_speed_while_armed() -> None:
     assert max(speeds(simulator)) < 1e-3
 
 
-def test_the_later_of_two_faults_of_a_rotor_counts() -> None:
+def test_last_of_two_faults_of_a_rotor_wins() -> None:
     simulator = flown("rotor:1:stuck=150", "rotor:1:off@0.2-0.3", seconds=0.28)
     assert speeds(simulator)[0] < 1.0
     fly(simulator, 0.2)
@@ -164,7 +164,7 @@ def states(simulator: Simulator, count: int, speed: float = 260.0) -> list:
     return found
 
 
-def test_a_frozen_state_stays_while_its_time_goes_on() -> None:
+def test_frozen_state_has_new_timestamps() -> None:
     simulator, twin = flown("state:freeze@0.5-0.6", seconds=0.48), flown(seconds=0.48)
     seen, truth = states(simulator, 100), states(twin, 100)
     assert [m.time_us for m in seen] == [m.time_us for m in truth]
@@ -174,7 +174,7 @@ def test_a_frozen_state_stays_while_its_time_goes_on() -> None:
     assert simulator.frame.state.tobytes() == twin.frame.state.tobytes()
 
 
-def test_a_state_that_is_not_a_number() -> None:
+def test_nan_fault_sends_nan_states() -> None:
     simulator = flown("state:nan@0.5-0.6", seconds=0.48)
     numbers = [
         [*m.position_ned_m, *m.velocity_ned_m_s, *m.q, *m.rates_frd_rad_s] for m in states(simulator, 100)
@@ -252,7 +252,7 @@ def inject(link: FlightStackEndpoint, *params: float) -> int:
     return send(link, mavlink.MAV_CMD_INJECT_FAILURE, *params)
 
 
-def test_dropping_states_is_refused_in_lockstep_with_a_sentence() -> None:
+def test_state_drop_is_rejected_in_lockstep() -> None:
     link = linked("state:drop@100-101")
     link.state()
     link.receive(memoryview(bytes(command(flags=ARMED_FLAG | LOCKSTEP_FLAG).frame)))
@@ -300,7 +300,7 @@ def test_the_battery_fails_by_command() -> None:
         ((100, 2, 0), mavlink.MAV_RESULT_UNSUPPORTED), ((100, 1, 7), mavlink.MAV_RESULT_DENIED),
     ],
 )  # fmt: skip
-def test_what_cannot_fail_is_refused(params: tuple[float, ...], result: int) -> None:
+def test_unsupported_failures_are_rejected(params: tuple[float, ...], result: int) -> None:
     link = linked()
     assert inject(link, *params) == result
     assert link.simulator.faults == ()

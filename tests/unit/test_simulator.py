@@ -48,7 +48,7 @@ def rotor_speeds(simulator: Simulator) -> list[float]:
 
 
 def flight_digest(options: PlantOptions) -> str:
-    """Digest of all frames of 3 s, long enough for the noise to be drawn anew twice."""
+    """Digest of all frames of 3 s, long enough to refill the noise twice."""
     simulator = Simulator(X_QUAD, "rigid", options)
     digest = hashlib.sha256()
     actuators = command(0.0, 0.0, 0.0, 0.0)
@@ -115,7 +115,7 @@ def test_bad_commands_are_counted_and_the_last_good_one_holds(plant: str, ideal:
     assert bytes(simulator.state_frame()) == bytes(twin.state_frame())
 
 
-def test_diverging_plant_says_so() -> None:
+def test_divergence_is_an_error() -> None:
     push = PlantOptions(Disturbance(torque_frd_n_m=Vector3(1e9, 1e9, 1e9)))
     simulator = Simulator(PAPER, "rigid", push)
 
@@ -139,7 +139,7 @@ def test_same_seed_same_bytes_other_seed_other_bytes(options: PlantOptions) -> N
 
 @GUSTS
 def test_gusts_do_not_depend_on_how_the_steps_are_batched(options: PlantOptions) -> None:
-    """5 s in exchanges of 1, 2, 5 or 500 ms see the same gusts, also where the noise buffer is refilled."""
+    """5 s in exchanges of 1, 2, 5 or 500 ms have the same gusts, also across refills of the noise."""
     ends = []
     for interval_us in (1000, 2000, 5000, 500_000):
         simulator = Simulator(X_QUAD, "rigid", options, interval_us=interval_us)
@@ -149,8 +149,8 @@ def test_gusts_do_not_depend_on_how_the_steps_are_batched(options: PlantOptions)
     assert len(set(ends)) == 1
 
 
-def test_gusts_of_wind_and_torque_leave_each_other_as_they_were() -> None:
-    """Without drag or rotors the wind's gusts show in the airspeed alone, the torque's in the rates alone."""
+def test_gusts_of_wind_and_torque_are_independent() -> None:
+    """Without drag or rotors gusts of wind affect the airspeed alone, gusts of torque the rates alone."""
     shown = []
     for options in (GUSTY, BOTH_GUSTS, TWISTED):
         plant = CompiledPlant(PAPER, "rigid", options._replace(ground=False))
@@ -180,13 +180,13 @@ def test_any_interval_is_split_into_whole_steps(interval_us: int, physics_hz: fl
 
 
 @pytest.mark.parametrize("interval_us", [0, 49, 1_000_001])
-def test_intervals_out_of_range_are_refused(interval_us: int) -> None:
+def test_intervals_out_of_range_are_rejected(interval_us: int) -> None:
     with pytest.raises(ValueError, match="outside the allowed"):
         Simulator(PAPER).set_interval_us(interval_us)
 
 
 @pytest.mark.parametrize("air", [Disturbance(Vector3(5.0, 0.0, 0.0)), Disturbance(gust_m_s=1.0)])
-def test_wind_that_cannot_act_is_refused(air: Disturbance) -> None:
+def test_wind_without_drag_is_rejected(air: Disturbance) -> None:
     options = PlantOptions(air)
     with pytest.raises(UsageProblemError, match="paper_quad has no drag; add --drag"):
         Simulator(PAPER, options=options)
@@ -208,7 +208,7 @@ def test_wind_that_cannot_act_is_refused(air: Disturbance) -> None:
 @pytest.mark.parametrize("plant", ["rigid", "paper"])
 def test_each_disturbance_acts_on_each_plant_that_takes_it(plant: str, ideal: bool, air: Disturbance) -> None:
     if plant == "paper" and (any(air.wind_ned_m_s) or air.gust_m_s):
-        pytest.skip("refused: test_wind_that_cannot_act_is_refused")
+        pytest.skip("refused: test_wind_without_drag_is_rejected")
     vehicle = X_QUAD.with_ideal_rotors() if ideal else X_QUAD
     start = InitialState(position_ned_m=Vector3(0.0, 0.0, -10.0))
     calm, moved = (

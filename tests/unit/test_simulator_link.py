@@ -43,7 +43,7 @@ class Client:
         return ack.result
 
     def state(self):
-        """The state; where a battery is due, it comes just before."""
+        """The state; a due battery report precedes it."""
         *before, message = self.codec.decode(bytes(self.sim.state()))
         assert [one.get_type() for one in before] in ([], ["BATTERY_STATUS"])
         return message
@@ -84,7 +84,7 @@ def test_requests_are_answered(client: Client, message_id: float, interval_us: f
         assert client.sim.simulator.interval_us == round(interval_us)
 
 
-def test_who_asks_for_both_states_gets_the_exact_one(client: Client) -> None:
+def test_plant_state_has_priority_over_hil_state(client: Client) -> None:
     assert client.request(HIL_STATE_QUATERNION_ID, 4000) == 0
     assert client.request(FS_PLANT_STATE_ID, 2000) == 0
     assert client.request(HIL_STATE_QUATERNION_ID, 4000) == mavlink.MAV_RESULT_DENIED
@@ -159,7 +159,7 @@ def test_wrong_rotor_count_is_a_fault(client: Client) -> None:
     assert "commands 6 rotors" in (client.sim.error or "")
 
 
-def test_heartbeat_says_goodbye_both_ways(client: Client) -> None:
+def test_poweroff_heartbeat_ends_the_link_in_both_directions(client: Client) -> None:
     client.send(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, mavlink.MAV_STATE_ACTIVE, 3))
     assert not client.sim.peer_ended
     client.send(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, mavlink.MAV_STATE_POWEROFF, 3))
@@ -223,8 +223,8 @@ def test_link_recovers_after_junk(client: Client) -> None:
 
 @pytest.mark.parametrize("junk", [b"\xfd\xff\x00", b"\xfe\xff", b"\xfd\xff\x00" * 90, b"\xfd" * 500, b"junk"])
 @pytest.mark.parametrize("pieces", [1, 2, 7])
-def test_junk_before_actuators_does_not_swallow_them(client: Client, junk: bytes, pieces: int) -> None:
-    """In lockstep nothing comes after them: actuators that wait for the rest of junk would end the flight."""
+def test_actuators_after_junk_are_handled(client: Client, junk: bytes, pieces: int) -> None:
+    """In lockstep nothing follows them: actuators held back as part of junk would stop the exchange."""
     client.request(FS_PLANT_STATE_ID, 2000)
     for step in range(20):
         client.state()
@@ -242,7 +242,7 @@ FLOATS = [math.nan, math.inf, -math.inf, 3.4e38, -0.0, 1e-45]
 
 
 def random_message(random: Random) -> bytes:
-    """A frame with a right checksum and any payload: random octets, or NaN and the like in every float."""
+    """A frame with a right checksum and any payload: random bytes, or NaN and infinities in every float."""
     kind = mavlink.mavlink_map[random.choice([*MESSAGES, 76, 75, 93, FsActuators.id, 0])]
     size = struct.calcsize(kind.unpacker.format)
     payload = bytearray(random.randbytes(size))
@@ -254,7 +254,7 @@ def random_message(random: Random) -> bytes:
                 if code in "fd":
                     struct.pack_into("<" + code, payload, at, random.choice(FLOATS))
                 at += width
-    if kind.id in (75, 76) and random.random() < 0.8:  # a command that the simulator knows
+    if kind.id in (75, 76) and random.random() < 0.8:  # a supported command
         struct.pack_into("<H", payload, 28, random.choice([420, 511]))
     cut = bytes(payload).rstrip(b"\0") or b"\0"
     body = bytes([len(cut), 0, 0, random.randrange(256), 1, 1]) + kind.id.to_bytes(3, "little") + cut
@@ -274,8 +274,8 @@ def mangled(random: Random, frame: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_nothing_that_arrives_raises_or_piles_up(seed: int) -> None:
-    """10 000 pieces in all; after each batch the link still answers a request and takes a lockstep answer."""
+def test_random_input_neither_raises_nor_accumulates(seed: int) -> None:
+    """10 000 inputs; after each batch the link still answers a request and accepts a lockstep answer."""
     random, raised_by = Random(seed), 0
     client = Client()
     for _ in range(50):
@@ -285,7 +285,7 @@ def test_nothing_that_arrives_raises_or_piles_up(seed: int) -> None:
             client.sim.state()
             try:
                 client.sim.step()
-            except PlantDivergedError:  # absurd commands may end the flight: in order, with a sentence
+            except PlantDivergedError:  # absurd commands may end the flight with this error
                 raised_by += 1
                 client = Client()
         assert len(client.sim.simulator.faults) <= 4
@@ -299,7 +299,7 @@ def test_nothing_that_arrives_raises_or_piles_up(seed: int) -> None:
     assert raised_by < 10
 
 
-def test_a_huge_piece_is_looked_through_in_full(client: Client) -> None:
+def test_large_input_is_searched_completely(client: Client) -> None:
     client.request(FS_PLANT_STATE_ID, 2000)
     client.state()
     data = Random(5).randbytes(30_000) + b"\xfd\x22\x00" * 10_000 + actuators(0, 123.0)
