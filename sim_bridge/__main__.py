@@ -76,7 +76,10 @@ def run(
     timeout: options.Timeout = None,
     version: Version = False,  # handled by its callback
 ) -> None:
-    """Simulate a vehicle for one flight stack, which connects over TCP; Ctrl-C ends the simulation."""
+    """Simulate a vehicle for one flight stack, which connects over TCP.
+
+    Ctrl-C ends the simulation.
+    """
     if context.invoked_subcommand is not None:
         return
     arguments.check_plant(plant)
@@ -145,7 +148,10 @@ def open_loop(
     seed: options.Seed = 1,
     as_json: options.Json = False,
 ) -> None:
-    """Print the state after a flight at constant rotor speeds, without their limits."""
+    """Print the state after a flight at constant rotor speeds.
+
+    Rotor speeds are not limited.
+    """
     arguments.check_plant(plant)
     arguments.check_range("--seconds", seconds, 0.0, 1e5)
     arguments.check_range("--dt", dt, 1e-6, 1.0)

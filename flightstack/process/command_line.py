@@ -39,33 +39,31 @@ Version = Annotated[
 
 Png = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Write a picture: of the middle of the flight, or of --at."),
+    typer.Option(metavar="FILE", help="Write a picture of the middle of the flight, or of the time --at."),
 ]
 Sheet = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Write nine moments, or those of --at, in one picture.")
+    Path | None, typer.Option(metavar="FILE", help="Write nine times, or those of --at, in one picture.")
 ]
 Video = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Write a film, .mp4 (which needs even sizes) or .gif.")
 ]
-View = Annotated[bool, typer.Option("--view", help="Play it in a window.")]
+View = Annotated[bool, typer.Option("--view", help="Play the flight in a window.")]
 At = Annotated[
     str | None,
-    typer.Option(metavar="T1[,T2,…]", help="Moments of the pictures, s; several give numbered files."),
+    typer.Option(metavar="T1[,T2,…]", help="Times of the pictures, s; several write numbered files."),
 ]
-Camera = Annotated[str, typer.Option(help="chase, fixed, top, side, or whole: all of the way from above.")]
+Camera = Annotated[str, typer.Option(help="chase, fixed, top, side, or whole (the whole path from above).")]
 Size = Annotated[
     str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 1280x720; 480x270 for a gif]")
 ]
 Fps = Annotated[float | None, typer.Option(help="Frames per second.  [default: 30; 12.5 for a gif]")]
-Begin = Annotated[float | None, typer.Option("--from", help="Begin of the film, s.")]
+Begin = Annotated[float | None, typer.Option("--from", help="Start of the film, s.")]
 End = Annotated[float | None, typer.Option("--to", help="End of the film, s.")]
 Speed = Annotated[
-    float | None, typer.Option(help="Show it so many times as fast as it was flown.  [default: 1]")
+    float | None, typer.Option(help="Speed of the playback over that of the flight.  [default: 1]")
 ]
-NoWords = Annotated[
-    bool, typer.Option("--no-words", help="Leave out figures, numbers of places and the scale.")
-]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace files that exist already.")]
+NoWords = Annotated[bool, typer.Option("--no-words", help="Omit figures, waypoint numbers and scale.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
 
 
 class PictureOptions(NamedTuple):
@@ -108,14 +106,12 @@ FORCE = typer.Option(metavar="N,E,D", help="Constant external force, N.")
 TORQUE = typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")
 TORQUE_GUST = typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
 SEED = typer.Option(help="Seed of the gusts.")
-SPEED = typer.Option(metavar="max|N", help="N times real time, or as fast as it goes.")
-IDEAL_ROTORS = typer.Option(
-    "--ideal-rotors", help="Rotors without limits, without lag and without spin-up torque."
-)
-PHYSICS_HZ = typer.Option(help="Lowest rate of the integration steps, Hz.")
-BATTERY_START = typer.Option(metavar="PERCENT", help="Charge at the start.  [default: 100]")
-BATTERY_CAPACITY = typer.Option(metavar="MAH", help="Capacity.  [default: the vehicle's]")
-BATTERY_DRAIN = typer.Option(metavar="FACTOR", help="Let the charge fall so many times as fast.")
+SPEED = typer.Option(metavar="max|N", help="N times real time, or max: as fast as possible.")
+IDEAL_ROTORS = typer.Option("--ideal-rotors", help="Rotors without limits, lag and spin-up torque.")
+PHYSICS_HZ = typer.Option(help="Lowest integration rate, Hz.")
+BATTERY_START = typer.Option(metavar="PERCENT", help="Initial charge.  [default: 100]")
+BATTERY_CAPACITY = typer.Option(metavar="MAH", help="Battery capacity.  [default: the vehicle's]")
+BATTERY_DRAIN = typer.Option(metavar="FACTOR", help="Factor on the discharge.  [default: 1]")
 FAULTS = typer.Option(
     "--fault",
     metavar="SPEC",

@@ -51,7 +51,7 @@ class MultibodyPlant(RecordPlant):
         self.data = mujoco.MjData(self._model)
         """MuJoCo's state, forces and accelerations, NWU and FLU; read only."""
         self._rest_depth_m = 0.0
-        self._contact_state = NEAR
+        self._proximity = NEAR
         first = 1 + mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, "vehicle")
         self._on_rotors: FloatArray = self.data.xfrc_applied[first:]
         self._bind_arrays()
@@ -114,7 +114,7 @@ class MultibodyPlant(RecordPlant):
         model = self._model
         data = mujoco.MjData(model)
         self._enable_contacts(True)
-        self._contact_state = NEAR
+        self._proximity = NEAR
         depths, falls = (_FIRST_DEPTH_M, 2.0 * _FIRST_DEPTH_M), []
         for depth in depths:
             data.qpos[2] = -depth
@@ -125,30 +125,30 @@ class MultibodyPlant(RecordPlant):
 
     def _advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         rotor_drive.hold_commands(self.memory, command_rad_s, flags)
-        where = rotor_drive.FLYING
+        proximity = rotor_drive.FLYING
         for _ in range(steps):
-            where = self._step()
-            if where == LOST:
+            proximity = self._step()
+            if proximity == LOST:
                 break
         return self.show()
 
     def _step(self) -> int:
         """Advance by one step; return FLYING, NEAR or LOST."""
         memory, drive, qpos, qvel = self.memory, self._drive, self._qpos, self._qvel
-        where = rotor_drive.begin_step(memory, drive, qpos, qvel)
-        self._update_contacts(where)
+        proximity = rotor_drive.begin_step(memory, drive, qpos, qvel)
+        self._update_contacts(proximity)
         for stage in _STAGES:
-            if where == LOST:
+            if proximity == LOST:
                 break
             self._accelerations(stage)
-            where = rotor_drive.end_stage(memory, drive, stage, self._qacc, qpos, qvel)
-        return where
+            proximity = rotor_drive.end_stage(memory, drive, stage, self._qacc, qpos, qvel)
+        return proximity
 
-    def _update_contacts(self, where: int) -> None:
+    def _update_contacts(self, proximity: int) -> None:
         """Enable contact detection only near the ground."""
-        if where != self._contact_state:
-            self._contact_state = where
-            self._enable_contacts(where == NEAR)
+        if proximity != self._proximity:
+            self._proximity = proximity
+            self._enable_contacts(proximity == NEAR)
 
     def _enable_contacts(self, enable: bool) -> None:
         option = self._model.opt
@@ -168,20 +168,20 @@ class MultibodyPlant(RecordPlant):
 
     def show(self) -> int:
         """Write the present state to ``output``; return the bits of ``advance``."""
-        where = rotor_drive.show_pose(self.memory, self._drive, self._qpos, self._qvel)
+        proximity = rotor_drive.show_pose(self.memory, self._drive, self._qpos, self._qvel)
         touches = 0
-        if where == NEAR:
-            self._update_contacts(where)
+        if proximity == NEAR:
+            self._update_contacts(proximity)
             mujoco.mj_fwdPosition(self._model, self.data)
             touches = int(self.data.ncon > 0)
         return rotor_drive.show_state(self.memory, self.output, touches)
 
     def acceleration_ned_m_s2(self) -> Vector3:
         """Return the acceleration at the present state, without an effect on the flight."""
-        where = rotor_drive.show_pose(self.memory, self._drive, self._qpos, self._qvel)
-        if where == LOST:
+        proximity = rotor_drive.show_pose(self.memory, self._drive, self._qpos, self._qvel)
+        if proximity == LOST:
             return Vector3(0.0, 0.0, 0.0)
-        self._update_contacts(where)
+        self._update_contacts(proximity)
         # the next stage uses both from the stage before: restore them after this evaluation
         force, warm_start = self._contact_force.copy(), self._warm_start.copy()
         self._accelerations(0)

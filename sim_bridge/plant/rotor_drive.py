@@ -99,12 +99,12 @@ def _proximity(x: FloatArray, m: Record) -> int:
 def show_pose(memory: RecordArray, drive: RecordArray, qpos: FloatArray, qvel: FloatArray) -> int:
     """Write the present state to MuJoCo, as in the first stage of a step; return FLYING, NEAR or LOST."""
     m, d = memory[0], drive[0]
-    where = _proximity(m["body"], m)
-    if where != LOST:
+    proximity = _proximity(m["body"], m)
+    if proximity != LOST:
         m["stage"][:] = m["body"]
         _store_speeds(m, d, 0)
         _write_pose(m["body"], d, 0, m["rotor_count"], qpos, qvel)
-    return where
+    return proximity
 
 
 @compiled
@@ -113,12 +113,12 @@ def begin_step(memory: RecordArray, drive: RecordArray, qpos: FloatArray, qvel: 
     m, d = memory[0], drive[0]
     if m["gust_scale"][0] > 0.0 or m["torque_gust_scale"][0] > 0.0:
         next_gust(m)
-    where = show_pose(memory, drive, qpos, qvel)
+    proximity = show_pose(memory, drive, qpos, qvel)
     half_step(m)
     _store_speeds(m, d, 1)
     half_step(m)
     _store_speeds(m, d, 2)
-    return where
+    return proximity
 
 
 @compiled
@@ -239,10 +239,10 @@ def end_stage(
     for i in range(len(x)):
         now[i] = x[i] + scale * slope[i]
     after_step(now)
-    where = _proximity(now, m)
-    if where != LOST:
+    proximity = _proximity(now, m)
+    if proximity != LOST:
         _write_pose(now, d, (stage + 2) // 2, m["rotor_count"], qpos, qvel)
-    return where
+    return proximity
 
 
 @compiled
