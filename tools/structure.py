@@ -11,6 +11,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAMS = ("flightstack", "sim_bridge", "gcs_cli")
+SMALL = 60
 INDEX = re.compile(r"[A-Z]+_[A-Z0-9_]+$")
 
 
@@ -33,6 +34,13 @@ def lines(program: str) -> list[int]:
     ]
 
 
+def has_one_small_definition(tree: ast.Module) -> bool:
+    """Return True for a module whose only function or class has at most SMALL lines."""
+    kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+    found = [node for node in tree.body if isinstance(node, kinds)]
+    return len(found) == 1 and (found[0].end_lineno or 0) - found[0].lineno < SMALL
+
+
 def has_one_definition(tree: ast.Module) -> bool:
     """Return True for a module with a single function or class at its top."""
     kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
@@ -42,7 +50,8 @@ def has_one_definition(tree: ast.Module) -> bool:
 def index_constants(tree: ast.Module) -> int:
     """Return how often an array is indexed by a named constant such as ``M_SPEED``."""
     slices = (node.slice for node in ast.walk(tree) if isinstance(node, ast.Subscript))
-    return sum(isinstance(index, ast.Name) and bool(INDEX.match(index.id)) for index in slices)
+    parts = (part for index in slices for part in (index.elts if isinstance(index, ast.Tuple) else [index]))
+    return sum(isinstance(part, ast.Name) and bool(INDEX.match(part.id)) for part in parts)
 
 
 def imports(name: str, tree: ast.Module, known: set[str]) -> Iterator[tuple[str, str]]:
@@ -80,8 +89,10 @@ def cycles(modules: dict[str, ast.Module]) -> int:
 
 def main() -> None:
     """Print a table in Markdown."""
-    print("| | files | median lines | p90 | one definition | index constants | packages in cycles |")
-    print("|---|---|---|---|---|---|---|")
+    print(
+        "| | files | median lines | p90 | one definition | small ones of them | index constants | packages in cycles |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
     for program in PROGRAMS:
         modules, sizes = sources(program), lines(program)
         row = (
@@ -90,6 +101,7 @@ def main() -> None:
             round(statistics.median(sizes)),
             round(statistics.quantiles(sizes, n=10)[-1]),
             sum(map(has_one_definition, modules.values())),
+            sum(map(has_one_small_definition, modules.values())),
             sum(map(index_constants, modules.values())),
             cycles(modules),
         )
