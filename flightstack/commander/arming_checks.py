@@ -1,4 +1,4 @@
-"""What keeps a vehicle from arming: every reason at once, each a sentence. Pure."""
+"""Pre-arm checks: return all reasons not to arm at once, each as a sentence. Pure."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from flightstack.core.enums import Mode
 from flightstack.params.behaviour import Behaviour
 
 THROTTLE_CENTRED = 0.2
-"""Largest throttle that counts as not above the centre; PX4's value, below the one that takes off."""
+"""Largest throttle that counts as centred; PX4's value, below the takeoff threshold."""
 
 
 class ArmingFacts(NamedTuple):
-    """What the checks look at."""
+    """Inputs of the checks."""
 
     mode: Mode
     state_is_valid: bool
@@ -24,24 +24,24 @@ class ArmingFacts(NamedTuple):
     manual_fresh: bool
     offboard_fresh: bool
     fence_breach: str
-    """How the geofence is breached, as the end of a sentence; empty: it is not."""
+    """The geofence breach as the end of a sentence; empty without a breach."""
     battery_level: int
-    """0 enough or unknown, 1 low, 2 critical, 3 emergency."""
+    """0 normal or unknown, 1 low, 2 critical, 3 emergency."""
     battery_remaining: float
     throttle: float = 0.0
-    """Throttle stick, −1 to 1; 0 at the centre, and without sticks."""
+    """Throttle stick, −1 to 1; 0 at the centre or without manual control."""
     mode_fault: str = ""
-    """Why the mode does not take a standing vehicle into the air; empty: it may."""
+    """Reason that the mode cannot take off from the ground; empty if it can."""
     is_at_rest: bool = True
-    """Whether the vehicle neither falls nor rises."""
+    """True if the vehicle neither falls nor rises."""
     step_refusal: str = ""
-    """Why the steps between the simulator's states cannot be flown, a sentence; empty: they can."""
+    """Reason that the simulator's time steps cannot be flown, a sentence; empty if they can."""
 
 
 def arming_refusals(facts: ArmingFacts, behaviour: Behaviour) -> tuple[str, ...]:
-    """Return every reason not to arm; empty when the vehicle may.
+    """Return every reason not to arm; empty if the vehicle may arm.
 
-    What a failsafe would act on in the air keeps the vehicle on the ground, unless its action is switched off.
+    A condition that triggers a failsafe in the air also prevents arming, unless the failsafe's action is disabled.
     """
     if facts.mode is Mode.TERMINATION:
         return (TERMINATED,)

@@ -1,4 +1,4 @@
-"""What the supervisor is told by others: links, battery, the state's age. Types only."""
+"""Inputs of the failsafe monitor: links, battery, age of the state. Types only."""
 
 from __future__ import annotations
 
@@ -8,60 +8,57 @@ from typing import Protocol
 
 @dataclass
 class LinkFacts:
-    """What the services of the ground links know; each writes its own field.
-
-    Without a stream there are no setpoints and no sticks.
-    """
+    """State of the ground links; each service writes its own field."""
 
     gcs_lost: bool = False
-    """Silent for too long; if the loss has an action, also before the first heartbeat."""
+    """True after the heartbeat timeout; with a loss action configured, also before the first heartbeat."""
     gcs_heard: bool = False
-    """Whether a ground station has spoken since the vehicle booted."""
+    """True if a ground station heartbeat was received since boot."""
     offboard_lost: bool = True
     manual_lost: bool = True
 
 
 class BatteryReading(Protocol):
-    """What is known of the battery."""
+    """A battery measurement."""
 
     @property
     def remaining(self) -> float:
-        """Share of the charge, 0 to 1."""
+        """Remaining charge, 0 to 1."""
         ...
 
     @property
     def valid(self) -> bool:
-        """Whether anything is known."""
+        """True if the charge is known."""
         ...
 
 
 class Freshness(Protocol):
-    """How old the state is."""
+    """Age of the state."""
 
     @property
     def age_us(self) -> int:
-        """Vehicle time since the newest state arrived."""
+        """Vehicle time since the newest state was received."""
         ...
 
     @property
     def frozen_us(self) -> int:
-        """Vehicle time since any of its numbers changed."""
+        """Vehicle time since any value of the state changed."""
         ...
 
 
 class StateSource(Protocol):
-    """Where states come from, and what else is known there; ``SimulatorEndpoint`` is one."""
+    """Source of states and battery measurements; implemented by ``SimulatorEndpoint``."""
 
     @property
     def battery(self) -> BatteryReading:
-        """The newest word about the battery."""
+        """Newest battery measurement."""
         ...
 
     @property
     def step_refusal(self) -> str:
-        """Why the steps between states cannot be flown; empty if they can."""
+        """Reason that the time steps between states cannot be flown; empty if they can."""
         ...
 
     def freshness(self, now_us: int) -> Freshness:
-        """Tell how old the state is at vehicle time ``now_us``."""
+        """Return the age of the state at vehicle time ``now_us``."""
         ...

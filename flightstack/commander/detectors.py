@@ -1,7 +1,7 @@
-"""Detectors of faults in flight: limits of attitude and position, rotors, the battery. Pure.
+"""Failure detectors: limits of attitude and position, rotors, the battery. Pure.
 
-A detector triggers when its limit is exceeded for its time, and releases when the value is within the limit for
-``RELEASE_S``, so that a value at the limit does not chatter.
+A detector triggers after its limit is exceeded for its trigger time, and releases after the value is within the limit
+for ``RELEASE_S``, so that a value at the limit does not chatter.
 """
 
 from __future__ import annotations
@@ -27,28 +27,28 @@ from flightstack.params.vehicle import Vehicle
 
 RELEASE_S = 1.0
 NOT_FINITE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT, MOVING, UNMEASURED = 1, 2, 4, 8, 16, 32
-"""Bits of what ``detect`` returns."""
+"""Bits of the value of ``detect``."""
 MOVING_ABOVE = 1e-9
-"""Speed [m/s] or rate [rad/s] that must change the state in twentieths of a second: its last digit is smaller yet."""
+"""Speed [m/s] or rate [rad/s] above which the state must change within 50 ms: the change exceeds its last digit."""
 BATTERY_HYSTERESIS = 0.02
 TILT_MARGIN_DEG = 15
 ROTOR_MEAN_S = 0.03
-"""Rotors are compared by means over about this time: loops that shake them are no fault of theirs."""
+"""Time constant of the averaged rotor speed error: oscillating commands must not trigger the rotor detector."""
 FASTEST_RAD_S = 1e6
-"""A rotor speed beyond this is no measurement; ideal rotors without limits stay below it."""
+"""A larger rotor speed is not a measurement; ideal rotors without limits stay below it."""
 UNMEASURED_AFTER_S = 0.5
-"""A rotor without a measurement for this time is reported as not measured."""
+"""Time without a measurement after which a rotor is reported as not measured."""
 
 ROLL, PITCH, TILT_ERROR, POSITION, ROTORS = range(5)
 TIMERS = 5
 DETECTORS = np.dtype([("time", "f8", TIMERS), ("triggered", "i8", TIMERS)])
-"""For each detector the time [s] for which the value has contradicted its answer, and the answer."""
+"""For each detector its output, and the time [s] for which the input has contradicted this output."""
 LIMITS = np.dtype(
     [
         ("limit", "f8", TIMERS),  # rad, rad, rad, m, share of the rotor speed; 0 is off
         ("time", "f8", TIMERS),  # s beyond the limit before a detector triggers
         ("rotors", "i8"),
-        ("slow", "f8"),  # rad/s; below it errors count as shares of this speed
+        ("slow", "f8"),  # rad/s; the relative error's least denominator
     ]
 )
 ROTOR_SPEEDS = np.dtype(
@@ -57,17 +57,17 @@ ROTOR_SPEEDS = np.dtype(
             "expected",
             "f8",
             MAX_ROTORS,
-        ),  # rad/s: first-order lag of the commands, exact for commands that are held
+        ),  # rad/s: first-order lag of the commands, exact for a zero-order hold
         ("mean", "f8", MAX_ROTORS),  # of the expected speed
         ("error", "f8", MAX_ROTORS),  # mean of the measured minus the expected speed
         ("missing", "f8", MAX_ROTORS),  # s without a measurement
-        ("measured", "i8"),  # 1 once any speed other than 0 was measured
+        ("measured", "i8"),  # 1 after the first measured speed other than 0
     ]
 )
 ROTOR_LAGS = np.dtype(
     [
-        ("lag", "f8", MAX_ROTORS),  # share of each rotor's lag that passes in a tick
-        ("mean", "f8"),  # share of ROTOR_MEAN_S that passes in a tick
+        ("lag", "f8", MAX_ROTORS),  # filter coefficient of each rotor's lag, per tick
+        ("mean", "f8"),  # filter coefficient of ROTOR_MEAN_S, per tick
         ("dt", "f8"),  # s
         ("rotors", "i8"),
     ]
@@ -111,11 +111,11 @@ def rotor_lags(vehicle: Vehicle, dt_s: float) -> RecordArray:
 
 @compiled
 def follow_rotors(row: FloatArray, speeds: RecordArray, lags: RecordArray) -> None:
-    """Compare each rotor's measured speed with the speed that its commands lead to; once per inner tick.
+    """Compare each rotor's measured speed with the speed expected from its commands; once per inner tick.
 
-    ``row`` (48,) holds speeds from before its commands; ``speeds`` (1,) holds ``ROTOR_SPEEDS``. A command that is not
-    finite, or beyond ``FASTEST_RAD_S``, is left out. Such a speed is a missing measurement: the mean of the error
-    decays meanwhile, so that no old error outlasts the measurements.
+    ``row`` (48,) holds speeds measured before its commands; ``speeds`` (1,) holds ``ROTOR_SPEEDS``. A command that is
+    not finite, or beyond ``FASTEST_RAD_S``, is ignored. Such a speed is a missing measurement: the mean error decays
+    until the next measurement.
     """
     s, lag = speeds[0], lags[0]
     for i in range(lag["rotors"]):
@@ -131,8 +131,8 @@ def follow_rotors(row: FloatArray, speeds: RecordArray, lags: RecordArray) -> No
 
 
 @compiled
-def _advance(detectors: Record, index: int, beyond: bool, time_s: float, dt_s: float) -> None:
-    """Advance one detector."""
+def _advance_detector(detectors: Record, index: int, beyond: bool, time_s: float, dt_s: float) -> None:
+    """Advance one detector by ``dt_s``."""
     time, triggered = detectors["time"], detectors["triggered"]
     if beyond == (triggered[index] != 0):
         time[index] = 0.0
@@ -144,7 +144,7 @@ def _advance(detectors: Record, index: int, beyond: bool, time_s: float, dt_s: f
 
 
 @compiled
-def _found(detectors: Record) -> int:
+def _fault_bits(detectors: Record) -> int:
     """Return the bits of the detectors that are triggered."""
     bits = (BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_ATTITUDE, BEYOND_POSITION, ROTOR_FAULT)
     result = 0
@@ -156,10 +156,10 @@ def _found(detectors: Record) -> int:
 
 @compiled
 def _rotor_error(row: FloatArray, speeds: Record, limits: Record) -> float:
-    """Return the largest mean error of a rotor's speed as share of the mean speed that was expected.
+    """Return the largest mean error of a rotor's speed as share of its mean expected speed.
 
-    A simulator that measures no speeds sends zeros: until another value comes in this flight the error is unknown, 0.
-    After that, zeros are rotors that stand: an empty battery stops them all.
+    A simulator without speed measurements sends zeros: the error is 0 until the first other value of a flight. After
+    that, zeros are stopped rotors: an empty battery stops them all.
     """
     worst = 0.0
     for i in range(limits["rotors"]):
@@ -196,14 +196,14 @@ def detect(
     """Advance all detectors by one outer tick; return the bits of the faults, ``MOVING`` and ``UNMEASURED``.
 
     ``state`` (13,), ``setpoint`` (11,) and ``row`` (48,), the newest row of the inner loop, as in ``contract``. A state
-    that is not finite leaves the other detectors as they are. ``on_ground``: the feet hold the vehicle, and its
-    attitude need not follow the reference; it must still be upright.
+    that is not finite leaves the other detectors unchanged. ``on_ground`` disables the tilt error: ground contact
+    determines the attitude. The limits of roll and pitch still apply.
     """
     speeds, memory, limits = rotor_speeds[0], detectors[0], limits_array[0]
     status = int(row[_STATUS_AT])
     for value in state:
         if not math.isfinite(value):
-            return NOT_FINITE | _found(memory)
+            return NOT_FINITE | _fault_bits(memory)
     result = NOT_FINITE if status & _BAD_OUTPUT != 0 else 0
     now = vehicle_state(state)
     v, w = now.velocity_ned_m_s, now.rates_frd_rad_s
@@ -223,15 +223,15 @@ def detect(
     for index in range(TIMERS):
         limit = limits["limit"][index]
         beyond = limit > 0.0 and not errors[index] <= limit
-        _advance(memory, index, beyond, limits["time"][index], dt_s)
-    return result | _found(memory)
+        _advance_detector(memory, index, beyond, limits["time"][index], dt_s)
+    return result | _fault_bits(memory)
 
 
 def battery_level(before: int, remaining: float, thresholds: tuple[float, float, float]) -> int:
-    """Return how low the battery is: 0 enough or never known, 1 low, 2 critical, 3 emergency.
+    """Return the battery level: 0 normal or unknown so far, 1 low, 2 critical, 3 emergency.
 
-    ``thresholds`` are the shares of charge for low, critical and emergency. A level once reached is left
-    only when the charge lies ``BATTERY_HYSTERESIS`` above its threshold; an unknown charge (NaN) keeps it.
+    ``thresholds`` are the charges for low, critical and emergency, 0 to 1. A level ends only when the charge is
+    ``BATTERY_HYSTERESIS`` above its threshold; an unknown charge (NaN) keeps it.
     """
     if math.isnan(remaining):
         return before

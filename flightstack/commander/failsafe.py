@@ -1,8 +1,7 @@
-"""The failsafes as one table: what each is, which parameter says what it does, and who wins. Pure.
+"""Table of failsafes: condition, parameter of the action, priority. Pure.
 
-Read ``RULES`` from top to bottom: that is the order of priority, and every failsafe that there is. What an action
-becomes in a phase of flight stands in ``decide``. Names and values of the parameters are PX4's wherever PX4 has
-the failsafe; https://docs.px4.io/main/en/config/safety describes its behaviour.
+``RULES`` lists all failsafes in order of priority. ``decide`` selects the action for the phase of flight. Parameters
+have PX4's names and values if PX4 has the failsafe; https://docs.px4.io/main/en/config/safety describes its behaviour.
 """
 
 from __future__ import annotations
@@ -16,24 +15,24 @@ from flightstack.params.behaviour import Behaviour
 
 
 class Action(IntEnum):
-    """What a failsafe does, in order of severity: of several the most severe wins."""
+    """Action of a failsafe, in order of severity: the most severe one wins."""
 
     NONE = 0
     WARN = 1
     POSITION = 2
-    """Give the sticks back, in position mode."""
+    """Position mode, flown with the sticks."""
     ALTITUDE = 3
     HOLD = 4
     RETURN = 5
     LAND = 6
     BLIND = 7
-    """Hold the rotors' last good speeds: without a state nothing can be navigated."""
+    """Hold the last valid rotor speeds: guidance needs a valid state."""
     DISARM = 8
     TERMINATE = 9
 
 
 class Failsafe(Enum):
-    """Everything that can go wrong and is watched."""
+    """Conditions that trigger a failsafe."""
 
     NOT_FINITE = auto()
     STATE_STALE = auto()
@@ -50,7 +49,7 @@ class Failsafe(Enum):
 
 
 class Phase(Enum):
-    """Part of a flight, as far as failsafes tell them apart."""
+    """Phase of flight, as failsafes distinguish them."""
 
     DISARMED = auto()
     STANDING = auto()
@@ -59,7 +58,7 @@ class Phase(Enum):
     MISSION = auto()
     HOLD = auto()
     GOTO = auto()
-    """In hold mode, on the way to another place that was named."""
+    """In hold mode, on the way to a commanded position."""
     MANUAL = auto()
     OFFBOARD = auto()
     RETURN = auto()
@@ -80,7 +79,7 @@ PHASE_OF_MODE: Mapping[Mode, Phase] = {
 
 
 def phase_of(armed: bool, landed: bool, mode: Mode, goes: bool = False) -> Phase:
-    """Return the phase of flight; ``goes``: in hold mode, on the way to another place."""
+    """Return the phase of flight; ``goes`` is true in hold mode on the way to a commanded position."""
     if not armed:
         return Phase.DISARMED
     if goes and mode is Mode.HOLD and not landed:
@@ -120,16 +119,16 @@ WARN_ONLY = {0: Action.WARN}
 
 FLIGHT = frozenset(Phase) - {Phase.DISARMED}
 LANDING_GOES_ON = FLIGHT - {Phase.LAND}
-"""A lost link does not end a landing, whatever its parameter says (PX4's rule)."""
+"""A lost link does not end a landing, regardless of its parameter (PX4's rule)."""
 
 
 class Rule(NamedTuple):
     """One row of the table.
 
-    ``parameter`` is the field of ``Behaviour`` whose value chooses from ``actions``. With ``holds_first`` a
-    return or a landing begins after COM_FAIL_ACT_T in hold, so that a user can take over. ``user_may``: whether a
-    user may override it by selecting a mode; what stops the rotors is never overridden. ``phases`` are those in
-    which the failsafe counts.
+    ``parameter`` is the field of ``Behaviour`` that selects from ``actions``. With ``holds_first`` a return or a
+    landing begins after COM_FAIL_ACT_T in hold, so that a user can take over. ``allows_takeover`` is true if a user
+    may override the failsafe by selecting a mode; an action that stops the rotors is never overridden. ``phases`` are
+    those in which the failsafe applies.
     """
 
     failsafe: Failsafe
@@ -138,24 +137,24 @@ class Rule(NamedTuple):
     parameter: str
     actions: Mapping[int, Action]
     holds_first: bool
-    user_may: bool
+    allows_takeover: bool
     phases: frozenset[Phase]
 
 
 F, NOW, DELAYED = Failsafe, False, True
-NOBODY, USER = False, True
+NEVER, USER = False, True
 # fmt: off
 RULES = (
     Rule(F.NOT_FINITE, "State or controller output is not finite", "State and controller output are finite again",
-         "", {0: Action.BLIND}, NOW, NOBODY, FLIGHT),
+         "", {0: Action.BLIND}, NOW, NEVER, FLIGHT),
     Rule(F.STATE_STALE, "State is frozen or missing", "State is fresh again",
-         "", {0: Action.BLIND}, NOW, NOBODY, FLIGHT),
+         "", {0: Action.BLIND}, NOW, NEVER, FLIGHT),
     Rule(F.ATTITUDE, "Attitude is beyond its limits", "Attitude is within its limits again",
-         "attitude_failure_action", FAULT_ACTIONS, NOW, NOBODY, FLIGHT),
+         "attitude_failure_action", FAULT_ACTIONS, NOW, NEVER, FLIGHT),
     Rule(F.ROTOR, "A rotor does not follow its command", "All rotors follow their commands again",
          "rotor_failure_action", FAULT_ACTIONS, NOW, USER, FLIGHT),
     Rule(F.BATTERY_EMERGENCY, "Battery level is dangerously low", "Battery level has left emergency",
-         "low_battery_action", EMERGENCY_ACTIONS, DELAYED, NOBODY, FLIGHT),
+         "low_battery_action", EMERGENCY_ACTIONS, DELAYED, NEVER, FLIGHT),
     Rule(F.FENCE, "Geofence breached", "Inside the geofence again",
          "fence_action", FENCE_ACTIONS, DELAYED, USER, FLIGHT),
     Rule(F.POSITION_ERROR, "Position is far from its setpoint", "Position follows its setpoint again",
@@ -181,43 +180,43 @@ DOES_ALREADY: Mapping[Phase, Action] = {
     Phase.RETURN: Action.RETURN,
     Phase.LAND: Action.LAND,
 }
-"""What a phase amounts to: a failsafe that asks for no more changes nothing, so that actions only escalate."""
+"""Action equivalent to each phase: a failsafe with this or a less severe action does not end the phase."""
 
 STEERS = frozenset({Action.POSITION, Action.ALTITUDE, Action.HOLD, Action.RETURN, Action.LAND})
-"""Actions that fly in a mode of their own."""
+"""Actions that change the flight mode."""
 LINK_FAILSAFES = frozenset({Failsafe.MANUAL_LOST, Failsafe.OFFBOARD_LOST, Failsafe.GCS_LOST})
 
 BEYOND_REACH: Mapping[Failsafe, frozenset[Action]] = {
     Failsafe.POSITION_ERROR: frozenset({Action.POSITION, Action.HOLD, Action.RETURN}),
 }
-"""Actions that cannot be flown while a failsafe acts: who cannot keep a place cannot go home either."""
+"""Actions that cannot be flown while a failsafe is active: a vehicle that cannot hold its position cannot return."""
 
 
 def action_of(failsafe: Failsafe, behaviour: Behaviour) -> Action:
-    """Return what the parameters ask for; a value that the table does not have warns."""
+    """Return the action that the parameters select; a value that is not in the table selects a warning."""
     rule = RULE_OF[failsafe]
     value = int(getattr(behaviour, rule.parameter)) if rule.parameter else 0
     return rule.actions.get(value, Action.WARN)
 
 
-def opposes(failsafe: Failsafe, phase: Phase, behaviour: Behaviour) -> bool:
-    """Tell whether a failsafe, once it acts, would end a flight in ``phase`` to fly in another mode."""
+def conflicts_with(failsafe: Failsafe, phase: Phase, behaviour: Behaviour) -> bool:
+    """Return True if the failsafe's action would end a flight in ``phase`` for another mode."""
     action = action_of(failsafe, behaviour)
     if action in BEYOND_REACH.get(failsafe, frozenset()):
         action = Action.LAND
-    counts = phase in RULE_OF[failsafe].phases
-    return counts and action in STEERS and action > DOES_ALREADY.get(phase, Action.NONE)
+    applies = phase in RULE_OF[failsafe].phases
+    return applies and action in STEERS and action > DOES_ALREADY.get(phase, Action.NONE)
 
 
 class Demand(NamedTuple):
-    """An active failsafe and what it asks for at this moment."""
+    """An active failsafe and its present action."""
 
     failsafe: Failsafe
     action: Action
 
 
 class Decision(NamedTuple):
-    """What is to be done, and because of which failsafe (None: none is active)."""
+    """The action to carry out, and the failsafe that caused it (None if none is active)."""
 
     action: Action
     cause: Failsafe | None
@@ -227,22 +226,22 @@ NOTHING = Decision(Action.NONE, None)
 
 
 def decide(demands: Iterable[Demand], phase: Phase, sticks_are_live: bool, behaviour: Behaviour) -> Decision:
-    """Return the action for all that is active.
+    """Return the action for all active failsafes.
 
-    The most severe action wins, among equals the failsafe that stands higher in the table. It is then made
-    possible: without sticks there is no position mode, with the position lost no return. On the ground every
-    action is to disarm. What the vehicle does already, or more than that, is left alone.
+    The most severe action wins; among equals, the failsafe that is higher in the table. An action that cannot be flown
+    is replaced first: position mode without manual control, a return without position control. On the ground every
+    action above a warning disarms. In flight, an action no more severe than the present phase becomes a warning.
     """
-    counted = [d for d in demands if phase in RULE_OF[d.failsafe].phases and d.action > Action.NONE]
-    if not counted:
+    applicable = [d for d in demands if phase in RULE_OF[d.failsafe].phases and d.action > Action.NONE]
+    if not applicable:
         return NOTHING
     impossible: set[Action] = set() if sticks_are_live else {Action.POSITION, Action.ALTITUDE}
-    for demand in counted:
+    for demand in applicable:
         if demand.action > Action.WARN:
             impossible |= BEYOND_REACH.get(demand.failsafe, frozenset())
     without_sticks = max(Action.HOLD, action_of(Failsafe.MANUAL_LOST, behaviour))
     best = max(
-        (Demand(d.failsafe, _possible(d.action, impossible, without_sticks)) for d in counted),
+        (Demand(d.failsafe, _possible(d.action, impossible, without_sticks)) for d in applicable),
         key=lambda d: (d.action, PRIORITY[d.failsafe]),
     )
     if best.action > Action.WARN and phase is Phase.STANDING:

@@ -1,7 +1,7 @@
-"""Watches a flight: gathers what the detectors, links, battery and fence say, and what the failsafes make of it.
+"""Collect the conditions from detectors, links, battery and fence, and decide the failsafe action.
 
-No I/O and no clock. The autopilot calls ``update`` once per outer tick, ``evaluate`` if something is wrong, and carries
-out the action.
+No I/O and no clock. The autopilot calls ``update`` once per outer tick, ``evaluate`` if it returns conditions, and
+carries out the action.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from flightstack.commander.failsafe_step import (
     active_failsafes,
     failsafe_step,
     override,
-    renew,
+    restart,
 )
 from flightstack.commander.fault_detector import FaultDetector
 from flightstack.commander.fence_monitor import FenceMonitor
-from flightstack.commander.takeover import Takeovers, opponents
 from flightstack.commander.transitions import Event, Status
+from flightstack.commander.user_takeover import UserTakeover, conflicting_failsafes
 from flightstack.core.contract import FloatArray
 from flightstack.core.enums import STREAM_MODES, Mode
 from flightstack.guidance.fence import Fence
@@ -34,26 +34,26 @@ from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
 
 HOLD_AFTER_US = 50_000
-"""Age of a state from which on the loops rest: fed with what does not change, they would go to their limits."""
+"""Age of a state from which the control loops stop: with a constant input they would run to their limits."""
 
 
 class StateMonitor:
-    """Looks at the source of states once per outer tick."""
+    """Monitors the age of the state once per outer tick."""
 
     def __init__(self, source: StateSource) -> None:
         self._source = source
         self.is_new = True
-        """Whether the state has changed since the outer tick before."""
+        """True if the state has changed since the previous outer tick."""
         self.holds_rotors = False
-        """Whether the state must not be flown by: it is frozen or missing."""
+        """True if the state is frozen or missing, so that the rotor speeds are held."""
         self.is_stale = False
-        """Whether the newest state is too old, or frozen though its own speeds say that it must change."""
+        """True if the state is older than the limit, or frozen although its velocities and rates are not zero."""
 
     def update(self, time_us: int, moves_in_air: bool, limit_s: float) -> None:
-        """Find out whether the state is too old, or does not change although its own speeds say that it must.
+        """Update the flags; ``limit_s`` is the age from which the state is stale.
 
-        At rest on the ground, and in the calm at the end of a long hover, it may stay the same to the last bit.
-        ``limit_s`` is the age from which on it is stale.
+        A frozen state counts only if ``moves_in_air``: at rest on the ground, or after a long hover in calm air, the
+        state may be constant to the last bit.
         """
         fresh = self._source.freshness(time_us)
         age_us, frozen_us = fresh.age_us, fresh.frozen_us
@@ -78,11 +78,11 @@ EVENTS_OF_ACTION: dict[Action, tuple[Event, ...]] = {
     Action.DISARM: (Event.FORCE_DISARM,),
     Action.TERMINATE: (Event.TERMINATE,),
 }
-"""What a failsafe's action means to the commander: the first event that is not refused."""
+"""Events that carry out an action: the first one that is not refused."""
 
 
 class FailsafeMonitor:
-    """Holds what the detectors and failsafes remember."""
+    """Holds the state of detectors and failsafes."""
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class FailsafeMonitor:
         state: FloatArray,
         source: StateSource,
     ) -> None:
-        """Watch ``state`` (13,), which ``source`` writes in place; ``divisor`` inner ticks make an outer one."""
+        """Monitor ``state`` (13,), which ``source`` writes in place; ``divisor`` is inner ticks per outer tick."""
         self.links = LinkFacts()
         self.fence = FenceMonitor(behaviour)
         self.faults = FaultDetector(vehicle, behaviour, outer_hz, divisor, state)
@@ -101,16 +101,16 @@ class FailsafeMonitor:
         self.take_unmeasured = self.faults.take_unmeasured
         self.states = StateMonitor(source)
         self.position_is_controlled = False
-        """Whether the setpoint's place is flown to: not on the ground, nor while a stream gives attitudes."""
+        """True while the position setpoint is tracked: not on the ground, nor under attitude setpoints."""
         self.on_ground = True
-        """Whether the vehicle stands, or touches the ground without being found landed yet."""
+        """True if the vehicle is landed, or in ground contact before the land detector reports landed."""
         self.battery_level = 0
         self._reading: BatteryReading | None = None
         self._source = source
         self._state = state
         self._behaviour = behaviour
         self._memory = IDLE
-        self._takeovers = Takeovers()
+        self._user_takeover = UserTakeover()
         self._phase = Phase.DISARMED
         self._time_us = 0
 
@@ -118,11 +118,11 @@ class FailsafeMonitor:
         """Compile the fence, or load it from the cache."""
         self.fence.warm_up(self._state)
 
-    # ------------------------------------------------------------------ what is
+    # ------------------------------------------------------------------ state
 
     @property
     def active(self) -> tuple[Failsafe, ...]:
-        """Active failsafes in order of priority, those overridden by a user too."""
+        """Active failsafes in order of priority, including overridden ones."""
         return active_failsafes(self._memory)
 
     @property
@@ -133,12 +133,12 @@ class FailsafeMonitor:
 
     @property
     def decision(self) -> Decision:
-        """What the failsafes ask for, and the cause."""
+        """Action of the failsafes, and its cause."""
         return self._memory.decision
 
     def arming_facts(self, mode: Mode, has_state: bool) -> ArmingFacts:
-        """Return what the arming checks look at."""
-        self._watch_battery()
+        """Return the inputs of the arming checks."""
+        self._update_battery_level()
         finite = bool(np.isfinite(self._state).all())
         qx, qy = float(self._state[7]), float(self._state[8])
         breach = self.fence.text(self.fence.step(self._state))
@@ -157,53 +157,53 @@ class FailsafeMonitor:
             step_refusal=self._source.step_refusal,
         )
 
-    # ------------------------------------------------------------------ what is told
+    # ------------------------------------------------------------------ inputs
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
-        """Take new parameters, from the next outer tick on."""
+        """Set new parameters, from the next outer tick on."""
         self._behaviour = behaviour
         self.faults.set_behaviour(behaviour)
         self.fence.set_behaviour(behaviour)
         self._reading = None
 
     def set_fence(self, fence: Fence) -> None:
-        """Take the areas of a geofence that was checked; ``NO_FENCE`` for none."""
+        """Set the areas of a checked geofence; ``NO_FENCE`` for none."""
         self.fence.set_fence(fence)
 
     def armed(self) -> None:
-        """Forget what the detectors saw before: a flight begins."""
+        """Reset the detectors at the start of a flight."""
         self.faults.begin()
-        self._takeovers.begin_flight()
+        self._user_takeover.begin_flight()
 
     def refusal(self, phase: Phase) -> str | None:
-        """Return why a user may not fly in ``phase`` for a failsafe's sake, or None; once for each request."""
-        return self._takeovers.refusal(self._memory, phase, self._time_us, self._behaviour)
+        """Return the reason that a failsafe denies a user ``phase``, or None. Call once per request."""
+        return self._user_takeover.refusal(self._memory, phase, self._time_us, self._behaviour)
 
     def override(self, phase: Phase) -> None:
-        """A user flies in ``phase`` from now on: the failsafes that stood against it act no more."""
-        against = opponents(self._memory, phase, self._behaviour)
-        if Failsafe.FENCE in against:
-            self.fence.note_override()
-        self._memory = override(self._memory, against)
-        self._takeovers.clear()
+        """Override the failsafes that conflict with ``phase``, which a user has selected."""
+        conflicting = conflicting_failsafes(self._memory, phase, self._behaviour)
+        if Failsafe.FENCE in conflicting:
+            self.fence.record_override()
+        self._memory = override(self._memory, conflicting)
+        self._user_takeover.clear()
 
     def action_applied(self) -> None:
-        """The decision was carried out, and has ended the phase of flight of the last step."""
+        """Record that the decision was carried out and has ended the phase of flight of the last step."""
         if self.decision.cause is not None:
-            self._takeovers.record(self._phase, self.decision.cause)
+            self._user_takeover.record(self._phase, self.decision.cause)
 
-    # ------------------------------------------------------------------ time passes
+    # ------------------------------------------------------------------ ticks
 
     def update(
         self, time_us: int, status: Status, landed: bool, setpoint: FloatArray, row: FloatArray
     ) -> frozenset[Failsafe] | None:
-        """Advance by one outer tick; return what is wrong, or None when nothing is and nothing was.
+        """Advance by one outer tick; return the present conditions, or None if none holds and no failsafe is active.
 
-        ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop. A flight in which all is
-        well takes the short way through here, a hundred times a second.
+        ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop. A nominal tick returns
+        early: this runs at the outer rate.
         """
         self._time_us = time_us
-        self._watch_battery()
+        self._update_battery_level()
         armed, mode = status
         states, faults = self.states, self.faults
         states.update(time_us, armed and not landed and faults.moves, self._behaviour.stale_s)
@@ -224,19 +224,19 @@ class FailsafeMonitor:
         return conditions if conditions or entries else None
 
     def evaluate(self, conditions: frozenset[Failsafe], phase: Phase) -> tuple[Announcement, ...]:
-        """Let the failsafes act on what ``update`` returned; ``decision`` is what to do then."""
+        """Evaluate the failsafes for the conditions from ``update``; sets ``decision``."""
         self._phase = phase
         entry = self._memory.entries.get(Failsafe.FENCE)
-        if entry is not None and entry.overridden and self.fence.breach_grows:
-            self._memory = renew(self._memory, Failsafe.FENCE)
+        if entry is not None and entry.overridden and self.fence.has_breach_grown:
+            self._memory = restart(self._memory, Failsafe.FENCE)
         situation = Situation(self._time_us, phase, not self.links.manual_lost)
-        self._memory, said = failsafe_step(self._memory, conditions, situation, self._behaviour)
-        return said
+        self._memory, announcements = failsafe_step(self._memory, conditions, situation, self._behaviour)
+        return announcements
 
     def _conditions(self, breached: bool, mode: Mode) -> frozenset[Failsafe]:
-        """Return what is wrong now.
+        """Return the present conditions.
 
-        A stream that was lost in its mode stays lost until it is back, in whichever mode that ended.
+        A stream lost in its own mode stays a condition in the mode of the failsafe, until the stream is back.
         """
         links, entries = self.links, self._memory.entries
         flies_offboard = mode is Mode.OFFBOARD or Failsafe.OFFBOARD_LOST in entries
@@ -252,9 +252,9 @@ class FailsafeMonitor:
         present |= self.faults.failsafes()
         return frozenset(present.union(BATTERY_FAILSAFES[: self.battery_level]))
 
-    def _watch_battery(self) -> None:
+    def _update_battery_level(self) -> None:
         battery, b = self._source.battery, self._behaviour
-        if battery is self._reading:  # most of the time: it is read ten times a second
+        if battery is self._reading:  # the measurement comes less often than ticks
             return
         self._reading = battery
         remaining = battery.remaining if battery.valid else math.nan

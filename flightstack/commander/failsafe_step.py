@@ -1,9 +1,8 @@
-"""Failsafes over time: when each begins, acts, is overridden and ends, and what is said about it. Pure.
+"""State machine of the failsafes: begin, act, be overridden, end, with announcements. Pure.
 
-A failsafe begins with its condition and ends with it. The end of a condition is announced and undoes nothing: the
-vehicle goes on with what the failsafe chose until a user selects a mode, or it is disarmed. A user who selects
-a mode overrides what stands against it, if the table allows that (``takeover`` judges who is a user); whatever begins
-after that acts again.
+A failsafe is active while its condition holds. The end of a condition is announced and changes no mode: the vehicle
+continues the failsafe's action until a user selects a mode or disarms. Selecting a mode overrides the failsafes that
+conflict with it, if the table allows this (see ``user_takeover``); a failsafe that begins later acts again.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ from flightstack.core.enums import Severity
 from flightstack.params.behaviour import Behaviour
 
 CAN_WAIT = (Phase.TAKEOFF, Phase.MISSION, Phase.HOLD, Phase.GOTO, Phase.MANUAL, Phase.OFFBOARD)
-"""Phases in which a person or a plan flies, and may be given time to react."""
+"""Phases in which a failsafe may hold first, so that a user has time to react."""
 
 VERB: Mapping[Action, str] = {
     Action.POSITION: "position mode",
@@ -50,7 +49,7 @@ class Entry(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What is active, and what was decided last."""
+    """Active failsafes and the last decision."""
 
     entries: Mapping[Failsafe, Entry] = {}
     decision: Decision = NOTHING
@@ -64,7 +63,7 @@ class Announcement(NamedTuple):
 
 
 class Situation(NamedTuple):
-    """What decides beside the conditions."""
+    """Inputs of a step besides the conditions."""
 
     time_us: int
     phase: Phase
@@ -72,7 +71,7 @@ class Situation(NamedTuple):
 
 
 class Step(NamedTuple):
-    """Outcome of one step; ``memory.decision`` is what to do."""
+    """Outcome of one step; ``memory.decision`` is the action to carry out."""
 
     memory: Memory
     announcements: tuple[Announcement, ...]
@@ -84,15 +83,15 @@ IDLE = Memory()
 def failsafe_step(
     memory: Memory, conditions: frozenset[Failsafe], situation: Situation, behaviour: Behaviour
 ) -> Step:
-    """Advance by one outer tick with the conditions that hold now."""
+    """Advance by one outer tick with the present conditions."""
     if situation.phase is Phase.DISARMED or not (conditions or memory.entries):
         return Step(IDLE, ())
     time_us, phase = situation.time_us, situation.phase
-    said: list[Announcement] = []
+    announcements: list[Announcement] = []
     kept = {failsafe: entry for failsafe, entry in memory.entries.items() if failsafe in conditions}
     for failsafe in memory.entries:
         if failsafe not in conditions:
-            said.append(Announcement(Severity.NOTICE, RULE_OF[failsafe].ends))
+            announcements.append(Announcement(Severity.NOTICE, RULE_OF[failsafe].ends))
     begun = [rule.failsafe for rule in RULES if rule.failsafe in conditions and rule.failsafe not in kept]
     begun = [f for f in begun if action_of(f, behaviour) > Action.NONE and phase in RULE_OF[f].phases]
     entries = kept | {failsafe: Entry(time_us) for failsafe in begun}
@@ -105,15 +104,15 @@ def failsafe_step(
     escalates = decision.action > max(Action.WARN, memory.decision.action)
     for failsafe in begun:
         if not (escalates and failsafe is decision.cause):
-            said.append(Announcement(Severity.WARNING, RULE_OF[failsafe].begins))
+            announcements.append(Announcement(Severity.WARNING, RULE_OF[failsafe].begins))
     if escalates:
         waited_s = (time_us - entries[decision.cause].since_us) * 1e-6 if decision.cause else 0.0
-        said.append(_announce(decision, begun, waited_s, behaviour))
-    return Step(Memory(entries, decision), tuple(said))
+        announcements.append(_announce(decision, begun, waited_s, behaviour))
+    return Step(Memory(entries, decision), tuple(announcements))
 
 
 def _present_action(failsafe: Failsafe, entry: Entry, situation: Situation, behaviour: Behaviour) -> Action:
-    """Return what a failsafe asks for now: hold before it returns or lands, blind before it terminates."""
+    """Return the failsafe's present action: hold before a return or landing, held rotor speeds before termination."""
     action = action_of(failsafe, behaviour)
     elapsed_s = (situation.time_us - entry.since_us) * 1e-6
     if action is Action.BLIND:
@@ -131,7 +130,7 @@ def _waits(failsafe: Failsafe, elapsed_s: float, phase: Phase, behaviour: Behavi
 def _announce(
     decision: Decision, begun: Sequence[Failsafe], waited_s: float, behaviour: Behaviour
 ) -> Announcement:
-    """Tell what a failsafe does: with its beginning, or later when it acts after a wait."""
+    """Announce a failsafe's action, when it begins or when it acts after a wait."""
     assert decision.cause is not None
     begins, verb = RULE_OF[decision.cause].begins, VERB[decision.action]
     later = action_of(decision.cause, behaviour)
@@ -143,7 +142,7 @@ def _announce(
 
 
 def override(memory: Memory, overridden: Collection[Failsafe]) -> Memory:
-    """Return the memory after a user has selected a mode: what stood against it acts no more until it begins anew."""
+    """Return the memory after a user has selected a mode: ``overridden`` failsafes do not act until they restart."""
     entries = {
         failsafe: entry._replace(overridden=entry.overridden or failsafe in overridden)
         for failsafe, entry in memory.entries.items()
@@ -151,11 +150,11 @@ def override(memory: Memory, overridden: Collection[Failsafe]) -> Memory:
     return Memory(entries, Decision(Action.WARN, None) if entries else NOTHING)
 
 
-def renew(memory: Memory, failsafe: Failsafe) -> Memory:
-    """Return the memory without a failsafe: if its condition still holds, it begins anew."""
+def restart(memory: Memory, failsafe: Failsafe) -> Memory:
+    """Return the memory without ``failsafe``: if its condition still holds, it begins again."""
     return memory._replace(entries={f: entry for f, entry in memory.entries.items() if f is not failsafe})
 
 
 def active_failsafes(memory: Memory) -> tuple[Failsafe, ...]:
-    """Return the active failsafes, overridden ones too, in order of priority."""
+    """Return the active failsafes in order of priority, including overridden ones."""
     return tuple(sorted(memory.entries, key=lambda failsafe: -PRIORITY[failsafe]))

@@ -1,4 +1,4 @@
-"""The detectors of a flight, with all that they remember. No I/O, no clock."""
+"""The failure detectors of a flight with their state. No I/O, no clock."""
 
 from __future__ import annotations
 
@@ -34,35 +34,43 @@ FAULTS = (
 
 
 class FaultDetector:
-    """Looks at each row of the loops, and at state and setpoint once per outer tick."""
+    """Evaluates each row of the loops, and state and setpoint once per outer tick."""
 
     def __init__(
         self, vehicle: Vehicle, behaviour: Behaviour, outer_hz: float, divisor: int, state: FloatArray
     ) -> None:
-        """Watch ``state`` (13,), which is written in place; ``divisor`` inner ticks make an outer one."""
+        """Monitor ``state`` (13,), which is written in place; ``divisor`` is inner ticks per outer tick."""
         self._vehicle = vehicle
         self._state = state
         self._dt_s = 1.0 / outer_hz
         self._detectors: RecordArray = np.zeros(1, DETECTORS)
         self._rotors: RecordArray = np.zeros(1, ROTOR_SPEEDS)
-        self._nowhere = np.zeros(SETPOINT_SIZE)
+        self._no_error_setpoint = np.zeros(SETPOINT_SIZE)
         self._lags = rotor_lags(vehicle, self._dt_s / divisor)
         self._unmeasured: set[int] = set()
         self.found = 0
-        """Bits of ``detectors.detect``, of the newest look."""
+        """Bits of ``detectors.detect`` from the last update."""
         self.set_behaviour(behaviour)
         row = np.zeros(LoopRow.SIZE)
         self._follow = direct(follow_rotors, row, self._rotors, self._lags)
         self._detect = direct(
-            detect, state, self._nowhere, row, self._rotors, self._detectors, self._limits, False, self._dt_s
+            detect,
+            state,
+            self._no_error_setpoint,
+            row,
+            self._rotors,
+            self._detectors,
+            self._limits,
+            False,
+            self._dt_s,
         )
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
-        """Take new limits, from the next look on."""
+        """Set new limits, from the next update on."""
         self._limits = detector_limits(behaviour, self._vehicle)
 
     def begin(self) -> None:
-        """Forget what was seen before: a flight begins."""
+        """Reset all detectors at the start of a flight."""
         self._detectors[:] = np.zeros(1, DETECTORS)
         self._rotors[:] = np.zeros(1, ROTOR_SPEEDS)
         self._unmeasured.clear()
@@ -75,14 +83,14 @@ class FaultDetector:
     def update(
         self, setpoint: FloatArray, row: FloatArray, position_is_controlled: bool, on_ground: bool
     ) -> int:
-        """Advance by one outer tick; return the bits found.
+        """Advance by one outer tick; return the bits of ``detectors.detect``.
 
         ``setpoint`` (11,) and ``row`` (48,) are the newest of the outer and the inner loop. Position errors count only
-        while the position is controlled: not on the ground, nor while a stream gives attitudes.
+        while the position is controlled: not on the ground, nor under attitude setpoints.
         """
         if not position_is_controlled:
-            self._nowhere[:3] = self._state[:3]
-            setpoint = self._nowhere
+            self._no_error_setpoint[:3] = self._state[:3]
+            setpoint = self._no_error_setpoint
         self.found = self._detect(
             self._state, setpoint, row, self._rotors, self._detectors, self._limits, on_ground, self._dt_s
         )
@@ -90,16 +98,16 @@ class FaultDetector:
 
     @property
     def moves(self) -> bool:
-        """Whether the state's own speeds say that it must change."""
+        """True if the velocities and rates in the state are so large that the state must change."""
         return self.found & MOVING != 0
 
     @property
     def is_quiet(self) -> bool:
-        """Whether no fault was found."""
+        """True if no fault was found."""
         return not self.found & ~(MOVING | UNMEASURED)
 
     def take_unmeasured(self) -> list[int]:
-        """Return the rotors, from 1, whose speed is no longer measured; each once in a flight."""
+        """Return the rotors, from 1, whose speed is no longer measured; each one once per flight."""
         if not self.found & UNMEASURED:
             return []
         missing_s = self._rotors["missing"][0, : len(self._vehicle.rotors)]
@@ -108,5 +116,5 @@ class FaultDetector:
         return sorted(fresh)
 
     def failsafes(self) -> set[Failsafe]:
-        """Return the failsafes of what was found."""
+        """Return the failsafes of the faults found."""
         return {failsafe for bit, failsafe in FAULTS if self.found & bit}

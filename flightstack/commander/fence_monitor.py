@@ -1,4 +1,4 @@
-"""The geofence of a flight: its areas, the limits of the parameters around home, and a breach that a user overrode."""
+"""Geofence monitor: areas, limits around home, and the breach that a user has overridden."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceEvalua
 from flightstack.params.behaviour import Behaviour
 
 BREACH_GROWS_M = 5.0
-"""So much farther out, a fence that a user has overridden acts again."""
+"""Distance farther out at which an overridden fence acts again."""
 
 
 class FenceBreaches(NamedTuple):
-    """Breaches since the vehicle booted."""
+    """Breaches since boot."""
 
     number: int = 0
     latest_us: int = 0
@@ -24,7 +24,7 @@ class FenceBreaches(NamedTuple):
 
 
 class FenceMonitor(FenceEvaluator):
-    """A monitor that is set up anew whenever areas, parameters or home change."""
+    """A fence evaluator that is reconfigured when areas, parameters or home change."""
 
     def __init__(self, behaviour: Behaviour) -> None:
         super().__init__()
@@ -42,25 +42,25 @@ class FenceMonitor(FenceEvaluator):
         probe.step(state)
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
-        """Take new parameters."""
+        """Set new parameters."""
         self._behaviour = behaviour
         self._set_up()
 
     def set_fence(self, fence: Fence) -> None:
-        """Take the areas of a geofence that was checked; ``NO_FENCE`` for none."""
+        """Set the areas of a checked geofence; ``NO_FENCE`` for none."""
         self._fence_areas = fence
         self._set_up()
 
     def set_home(self, home_ned_m: tuple[float, float, float]) -> None:
-        """Measure distance and altitude from another home."""
+        """Set the home from which distance and altitude are measured."""
         self._home_ned_m = home_ned_m
         self._set_up()
 
     def _set_up(self) -> None:
         b = self._behaviour
-        brakes = (b.acceleration_m_s2, b.vertical_acceleration_m_s2) if b.fence_predicts else None
+        decelerations = (b.acceleration_m_s2, b.vertical_acceleration_m_s2) if b.fence_predicts else None
         self.configure(
-            self._fence_areas, b.fence_max_distance_m, b.fence_max_altitude_m, self._home_ned_m, brakes
+            self._fence_areas, b.fence_max_distance_m, b.fence_max_altitude_m, self._home_ned_m, decelerations
         )
 
     def update(self, state: FloatArray, time_us: int) -> bool:
@@ -74,11 +74,11 @@ class FenceMonitor(FenceEvaluator):
             self.breaches = FenceBreaches(number, latest_us, FenceBreach(flags))
         return flags != 0
 
-    def note_override(self) -> None:
-        """A user flies on outside the fence: remember how far out that was."""
+    def record_override(self) -> None:
+        """Record the margin at which a user overrides the fence."""
         self._overridden_margin_m = self.margin_m
 
     @property
-    def breach_grows(self) -> bool:
-        """Whether the vehicle is so much farther out than when a user overrode the fence that it acts again."""
+    def has_breach_grown(self) -> bool:
+        """True if the vehicle has moved far enough outward since the override for the fence to act again."""
         return self.margin_m < self._overridden_margin_m - BREACH_GROWS_M

@@ -1,4 +1,4 @@
-"""Whether a vehicle stands on the ground, and when it is disarmed there. Pure."""
+"""Automatic disarming on the ground: after a landing, or without a takeoff. Pure."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from flightstack.commander.transitions import Event
 from flightstack.params.behaviour import Behaviour
 
 OFF_GROUND_M = 0.05
-"""Distance above or below where the rotors began to lift from which on the vehicle is off the ground.
+"""Vertical distance from the start of the takeoff at which the vehicle is off the ground.
 
-The land detector finds that later, and below a roof or ledge perhaps not at all.
+The land detector reports this later, and below a roof or ledge perhaps not at all.
 """
 STANDING_M_S = 0.25
-"""Vertical speed up to which a vehicle may stand; PX4's LNDMC_Z_VEL_MAX."""
+"""Largest vertical speed of a vehicle on the ground; PX4's LNDMC_Z_VEL_MAX."""
 FALL_M_S, REST_S = 1.0, 0.5
-"""A vehicle beyond this vertical speed falls or rises, and is at rest after so long below it: at the top of a bounce it
-is slow for a moment."""
+"""A vehicle above this vertical speed falls or rises; it is at rest after this time below it, because the speed is low
+for a moment at the top of a bounce."""
 FARTHER_M, MORE_LIFT = 0.005, 0.01
-"""A takeoff makes progress when it is higher or lower than ever by so much, or asks for so much more thrust than ever,
-as share of the weight: integrators are slow. Noise sets few such records, and a vehicle that cannot rise none."""
+"""A takeoff makes progress if it exceeds its extreme heights by this distance, or its largest thrust by this share of
+the weight: integrators are slow. Noise exceeds them rarely, and a vehicle that cannot rise never."""
 
 
 class Standing(NamedTuple):
-    """What a vehicle does that the land detector has on the ground."""
+    """State of a landed vehicle."""
 
     goes_on: bool
-    """Whether its mode flies on after a landing, now or later."""
+    """True if the mode continues the flight after a landing, now or later."""
     lifts: bool
-    """Whether the loops fly it."""
+    """True if the control loops run."""
     down_m: float
     down_m_s: float
     lift: float
-    """Thrust that the loops ask for, as share of the weight."""
+    """Thrust setpoint of the loops, as share of the weight."""
 
 
 class _Takeoff(NamedTuple):
-    """A takeoff under way: where it began, and its records."""
+    """A takeoff in progress: where it began, and its extreme values."""
 
     stood_down_m: float
     least_down_m: float
@@ -45,7 +45,7 @@ class _Takeoff(NamedTuple):
 
 
 class GroundMonitor:
-    """Counts the time since arming, since the last landing, and since a takeoff last made progress."""
+    """Measures the time since arming, since the last landing, and since the last progress of a takeoff."""
 
     def __init__(self) -> None:
         self._since_us = 0
@@ -54,32 +54,32 @@ class GroundMonitor:
         self._fell_us: int | None = None
 
     def update(self, time_us: int, down_m_s: float) -> None:
-        """Take the vertical speed, armed or not; once per outer tick."""
+        """Take the vertical speed, armed or disarmed; once per outer tick."""
         if abs(down_m_s) > FALL_M_S:
             self._fell_us = time_us
 
     def disarmed_in_air(self, time_us: int) -> None:
-        """Note that the vehicle was disarmed in the air."""
+        """Record that the vehicle was disarmed in the air."""
         self._fell_us = time_us
 
     def is_at_rest(self, time_us: int) -> bool:
-        """Return whether the vehicle has neither fallen nor risen for a while."""
+        """Return True if the vehicle has neither fallen nor risen for ``REST_S``."""
         return self._fell_us is None or time_us - self._fell_us >= REST_S * 1e6
 
     def armed(self, time_us: int) -> None:
-        """Note the arming: a flight begins."""
+        """Record the arming at the start of a flight."""
         self._since_us, self._has_flown, self._takeoff = time_us, False, None
 
     def took_off_or_landed(self, time_us: int) -> None:
-        """Note a takeoff or a landing."""
+        """Record a takeoff or a landing."""
         self._has_flown, self._since_us = True, time_us
 
     def restart_timer(self, time_us: int) -> None:
-        """Count anew: the plan makes the vehicle wait on the ground."""
+        """Restart the timer while the plan makes the vehicle wait on the ground."""
         self._since_us = time_us
 
     def due_event(self, time_us: int, standing: Standing, behaviour: Behaviour) -> Event | None:
-        """Return the event that is due while the vehicle stands: disarming after a landing, or without a takeoff."""
+        """Return the disarming event that is due on the ground, after a landing or without a takeoff, or None."""
         if self._makes_progress(standing) or abs(standing.down_m_s) > STANDING_M_S:
             self._since_us = time_us
         after_landing = self._has_flown and not standing.goes_on
@@ -88,7 +88,7 @@ class GroundMonitor:
         return event if 0.0 < wait_s <= (time_us - self._since_us) * 1e-6 else None
 
     def _makes_progress(self, now: Standing) -> bool:
-        """Tell whether a takeoff begins, is off the ground, or sets a record of height, depth or thrust."""
+        """Return True if a takeoff begins, is off the ground, or exceeds its extreme heights or largest thrust."""
         before, self._takeoff = self._takeoff, None
         if not now.lifts:
             return False

@@ -1,7 +1,7 @@
-"""Arming and modes as a table: each event, what it needs, and where it leads. Pure.
+"""Transition table of arming and modes: each event, its conditions, and the resulting status. Pure.
 
-Read ``RULES`` from top to bottom: that is the whole behaviour. A need that is not met refuses the event with the
-sentence that stands beside it, and nothing changes. As with PX4, a disarmed vehicle takes any mode.
+``RULES`` is the complete behaviour. An unmet need refuses the event with the text of the need and changes nothing. As
+in PX4, a disarmed vehicle accepts any mode.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from flightstack.core.enums import Mode
 
 
 class Event(Enum):
-    """What can happen to mode and arming."""
+    """Events that change mode or arming."""
 
     ARM = auto()
     DISARM = auto()
@@ -35,7 +35,7 @@ class Event(Enum):
 
 
 class Facts(NamedTuple):
-    """What the commander knows of the vehicle when an event comes."""
+    """State of the vehicle at an event."""
 
     state_is_valid: bool
     upright: bool
@@ -68,7 +68,7 @@ class Need(Enum):
 
 
 def is_met(need: Need, status: Status, facts: Facts) -> bool:
-    """Tell whether ``need`` holds."""
+    """Return True if ``need`` is met."""
     return {
         Need.STATE: facts.state_is_valid,
         Need.UPRIGHT: facts.upright,
@@ -83,7 +83,7 @@ def is_met(need: Need, status: Status, facts: Facts) -> bool:
 
 
 class Rule(NamedTuple):
-    """One row: in these modes the event needs this and leads there (None: unchanged)."""
+    """One row: ``event`` needs ``modes`` and ``needs``; it sets ``armed`` and ``mode`` (None: unchanged)."""
 
     event: Event
     modes: tuple[Mode, ...]
@@ -93,13 +93,13 @@ class Rule(NamedTuple):
 
     @property
     def selects(self) -> bool:
-        """Whether a user selects a mode by it, which needs nothing while disarmed: arming then says what is missing."""
+        """True if the event selects a mode; while disarmed it has no needs, because arming checks them."""
         return self.event.name.startswith("SELECT_")
 
 
 FLYABLE = tuple(mode for mode in Mode if mode is not Mode.TERMINATION)
 TERMINATED = "the flight was terminated: reboot the vehicle first"
-"""Refusal of every event but one after a termination: it ends with the process."""
+"""Refusal of every event but TERMINATE after a termination, which lasts until a reboot."""
 
 RULES = (
     Rule(Event.ARM, FLYABLE, (Need.STATE, Need.UPRIGHT), True, None),
@@ -123,14 +123,14 @@ RULES = (
 
 
 class Outcome(NamedTuple):
-    """The status after an event, and why it was refused (None: it was not)."""
+    """The status after an event, and the reason of a refusal (None if accepted)."""
 
     status: Status
     refusal: str | None
 
 
 def transition(status: Status, facts: Facts, event: Event) -> Outcome:
-    """Apply ``event``: the first rule for it and the present mode decides."""
+    """Apply ``event`` by the first rule for it in the present mode."""
     for rule in RULES:
         if rule.event is not event or status.mode not in rule.modes:
             continue

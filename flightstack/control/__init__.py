@@ -1,1 +1,1 @@
-"""Control laws, mixer and the loops that join them."""
+"""Control laws, mixer and control loops."""

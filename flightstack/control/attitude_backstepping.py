@@ -13,13 +13,13 @@ from flightstack.params.vehicle import Vehicle
 
 
 class BacksteppingMemory(NamedTuple):
-    """The law has no memory; a NamedTuple of floats needs one field."""
+    """Placeholder: the law has no state, and a memory type needs at least one field."""
 
     unused: float
 
 
 class BacksteppingParams(NamedTuple):
-    """c1 … c6 [1/s] of the paper's Table III, inertias, and how much of ẋ_d and ẍ_d is fed in (0 or 1)."""
+    """c1 … c6 [1/s] of the paper's Table III, feed-forward of ẋ_d and ẍ_d (0 to 1), and inertias."""
 
     c1: float
     c2: float
@@ -51,7 +51,7 @@ BACKSTEPPING_TUNABLES = (
 def _axis(
     error: float, rate: float, rate_d: float, acceleration_d: float, c_outer: float, c_inner: float
 ) -> float:
-    """Angular acceleration demanded on one axis before the cancelling terms [rad/s²].
+    """Return the angular acceleration [rad/s²] of one axis, without the terms that cancel coupling.
 
     ε1 = x_d − x, ε2 = ẋ − ẋ_d − c1 ε1, and ε1 − c2 ε2 − c1 (c1 ε1 + ε2) + ẍ_d.
     """
@@ -64,13 +64,13 @@ def _axis(
 def attitude_backstepping_step(
     memory: BacksteppingMemory, inputs: AttitudeInputs, params: BacksteppingParams, dt_s: float
 ) -> tuple[BacksteppingMemory, Vector3]:
-    """Return the torque [N m, FRD]: the law of each axis, with coupling and gyroscopic torque cancelled."""
+    """Return the torque [N m, FRD]: the law of each axis, with inertial coupling and gyroscopic torque cancelled."""
     error, rates, reference = inputs.error_rad, inputs.rates_frd_rad_s, inputs.reference
     ff, fa = params.rate_feedforward, params.acceleration_feedforward
-    ahead, push = reference.rates_frd_rad_s, reference.acceleration_frd_rad_s2
-    roll = _axis(error.x, rates.x, ff * ahead.x, fa * push.x, params.c1, params.c2)
-    pitch = _axis(error.y, rates.y, ff * ahead.y, fa * push.y, params.c3, params.c4)
-    yaw = _axis(error.z, rates.z, ff * ahead.z, fa * push.z, params.c5, params.c6)
+    rates_d, acceleration_d = reference.rates_frd_rad_s, reference.acceleration_frd_rad_s2
+    roll = _axis(error.x, rates.x, ff * rates_d.x, fa * acceleration_d.x, params.c1, params.c2)
+    pitch = _axis(error.y, rates.y, ff * rates_d.y, fa * acceleration_d.y, params.c3, params.c4)
+    yaw = _axis(error.z, rates.z, ff * rates_d.z, fa * acceleration_d.z, params.c5, params.c6)
     ix, iy, iz = params.ix_kg_m2, params.iy_kg_m2, params.iz_kg_m2
     p, q, r = rates.x, rates.y, rates.z
     momentum = params.rotor_inertia_kg_m2 * inputs.relative_rotor_speed_rad_s  # J_r Ω_r
@@ -83,7 +83,7 @@ def attitude_backstepping_step(
 
 
 def read_backstepping_params(vehicle: Vehicle, gains: Table) -> BacksteppingParams:
-    """Read ``[attitude_backstepping]``: c = [c1 … c6] and the feed-forward switches."""
+    """Read ``[attitude_backstepping]``: c = [c1 … c6] and the feed-forward gains."""
     c = gains.numbers("c", 6, 0.0, 1e4)
     feedforward = (
         gains.number("rate_feedforward", 0.0, 1.0),

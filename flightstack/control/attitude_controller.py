@@ -1,8 +1,8 @@
-"""What an attitude controller is.
+"""Interface of attitude controllers.
 
-A controller is a value of ``AttitudeController`` in a module, announced by the entry point group
-``flightstack.attitude_controllers`` (``controller_loading``). A user's package adds one in its own
-``pyproject.toml`` and flies it with ``--controller name``; docs/tutorials/controller.md shows an example.
+A controller is a module-level ``AttitudeController``, registered in the entry point group
+``flightstack.attitude_controllers`` (``controller_loading``). A user's package registers its controller in its own
+``pyproject.toml`` and selects it with ``--controller name``; docs/tutorials/controller.md shows an example.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from flightstack.params.vehicle import Vehicle
 
 
 class AttitudeInputs(NamedTuple):
-    """What an attitude controller sees in one tick.
+    """Inputs of an attitude controller in one tick.
 
-    ``error_rad`` is the rotation from the vehicle to the reference as a rotation vector in the body frame: on
-    one axis it is the angle error itself. ``relative_rotor_speed_rad_s`` is the paper's Ω_r from the previous
-    tick. ``saturation`` is −1, 0 or +1 for each axis: the direction in which the mixer could not follow.
+    ``error_rad`` is the rotation from the vehicle to the reference as a rotation vector in the body frame; for a
+    rotation about one axis it is the angle error. ``relative_rotor_speed_rad_s`` is the paper's Ω_r from the previous
+    tick. ``saturation`` is −1, 0 or +1 for each axis: the direction in which the mixer was saturated.
     """
 
     attitude: Quaternion
@@ -41,13 +41,12 @@ class AttitudeController(NamedTuple):
     """An attitude controller: a pure step function and the types of its memory and parameters.
 
     ``step(memory, inputs, params, dt_s) -> (memory, torque)`` is marked ``@compiled``; torque is a
-    ``Vector3`` in N m about the body axes. ``memory_type`` and ``params_type`` are NamedTuples of floats
-    only, one at least; ``initial_memory`` is what a reset restores. ``read_params(vehicle, gains)`` makes the
-    parameters from the vehicle and the table ``[attitude_<name>]`` of the gains file, which is empty when
-    the file has none.
+    ``Vector3`` in N m about the body axes. ``memory_type`` and ``params_type`` are NamedTuples of at least one field,
+    floats only; a reset restores ``initial_memory``. ``read_params(vehicle, gains)`` returns the parameters from the
+    vehicle and the table ``[attitude_<name>]`` of the gains file, which is empty if the file has none.
 
-    ``tunables`` declares which fields of ``params_type`` are parameters of the vehicle, to be read and changed in
-    flight. Without it, all are, under names made of the controller's and the field's.
+    ``tunables`` declares the fields of ``params_type`` that are vehicle parameters, readable and writable in flight.
+    Without it, all fields are, with names derived from controller and field.
     """
 
     name: str
@@ -60,7 +59,7 @@ class AttitudeController(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Identify name and source text, so that a cached kernel is never an older controller's."""
+        """Name and source hash, so that a change of the controller invalidates its cached kernel."""
         digest = hashlib.sha256()
         for source in _sources(self.step.__module__):
             digest.update(source.read_bytes())
@@ -68,11 +67,11 @@ class AttitudeController(NamedTuple):
 
 
 def _sources(module_name: str) -> list[Path]:
-    """Return the module's file and, in a package, those beside and below it: the law may call into them."""
+    """Return the module's file and, in a package, all files of its directory tree, which the law may use."""
     module = sys.modules[module_name]
     if module.__file__ is None:
         return []
     path = Path(module.__file__)
-    if not module.__package__ or is_own(module_name):  # ours: the cache directory covers what it imports
+    if not module.__package__ or is_own(module_name):  # the key of the cache directory covers its imports
         return [path]
     return sorted(path.parent.rglob("*.py"))

@@ -21,7 +21,7 @@ class PidMemory(NamedTuple):
 
 
 class PidParams(NamedTuple):
-    """Gains in angular acceleration per error, which fit any vehicle; its inertia turns them into torque."""
+    """Gains in angular acceleration per error, independent of the vehicle; its inertia converts them to torque."""
 
     kp_roll: float
     kp_pitch: float
@@ -56,7 +56,7 @@ PID_TUNABLES = (
 
 @compiled
 def integrated(integral: float, error: float, saturation: float, dt_s: float) -> float:
-    """Integrate ``error`` unless the actuators cannot follow in its direction (anti-windup)."""
+    """Integrate ``error`` unless the actuators are saturated in its direction (anti-windup)."""
     return integral if error * saturation > 0.0 else integral + error * dt_s
 
 
@@ -64,26 +64,28 @@ def integrated(integral: float, error: float, saturation: float, dt_s: float) ->
 def attitude_pid_step(
     memory: PidMemory, inputs: AttitudeInputs, params: PidParams, dt_s: float
 ) -> tuple[PidMemory, Vector3]:
-    """Return the torque [N m, FRD]: PID on the angle error, the gyro for its derivative, and feed-forward."""
+    """Return the torque [N m, FRD]: PID on the angle error, with the rate error as derivative, and feed-forward."""
     error, rates, reference = inputs.error_rad, inputs.rates_frd_rad_s, inputs.reference
-    ahead, push = reference.rates_frd_rad_s, reference.acceleration_frd_rad_s2
+    rates_d, acceleration_d = reference.rates_frd_rad_s, reference.acceleration_frd_rad_s2
     memory = PidMemory(
         integrated(memory.roll, error.x, inputs.saturation.x, dt_s),
         integrated(memory.pitch, error.y, inputs.saturation.y, dt_s),
         integrated(memory.yaw, error.z, inputs.saturation.z, dt_s),
     )
     ff, fa = params.rate_feedforward, params.acceleration_feedforward
-    roll = params.kp_roll * error.x + params.ki_roll * memory.roll + params.kd_roll * (ff * ahead.x - rates.x)
+    roll = (
+        params.kp_roll * error.x + params.ki_roll * memory.roll + params.kd_roll * (ff * rates_d.x - rates.x)
+    )
     pitch = (
         params.kp_pitch * error.y
         + params.ki_pitch * memory.pitch
-        + params.kd_pitch * (ff * ahead.y - rates.y)
+        + params.kd_pitch * (ff * rates_d.y - rates.y)
     )
-    yaw = params.kp_yaw * error.z + params.ki_yaw * memory.yaw + params.kd_yaw * (ff * ahead.z - rates.z)
+    yaw = params.kp_yaw * error.z + params.ki_yaw * memory.yaw + params.kd_yaw * (ff * rates_d.z - rates.z)
     torque = Vector3(
-        params.ix_kg_m2 * (roll + fa * push.x),
-        params.iy_kg_m2 * (pitch + fa * push.y),
-        params.iz_kg_m2 * (yaw + fa * push.z),
+        params.ix_kg_m2 * (roll + fa * acceleration_d.x),
+        params.iy_kg_m2 * (pitch + fa * acceleration_d.y),
+        params.iz_kg_m2 * (yaw + fa * acceleration_d.z),
     )
     return memory, torque
 

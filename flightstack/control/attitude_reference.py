@@ -1,4 +1,4 @@
-"""Smooth the attitude target and differentiate it: the reference that the attitude controllers track."""
+"""Attitude reference: the filtered and differentiated attitude target that attitude controllers track."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ReferenceMemory(NamedTuple):
 
 
 class ReferenceParams(NamedTuple):
-    """Second-order filter: natural frequency (0: pass the target through) and limits."""
+    """Second-order filter: natural frequency (0: no filter), damping ratio and limits."""
 
     bandwidth_rad_s: float
     damping: float
@@ -63,10 +63,9 @@ def attitude_reference_step(
 ) -> tuple[ReferenceMemory, AttitudeReference]:
     """Advance the reference by ``dt_s`` towards ``target``.
 
-    The outer loop moves its target in steps; a stiff attitude loop would answer each with a saturated rotor.
-    The filter gives the rate and acceleration that feed-forward and backstepping (ẋ_d, ẍ_d) need. It is a
-    critically damped oscillator on the rotation group: error by the quaternion logarithm, exact integration
-    of the rotation over a step.
+    The outer loop's target changes in steps, which would saturate the rotors of a stiff attitude loop. The filter
+    provides the rate and acceleration for feed-forward and backstepping (ẋ_d, ẍ_d). It is a second-order system on
+    the rotation group: error by the quaternion logarithm, exact integration of the rotation over a step.
     """
     if params.bandwidth_rad_s <= 0.0:
         zero = Vector3(0.0, 0.0, 0.0)
@@ -92,7 +91,7 @@ def attitude_reference_step(
         ),
         params.max_rate_rad_s,
     )
-    acceleration = Vector3(  # what the limits left of it
+    acceleration = Vector3(  # after the limits
         (rates.x - memory.p_rad_s) / dt_s,
         (rates.y - memory.q_rad_s) / dt_s,
         (rates.z - memory.r_rad_s) / dt_s,
@@ -104,7 +103,7 @@ def attitude_reference_step(
 
 @compiled
 def in_body_frame(reference: AttitudeReference, attitude: Quaternion) -> AttitudeReference:
-    """Turn the reference's rates and acceleration from its own body frame into the vehicle's."""
+    """Rotate the reference's rates and acceleration from its own body frame to the vehicle's."""
     turn = quaternion_product(conjugate(attitude), reference.attitude)
     return AttitudeReference(
         reference.attitude,

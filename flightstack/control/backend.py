@@ -1,4 +1,4 @@
-"""Seam between the flight stack and the control loops that fly: Python, C on the host, or C on a target."""
+"""Interface of the control loops: implementations in Python, C on the host, and C on a target."""
 
 from __future__ import annotations
 
@@ -21,32 +21,32 @@ class ControlBackend(Protocol):
 
     name: str
     version: str
-    """What computes: implementation and version, for the log."""
+    """Implementation and version, for the log."""
     attitude_target: FloatArray
     """Array form of the latest ``AttitudeTarget``, shape (5,)."""
 
     @property
     def parameter_specs(self) -> Sequence[ParamSpec]:
-        """Declarations of all that may be tuned of the loops, with the defaults that vehicle and gains file give."""
+        """Declarations of the loops' parameters, with defaults from vehicle and gains file."""
 
     def get_parameter(self, name: str) -> float:
-        """Return a parameter as the loops use it; raise KeyError if they have none of that name."""
+        """Return the parameter's value in the loops; raise KeyError if unknown."""
 
     def set_parameter(self, name: str, value: float) -> None:
-        """Change a parameter, checked by its declaration, from the next tick on; raise KeyError if unknown."""
+        """Set a parameter from the next tick on; the caller checks its range. Raise KeyError if unknown."""
 
     def warm_up(self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray) -> None:
-        """Do what takes time once, on the arrays that ``step`` will get: the first tick must not take a second."""
+        """Prepare for the arrays that ``step`` will receive, so that the first tick meets its deadline."""
 
     def reset(self, state: FloatArray) -> None:
-        """Forget the past: integrators zero, the reference at the present attitude, at rest."""
+        """Reset the integrators to zero and the reference to the present attitude, at rest."""
 
     def set_attitude_target(self, target: FloatArray) -> None:
-        """Fly ``target``, shape (5,), in place of the outer loop's: call it once in each outer period.
+        """Use ``target``, shape (5,), instead of the outer loop's target. Call once per outer period.
 
-        The attitude moves there in a straight line over an outer period, as the outer loop's targets do; the
-        thrust is taken at once. ``step`` is then called with ``outer_due`` false; the outer loop's integrators
-        rest, and its next target starts from this one.
+        The attitude is interpolated over an outer period, as for the outer loop's targets; the thrust changes at once.
+        The caller then passes ``outer_due`` false to ``step``: the outer loop's integrators hold, and its next target
+        is interpolated from this one.
         """
 
     def step(
@@ -63,11 +63,11 @@ class ControlBackend(Protocol):
         """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""
 
     def close(self) -> None:
-        """End; nothing is called after it."""
+        """Release resources; no other call may follow."""
 
 
 class IdleRow:
-    """Writes rows of loops that rest."""
+    """Writes the row of a tick without control."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._speed = np.array([max(0.0, rotor.min_speed_rad_s) for rotor in vehicle.rotors])

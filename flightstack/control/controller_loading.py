@@ -1,4 +1,4 @@
-"""Find the installed attitude controllers and say in one sentence what is wrong with one that cannot fly."""
+"""Load installed attitude controllers, and report in one sentence why one cannot be used."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def controller_names() -> list[str]:
 
 
 def controller_error(name: str, problem: str) -> ConfigError:
-    """Return the error to raise for a controller; it lists the installed ones."""
+    """Return the error for a controller; its text lists the installed ones."""
     return ConfigError("--controller", name, f"{problem}; installed are {', '.join(controller_names())}")
 
 
@@ -39,7 +39,7 @@ def load_controller(name: str) -> AttitudeController:
         raise controller_error(name, f"several packages have a controller of this name: {owners}")
     try:
         controller = points[0].load()
-    except Exception as error:  # a user's package may fail in any way: report it as theirs
+    except Exception as error:  # a user's package may raise anything
         raise controller_error(name, f"{points[0].value} cannot be loaded: {_reason(error)}") from error
     problem = form_problem(name, controller)
     if problem is not None:
@@ -76,20 +76,20 @@ def _tunables_problem(controller: AttitudeController) -> str | None:
 
 
 def fields_of(kind: type) -> tuple[str, ...]:
-    """Return the names of a NamedTuple's fields; of anything else, none."""
+    """Return the field names of a NamedTuple, or an empty tuple for any other type."""
     names: tuple[str, ...] = getattr(kind, "_fields", ())
     return names
 
 
 def controller_tunables(controller: AttitudeController) -> tuple[Tunable, ...]:
-    """Return the declarations of the controller's parameters, made of its fields if it has none."""
+    """Return the declarations of the controller's parameters, derived from its fields if it has none."""
     if controller.tunables is not None:
         return controller.tunables
     return undeclared(controller.name, fields_of(controller.params_type))
 
 
 def controller_params(controller: AttitudeController, vehicle: Vehicle, gains: Table) -> FloatArray:
-    """Return the controller's parameters for a vehicle, from its table of the gains; raise ConfigError."""
+    """Return the controller's parameters for a vehicle, from its table of the gains file; raise ConfigError."""
     table = gains.optional_table(f"attitude_{controller.name}")
     try:
         values = np.array(controller.read_params(vehicle, table), dtype=np.float64)
@@ -104,18 +104,18 @@ def controller_params(controller: AttitudeController, vehicle: Vehicle, gains: T
 
 
 def compile_error(name: str, error: Exception) -> ConfigError:
-    """Return the error to raise when the controller's step does not compile: the reason and its line."""
+    """Return the error for a controller whose step does not compile, with reason and line."""
     place = re.search(r'File "([^"]+)", line (\d+)', _COLOURS.sub("", str(error)))
     where = f" ({place[1].rsplit('/', 1)[-1]}, line {place[2]})" if place else ""
     return controller_error(name, f"its step cannot be compiled: {_reason(error)}{where}")
 
 
 def _reason(error: Exception) -> str:
-    """Return the first line of an error's text that gives a reason: Numba puts its own position before it.
+    """Return the first line of an error's text after Numba's own position, without colours.
 
     Numba colours its text if colorama is installed.
     """
     lines = [line.strip() for line in _COLOURS.sub("", str(error)).splitlines()]
-    telling = [line for line in lines if line and not line.startswith("Failed in")]
-    reason = telling[0] if telling else type(error).__name__
+    reasons = [line for line in lines if line and not line.startswith("Failed in")]
+    reason = reasons[0] if reasons else type(error).__name__
     return reason if len(reason) <= _LONGEST_REASON else reason[: _LONGEST_REASON - 1] + "…"

@@ -1,4 +1,4 @@
-"""The parameters of the control loops: declarations on one side, the numbers that the kernels read on the other."""
+"""Parameters of the control loops: their declarations and the arrays that the kernels read."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from flightstack.params.tunable import Tunable, spec_of
 from flightstack.params.vehicle import Vehicle
 
 TILT = "MPC_TILTMAX_AIR"
-"""The one parameter of the loops that belongs to the vehicle's behaviour as well: degrees, in the kernels radians."""
+"""The only parameter of the loops that is also a field of ``Behaviour``; degrees, radians in the kernels."""
 TILT_AT = PositionParams._fields.index("max_tilt_rad")
 
 
 class LoopNumbers(NamedTuple):
-    """All numbers of the loops in the form that the kernels read, and the parameters that they are."""
+    """Parameter arrays that the kernels read, and the declarations of the parameters."""
 
     position: FloatArray
     reference: FloatArray
     controller: FloatArray
     specs: tuple[ParamSpec, ...]
-    """Declarations of all parameters; the defaults are what vehicle and gains file give."""
+    """Declarations of all parameters, with defaults from vehicle and gains file."""
 
 
 def loop_numbers(
     vehicle: Vehicle, controller: AttitudeController, gains: Table, max_tilt_rad: float
 ) -> LoopNumbers:
-    """Read the numbers of the loops from vehicle and gains file, and declare them; raise ConfigError.
+    """Read and declare the loops' parameters from vehicle and gains file; raise ConfigError.
 
-    The same for every backend: loops that run elsewhere are given these numbers at their start.
+    All backends use these values: loops on a target receive them at their start.
     """
     position = read_position_params(vehicle, gains, max_tilt_rad)
     reference = read_reference_params(gains)
@@ -63,7 +63,7 @@ def _specs(tunables: Sequence[Tunable], values: dict[str, float], group: str) ->
 
 
 def tilt_deg(tilt_rad: float) -> float:
-    """Return the shortest number of degrees that ``math.radians`` turns into ``tilt_rad``, to the last bit."""
+    """Return the shortest number of degrees that ``math.radians`` converts exactly to ``tilt_rad``."""
     exact = math.degrees(tilt_rad)
     return next(
         (short for digits in (9, 12) if math.radians(short := round(exact, digits)) == tilt_rad), exact
@@ -71,7 +71,7 @@ def tilt_deg(tilt_rad: float) -> float:
 
 
 class _Slot(NamedTuple):
-    """Where a parameter's number stands, and the integral that it multiplies: both live arrays of the kernels."""
+    """Position of a parameter in its array, and the integral that it multiplies; both arrays are the kernels' own."""
 
     values: FloatArray
     at: int
@@ -79,17 +79,17 @@ class _Slot(NamedTuple):
 
 
 class LoopParameters:
-    """Reads and writes the numbers of running loops by the names of their parameters."""
+    """Gets and sets parameters of running loops by name."""
 
     def __init__(self, numbers: LoopNumbers, controller: AttitudeController, memory: FloatArray) -> None:
-        """Take the arrays that the kernels read, and the controller's ``memory``: they are written in place."""
+        """Take the arrays that the kernels read, and the controller's ``memory``; both are written in place."""
         self.specs = numbers.specs
         self._slots = {TILT: _Slot(numbers.position, TILT_AT)}
         self._add(POSITION_TUNABLES, PositionParams._fields, numbers.position)
         self._add(REFERENCE_TUNABLES, ReferenceParams._fields, numbers.reference)
-        fields, remembered = fields_of(controller.params_type), list(fields_of(controller.memory_type))
+        fields, memory_fields = fields_of(controller.params_type), list(fields_of(controller.memory_type))
         for tunable in controller_tunables(controller):
-            at = remembered.index(tunable.integrates) if tunable.integrates else None
+            at = memory_fields.index(tunable.integrates) if tunable.integrates else None
             integral = None if at is None else memory[at : at + 1]
             self._slots[tunable.name] = _Slot(numbers.controller, fields.index(tunable.field), integral)
 
@@ -104,22 +104,24 @@ class LoopParameters:
         return tilt_deg(number) if name == TILT else number
 
     def set(self, name: str, value: float) -> None:
-        """Change a parameter, which the next tick uses; raise KeyError for an unknown name.
+        """Set a parameter from the next tick on; raise KeyError for an unknown name.
 
-        An integral that its gain multiplies is scaled, so that the product stays; one that holds its output already
-        (the position loop's) needs nothing. A proportional gain or a damping acts at once on the present error. To
-        set the value that stands changes no bit: whoever hears no answer sets again.
+        An integral that the gain multiplies is rescaled, so that the product is unchanged; the position loop's
+        integrals hold the product itself. Other gains act at once on the present error. Setting the present value
+        again changes no bit, because a client without a reply repeats its request.
         """
         slot = self._slots[name]
         number = math.radians(value) if name == TILT else float(value)
         if number == float(slot.values[slot.at]):
             return
         if slot.integral is not None:
-            slot.integral[0] = _carried_over(float(slot.integral[0]), float(slot.values[slot.at]), number)
+            slot.integral[0] = _rescaled_integral(
+                float(slot.integral[0]), float(slot.values[slot.at]), number
+            )
         slot.values[slot.at] = number
 
 
-def _carried_over(integral: float, old_gain: float, new_gain: float) -> float:
-    """Return the integral that gives with the new gain what it gave with the old one; zero if none can."""
+def _rescaled_integral(integral: float, old_gain: float, new_gain: float) -> float:
+    """Return the integral whose product with the new gain equals that with the old one; zero if there is none."""
     carried = integral * old_gain / new_gain if new_gain != 0.0 else 0.0
     return carried if math.isfinite(carried) else 0.0

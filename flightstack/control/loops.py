@@ -1,4 +1,4 @@
-"""The control loops in Python: outer kernel, inner kernel, and the backend that runs them."""
+"""Control loops in Python: outer kernel, inner kernel, and the backend that runs them."""
 
 from __future__ import annotations
 
@@ -25,9 +25,13 @@ from flightstack.control.position_pid import (
     position_pid_step,
 )
 from flightstack.core.arrays import (
+    achieved_wrench,
     attitude_target,
+    commanded_wrench,
     position_setpoint,
     store_attitude_target,
+    store_status,
+    store_wrenches,
     vehicle_state,
 )
 from flightstack.core.compiled import as_tuple, compiled, direct, specialise, store
@@ -53,17 +57,12 @@ REFERENCE_MEMORY_SIZE = 7
 REFERENCE_PARAMS_SIZE = 4
 
 REFERENCE_AT = LoopRow.REFERENCE_ATTITUDE.start
-WRENCH_AT = LoopRow.WRENCH.start
-ACHIEVED_AT = LoopRow.WRENCH_ACHIEVED.start
 COMMAND_AT = LoopRow.ROTOR_COMMAND.start
 SPEED_AT = LoopRow.ROTOR_SPEED.start
-STATUS_AT = LoopRow.STATUS
-YAW_AT = 9
-"""Of the setpoint."""
 INPUT_NOT_FINITE = LoopStatus.INPUT_NOT_FINITE
 OUTPUT_NOT_FINITE = LoopStatus.OUTPUT_NOT_FINITE
 
-# bound by ``specialise`` to the chosen controller
+# bound by ``specialise`` to the selected controller
 controller_step: Any = None
 ControllerMemory: Any = None
 ControllerParams: Any = None
@@ -73,7 +72,7 @@ CONTROLLER_PARAMS_SIZE = 0
 
 @compiled
 def all_finite(values: FloatArray | tuple[float, ...]) -> bool:
-    """Tell whether no value of an array or a flat tuple is infinite or not a number."""
+    """Return True if all values of an array or a flat tuple are finite."""
     for value in values:  # noqa: SIM110  # compiled code has no generators
         if not math.isfinite(value):
             return False
@@ -90,30 +89,34 @@ def outer_kernel(
     dt_s: float,
     target: FloatArray,
 ) -> None:
-    """Run the position loop: write ``memory`` (3,) and ``target`` (5,), or keep both as they were.
+    """Run the position loop: update ``memory`` (3,) and ``target`` (5,).
 
-    Both are kept if a number is not finite, or the yaw setpoint beyond ±10⁴ rad, where there is no sine of it.
-    ``last`` (48,) is the inner loop's row of the previous tick: it tells whether the mixer followed.
+    Both are unchanged if a number is not finite, or if the yaw setpoint is beyond ±10⁴ rad, the limit of ``sin_cos``.
+    ``last`` (48,) is the inner loop's row of the previous tick, which shows saturation of the mixer.
     """
-    if not (all_finite(state) and all_finite(setpoint) and abs(setpoint[YAW_AT]) <= LARGEST_ANGLE_RAD):
+    if not (
+        all_finite(state)
+        and all_finite(setpoint)
+        and abs(position_setpoint(setpoint).yaw_rad) <= LARGEST_ANGLE_RAD
+    ):
         return
-    advanced, aim = position_pid_step(
+    advanced, new_target = position_pid_step(
         PositionMemory(*as_tuple(memory, POSITION_MEMORY_SIZE)),
         vehicle_state(state),
         position_setpoint(setpoint),
         PositionParams(*as_tuple(params, POSITION_PARAMS_SIZE)),
         dt_s,
-        _lag(last[WRENCH_AT], last[ACHIEVED_AT], 1e-9),
+        _saturation_direction(commanded_wrench(last).thrust_n, achieved_wrench(last).thrust_n, 1e-9),
     )
-    if not (all_finite(aim.attitude) and math.isfinite(aim.thrust_n)):
+    if not (all_finite(new_target.attitude) and math.isfinite(new_target.thrust_n)):
         return
     store(memory, advanced)
-    store_attitude_target(target, aim)
+    store_attitude_target(target, new_target)
 
 
 @compiled
-def _lag(demanded: float, achieved: float, resolution: float) -> float:
-    """Direction in which the mixer could not follow: −1, 0 or +1."""
+def _saturation_direction(demanded: float, achieved: float, resolution: float) -> float:
+    """Return the direction of saturation: −1, 0 or +1."""
     if demanded - achieved > resolution:
         return 1.0
     if achieved - demanded > resolution:
@@ -129,47 +132,40 @@ def _store_reference(row: FloatArray, reference: AttitudeReference) -> None:
 
 
 @compiled
-def _store_wrenches(row: FloatArray, demanded: Wrench, achieved: Wrench) -> None:
-    row[WRENCH_AT] = demanded.thrust_n
-    store(row[WRENCH_AT + 1 :], demanded.torque_frd_n_m)
-    row[ACHIEVED_AT] = achieved.thrust_n
-    store(row[ACHIEVED_AT + 1 :], achieved.torque_frd_n_m)
-
-
-@compiled
 def _is_finite(v: Vector3) -> bool:
     return math.isfinite(v.x) and math.isfinite(v.y) and math.isfinite(v.z)
 
 
 @compiled
 def _saturation(row: FloatArray) -> Vector3:
-    """Saturation of each axis in the tick that wrote ``row``."""
+    """Return the saturation of each axis in ``row``."""
+    commanded, achieved = commanded_wrench(row).torque_frd_n_m, achieved_wrench(row).torque_frd_n_m
     return Vector3(
-        _lag(row[WRENCH_AT + 1], row[ACHIEVED_AT + 1], 1e-9),
-        _lag(row[WRENCH_AT + 2], row[ACHIEVED_AT + 2], 1e-9),
-        _lag(row[WRENCH_AT + 3], row[ACHIEVED_AT + 3], 1e-9),
+        _saturation_direction(commanded.x, achieved.x, 1e-9),
+        _saturation_direction(commanded.y, achieved.y, 1e-9),
+        _saturation_direction(commanded.z, achieved.z, 1e-9),
     )
 
 
 @compiled
 def _status(row: FloatArray) -> int:
     s = _saturation(row)
-    thrust = _lag(row[WRENCH_AT], row[ACHIEVED_AT], 1e-9)
+    thrust = _saturation_direction(commanded_wrench(row).thrust_n, achieved_wrench(row).thrust_n, 1e-9)
     return 2 * int(s.x != 0.0) + 4 * int(s.y != 0.0) + 8 * int(s.z != 0.0) + 16 * int(thrust != 0.0)
 
 
 def inner_layout(rotors: int, controller_memory: int, controller_params: int) -> np.dtype[np.void]:
-    """Layout of all that the inner loop keeps: one record, because each array that a call passes costs time."""
+    """Return the layout of the inner loop's memory: one record, because each array argument costs time."""
     return np.dtype(
         [
-            # what changes
+            # state
             ("last_target", "f8", (ATTITUDE_TARGET_SIZE,)),
             ("target", "f8", (ATTITUDE_TARGET_SIZE,)),
             ("reference", "f8", (REFERENCE_MEMORY_SIZE,)),
             ("controller", "f8", (controller_memory,)),
             ("last", "f8", (LoopRow.SIZE,)),
             ("work", "f8", (WORK_ROWS, rotors)),
-            # what is fixed
+            # parameters
             ("dt_s", "f8"),
             ("reference_params", "f8", (REFERENCE_PARAMS_SIZE,)),
             ("controller_params", "f8", (controller_params,)),
@@ -195,36 +191,36 @@ def inner_kernel(
 ) -> None:
     """Run reference filter, attitude controller and mixer; write ``row`` (48,) and update ``memory`` (1,).
 
-    ``memory`` is laid out by ``inner_layout``. Its ``last`` is the row of the previous tick: anti-windup and
-    Ω_r come from it, and it is repeated, with a status bit, when an input or what the controller makes of it
-    is not finite. The target moves in a straight line from ``last_target`` (the outer loop's tick before) to
-    ``target`` over an outer period, ``fraction`` of which has passed: its steps would shake the rotors at the
-    outer rate. A template: ``specialise`` binds the controller.
+    ``memory`` has the layout of ``inner_layout``. Its ``last`` is the row of the previous tick: it provides saturation
+    and Ω_r, and is repeated with a status bit if an input or a result is not finite. The target is interpolated from
+    ``last_target`` (previous outer tick) to ``target``; ``fraction`` is the elapsed part of the outer period. Without
+    interpolation, steps of the target would excite the rotors at the outer rate. This function is a template:
+    ``specialise`` binds the controller.
     """
     m = memory[0]
     target, last, dt_s = m["target"], m["last"], m["dt_s"]
     if not (all_finite(state) and all_finite(target)):
         store(row, last)
-        row[STATUS_AT] = INPUT_NOT_FINITE
+        store_status(row, INPUT_NOT_FINITE)
         return
     mixer = Mixer(
         m["allocation"], m["effectiveness"], m["low"], m["high"], m["spin"],
         m["middle"], m["reach"], m["is_inverse"], m["is_even"],
     )  # fmt: skip
     n = mixer.spin.size
-    now, aim = vehicle_state(state), attitude_target(target)
+    vehicle, desired = vehicle_state(state), attitude_target(target)
     filtered, reference = attitude_reference_step(
         ReferenceMemory(*as_tuple(m["reference"], REFERENCE_MEMORY_SIZE)),
-        blend(attitude_target(m["last_target"]).attitude, aim.attitude, fraction),
+        blend(attitude_target(m["last_target"]).attitude, desired.attitude, fraction),
         ReferenceParams(*as_tuple(m["reference_params"], REFERENCE_PARAMS_SIZE)),
         dt_s,
     )
-    reference = in_body_frame(reference, now.attitude)
+    reference = in_body_frame(reference, vehicle.attitude)
     inputs = AttitudeInputs(
-        now.attitude,
-        now.rates_frd_rad_s,
+        vehicle.attitude,
+        vehicle.rates_frd_rad_s,
         reference,
-        rotation_vector(quaternion_product(conjugate(now.attitude), reference.attitude)),
+        rotation_vector(quaternion_product(conjugate(vehicle.attitude), reference.attitude)),
         relative_rotor_speed(last[COMMAND_AT:], mixer.spin),
         _saturation(last),
     )
@@ -234,35 +230,35 @@ def inner_kernel(
         ControllerParams(*as_tuple(m["controller_params"], CONTROLLER_PARAMS_SIZE)),
         dt_s,
     )
-    # no call with the controller's own types: the callee's cache would name them, and fail when they are gone
-    sound = _is_finite(torque)
+    # pass no value of the controller's types to a function: its cache would refer to types that may be removed
+    is_valid = _is_finite(torque)
     for value in advanced:
-        sound = sound and math.isfinite(value)
-    if not sound:
+        is_valid = is_valid and math.isfinite(value)
+    if not is_valid:
         store(row, last)
-        row[STATUS_AT] = OUTPUT_NOT_FINITE
+        store_status(row, OUTPUT_NOT_FINITE)
         return
-    demanded = Wrench(aim.thrust_n, torque)
+    demanded = Wrench(desired.thrust_n, torque)
     achieved = mix(demanded, mixer, row[COMMAND_AT:], m["work"])
-    sound = math.isfinite(achieved.thrust_n) and _is_finite(achieved.torque_frd_n_m)
-    if not (sound and all_finite(row[COMMAND_AT : COMMAND_AT + n])):  # a sum overflowed
+    is_valid = math.isfinite(achieved.thrust_n) and _is_finite(achieved.torque_frd_n_m)
+    if not (is_valid and all_finite(row[COMMAND_AT : COMMAND_AT + n])):  # a sum overflowed
         row[:] = last
-        row[STATUS_AT] = OUTPUT_NOT_FINITE
+        store_status(row, OUTPUT_NOT_FINITE)
         return
     store(m["reference"], filtered)
     for index in range(CONTROLLER_MEMORY_SIZE):
         m["controller"][index] = advanced[index]
     store(row, state)
     _store_reference(row, reference)
-    _store_wrenches(row, demanded, achieved)
+    store_wrenches(row, demanded, achieved)
     row[COMMAND_AT + n : SPEED_AT] = 0.0
     store(row[SPEED_AT:], rotor_speed_rad_s)
-    row[STATUS_AT] = _status(row)
+    store_status(row, _status(row))
     store(last, row)
 
 
 class PythonLoops:
-    """The loops as compiled Python; implements ``ControlBackend``."""
+    """Control loops as compiled Python; implements ``ControlBackend``."""
 
     name = "python"
     version = f"Python, Numba {numba.__version__}"
@@ -283,19 +279,19 @@ class PythonLoops:
         self._initial_memory = np.array(controller.initial_memory, dtype=np.float64)
         layout = inner_layout(len(vehicle.rotors), self._initial_memory.size, numbers.controller.size)
         self._memory: RecordArray = np.zeros(1, layout)
-        kept = self._memory[0]
-        kept["dt_s"] = 1.0 / inner_hz
-        kept["reference_params"], kept["controller_params"] = numbers.reference, numbers.controller
+        record = self._memory[0]
+        record["dt_s"] = 1.0 / inner_hz
+        record["reference_params"], record["controller_params"] = numbers.reference, numbers.controller
         for name, values in mixer_for(vehicle)._asdict().items():
-            kept[name] = values
-        self.attitude_target: FloatArray = kept["target"]
-        self._last_target: FloatArray = kept["last_target"]
-        self._reference_memory: FloatArray = kept["reference"]
-        self._controller_memory: FloatArray = kept["controller"]
-        live = numbers._replace(reference=kept["reference_params"], controller=kept["controller_params"])
+            record[name] = values
+        self.attitude_target: FloatArray = record["target"]
+        self._last_target: FloatArray = record["last_target"]
+        self._reference_memory: FloatArray = record["reference"]
+        self._controller_memory: FloatArray = record["controller"]
+        live = numbers._replace(reference=record["reference_params"], controller=record["controller_params"])
         self._parameters = LoopParameters(live, controller, self._controller_memory)
         self.parameter_specs = numbers.specs
-        self._last: FloatArray = kept["last"]
+        self._last: FloatArray = record["last"]
         self._position_memory = np.zeros(POSITION_MEMORY_SIZE)
         self._idle = IdleRow(vehicle)
         self._kernel = specialise(
@@ -308,7 +304,7 @@ class PythonLoops:
             CONTROLLER_PARAMS_SIZE=numbers.controller.size,
         )
         self._compile(controller.name)
-        self._met: tuple[FloatArray, FloatArray] | None = None
+        self._last_arrays: tuple[FloatArray, FloatArray] | None = None
         self._bound: tuple[FloatArray, FloatArray] | None = None
         self._inner, self._outer = self._kernel, outer_kernel
 
@@ -319,27 +315,27 @@ class PythonLoops:
         try:
             speeds, row = np.zeros(MAX_ROTORS, np.float32), np.zeros(LoopRow.SIZE)
             self._kernel(state, 1.0, speeds, self._memory, row)
-        except Exception as error:  # the controller may be anyone's
+        except Exception as error:  # a user's controller may fail in any way
             raise compile_error(name, error) from error
         self.reset(state)
 
     def get_parameter(self, name: str) -> float:
-        """Return a parameter as the loops use it; raise KeyError if they have none of that name."""
+        """Return the parameter's value in the loops; raise KeyError if unknown."""
         return self._parameters.get(name)
 
     def set_parameter(self, name: str, value: float) -> None:
-        """Change a parameter from the next tick on; raise KeyError if unknown."""
+        """Set a parameter from the next tick on; raise KeyError if unknown."""
         self._parameters.set(name, value)
 
     def warm_up(self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray) -> None:
         """Compile the kernels for these arrays, or load them from the cache."""
         row = np.zeros(LoopRow.SIZE)
-        for _ in range(2):  # the second time, they know their arrays
+        for _ in range(2):  # the second step binds the kernels to the arrays
             self.step(state, setpoint, rotor_speed_rad_s, True, row)
         self.reset(state)
 
     def reset(self, state: FloatArray) -> None:
-        """Forget the past: integrators zero, the reference at the present attitude, at rest."""
+        """Reset the integrators to zero and the reference to the present attitude, at rest."""
         self._position_memory[:] = 0.0
         self._controller_memory[:] = self._initial_memory
         self._reference_memory[:4] = state[6:10]
@@ -351,7 +347,7 @@ class PythonLoops:
         self._last[:] = 0.0
 
     def set_attitude_target(self, target: FloatArray) -> None:
-        """Fly ``target``, shape (5,), in place of the outer loop's: call it once in each outer period."""
+        """Use ``target``, shape (5,), instead of the outer loop's target. Call once per outer period."""
         self._last_target[:] = self.attitude_target
         self._fraction = 0.0
         self.attitude_target[:] = target
@@ -367,7 +363,7 @@ class PythonLoops:
         """Run the outer loop if it is due, then the inner loop; write ``row`` with the rotor commands."""
         bound = self._bound
         if bound is None or state is not bound[0] or rotor_speed_rad_s is not bound[1]:
-            self._meet(state, rotor_speed_rad_s, setpoint, row)
+            self._bind(state, rotor_speed_rad_s, setpoint, row)
         if outer_due:
             self._last_target[:] = self.attitude_target
             self._fraction = 0.0
@@ -383,22 +379,22 @@ class PythonLoops:
         self._fraction += self._fraction_step
         self._inner(state, self._fraction, rotor_speed_rad_s, self._memory, row)
 
-    def _meet(self, state: FloatArray, speeds: FloatArray, setpoint: FloatArray, row: FloatArray) -> None:
-        """Take kernels for any arrays, and at the second meeting with the same ones those made for their types."""
+    def _bind(self, state: FloatArray, speeds: FloatArray, setpoint: FloatArray, row: FloatArray) -> None:
+        """Select the generic kernels for new arrays, or bind direct calls when the same arrays come a second time."""
         self._inner, self._outer = self._kernel, outer_kernel
         self._bound = None
-        if self._met is not None and state is self._met[0] and speeds is self._met[1]:
+        if self._last_arrays is not None and state is self._last_arrays[0] and speeds is self._last_arrays[1]:
             self._inner = direct(self._kernel, state, 1.0, speeds, self._memory, row)
             self._outer = direct(
                 outer_kernel, state, setpoint, self._position_memory, self._position_params, self._last,
                 self._outer_dt_s, self.attitude_target,
             )  # fmt: skip
             self._bound = state, speeds
-        self._met = state, speeds
+        self._last_arrays = state, speeds
 
     def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
         """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""
         self._idle.write(state, rotor_speed_rad_s, armed, row)
 
     def close(self) -> None:
-        """End: there is nothing to end."""
+        """Do nothing: there are no resources to release."""

@@ -1,6 +1,6 @@
-"""From a wrench to rotor speeds, for any rotor set, with limits: roll and pitch before thrust before yaw.
+"""Mixer: rotor speeds for a wrench, any rotor set, with limits; priority roll and pitch, then thrust, then yaw.
 
-Operations and their order are those of ``firmware/core/fs_mixer.c``.
+Operations and their order match ``firmware/core/fs_mixer.c``.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray, Vector3, Wrench
 from flightstack.params.vehicle import Vehicle
 
-UNLIMITED_SPEED_SQUARED = 1e12  # (rad/s)²: stands for "no limit" with ideal rotors, and stays finite
+UNLIMITED_SPEED_SQUARED = 1e12  # (rad/s)²: finite limit of ideal rotors, never reached
 ROUNDING = 1.0 / 2**53  # largest relative error of one operation
 WORK_ROWS = 3
 
 
 class Mixer(NamedTuple):
-    """Rotor geometry in the form that the mixer computes with, n rotors.
+    """Rotor geometry and limits of n rotors.
 
     ``allocation`` (n, 4) maps (thrust [N], torque FRD [N m]) to Ω² [rad²/s²]: the pseudo-inverse of
-    ``effectiveness`` (4, n), which is the least-norm choice when there are more than four rotors.
+    ``effectiveness`` (4, n), the least-norm solution for more than four rotors.
     ``low`` and ``high`` (n,) bound Ω²; ``spin`` (n,) is +1 for a rotor that turns clockwise from above.
     """
 
@@ -32,15 +32,15 @@ class Mixer(NamedTuple):
     low: FloatArray
     high: FloatArray
     spin: FloatArray
-    # what follows from these, by ``derived``
+    # computed from these by ``derived``
     middle: FloatArray
-    """Between ``low`` and ``high``, (n,)."""
+    """Mean of ``low`` and ``high``, (n,)."""
     reach: FloatArray
-    """From there to either, less some rounding, (n,)."""
+    """Distance from ``middle`` to either limit, less a rounding margin, (n,)."""
     is_inverse: float
-    """1: ``effectiveness`` undoes ``allocation`` but for rounding, and every rotor lifts; else 0."""
+    """1 if ``effectiveness`` inverts ``allocation`` except for rounding and every rotor adds thrust, else 0."""
     is_even: float
-    """1: all rotors have the same limits and the same share of the thrust; else 0."""
+    """1 if all rotors have the same limits and the same share of the thrust, else 0."""
 
 
 def mixer_for(vehicle: Vehicle) -> Mixer:
@@ -55,7 +55,7 @@ def mixer_for(vehicle: Vehicle) -> Mixer:
 def derived(
     allocation: FloatArray, effectiveness: FloatArray, low: FloatArray, high: FloatArray, spin: FloatArray
 ) -> Mixer:
-    """Return the mixer with these numbers."""
+    """Return the mixer for these arrays, with its derived fields."""
     middle = 0.5 * low + 0.5 * high
     reach = (0.5 * high - 0.5 * low) - 8.0 * ROUNDING * (abs(low) + abs(high))
     is_inverse = float(_is_inverse(allocation.tolist(), effectiveness.tolist()))
@@ -64,7 +64,7 @@ def derived(
 
 
 def _is_inverse(allocation: list[list[float]], effectiveness: list[list[float]]) -> bool:
-    """Tell whether effectiveness times allocation is the identity but for rounding, and every rotor lifts."""
+    """Return True if effectiveness times allocation is the identity up to rounding, and every rotor adds thrust."""
     if not all(shares[0] > 0.0 for shares in allocation):
         return False
     for row, effects in enumerate(effectiveness):
@@ -79,15 +79,15 @@ def _is_inverse(allocation: list[list[float]], effectiveness: list[list[float]])
 
 
 def _is_same(values: FloatArray) -> bool:
-    """Tell whether all numbers are the same but for rounding."""
+    """Return True if all numbers are equal except for rounding."""
     return bool((abs(values[0] - values) <= 16.0 * ROUNDING * abs(values[0])).all())
 
 
 @compiled
-def _share_out(wrench: Wrench, mixer: Mixer, work: FloatArray) -> tuple[bool, bool]:
+def _allocate(wrench: Wrench, mixer: Mixer, work: FloatArray) -> tuple[bool, bool]:
     """Write each rotor's part of roll and pitch, of yaw, and of roll, pitch and thrust, without limits.
 
-    Returns whether no rotor comes near a limit, and whether one is beyond or next to it before there is any yaw.
+    Return two flags: no rotor is near a limit; a rotor is at or beyond a limit even without yaw.
     """
     base, turn, lift = work[0], work[1], work[2]
     torque, is_free, is_thrust_limited = wrench.torque_frd_n_m, True, False
@@ -105,9 +105,9 @@ def _share_out(wrench: Wrench, mixer: Mixer, work: FloatArray) -> tuple[bool, bo
 
 @compiled
 def _limit_even(thrust_n: float, mixer: Mixer, work: FloatArray) -> tuple[float, float]:
-    """Limit roll and pitch, then thrust, for rotors that are alike; return the scale of the first and the thrust.
+    """Limit roll and pitch, then thrust, for identical rotors; return the scale of roll and pitch, and the thrust.
 
-    The rotor that roll and pitch ask most of and the one that they ask least of decide for all.
+    The rotors with the largest and the smallest part of roll and pitch determine both.
     """
     base, lift = work[0], work[2]
     share, low, high = mixer.allocation[0, 0], mixer.low[0], mixer.high[0]
@@ -127,7 +127,7 @@ def _limit_even(thrust_n: float, mixer: Mixer, work: FloatArray) -> tuple[float,
 
 @compiled
 def _yaw_scale(mixer: Mixer, work: FloatArray) -> float:
-    """Return the share of yaw, in [0, 1], that the rest leaves room for."""
+    """Return the share of yaw, in [0, 1], that fits within the limits."""
     turn, lift = work[1], work[2]
     scale = 1.0
     for i in range(mixer.low.size):
@@ -146,7 +146,7 @@ def _signed_root(square: float) -> float:
 
 @compiled
 def _largest_scale(base: FloatArray, direction: FloatArray, low: FloatArray, high: FloatArray) -> float:
-    """Largest k in [0, 1] for which low ≤ base + k·direction ≤ high holds for every rotor."""
+    """Return the largest k in [0, 1] for which low ≤ base + k·direction ≤ high holds for every rotor."""
     scale = 1.0
     for i in range(base.size):
         step = direction[i]
@@ -158,10 +158,10 @@ def _largest_scale(base: FloatArray, direction: FloatArray, low: FloatArray, hig
 
 @compiled
 def _fit_roll_pitch(speed_squared: FloatArray, mixer: Mixer) -> float:
-    """Scale the roll-pitch part so that some thrust brings it between the limits; return the scale in [0, 1].
+    """Scale the roll-pitch part so that some thrust brings it within the limits; return the scale in [0, 1].
 
-    Rotor i allows the thrusts from (low − b)/a to (high − b)/a, a being its share of a newton. There is a
-    common one when no rotor's least is above another's most; a > 0 for any vehicle that hovers.
+    Rotor i allows thrusts from (low − b)/a to (high − b)/a, where b is its roll-pitch part and a its Ω² per newton. A
+    common thrust exists if no rotor's minimum exceeds another's maximum; a > 0 for any vehicle that hovers.
     """
     scale = 1.0
     n = speed_squared.size
@@ -179,7 +179,7 @@ def _fit_roll_pitch(speed_squared: FloatArray, mixer: Mixer) -> float:
 
 @compiled
 def _fit_thrust(base: FloatArray, thrust_n: float, mixer: Mixer) -> float:
-    """Thrust nearest to ``thrust_n`` that keeps every rotor within its limits beside the roll-pitch part."""
+    """Return the thrust nearest to ``thrust_n`` that keeps every rotor, with its roll-pitch part, within its limits."""
     least, most = -math.inf, math.inf
     for i in range(base.size):
         per_newton = mixer.allocation[i, 0]
@@ -191,7 +191,7 @@ def _fit_thrust(base: FloatArray, thrust_n: float, mixer: Mixer) -> float:
 
 @compiled
 def _fit(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: FloatArray) -> Wrench:
-    """Mix where rotors are not alike, or effectiveness does not undo allocation."""
+    """Mix for rotors that differ, or if effectiveness does not invert allocation."""
     n = mixer.low.size
     base, yaw = work[0], work[1]
     torque = wrench.torque_frd_n_m
@@ -216,17 +216,17 @@ def _fit(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: Floa
 
 @compiled
 def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: FloatArray) -> Wrench:
-    """Write the rotor speeds that come nearest to ``wrench``; return the wrench that they make.
+    """Write the rotor speeds nearest to ``wrench``; return the wrench that they achieve.
 
-    ``rotor_speed_rad_s`` has room for the rotors; ``work``, shape (``WORK_ROWS``, n), is scratch space. Torque about
-    roll and pitch is served first (they keep the vehicle upright), then thrust, then yaw with what is left. With
-    ideal rotors Ω² may be negative: the speed then carries the sign.
+    ``rotor_speed_rad_s`` has at least n elements; ``work``, shape (``WORK_ROWS``, n), is scratch space. Torque about
+    roll and pitch has priority (it keeps the vehicle upright), then thrust, then yaw. With ideal rotors Ω² may be
+    negative: the speed then has its sign.
 
-    Where effectiveness undoes allocation the wrench achieved is known without multiplying it out.
+    If effectiveness inverts allocation, the achieved wrench follows from the scales without a multiplication.
     """
     if mixer.is_inverse == 0.0:
         return _fit(wrench, mixer, rotor_speed_rad_s, work)
-    is_free, is_thrust_limited = _share_out(wrench, mixer, work)
+    is_free, is_thrust_limited = _allocate(wrench, mixer, work)
     tilt_scale, thrust_n, yaw_scale = 1.0, wrench.thrust_n, 1.0
     if not is_free:
         if is_thrust_limited:
@@ -247,7 +247,7 @@ def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: Float
 
 @compiled
 def relative_rotor_speed(rotor_speed_rad_s: FloatArray, spin: FloatArray) -> float:
-    """Ω_r of the paper: counter-clockwise minus clockwise rotor speeds [rad/s]."""
+    """Return Ω_r of the paper: counter-clockwise minus clockwise rotor speeds [rad/s]."""
     total = 0.0
     for i in range(spin.size):
         total -= spin[i] * rotor_speed_rad_s[i]

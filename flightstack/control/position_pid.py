@@ -1,4 +1,4 @@
-"""Position and altitude control: the outer loop, from a trajectory point to attitude and thrust."""
+"""Position and altitude control: the outer loop, from a position setpoint to attitude and thrust."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ POSITION_TUNABLES = (
     Tunable("min_thrust_n", "POS_THR_MIN", 0.0, 1e3, "N", "Least thrust that the position loop asks for"),
     Tunable("max_thrust_n", "POS_THR_MAX", 0.0, 1e3, "N", "Largest thrust that the position loop asks for"),
 )  # fmt: skip
-"""What may be tuned of ``PositionParams``; the largest tilt is MPC_TILTMAX_AIR, in degrees."""
+"""Tunable fields of ``PositionParams``; the largest tilt is MPC_TILTMAX_AIR, in degrees."""
 
 
 @compiled
@@ -77,13 +77,13 @@ def position_pid_step(
     dt_s: float,
     thrust_saturation: float = 0.0,
 ) -> tuple[PositionMemory, AttitudeTarget]:
-    """Return the attitude and the thrust that accelerate the vehicle along the setpoint.
+    """Return the attitude and the thrust that track the setpoint.
 
-    PID on position in NED with feed-forward; the desired specific force f = a − g is turned into roll and
+    PID on position in NED with feed-forward; the desired specific force f = a − g is converted to roll and
     pitch by inverting eq. 7 (NED signs corrected): θ = atan2(−f_x', −f_z), φ = atan2(f_y', √(f_x'² + f_z²)),
-    f' in the frame turned by the yaw setpoint. Thrust carries the weight at the present tilt. Integrators
-    stop while tilt or thrust is at its limit, or while the mixer could not deliver the thrust
-    (``thrust_saturation``: −1 more, +1 less than demanded in the last tick).
+    f' in the frame rotated by the yaw setpoint. Thrust is compensated for the present tilt. Integrators hold while
+    tilt or thrust is at its limit, or while the mixer is saturated in thrust (``thrust_saturation``: the last
+    tick achieved more (−1) or less (+1) than demanded).
     """
     north, east = _horizontal_demand(memory, state, setpoint, params)
     z, vz = state.position_ned_m.z, state.velocity_ned_m_s.z
@@ -94,9 +94,9 @@ def position_pid_step(
         + params.kd_z * (setpoint.velocity_ned_m_s.z - vz)
         + memory.z
     )
-    lift = params.gravity_m_s2 - down  # specific force upwards
+    lift = params.gravity_m_s2 - down  # upward specific force
     most, least = params.max_thrust_n / params.mass_kg, params.min_thrust_n / params.mass_kg
-    # the vertical integrator stops only in the direction that cannot be followed, here or in the mixer
+    # the vertical integrator holds only in the direction of saturation, here or in the mixer
     at_top = lift >= most or thrust_saturation > 0.0
     at_bottom = lift <= least or thrust_saturation < 0.0
     vertical_free = not (at_top and error_z < 0.0) and not (at_bottom and error_z > 0.0)
@@ -121,11 +121,11 @@ def position_pid_step(
 def _attitude_along(
     forward: float, right: float, upward: float, half_yaw_sine: float, half_yaw_cosine: float
 ) -> Quaternion:
-    """Return yaw, then pitch and roll that turn the thrust along (forward, right, upward), ``upward`` positive.
+    """Return the attitude with this yaw whose thrust axis is along (forward, right, upward), ``upward`` positive.
 
-    With θ = atan2(−forward, upward) and φ = atan2(right, level), level = √(forward² + upward²), tangents of the half
-    angles are −forward / (level + upward) and right / (whole + level), where nothing cancels, and one scale makes
-    sines and cosines of them.
+    With θ = atan2(−forward, upward) and φ = atan2(right, level), level = √(forward² + upward²), the tangents of the
+    half angles are −forward / (level + upward) and right / (whole + level), without cancellation. One common scale
+    converts them to sines and cosines.
     """
     level_square = forward * forward + upward * upward
     level, whole = math.sqrt(level_square), math.sqrt(right * right + level_square)
@@ -146,7 +146,7 @@ def _attitude_along(
 def _target_for(
     north: float, east: float, lift: float, yaw_rad: float, state: VehicleState, params: PositionParams
 ) -> AttitudeTarget:
-    # below half the weight the direction of a falling vehicle's thrust would swing about: bound it
+    # below half the weight, the thrust direction of a falling vehicle is ill-conditioned: bound it
     upward = max(lift, 0.5 * params.gravity_m_s2)
     half_sine, half_cosine = sin_cos(0.5 * yaw_rad)
     cos_yaw, sin_yaw = half_cosine * half_cosine - half_sine * half_sine, 2.0 * half_sine * half_cosine
@@ -161,8 +161,8 @@ def _target_for(
 def read_position_params(vehicle: Vehicle, gains: Table, max_tilt_rad: float) -> PositionParams:
     """Read ``[position]`` and ``[altitude]``.
 
-    Horizontal gains are accelerations (1/s², 1/s³, 1/s). ``[altitude] convention = "paper"`` means ΣΩ² per
-    metre, turned into acceleration by b/m; ``"acceleration"`` takes them as they are.
+    Horizontal gains are accelerations per error (1/s², 1/s³, 1/s). ``[altitude] convention = "paper"`` means ΣΩ² per
+    metre, converted to acceleration by b/m; ``"acceleration"`` uses the same units as the horizontal gains.
     """
     position, altitude = gains.table("position"), gains.table("altitude")
     scale = 1.0

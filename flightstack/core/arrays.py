@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from flightstack.core.compiled import compiled
+from flightstack.core.compiled import compiled, store
 from flightstack.core.contract import (
     AttitudeTarget,
     FloatArray,
+    LoopRow,
     PositionSetpoint,
     Quaternion,
     Vector3,
     VehicleState,
+    Wrench,
 )
+
+_WRENCH, _ACHIEVED, _STATUS = LoopRow.WRENCH.start, LoopRow.WRENCH_ACHIEVED.start, LoopRow.STATUS
 
 
 @compiled
@@ -57,6 +61,31 @@ def store_attitude_target(out: FloatArray, target: AttitudeTarget) -> None:
     """Write an ``AttitudeTarget`` in its array form to ``out``, shape (5,)."""
     q = target.attitude
     out[0], out[1], out[2], out[3], out[4] = q.w, q.x, q.y, q.z, target.thrust_n
+
+
+@compiled
+def commanded_wrench(row: FloatArray) -> Wrench:
+    """Read the wrench that the loops commanded from a row, shape (48,); see ``LoopRow``."""
+    return Wrench(row[_WRENCH], Vector3(row[_WRENCH + 1], row[_WRENCH + 2], row[_WRENCH + 3]))
+
+
+@compiled
+def achieved_wrench(row: FloatArray) -> Wrench:
+    """Read the wrench that the mixer achieved from a row, shape (48,)."""
+    return Wrench(row[_ACHIEVED], Vector3(row[_ACHIEVED + 1], row[_ACHIEVED + 2], row[_ACHIEVED + 3]))
+
+
+@compiled
+def store_wrenches(row: FloatArray, commanded: Wrench, achieved: Wrench) -> None:
+    """Write both wrenches to a row, shape (48,)."""
+    store(row[_WRENCH:], (commanded.thrust_n, *commanded.torque_frd_n_m))
+    store(row[_ACHIEVED:], (achieved.thrust_n, *achieved.torque_frd_n_m))
+
+
+@compiled
+def store_status(row: FloatArray, status: int) -> None:
+    """Write the status bits of ``LoopStatus`` to a row, shape (48,)."""
+    row[_STATUS] = status
 
 
 @compiled

@@ -1,1 +1,1 @@
-"""From modes and missions to the setpoints of the outer loop."""
+"""Guidance: setpoints of the outer loop from modes and missions."""

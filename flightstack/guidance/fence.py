@@ -1,7 +1,7 @@
-"""The geofence in flight: is the vehicle inside, by how much, and could it still stop inside.
+"""Geofence: margins and breaches of the present or the predicted stopping position.
 
 Inclusion areas are in groups (MAVLink): the vehicle must be inside all areas of at least one group, and outside every
-exclusion area. Ground stations use one group for all, so that it must be inside every inclusion area, as with PX4.
+exclusion area. Ground stations use one group for all areas: the vehicle must be inside every one, as in PX4.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from flightstack.core.portable_math import distance
 from flightstack.plan import FenceShape, MissionItem, fence_shape
 
 HYSTERESIS_M = 1.0
-"""How far inside a limit the vehicle must be for a breach of it to end, so that it does not flicker."""
+"""Margin at which a breach of a limit ends, so that the breach does not chatter."""
 
 LIMITS = np.dtype(
     [
         ("distance", "f8"),  # from home, m; 0 none
         ("altitude", "f8"),  # above home, m; 0 none
         ("home", "f8", 3),  # m NED
-        ("deceleration", "f8"),  # to look ahead with, m/s²; 0 to evaluate the present position only
+        ("deceleration", "f8"),  # for the prediction, m/s²; 0 to evaluate the present position only
         ("vertical_deceleration", "f8"),
     ]
 )
@@ -40,7 +40,7 @@ NO_MARGIN = math.inf
 
 
 class FenceBreach(IntFlag):
-    """Which limits of the geofence are broken."""
+    """Limits of the geofence that are breached."""
 
     NONE = 0
     OUTSIDE = 1
@@ -86,10 +86,10 @@ def area_margin(areas: RecordArray, vertices: FloatArray, index: int, north_m: f
 def fence_margins(
     areas: RecordArray, vertices: FloatArray, groups: int, north_m: float, east_m: float
 ) -> tuple[float, float]:
-    """Return by how much a place is inside the inclusion areas and outside the exclusion areas [m].
+    """Return the margins of a position to the inclusion areas and to the exclusion areas [m].
 
-    Negative when it is not; infinite where there are no such areas. Exact for one area; where several overlap, a
-    bound on the distance, of the right sign.
+    Negative if breached; infinite without such areas. Exact for one area; for several that overlap, a bound on the
+    distance with the right sign.
     """
     outside_m = math.inf
     inside_m = math.inf if groups == 0 else -math.inf
@@ -106,8 +106,8 @@ def fence_margins(
 
 
 @compiled
-def _stops_at(position: float, velocity: float, deceleration: float) -> float:
-    """Return where a motion ends that is slowed down from now on."""
+def _stopping_position(position: float, velocity: float, deceleration: float) -> float:
+    """Return the stopping position under constant deceleration."""
     return position + velocity * abs(velocity) / (2.0 * deceleration)
 
 
@@ -120,10 +120,10 @@ def fence_step(
     state: FloatArray,
     breach: RecordArray,
 ) -> None:
-    """Find the margins and breaches of one outer tick.
+    """Compute margins and breaches for one outer tick.
 
-    ``state`` (13,) is the vehicle's; ``limits`` (1,) holds ``LIMITS``, ``breach`` (1,) ``BREACH``. A state that is
-    not finite keeps the flags.
+    ``state`` (13,) is the vehicle's; ``limits`` (1,) holds ``LIMITS``, ``breach`` (1,) ``BREACH``. If the state is
+    not finite, the flags are unchanged.
     """
     limit, found = limits[0], breach[0]
     north_m, east_m, down_m = state[0], state[1], state[2]
@@ -131,7 +131,7 @@ def fence_step(
         speed = distance(state[3], state[4])
         ahead_s = speed / (2.0 * limit["deceleration"])
         north_m, east_m = north_m + state[3] * ahead_s, east_m + state[4] * ahead_s
-        down_m = _stops_at(down_m, state[5], limit["vertical_deceleration"])
+        down_m = _stopping_position(down_m, state[5], limit["vertical_deceleration"])
     if not (math.isfinite(north_m) and math.isfinite(east_m) and math.isfinite(down_m)):
         return
     home, margins = limit["home"], found["margins"]
@@ -152,23 +152,23 @@ def fence_step(
 
 
 class Fence:
-    """The areas of a geofence, in metres from the origin of the local frame."""
+    """Areas of a geofence, in metres from the origin of the local frame."""
 
     def __init__(self, shape: FenceShape) -> None:
         self.shape = shape
 
     @classmethod
     def from_items(cls, items: Sequence[MissionItem], frame: LocalFrame) -> Fence:
-        """Make the fence of items that ``plan.check_fence`` accepted; no items, no areas."""
+        """Create the fence from items that ``plan.check_fence`` accepted."""
         return cls(fence_shape(items, frame.origin))
 
     @property
     def is_empty(self) -> bool:
-        """Whether there are no areas, so that every place is inside."""
+        """True without areas: every position is inside."""
         return not len(self.shape.areas)
 
     def margins(self, north_m: float, east_m: float) -> tuple[float, float]:
-        """Return by how much a place is inside the inclusion areas, and outside the exclusion areas [m]."""
+        """Return the margins of a position to the inclusion areas and to the exclusion areas [m]."""
         inside_m, outside_m = fence_margins(
             self.shape.areas, self.shape.vertices, self.shape.groups, north_m, east_m
         )
@@ -185,7 +185,7 @@ def _no_breach() -> RecordArray:
 
 
 class FenceEvaluator:
-    """Watches the vehicle; ``flags`` and ``margin_m`` are those of the last step. No I/O, no clock."""
+    """Evaluates the fence; ``flags`` and ``margin_m`` are from the last step. No I/O, no clock."""
 
     def __init__(self) -> None:
         self._limits: RecordArray = np.zeros(1, LIMITS)
@@ -200,10 +200,10 @@ class FenceEvaluator:
         home_ned_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
         decelerations_m_s2: tuple[float, float] | None = None,
     ) -> None:
-        """Take a fence and limits (GF_MAX_HOR_DIST, GF_MAX_VER_DIST; 0 for none), both measured from home.
+        """Set a fence and limits (GF_MAX_HOR_DIST, GF_MAX_VER_DIST; 0 for none), both measured from home.
 
-        ``decelerations_m_s2``, horizontal and vertical and above 0, make a breach of what the vehicle could no
-        longer avoid by braking (GF_PREDICT). A breach under way goes on if it is one of the new limits too.
+        With ``decelerations_m_s2``, horizontal and vertical and above 0, a predicted stopping position outside is a
+        breach too (GF_PREDICT). A present breach continues if it also breaks the new limits.
         """
         self.fence = fence
         shape = fence.shape
@@ -212,7 +212,7 @@ class FenceEvaluator:
         self.is_active = not fence.is_empty or max_distance_m > 0.0 or max_altitude_m > 0.0
 
     def step(self, state: FloatArray) -> int:
-        """Look at ``state`` (13,), once per outer tick; return the flags of ``FenceBreach``."""
+        """Evaluate ``state`` (13,), once per outer tick; return the flags of ``FenceBreach``."""
         if not self.is_active:
             self._breach["flags"] = 0
             return 0
@@ -221,18 +221,18 @@ class FenceEvaluator:
 
     @property
     def flags(self) -> FenceBreach:
-        """The limits that are broken."""
+        """Breached limits."""
         return FenceBreach(int(self._breach["flags"][0]))
 
     @property
     def margin_m(self) -> float:
-        """Distance to the nearest limit [m]: negative when broken, infinite when there is none."""
+        """Distance to the nearest limit [m]: negative if breached, infinite without limits."""
         return float(self._breach["margins"].min()) if self.is_active else NO_MARGIN
 
     def refusal(self, north_m: float, east_m: float, altitude_m: float = 0.0) -> str | None:
-        """Return why the vehicle may not be at a place (altitude above home), as the end of a sentence, or None.
+        """Return why a position (altitude above home) is not allowed, as the end of a sentence, or None.
 
-        For arming, takeoff and goto: "the vehicle" or "the target" " is outside the geofence".
+        Used for arming, takeoff and goto: the subject is "the vehicle" or "the target".
         """
         breach = self._at(north_m, east_m, altitude_m)
         if breach is None:
@@ -240,15 +240,15 @@ class FenceEvaluator:
         return self.text(int(breach["flags"])) or None
 
     def way_refusal(self, here: tuple[float, float, float], there: tuple[float, float, float]) -> str | None:
-        """Return why the vehicle may not go straight to a place (north, east, altitude above home), or None.
+        """Return why the straight path to a position (north, east, altitude above home) is not allowed, or None.
 
         A vehicle outside a limit may go to any position that does not increase the violation.
         """
-        present, wanted = self._at(*here), self._at(*there)
-        if present is None or wanted is None:
+        present, target = self._at(*here), self._at(*there)
+        if present is None or target is None:
             return "is nowhere"
-        no_worse = wanted["margins"] >= present["margins"]
-        broken, present_flags = int(wanted["flags"]), int(present["flags"])
+        no_worse = target["margins"] >= present["margins"]
+        broken, present_flags = int(target["flags"]), int(present["flags"])
         for limit in range(4):
             if broken & present_flags & 1 << limit and no_worse[limit]:
                 broken &= ~(1 << limit)
@@ -260,7 +260,7 @@ class FenceEvaluator:
         return "is beyond an edge of the geofence" if segments_outside else None
 
     def _at(self, north_m: float, east_m: float, altitude_m: float) -> Record | None:
-        """Return the ``BREACH`` of a position without looking ahead, or None if it is not finite."""
+        """Return the ``BREACH`` of a position without prediction, or None if it is not finite."""
         state, breach = np.zeros(STATE_SIZE), _no_breach()
         limits = self._limits.copy()
         limits["deceleration"] = limits["vertical_deceleration"] = 0.0
@@ -271,7 +271,7 @@ class FenceEvaluator:
         return breach[0]
 
     def text(self, flags: int) -> str:
-        """Return what ``flags`` mean, as the end of a sentence: "is outside the geofence"; empty for none."""
+        """Return ``flags`` as the end of a sentence, such as "is outside the geofence"; empty for none."""
         distance_m, altitude_m = self._limits["distance"][0], self._limits["altitude"][0]
         parts = {
             FenceBreach.OUTSIDE: "outside the geofence",
@@ -279,5 +279,5 @@ class FenceEvaluator:
             FenceBreach.TOO_HIGH: f"more than {altitude_m:g} m above home (GF_MAX_VER_DIST)",
             FenceBreach.TOO_FAR: f"more than {distance_m:g} m from home (GF_MAX_HOR_DIST)",
         }
-        said = [text for flag, text in parts.items() if flags & flag]
-        return f"is {' and '.join(said)}" if said else ""
+        texts = [text for flag, text in parts.items() if flags & flag]
+        return f"is {' and '.join(texts)}" if texts else ""

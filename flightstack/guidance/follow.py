@@ -1,8 +1,8 @@
-"""Move the reference along a streamed setpoint: any of position, velocity and acceleration, within limits.
+"""Move the reference along streamed setpoints of position, velocity and acceleration, within limits.
 
-A position alone is approached as a waypoint is (``trajectory``). With a velocity or an acceleration beside it the
-setpoint is a point of the sender's own trajectory, and the reference follows it closely. Without a position
-the reference is moved by velocity or acceleration.
+A position alone is approached like a waypoint (``trajectory``). With a velocity or an acceleration, the position is a
+point of the sender's trajectory, and the reference tracks it closely. Without a position, the reference integrates
+the velocity or acceleration.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from flightstack.guidance.trajectory import (
     clipped,
 )
 
-# Closer than the approach of a waypoint: an acceleration that is not fed forward leaves 1/12 s² of it as error.
+# Faster than the waypoint approach: an acceleration without feed-forward causes an error of 1/12 s² times itself.
 FOLLOW_POLE_RAD_S = 6.0
 LEASH_M = 3.0
-"""How far a reference without a position may lead the vehicle: farther, the vehicle cannot follow it."""
+"""Largest distance between vehicle and a reference without a position setpoint, so that the vehicle can follow."""
 YAW_LEASH_RAD = 0.8
 
 
 @compiled
 def _pole(acceleration_m_s2: float, jerk_m_s3: float) -> float:
-    """Pole of following a position: the jerk limit must leave room for it."""
+    """Return the pole of position tracking, bounded by the jerk limit."""
     return max(POLE_RAD_S, min(FOLLOW_POLE_RAD_S, jerk_m_s3 / acceleration_m_s2))
 
 
@@ -74,7 +74,7 @@ def follow_horizontally(
         wx, wy = wx + dx * scale, wy + dy * scale
     elif has_acceleration and not has_velocity:
         wx, wy = t.vx, t.vy
-    # an acceleration is fed forward as a velocity that asks for it, which the top speed bounds too
+    # feed the acceleration forward as a velocity increment, so that the top speed bounds it too
     wx, wy = clipped(wx + fx / pole, wy + fy / pole, speed_m_s)
     ax, ay = clipped(pole * (wx - t.vx), pole * (wy - t.vy), limit)
     jx, jy = clipped(3.0 * pole * (ax - t.ax), 3.0 * pole * (ay - t.ay), limits.jerk_m_s3)
@@ -123,8 +123,8 @@ def follow_heading(
 ) -> tuple[float, float]:
     """Return the reference's next heading and its rate.
 
-    A heading is turned to the short way round, a rate fed forward if given too; a rate alone turns the reference, which
-    never leads the vehicle's ``present_rad`` by more than it can catch up; without either the turning stops.
+    A heading is approached by the shorter turn, with a given rate as feed-forward. A rate alone turns the reference,
+    which leads the vehicle's ``present_rad`` by at most ``YAW_LEASH_RAD``. Without either, the rotation stops.
     """
     wanted = _or_zero(yaw_rate_rad_s)
     has_heading = math.isfinite(yaw_rad)
@@ -141,5 +141,5 @@ def follow_heading(
 
 @compiled
 def leashed(value_m: float, present_m: float) -> float:
-    """Bound a coordinate of a reference that has no position of its own to the vehicle's neighbourhood."""
+    """Bound a coordinate of a reference without a position setpoint to ``LEASH_M`` from the vehicle."""
     return min(max(value_m, present_m - LEASH_M), present_m + LEASH_M)

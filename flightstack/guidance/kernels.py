@@ -1,4 +1,4 @@
-"""Guidance compiled: one kernel for the modes that fly to goals, one for those that follow a stream."""
+"""Compiled guidance: one kernel for modes with goals, one for modes with streamed setpoints."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from flightstack.core.geometry import blend, euler_from_quaternion
 from flightstack.core.portable_math import sin_cos
 from flightstack.guidance.land_detector import DESCENT_M_S, LandMemory, land_detector_step, lift_share
 from flightstack.guidance.manual import manual_step
-from flightstack.guidance.mission import into_ground, mission_goal, mission_step
+from flightstack.guidance.mission import mission_goal, mission_step, with_landing_descent
 from flightstack.guidance.mode_target import RETURN, advance_return, target_goal
 from flightstack.guidance.offboard import attitude_step, point_step
 from flightstack.guidance.params import GuidanceParams
@@ -42,10 +42,10 @@ TRAJECTORY_SIZE = 11
 GUIDANCE_PARAMS_SIZE = len(GuidanceParams._fields)
 LAND_MEMORY_SIZE = 4
 LEAD_M = 0.5
-"""How far below a vehicle that does not sink the reference sinks."""
+"""Largest distance of the reference below a vehicle that does not sink."""
 PRESS_1_S, PRESSED_LIFT = 7.0, 0.45
-"""Downward acceleration asked of such a vehicle, for its lack of sink rate, until the lift is this share of the weight.
-It takes the thrust away whatever the gains are: a vehicle in the air then sinks."""
+"""Downward acceleration setpoint of such a vehicle per missing sink rate, until the lift is this share of the weight.
+It reduces the thrust independently of the gains: a vehicle in the air then sinks."""
 
 
 @compiled
@@ -54,8 +54,8 @@ def _limits(params: GuidanceParams) -> TrajectoryLimits:
 
 
 @compiled
-def _waiting(last: Trajectory, reference: Trajectory, state: VehicleState) -> Trajectory:
-    """Return the reference, which waits for a vehicle that does not sink with it."""
+def _limit_sink_lead(last: Trajectory, reference: Trajectory, state: VehicleState) -> Trajectory:
+    """Return the reference, limited to ``LEAD_M`` below a vehicle that does not sink with it."""
     t = reference
     lowest_m = max(last.z, state.position_ned_m.z + LEAD_M)
     if t.z <= lowest_m or state.velocity_ned_m_s.z >= 0.5 * t.vz:
@@ -85,7 +85,7 @@ def _finish(
     dt_s: float,
     setpoint: FloatArray,
 ) -> None:
-    """Keep the reference, write the setpoint, and let the land detector see both."""
+    """Store the reference, write the setpoint, and advance the land detector."""
     pressed_m_s2 = position_setpoint(setpoint).acceleration_ned_m_s2.z - last.az
     spare_m_s2 = pressed_m_s2 + (lift - PRESSED_LIFT) * GRAVITY_M_S2
     store(trajectory, reference)
@@ -100,7 +100,7 @@ def _finish(
 def rest_kernel(
     state_array: FloatArray, trajectory: FloatArray, land: FloatArray, setpoint: FloatArray
 ) -> None:
-    """Put reference and setpoint at the vehicle's position, at rest, on the ground; not at a state of NaNs."""
+    """Set reference and setpoint to the vehicle's position, at rest, landed; ignore a state that is not finite."""
     for value in state_array:
         if not np.isfinite(value):
             return
@@ -115,7 +115,7 @@ def rest_kernel(
 
 @compiled
 def levelling_kernel(last: FloatArray, thrust_n: float, fraction: float, target: FloatArray) -> None:
-    """Write the attitude target, shape (5,), at ``fraction`` of the way from ``last`` to level, with this thrust."""
+    """Write the attitude target, shape (5,), interpolated by ``fraction`` from ``last`` to level, with this thrust."""
     q = attitude_target(last).attitude
     sine, cosine = sin_cos(0.5 * euler_from_quaternion(q).z)
     store_attitude_target(
@@ -140,7 +140,7 @@ def goal_kernel(
 ) -> None:
     """Advance guidance by one outer tick; write the setpoint (11,) and update the memories in place.
 
-    Nothing moves while the state is not finite: the loops then hold their output and set a status bit.
+    A state that is not finite changes nothing: the loops hold their output and set a status bit.
     """
     for value in state_array:
         if not np.isfinite(value):
@@ -157,9 +157,9 @@ def goal_kernel(
         if mode == RETURN:
             advance_return(a, state, params)
         goal = target_goal(mode, a, params)
-    goal = into_ground(goal, state.position_ned_m.z, params)
+    goal = with_landing_descent(goal, state.position_ned_m.z, params)
     lift = lift_share(state, attitude_target(last_target).thrust_n, params.weight_n)
-    reference = _waiting(last, trajectory_step(last, goal, _limits(params), dt_s), state)
+    reference = _limit_sink_lead(last, trajectory_step(last, goal, _limits(params), dt_s), state)
     _finish(last, reference, state, trajectory, land, lift, reference.vz, dt_s, setpoint)
 
 
@@ -176,9 +176,9 @@ def stream_kernel(
     setpoint: FloatArray,
     target: FloatArray,
 ) -> None:
-    """As ``goal_kernel``, for OFFBOARD, POSITION and ALTITUDE; ``stream`` is what was received (``setpoints``).
+    """Like ``goal_kernel``, for OFFBOARD, POSITION and ALTITUDE; ``stream`` is the record of ``setpoints``.
 
-    An offboard attitude or rate goes to ``target`` (5,), which the loops take in place of the outer loop's.
+    An offboard attitude or rate is written to ``target`` (5,), which the loops use instead of the outer loop's.
     """
     for value in state_array:
         if not np.isfinite(value):
@@ -196,6 +196,6 @@ def stream_kernel(
             reference = point_step(last, s, state, params, limits, dt_s)
         else:
             reference = manual_step(last, s["sticks"], state, mode == POSITION, params, limits, dt_s)
-        reference = _waiting(last, reference, state)
+        reference = _limit_sink_lead(last, reference, state)
         descent_m_s = reference.vz
     _finish(last, reference, state, trajectory, land, lift, descent_m_s, dt_s, setpoint)

@@ -1,14 +1,14 @@
-"""Decide whether the vehicle stands on the ground, from motion, thrust and what guidance asks for.
+"""Land detector: ground contact and landing from motion, thrust and the descent setpoint.
 
 The stages are those of PX4's MulticopterLandDetector:
 
-* *Contact*: guidance descends, the thrust carries much less than the weight, and yet the vehicle does not sink. It is
-  then levelled with hardly any thrust, so that a vehicle in the air falls, and leaves the stage at once.
-* *Rest* (PX4's "maybe landed"): contact has lasted. The loops stop, so that nothing works against the ground.
-* *Landed*: since contact the vehicle has neither had thrust nor fallen for a while.
+* *Contact*: guidance descends and the thrust is much less than the weight, but the vehicle does not sink. It is then
+  levelled with little thrust, so that a vehicle in the air falls and leaves the stage at once.
+* *Rest* (PX4's "maybe landed"): contact has persisted. The loops stop, so that they do not wind up against the ground.
+* *Landed*: low thrust and no fall for ``LANDED_S`` since contact.
 
-Unlike PX4's, the detector looks at no horizontal speed and no rates: wind that is stronger than friction makes a
-vehicle slide and rattle along the ground whatever the rotors do, and their thrust would only help it.
+Unlike PX4's, the detector ignores horizontal speed and rates: wind stronger than friction moves a vehicle along the
+ground regardless of the rotors, and more thrust would only reduce the friction.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ from flightstack.core.contract import VehicleState
 from flightstack.params.vehicle import GRAVITY_M_S2
 
 SUPPORT_LIFT = 0.7
-"""Vertical thrust, as share of the weight, below which a vehicle sinks even if 0.3 of its weight is carried by an
-updraft, or is missing because of a dropped payload or stronger propellers."""
+"""Vertical thrust, as share of the weight, below which a vehicle sinks even if an updraft, a dropped payload or
+stronger propellers compensate 0.3 of its weight."""
 CONTACT_M_S = 1.0
 """Contact: sink rate that thrust below ``SUPPORT_LIFT`` would have caused in the air. In the air the sum stays below
-0.5 m/s, the width of ``STILL_M_S``, for upward forces up to 0.3 of the weight; the rest is for the rotors' lag."""
+0.5 m/s, the width of ``STILL_M_S``, for upward forces up to 0.3 of the weight; the rest allows for the rotors' lag."""
 BOUNCE_SHARE = 0.5
-"""Rate at which that sum decreases while the vehicle moves vertically, in g: a bounce on its feet does not clear it."""
+"""Rate at which that sum decreases while the vehicle moves vertically, in g: a bounce does not clear it."""
 BLOCKED_M_S = 10.0
 """After contact has ended in a fall, the sum starts this far below 0: no contact for 2 s at ``BOUNCE_SHARE``."""
 REST_M_S = 2.8
-"""The same sum from which on the vehicle rests without any control: 0.3 s after contact, in which it has levelled."""
+"""Value of that sum at which the loops stop: 0.3 s after contact, the time to level."""
 DESCENT_M_S = 0.05
-"""Sink rate of the reference from which on guidance descends, and climb rate from which on it climbs."""
+"""Least sink rate of the reference that counts as a descent, and least climb rate that counts as a climb."""
 LANDED_S = 0.4
-"""How long the signs of standing must agree after contact."""
+"""Time for which all landed conditions must hold after contact."""
 LEVELLING_LIFT = 0.08
-"""Thrust, as share of the weight, of a vehicle that is levelled: friction holds it, and yaw is controlled."""
+"""Thrust, as share of the weight, while levelling: little enough for friction, enough for yaw control."""
 LANDED_LIFT = 0.15
-"""Vertical thrust, as share of the weight, of a vehicle that stands."""
+"""Largest vertical thrust, as share of the weight, of a landed vehicle."""
 STILL_M_S = 0.25
-"""Vertical speed of a vehicle that neither climbs nor sinks; PX4's LNDMC_Z_VEL_MAX."""
+"""Largest vertical speed without climb or descent; PX4's LNDMC_Z_VEL_MAX."""
 STANDING_M_S = 2.5 * STILL_M_S
-"""The same for a vehicle that may rattle on the ground; the factor is PX4's."""
+"""The same for a vehicle that may vibrate on the ground; the factor is PX4's."""
 SETTLING_M_S = 1.5
-"""Vertical speed that ends contact: a tilted vehicle with one foot on the ground falls onto the others."""
+"""Vertical speed that ends contact; a tilted vehicle that settles from one foot onto the others stays below it."""
 CLIMB_M = 0.15
 """Rise above the point of the last landing that ends it."""
 
@@ -63,7 +63,7 @@ class LandMemory(NamedTuple):
 
 @compiled
 def lift_share(state: VehicleState, thrust_n: float, weight_n: float) -> float:
-    """Return the vertical part of the thrust as share of the weight."""
+    """Return the vertical component of the thrust as share of the weight."""
     q = state.attitude
     return thrust_n * (1.0 - 2.0 * (q.x * q.x + q.y * q.y)) / weight_n
 
@@ -74,8 +74,8 @@ def land_detector_step(
 ) -> LandMemory:
     """Advance the detector by ``dt_s``.
 
-    ``lift`` is the ``lift_share`` of the thrust asked for, ``descent_m_s`` the sink rate of the reference: infinite
-    if guidance gives the thrust itself. Contact begins only in a descent. A landing ends with a rise by ``CLIMB_M``.
+    ``lift`` is the ``lift_share`` of the thrust setpoint, ``descent_m_s`` the sink rate of the reference: infinite
+    if guidance sets the thrust itself. Contact begins only in a descent. A rise by ``CLIMB_M`` ends the landed state.
     """
     vz, z = state.velocity_ned_m_s.z, state.position_ned_m.z
     if memory.landed > 0.0:

@@ -1,4 +1,4 @@
-"""Fly by sticks: POSITION moves and holds a point, ALTITUDE tilts and holds the height, as PX4's modes do."""
+"""Manual modes as in PX4: POSITION sets velocity and holds position, ALTITUDE sets tilt and holds altitude."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from flightstack.guidance.trajectory import KA, Trajectory, TrajectoryLimits, cl
 from flightstack.params.vehicle import GRAVITY_M_S2
 
 TAKEOFF_STICK = 0.3
-"""Shaped throttle, from the centre, beyond which a standing vehicle takes off; PX4's value."""
+"""Shaped throttle, from the centre, above which a landed vehicle takes off; PX4's value."""
 
 
 @compiled
 def shaped(stick: float, deadzone: float, expo: float) -> float:
-    """Deflection after the dead zone around the centre, and softened there: (1 − e) x + e x³."""
+    """Return the deflection after dead zone and expo: (1 − e) x + e x³."""
     size = min(abs(stick), 1.0)
     if not size > deadzone:
         return 0.0
@@ -31,7 +31,7 @@ def shaped(stick: float, deadzone: float, expo: float) -> float:
 
 @compiled
 def _horizontal_sticks(sticks: FloatArray, params: GuidanceParams, expo: float) -> tuple[float, float]:
-    """Return forward and right within the unit circle: diagonally no faster than straight."""
+    """Return forward and right, clipped to the unit circle so that diagonals are no faster."""
     forward = shaped(sticks[0], params.stick_deadzone, expo)
     right = shaped(sticks[1], params.stick_deadzone, expo)
     return clipped(forward, right, 1.0)
@@ -45,7 +45,7 @@ def _to_ned(forward: float, right: float, yaw_rad: float) -> tuple[float, float]
 
 @compiled
 def _climb_wanted(sticks: FloatArray, down_m: float, params: GuidanceParams) -> float:
-    """Vertical speed [m/s], down positive; near the ground the descent is a landing's."""
+    """Return the vertical speed [m/s], down positive; near the ground at most the landing speed."""
     up = shaped(sticks[2], params.stick_deadzone, params.stick_z_expo)
     return -up * (params.climb_speed_m_s if up > 0.0 else landing_speed(down_m, params))
 
@@ -62,9 +62,9 @@ def manual_step(
 ) -> Trajectory:
     """Move the reference by the sticks for one outer tick.
 
-    POSITION (``holds_position``): the sticks are a velocity in the reference's heading; centred, the reference
-    brakes and stays. ALTITUDE: they are a tilt, flown as the acceleration it gives; the reference goes along with the
-    vehicle horizontally, so that nothing but the tilt acts. Throttle off the centre climbs or descends.
+    POSITION (``holds_position``): the sticks set a velocity in the reference's heading frame; centred, the reference
+    brakes and holds. ALTITUDE: the sticks set a tilt, converted to an acceleration; the reference's horizontal position
+    and velocity are the vehicle's, so that only the tilt acts. The throttle sets the climb or descent rate.
     """
     p, v = state.position_ned_m, state.velocity_ned_m_s
     none = math.nan

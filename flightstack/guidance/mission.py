@@ -1,7 +1,7 @@
-"""Fly a plan item by item, over tables of numbers, so that a whole flight can be compiled.
+"""Mission execution item by item, on arrays so that it can be compiled.
 
-The plan is an array of ``PLAN_ITEM``, NaN where the item leaves a value open. Progress is a record of ``MISSION``,
-advanced in place. ``jumps_left`` holds for each DO_JUMP how often it still jumps (negative: for ever).
+The plan is an array of ``PLAN_ITEM``, NaN for values that the item does not set. Progress is a record of ``MISSION``,
+advanced in place. ``jumps_left`` holds the remaining repeats of each DO_JUMP (negative: unlimited).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ DO_CHANGE_SPEED = 178
 
 LOG_SIZE = 64
 BEGIN, TRAVEL, STAY, RISE = range(4)
-"""Phases of an item: about to begin; on the way; there (waiting out its time, or descending); leaving the ground."""
+"""Phases of an item: not begun; travelling; at the position (waiting or descending); climbing from the ground."""
 
 PLAN_ITEM = np.dtype(
     [
@@ -55,7 +55,7 @@ MISSION = np.dtype(
         ("wants_return", "?"),
         ("phase", "i8"),
         ("timer", "f8"),  # s
-        # the goal in force
+        # present goal
         ("x", "f8"),  # m NED
         ("y", "f8"),
         ("z", "f8"),
@@ -64,7 +64,7 @@ MISSION = np.dtype(
         ("yaw_is_counted", "?"),
         ("yaw_rate", "f8"),  # rad/s
         ("speed", "f8"),  # m/s
-        # where a vehicle on the ground rises to before it sets out for an item that is no takeoff
+        # goal of the initial climb from the ground, for an item that is not a takeoff
         ("rise_x", "f8"),
         ("rise_y", "f8"),
         ("rise_z", "f8"),
@@ -77,7 +77,7 @@ MISSION = np.dtype(
 
 
 def mission_start(m: Record, current: int, reference: Trajectory, params: GuidanceParams) -> None:
-    """Set ``m`` to a mission about to begin item ``current`` at the reference."""
+    """Initialise ``m`` to begin item ``current`` at the reference."""
     m["current"], m["reached"], m["finished"], m["wants_return"] = current, -1, False, False
     m["phase"], m["timer"] = BEGIN, 0.0
     m["x"], m["y"], m["z"], m["yaw"] = reference.x, reference.y, reference.z, reference.yaw_rad
@@ -102,7 +102,7 @@ def _advance(m: Record, to: int) -> None:
 
 @compiled
 def _leg_heading(m: Record, x: float, y: float, state: VehicleState, params: GuidanceParams) -> float:
-    """Heading of a leg for which the plan gives none."""
+    """Return the heading of a leg without a heading in the plan."""
     present: float = m["yaw"]
     if m["yaw_is_set"] or params.yaw_mode >= 0.5:
         return present
@@ -114,10 +114,10 @@ def _leg_heading(m: Record, x: float, y: float, state: VehicleState, params: Gui
 
 @compiled
 def _begin_condition_yaw(m: Record, item: Record, reference_yaw_rad: float, params: GuidanceParams) -> None:
-    """CONDITION_YAW: angle [deg], rate [deg/s], direction (−1, 0 shortest, 1), relative (1) or absolute.
+    """Begin CONDITION_YAW: angle [deg], rate [deg/s], direction (−1, 0 shortest, 1), relative (1) or absolute.
 
-    With a direction the turn is counted from the reference's heading: exactly, and by more than half a
-    circle if need be. Without one the heading alone counts.
+    With a direction, the turn is counted from the reference's heading and may exceed half a circle. Without one, the
+    vehicle takes the shorter turn to the heading.
     """
     angle, direction = math.radians(item["param1"]), item["param3"]
     turn = angle if item["param4"] > 0.5 else wrap_pi(angle - reference_yaw_rad)
@@ -140,7 +140,7 @@ def _begin_condition_yaw(m: Record, item: Record, reference_yaw_rad: float, para
 def _begin_position_item(
     m: Record, item: Record, state: VehicleState, landed: bool, params: GuidanceParams
 ) -> None:
-    """Aim for the item. From the ground the vehicle rises first, as PX4's does: at least to MIS_TAKEOFF_ALT."""
+    """Set the item's goal. From the ground the vehicle climbs first, at least to MIS_TAKEOFF_ALT, as in PX4."""
     command = item["command"]
     m["rise_x"], m["rise_y"] = m["x"], m["y"]
     x = m["x"] if math.isnan(item["north"]) else item["north"]
@@ -179,8 +179,8 @@ def _begin(
     landed: bool,
     params: GuidanceParams,
 ) -> None:
-    """Carry out items that take no time until one that does, and begin that one."""
-    for _ in range(2 * plan.shape[0] + 2):  # a plan was checked to have no endless loop of jumps
+    """Execute items without duration up to the next item with a duration, and begin that item."""
+    for _ in range(2 * plan.shape[0] + 2):  # the plan check excludes endless loops of jumps
         index = m["current"]
         if index >= plan.shape[0]:
             break
@@ -230,7 +230,7 @@ def _is_at_height(m: Record, state: VehicleState, params: GuidanceParams) -> boo
 
 @compiled
 def _is_reached(m: Record, item: Record, state: VehicleState, params: GuidanceParams) -> bool:
-    """Tell whether the vehicle is at the item's position, and at its heading if the item gives one."""
+    """Return True if the vehicle is at the item's position, and at its heading if the item sets one."""
     is_waypoint = item["command"] == WAYPOINT
     radius = item["param2"] if is_waypoint and item["param2"] > 0.0 else params.acceptance_radius_m
     if not (_is_within(m, state, radius) and _is_at_height(m, state, params)):
@@ -241,7 +241,7 @@ def _is_reached(m: Record, item: Record, state: VehicleState, params: GuidancePa
 
 @compiled
 def _is_turned(m: Record, state: VehicleState, reference_yaw_rad: float, params: GuidanceParams) -> bool:
-    """Tell whether a CONDITION_YAW is done: the vehicle looks there, and the reference has turned so far."""
+    """Return True if a CONDITION_YAW is complete: the vehicle has the heading and the reference the counted turn."""
     if m["yaw_is_counted"] and abs(m["yaw"] - reference_yaw_rad) > params.yaw_acceptance_rad:
         return False
     return _heading_error(m, state) <= params.yaw_acceptance_rad
@@ -258,12 +258,12 @@ def _travel(
 ) -> None:
     command = item["command"]
     following = m["current"] + 1
-    if command == CONDITION_YAW:  # a vehicle that stands cannot turn, and does so later
+    if command == CONDITION_YAW:  # a landed vehicle cannot turn: continue, it turns after takeoff
         if landed or _is_turned(m, state, reference_yaw_rad, params):
             _advance(m, following)
     elif command == TAKEOFF:
         if _is_at_height(m, state, params):
-            m["phase"] = STAY  # high enough: now over to the item's own position
+            m["phase"] = STAY  # at altitude: continue to the item's position
     elif _is_reached(m, item, state, params):
         waits = item["param1"] > 0.0 and command in (WAYPOINT, LOITER_TIME)
         if waits or command == LAND:
@@ -317,7 +317,7 @@ def mission_step(
 def mission_goal(
     m: Record, plan: RecordArray, start_x: float, start_y: float, params: GuidanceParams
 ) -> Goal:
-    """Return where the present item sends the vehicle; it began above ``start``."""
+    """Return the goal of the present item, which began above ``start``."""
     x, y, z, climb = m["x"], m["y"], m["z"], params.climb_speed_m_s
     index = m["current"]
     if not m["finished"] and index < plan.shape[0]:
@@ -336,10 +336,10 @@ def mission_goal(
 
 
 @compiled
-def into_ground(goal: Goal, down_m: float, params: GuidanceParams) -> Goal:
-    """Return the goal with the descent of a landing if it is below the ground: the vehicle is now at ``down_m``.
+def with_landing_descent(goal: Goal, down_m: float, params: GuidanceParams) -> Goal:
+    """Return ``goal`` with the landing speed at ``down_m`` if the goal is below the ground.
 
-    A landing's goal always is; so is a place whose ground is not where home or a plan says.
+    The goal of a landing always is, and so may be a position whose terrain differs from home or plan.
     """
     g = goal
     descent = landing_speed(down_m, params) if g.z > params.ground_down_m else g.descent_m_s
@@ -350,7 +350,7 @@ def into_ground(goal: Goal, down_m: float, params: GuidanceParams) -> Goal:
 
 @compiled
 def landing_speed(down_m: float, params: GuidanceParams) -> float:
-    """Descent speed of a landing at ``down_m``: slower near the ground."""
+    """Return the descent speed of a landing at ``down_m``, slower near the ground."""
     height_m = params.ground_down_m - down_m
     return params.descent_speed_m_s if height_m > params.land_slow_altitude_m else params.land_speed_m_s
 
@@ -358,9 +358,9 @@ def landing_speed(down_m: float, params: GuidanceParams) -> float:
 def plan_table(
     items: Sequence[MissionItem], frame: LocalFrame, home_altitude_m: float
 ) -> tuple[RecordArray, FloatArray]:
-    """Return the plan, n of ``PLAN_ITEM``, and the repeats of its jumps, shape (n,); see ``guidance.mission``.
+    """Return the plan, n of ``PLAN_ITEM``, and the repeats of its jumps, shape (n,).
 
-    Positions are in the local ``frame``; relative altitudes count from home, at ``home_altitude_m`` above the sea.
+    Positions are in the local ``frame``; relative altitudes refer to home, at ``home_altitude_m`` above mean sea level.
     """
     origin_altitude_m = frame.origin.altitude_m
     plan: RecordArray = np.empty(len(items), PLAN_ITEM)

@@ -1,4 +1,4 @@
-"""The target of every mode but the mission, as a record, and the goal it makes for the reference."""
+"""Target of all modes but the mission, as a record, and the resulting goal of the reference."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ MODE_TARGET = np.dtype(
         ("yaw", "f8"),  # rad
         ("speed", "f8"),  # m/s; 0: the cruise speed
         ("phase", "i8"),  # of a return
-        ("home_x", "f8"),  # where a return ends, m NED
+        ("home_x", "f8"),  # destination of a return, m NED
         ("home_y", "f8"),
         ("home_z", "f8"),
-        ("start_x", "f8"),  # where a mission's item began, m NED
+        ("start_x", "f8"),  # start of a mission item, m NED
         ("start_y", "f8"),
     ]
 )
@@ -33,7 +33,7 @@ CLIMBING, CRUISING, DESCENDING = range(3)
 
 @compiled
 def advance_return(target: Record, state: VehicleState, params: GuidanceParams) -> None:
-    """Return: climb, go to the place of the return, descend."""
+    """Advance the phases of a return: climb, cruise to the destination, descend."""
     p = state.position_ned_m
     dx, dy = target["home_x"] - p.x, target["home_y"] - p.y
     if target["phase"] == CLIMBING and abs(p.z - target["z"]) <= params.altitude_acceptance_m:
@@ -48,7 +48,7 @@ def advance_return(target: Record, state: VehicleState, params: GuidanceParams) 
 
 @compiled
 def target_goal(mode: int, target: Record, params: GuidanceParams) -> Goal:
-    """Return where ``mode`` sends the reference."""
+    """Return the goal of ``mode``."""
     z, climb, descent = target["z"], params.climb_speed_m_s, params.descent_speed_m_s
     speed = target["speed"] if target["speed"] > 0.0 else params.cruise_speed_m_s
     if mode == TAKEOFF:

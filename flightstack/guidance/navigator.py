@@ -1,4 +1,4 @@
-"""Guidance: from the mode to the setpoint of the outer loop, in one compiled kernel per outer tick."""
+"""Navigator: setpoint of the outer loop for the mode, by one compiled kernel per outer tick."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ from flightstack.guidance.setpoints import (
 from flightstack.guidance.trajectory import BRAKING, Trajectory
 
 LEVEL_S = 0.1
-"""Time constant with which a vehicle that touches the ground is levelled: a step would make it hop."""
+"""Time constant of levelling in ground contact: a step would make the vehicle hop."""
 ARRIVED_M = 0.5
-"""So near to the place it was sent to, a vehicle holds."""
+"""Distance from a commanded position at which the vehicle has arrived."""
 # looking up a member of an enumeration takes seven times as long as looking up a name or a key
 _OFFBOARD = Mode.OFFBOARD
 _NUMBER = {mode: int(mode) for mode in Mode}
@@ -52,7 +52,7 @@ _STREAM_NUMBERS = frozenset(int(mode) for mode in STREAM_MODES)
 
 
 class MissionProgress(NamedTuple):
-    """What the rest of the stack needs to know of the mission."""
+    """Progress of the mission."""
 
     current: int
     reached: int
@@ -61,7 +61,7 @@ class MissionProgress(NamedTuple):
 
 
 class Navigator:
-    """Holds the memories of guidance and enters modes. No I/O, no clock."""
+    """Holds the state of guidance and enters modes. No I/O, no clock."""
 
     def __init__(self, params: GuidanceParams, outer_hz: float) -> None:
         self._speeds = SpeedOverrides()
@@ -75,14 +75,14 @@ class Navigator:
         views = (self._mission[name].data for name in MissionProgress._fields)
         self._current, self._reached, self._finished, self._wants_return = views
         self._reported = 0
-        self._repositions = False
+        self._is_repositioning = False
         self._mode_target: RecordArray = np.zeros(1, MODE_TARGET)
         self._land = np.array(LandMemory(1.0, 0.0, 0.0, 0.0))
-        self._land_now = self._land.data  # a number of an array takes four times as long to read
+        self._land_view = self._land.data  # a number of an array takes four times as long to read
         self._stream = empty_stream()
         self._stream_kind = self._stream["kind"].data
         self.attitude_target = np.eye(1, ATTITUDE_TARGET_SIZE)[0]
-        """What the loops fly in place of the outer loop's target while ``flies_attitude``; array form."""
+        """Attitude target that replaces the outer loop's while ``flies_attitude``; array form."""
         self._plan: RecordArray = np.zeros(0, PLAN_ITEM)
         self._jumps_left = np.zeros(0)
         self.set_plan(self._plan, self._jumps_left)
@@ -102,9 +102,9 @@ class Navigator:
     # ------------------------------------------------------------------ parameters
 
     def set_params(self, params: GuidanceParams) -> None:
-        """Take new numbers, from the next outer tick on; speeds that were commanded stay in force.
+        """Set new parameters, from the next outer tick on; commanded speeds stay in force.
 
-        A mission flies at the new speed too, unless one of its items has set another.
+        A mission uses the new speed too, unless one of its items has set another.
         """
         self._given_params = params._replace(
             ground_down_m=self.params.ground_down_m, ceiling_down_m=self.params.ceiling_down_m
@@ -118,7 +118,7 @@ class Navigator:
             m["yaw_rate"] = self.params.yaw_rate_rad_s
 
     def set_speed(self, speeds: SpeedOverrides) -> None:
-        """Fly at other speeds than the parameters' until the end of the flight."""
+        """Override the speeds of the parameters until the end of the flight."""
         if speeds == self._speeds:
             return
         self._speeds = speeds
@@ -126,38 +126,38 @@ class Navigator:
         self._mission[0]["speed"] = self.params.cruise_speed_m_s
 
     def set_bounds(self, ground_down_m: float, ceiling_down_m: float) -> None:
-        """Take the ground to be there, and climb no higher than the ceiling, where no plan asks for it [m NED]."""
+        """Set the assumed ground, and the ceiling that guidance exceeds only for a plan [m NED]."""
         bounds = {"ground_down_m": ground_down_m, "ceiling_down_m": ceiling_down_m}
         self.params = self.params._replace(**bounds)
         self.set_params(self._given_params)
 
     @property
     def speeds(self) -> SpeedOverrides:
-        """The speeds that were commanded."""
+        """Commanded speeds."""
         return self._speeds
 
-    # ------------------------------------------------------------------ what is
+    # ------------------------------------------------------------------ state
 
     @property
     def landed(self) -> bool:
-        """Whether the vehicle stands on the ground."""
-        return self._land_now[0] > 0.0
+        """True if the vehicle is landed."""
+        return self._land_view[0] > 0.0
 
     @property
     def touches_ground(self) -> bool:
-        """Whether something other than the rotors holds the vehicle up: landed, or about to count as landed."""
-        return self._land_now[1] >= CONTACT_M_S
+        """True in ground contact: landed, or about to be reported as landed."""
+        return self._land_view[1] >= CONTACT_M_S
 
     @property
     def rests(self) -> bool:
-        """Whether the vehicle has touched the ground for so long that it needs no control."""
-        return self._land_now[1] >= REST_M_S
+        """True if ground contact has persisted, so that the loops stop."""
+        return self._land_view[1] >= REST_M_S
 
     def levelling_target(self, attitude_target: FloatArray) -> FloatArray:
-        """Return the next attitude target, with little thrust, shape (5,), of a vehicle that touches the ground.
+        """Return the next attitude target in ground contact, shape (5,), with little thrust.
 
-        From the last one, ``attitude_target``, it levels within about ``LEVEL_S``. The outer loop would lean against
-        wind that friction withstands, and wind itself up.
+        It levels from the last target, ``attitude_target``, with the time constant ``LEVEL_S``. The outer loop would
+        wind up against wind that friction withstands.
         """
         thrust_n = LEVELLING_LIFT * self.params.weight_n
         self._level(attitude_target, thrust_n, self._dt_s / LEVEL_S, self._levelling_target)
@@ -172,7 +172,7 @@ class Navigator:
 
     @property
     def mission_flies(self) -> bool:
-        """Whether the current item needs the vehicle in the air; a standing one waits for the others."""
+        """True if the current item needs the vehicle in the air; a landed vehicle may wait out the other items."""
         current = self._current[0]
         if self._finished[0] or current >= len(self._plan):
             return False
@@ -187,13 +187,13 @@ class Navigator:
         return [int(m["log"][index % LOG_SIZE]) for index in fresh]
 
     def set_plan(self, plan: RecordArray, jumps: FloatArray) -> None:
-        """Take a new plan, to be flown from its first item; ``jumps`` are the repeats of its DO_JUMPs."""
+        """Set a new plan, to be flown from its first item; ``jumps`` are the repeats of its DO_JUMPs."""
         self._plan = np.ascontiguousarray(plan)
         self._jumps = np.ascontiguousarray(jumps)
         self.restart_plan()
 
     def change_plan(self, plan: RecordArray, jumps: FloatArray) -> None:
-        """Take the same plan with other numbers in it; the mission goes on where it is, its jumps as counted."""
+        """Replace the values of the same plan; the mission continues with its progress and jump counts."""
         self._plan = np.ascontiguousarray(plan)
         self._jumps = np.ascontiguousarray(jumps)
 
@@ -204,91 +204,91 @@ class Navigator:
 
     def set_current(self, index: int) -> None:
         """Make ``index`` the mission's current item."""
-        t, aim = self._reference(), self._mode_target[0]
+        t, target = self._reference(), self._mode_target[0]
         mission_start(self._mission[0], index, t, self.params)
-        aim["start_x"], aim["start_y"] = t.x, t.y
+        target["start_x"], target["start_y"] = t.x, t.y
 
     def _reference(self) -> Trajectory:
         """Return the state of the reference point."""
         return Trajectory(*self._trajectory.tolist())
 
     def reset_on_ground(self, state: FloatArray) -> None:
-        """Put the reference at the vehicle's position, at rest, before it leaves the ground; not at a state of NaNs."""
+        """Set the reference to the vehicle's position, at rest and landed; ignore a state that is not finite."""
         self._rest(state, self._trajectory, self._land, self.setpoint)
 
     def reset_reference(self, state: FloatArray) -> None:
-        """Put the reference where the vehicle is, moving as it does: it could not follow the old one."""
+        """Set the reference to the vehicle's position and velocity, because it cannot follow the old reference."""
         if not np.isfinite(state).all():
             return
         self._trajectory[:6] = state[:6]
         self._trajectory[6:9] = 0.0
 
     def enter(self, mode: Mode, takeoff_altitude_m: float = 0.0) -> None:
-        """Aim for ``mode`` from where the reference is now."""
-        t, aim, p = self._reference(), self._mode_target[0], self.params
-        self._repositions = False
-        aim["x"], aim["y"], aim["z"], aim["yaw"], aim["speed"] = t.x, t.y, t.z, t.yaw_rad, 0.0
+        """Set the target of ``mode``, from the present reference."""
+        t, target, p = self._reference(), self._mode_target[0], self.params
+        self._is_repositioning = False
+        target["x"], target["y"], target["z"], target["yaw"], target["speed"] = t.x, t.y, t.z, t.yaw_rad, 0.0
         if mode == Mode.TAKEOFF:
-            aim["z"] = -takeoff_altitude_m
-        elif mode == Mode.HOLD:  # where the reference comes to rest
+            target["z"] = -takeoff_altitude_m
+        elif mode == Mode.HOLD:  # stopping position of the reference
             speed = distance(t.vx, t.vy)
             ahead_s = speed / (2.0 * BRAKING * p.acceleration_m_s2)
-            aim["x"], aim["y"] = t.x + t.vx * ahead_s, t.y + t.vy * ahead_s
-            aim["z"] = t.z + t.vz * abs(t.vz) / (2.0 * BRAKING * p.vertical_acceleration_m_s2)
+            target["x"], target["y"] = t.x + t.vx * ahead_s, t.y + t.vy * ahead_s
+            target["z"] = t.z + t.vz * abs(t.vz) / (2.0 * BRAKING * p.vertical_acceleration_m_s2)
         elif mode == Mode.RETURN:
             self._enter_return()
         elif mode == Mode.MISSION:
             self._enter_mission()
 
     def _enter_return(self) -> None:
-        """Climb to the return altitude above the place of the return, unless it is near or the vehicle higher.
+        """Climb to the return altitude above the destination, unless it is near or the vehicle is higher.
 
-        The ceiling comes first: a return does not break the fence that it may have been called by.
+        The ceiling has priority: a return must not breach the fence that may have caused it.
         """
-        t, aim, p = self._reference(), self._mode_target[0], self.params
-        aim["phase"] = CLIMBING
-        if distance(t.x - aim["home_x"], t.y - aim["home_y"]) > p.return_min_distance_m:
-            aim["z"] = min(t.z, aim["home_z"] - p.return_altitude_m)
-        aim["z"] = max(aim["z"], p.ceiling_down_m)
+        t, target, p = self._reference(), self._mode_target[0], self.params
+        target["phase"] = CLIMBING
+        if distance(t.x - target["home_x"], t.y - target["home_y"]) > p.return_min_distance_m:
+            target["z"] = min(t.z, target["home_z"] - p.return_altitude_m)
+        target["z"] = max(target["z"], p.ceiling_down_m)
 
     def return_to(self, north_m: float, east_m: float, ground_down_m: float) -> None:
-        """Let the next return end at this place [m NED]: home, or a rally point."""
-        aim = self._mode_target[0]
-        aim["home_x"], aim["home_y"], aim["home_z"] = north_m, east_m, ground_down_m
+        """Set the destination of the next return [m NED]: home or a rally point."""
+        target = self._mode_target[0]
+        target["home_x"], target["home_y"], target["home_z"] = north_m, east_m, ground_down_m
 
     def reposition(
         self, north_m: float, east_m: float, down_m: float, yaw_rad: float, speed_m_s: float = math.nan
     ) -> None:
-        """Hold at another place [m NED]; NaN keeps what is, for the heading as MPC_YAW_MODE says.
+        """Hold at another position [m NED]; NaN keeps the present value, for the heading subject to MPC_YAW_MODE.
 
-        Call it after entering HOLD.
+        Call after entering HOLD.
         """
-        t, aim = self._reference(), self._mode_target[0]
-        self._repositions = True
+        t, target = self._reference(), self._mode_target[0]
+        self._is_repositioning = True
         if math.isfinite(north_m) and math.isfinite(east_m):
-            aim["x"], aim["y"] = north_m, east_m
+            target["x"], target["y"] = north_m, east_m
             away_m = distance(north_m - t.x, east_m - t.y)
             if math.isnan(yaw_rad) and self.params.yaw_mode < 0.5 and away_m > 1.0:
                 yaw_rad = atan2(east_m - t.y, north_m - t.x)
         if math.isfinite(down_m):
-            aim["z"] = down_m
+            target["z"] = down_m
         if math.isfinite(yaw_rad):
-            aim["yaw"] = yaw_rad
+            target["yaw"] = yaw_rad
         if speed_m_s > 0.0:
-            aim["speed"] = min(speed_m_s, self.params.max_speed_m_s)
+            target["speed"] = min(speed_m_s, self.params.max_speed_m_s)
 
     @property
     def goes_elsewhere(self) -> bool:
-        """Whether HOLD is on its way to a place that ``reposition`` named."""
-        if not self._repositions:
+        """True while HOLD is on its way to the position of ``reposition``."""
+        if not self._is_repositioning:
             return False
-        t, aim = self._reference(), self._mode_target[0]
-        return distance(t.x - aim["x"], t.y - aim["y"], t.z - aim["z"]) > ARRIVED_M
+        t, target = self._reference(), self._mode_target[0]
+        return distance(t.x - target["x"], t.y - target["y"], t.z - target["z"]) > ARRIVED_M
 
     def _enter_mission(self) -> None:
-        """Begin the current item anew from here, at the speed and with the heading set by those before it.
+        """Restart the current item from here, with speed and heading set by earlier items.
 
-        A finished mission begins with its first item.
+        A finished mission restarts at its first item.
         """
         m = self._mission[0]
         if m["finished"]:
@@ -301,26 +301,26 @@ class Navigator:
             m["yaw"] = yaw
 
     def hold_at_last_item(self) -> None:
-        """Hold where the mission that has just ended was going to; a takeoff's goal needs no such step."""
-        m, aim = self._mission[0], self._mode_target[0]
-        aim["x"], aim["y"], aim["z"], aim["yaw"] = m["x"], m["y"], m["z"], m["yaw"]
+        """Hold at the last goal of the mission that has just ended."""
+        m, target = self._mission[0], self._mode_target[0]
+        target["x"], target["y"], target["z"], target["yaw"] = m["x"], m["y"], m["z"], m["yaw"]
 
     # ------------------------------------------------------------------ streams
 
     def set_offboard(self, setpoint: OffboardSetpoint, max_thrust_n: float) -> None:
-        """Remember the newest offboard setpoint; OFFBOARD flies it."""
+        """Store the newest offboard setpoint for OFFBOARD."""
         store_setpoint(self._stream, setpoint, max_thrust_n)
 
     def set_sticks(self, sticks: Sticks) -> None:
-        """Remember the sticks; POSITION and ALTITUDE fly by them."""
+        """Store the stick positions for POSITION and ALTITUDE."""
         self._stream["sticks"] = sticks
 
     def flies_attitude(self, mode: Mode) -> bool:
-        """Tell whether guidance gives attitude and thrust itself, in ``attitude_target``."""
+        """Return True if guidance sets attitude and thrust itself, in ``attitude_target``."""
         return mode is _OFFBOARD and self._stream_kind[0] >= ATTITUDE
 
     def wants_to_rise(self, mode: Mode, down_m: float) -> bool:
-        """Tell whether the stream asks a vehicle that stands at ``down_m`` to take off."""
+        """Return True if the stream commands a takeoff of a vehicle landed at ``down_m``."""
         s, p = self._stream[0], self.params
         if mode is not Mode.OFFBOARD:
             return shaped(s["sticks"][2], p.stick_deadzone, p.stick_z_expo) > TAKEOFF_STICK
@@ -333,7 +333,7 @@ class Navigator:
             return z < down_m - CLIMB_M
         return vz < 0.0 if math.isfinite(vz) else az < 0.0
 
-    # ------------------------------------------------------------------ the tick
+    # ------------------------------------------------------------------ ticks
 
     def step(self, mode: Mode, state: FloatArray, attitude_target: FloatArray) -> None:
         """Advance by one outer tick and write ``setpoint``, and ``attitude_target`` while ``flies_attitude``.

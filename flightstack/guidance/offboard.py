@@ -1,4 +1,4 @@
-"""Fly what a companion streams: points of a trajectory, or attitudes and body rates with their thrust."""
+"""Offboard guidance: streamed trajectory points, or attitudes and body rates with thrust."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from flightstack.guidance.trajectory import Trajectory, TrajectoryLimits, approa
 from flightstack.params.vehicle import GRAVITY_M_S2
 
 EXTRAPOLATION_S = 0.25
-"""How long a moving point goes on along its velocity until the next one: a stream of 4 Hz stays smooth."""
+"""Time for which a moving point is extrapolated until the next one, so that a stream of 4 Hz is smooth."""
 SPEED_LAG_S = 0.5
-"""How late the reference and the vehicle follow a descent that slows down: their acceleration and jerk are limited."""
+"""Delay of reference and vehicle in a descent that slows down, caused by limits of acceleration and jerk."""
 RATE_LEAD_RAD = 0.5
-"""How far an attitude turned by body rates may lead the vehicle: farther, the vehicle cannot follow it."""
+"""Largest angle between the vehicle and an attitude integrated from body rates, so that the vehicle can follow."""
 
 
 @compiled
-def _given(value: float) -> float:
+def _or_zero(value: float) -> float:
     return value if math.isfinite(value) else 0.0
 
 
@@ -42,12 +42,12 @@ def _vector(v: FloatArray) -> Vector3:
 
 @compiled
 def _moved(position: float, velocity: float, acceleration: float, age_s: float) -> float:
-    return position + age_s * (_given(velocity) + 0.5 * age_s * _given(acceleration))
+    return position + age_s * (_or_zero(velocity) + 0.5 * age_s * _or_zero(acceleration))
 
 
 @compiled
 def descent_above(height_m: float, params: GuidanceParams, limits: TrajectoryLimits) -> float:
-    """Largest descent at a height above the ground: that of a landing, and what may still be braked to it."""
+    """Return the largest descent speed at a height from which the vehicle can still brake to the landing speed."""
     spare = approach_speed(max(height_m, 0.0), params.descent_speed_m_s, limits.vertical_acceleration_m_s2)
     return min(params.descent_speed_m_s, params.land_speed_m_s + spare)
 
@@ -61,7 +61,7 @@ def point_step(
     limits: TrajectoryLimits,
     dt_s: float,
 ) -> Trajectory:
-    """Move the reference by one outer tick along the newest point; without any it brakes and stays."""
+    """Move the reference by one outer tick along the newest point; without a point it brakes and holds."""
     p, v, a = _vector(stream["position"]), _vector(stream["velocity"]), _vector(stream["acceleration"])
     yaw_wanted, turn = stream["yaw"], stream["yaw_rate"]
     if stream["kind"] != POINT:
@@ -87,13 +87,13 @@ def point_step(
 
 @compiled
 def _turned(target: Quaternion, rates: Vector3, present: Quaternion, dt_s: float) -> Quaternion:
-    """Turn the attitude target by body rates, no farther from the present attitude than it can catch up."""
+    """Rotate the attitude target by body rates, at most ``RATE_LEAD_RAD`` from the present attitude."""
     turned = normalised(quaternion_product(target, rotation_over(rates, dt_s)))
     lead = rotation_vector(quaternion_product(conjugate(present), turned))
     angle = math.sqrt(lead.x * lead.x + lead.y * lead.y + lead.z * lead.z)
     if angle <= RATE_LEAD_RAD:
         return turned
-    if not math.isfinite(angle):  # the target was not: begin anew
+    if not math.isfinite(angle):  # the target is not finite: restart at the present attitude
         return present
     scale = RATE_LEAD_RAD / angle
     bounded = Vector3(lead.x * scale, lead.y * scale, lead.z * scale)
@@ -110,10 +110,10 @@ def attitude_step(
     dt_s: float,
     target: FloatArray,
 ) -> Trajectory:
-    """Write the attitude target (5,) to fly, from the loops' ``last_target`` (5,); return the reference.
+    """Write the attitude target (5,), from the loops' ``last_target`` (5,); return the reference.
 
-    The reference goes along with the vehicle, accelerated as the target's thrust does: whatever mode comes
-    next begins with the motion and the attitude at hand.
+    The reference has the vehicle's position and velocity and the acceleration of the target's thrust, so that the next
+    mode starts from the present motion and attitude.
     """
     if stream["kind"] == ATTITUDE:
         wanted = stream["attitude"]

@@ -1,4 +1,4 @@
-"""The numbers of guidance in the form its compiled code takes."""
+"""Parameters of guidance in the form of its compiled code."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from flightstack.guidance.trajectory import POLE_RAD_S
 from flightstack.params.behaviour import Behaviour
 
 FAR_BELOW_M = 1e4
-"""Down coordinate of a goal that stands for "descend until the ground stops you"."""
+"""Down coordinate of a goal for a descent until ground contact."""
 
 
 class GuidanceParams(NamedTuple):
-    """Flat copy of what guidance needs of ``Behaviour``, angles in radians."""
+    """Parameters of guidance from ``Behaviour``, angles in radians."""
 
     cruise_speed_m_s: float
     max_speed_m_s: float
@@ -43,18 +43,18 @@ class GuidanceParams(NamedTuple):
     stick_z_expo: float
     stick_yaw_expo: float
     ground_down_m: float = 0.0
-    """Where the ground is taken to be: landings, and sticks that descend, slow down near it."""
+    """Assumed ground: landings and manual descents slow down near it."""
     ceiling_down_m: float = -math.inf
-    """Above this, guidance climbs nowhere by itself: below GF_MAX_VER_DIST."""
+    """Highest position that guidance climbs to by itself, below GF_MAX_VER_DIST."""
 
 
 def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:
-    """Collect the numbers of guidance.
+    """Return the parameters of guidance.
 
-    With little jerk the reference accelerates less: what it cannot shed in time would carry it past its goal.
+    A low jerk limit reduces the acceleration, because the reference would otherwise overshoot its goal.
     """
     b = behaviour
-    in_time_m_s2 = b.jerk_m_s3 / POLE_RAD_S
+    jerk_bound_m_s2 = b.jerk_m_s3 / POLE_RAD_S
     return GuidanceParams(
         cruise_speed_m_s=b.cruise_speed_m_s,
         max_speed_m_s=b.max_speed_m_s,
@@ -64,8 +64,8 @@ def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:
         takeoff_altitude_m=b.takeoff_altitude_m,
         land_speed_m_s=b.land_speed_m_s,
         land_slow_altitude_m=b.land_slow_altitude_m,
-        acceleration_m_s2=min(b.acceleration_m_s2, in_time_m_s2),
-        vertical_acceleration_m_s2=min(b.vertical_acceleration_m_s2, in_time_m_s2),
+        acceleration_m_s2=min(b.acceleration_m_s2, jerk_bound_m_s2),
+        vertical_acceleration_m_s2=min(b.vertical_acceleration_m_s2, jerk_bound_m_s2),
         jerk_m_s3=b.jerk_m_s3,
         yaw_rate_rad_s=math.radians(b.yaw_rate_deg_s),
         yaw_mode=b.yaw_mode,
@@ -87,14 +87,14 @@ def guidance_params(behaviour: Behaviour, weight_n: float) -> GuidanceParams:
 
 
 class SpeedOverrides(NamedTuple):
-    """Speeds that a command set [m/s]; NaN leaves the parameter's."""
+    """Speeds set by a command [m/s]; NaN selects the parameter's."""
 
     cruise_m_s: float = math.nan
     climb_m_s: float = math.nan
     descent_m_s: float = math.nan
 
     def applied_to(self, params: GuidanceParams) -> GuidanceParams:
-        """Return the parameters with these speeds, each at most the vehicle's largest."""
+        """Return the parameters with these speeds, each limited to the vehicle's maximum."""
         given = {
             "cruise_speed_m_s": min(self.cruise_m_s, params.max_speed_m_s),
             "climb_speed_m_s": min(self.climb_m_s, params.climb_speed_m_s),

@@ -1,4 +1,4 @@
-"""Where a return goes: home or a rally point."""
+"""Destination of a return: home or a rally point."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from flightstack.plan import MissionItem
 from flightstack.plan.rally import rally_altitude_m
 
 NEAREST, RALLY_FIRST = 0, 1
-"""Values of RTL_TYPE, as PX4's: to the nearest of home and rally points, or of the rally points if there are any.
+"""Values of RTL_TYPE, as in PX4: the nearest of home and rally points, or the nearest rally point if there is one.
 
 PX4's other values need a landing pattern in the mission.
 """
 
 
 class ReturnPlace(NamedTuple):
-    """A place to return to and land at: north, east and altitude above the local frame's origin [m].
+    """Destination of a return: north, east and altitude above the local frame's origin [m].
 
-    The altitude is that of the ground. As with PX4, a return to a rally point flies RTL_RETURN_ALT above it.
+    The altitude is that of the ground. As in PX4, a return to a rally point flies RTL_RETURN_ALT above it.
     """
 
     north_m: float
@@ -32,7 +32,7 @@ HOME = ReturnPlace(0.0, 0.0, 0.0)
 
 
 def rally_points(items: Iterable[MissionItem], frame: LocalFrame, home: GeoPoint) -> tuple[ReturnPlace, ...]:
-    """Return the places of rally points that ``plan.check_rally`` accepted; relative altitudes count from home."""
+    """Return the rally points from items that ``plan.check_rally`` accepted; relative altitudes refer to home."""
     home_m = home.altitude_m - frame.origin.altitude_m
     points = []
     for item in items:
@@ -45,7 +45,7 @@ def rally_points(items: Iterable[MissionItem], frame: LocalFrame, home: GeoPoint
 def choose(
     position_ne_m: tuple[float, float], home: ReturnPlace, points: Sequence[ReturnPlace], return_type: float
 ) -> ReturnPlace:
-    """Return the place that a return from ``position_ne_m`` goes to; of equally near ones home, then the first."""
+    """Return the destination of a return from ``position_ne_m``; at equal distance home, then the first point."""
     candidates = list(points) if return_type == RALLY_FIRST and points else [home, *points]
     north_m, east_m = position_ne_m
     return min(candidates, key=lambda place: distance(place.north_m - north_m, place.east_m - east_m))

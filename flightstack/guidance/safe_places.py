@@ -1,4 +1,4 @@
-"""Where the vehicle may fly and where it returns to: geofence, home and rally points. No I/O, no clock."""
+"""Geofence, home and rally points. No I/O, no clock."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from flightstack.plan import (
 
 
 def plan_limits(b: Behaviour) -> Limits:
-    """Return what a plan may ask for; without GF_MAX_VER_DIST, the altitude that missions always had."""
+    """Return the limits of plans; without GF_MAX_VER_DIST, the default altitude limit applies."""
     return Limits(
         max_first_distance_m=b.first_waypoint_distance_m,
         max_distance_m=b.waypoint_distance_m,
@@ -33,32 +33,32 @@ def plan_limits(b: Behaviour) -> Limits:
 
 
 FARTHEST_HOME_M = 100_000.0
-"""Beyond this a home is a mistake: the local frame is flat."""
+"""Largest distance of home from the origin: the local frame is flat."""
 GREATEST_HOME_STEP_M = 1_000.0
-"""So far above or below the origin home may be: missions and returns measure their heights from it."""
+"""Largest height of home above or below the origin: missions and returns measure their altitudes from home."""
 HOME_SPREAD_M = 0.05
-"""So far a vehicle may stand from home and be there: the ground gives by less, and home need not follow that."""
+"""Distance from home up to which a landed vehicle is at home; compliance of the ground moves it by less."""
 
 
 class SafePlaces:
-    """The geofence and the rally points in force, and the checks of plans against them."""
+    """Present geofence, home and rally points, and the checks of plans against them."""
 
     def __init__(self, origin: GeoPoint) -> None:
-        """Measure in metres from ``origin``, the origin of the local frame."""
+        """Use ``origin`` as the origin of the local frame."""
         self.frame = LocalFrame(origin)
         self.home_point = origin
         self.fence: Fence = NO_FENCE
         self.home: ReturnPlace = HOME
-        """Where home is; it may be set elsewhere than at the origin."""
+        """Home, which may differ from the origin."""
         self.home_is_chosen = False
-        """Whether a user named the place: then it does not follow the vehicle."""
+        """True if a user has set home; it then does not follow the vehicle."""
         self.points: tuple[ReturnPlace, ...] = ()
         self._rally_items: tuple[MissionItem, ...] = ()
         self.ids: tuple[int, int, int] = (0, 0, 0)
         """Opaque ids of mission, geofence and rally points; the owner of the stores keeps them."""
 
     def set_home(self, point: GeoPoint, chosen: bool) -> str | None:
-        """Move home; return why not, or None. ``chosen`` is true for a place that a user named."""
+        """Set home; return the reason of a refusal, or None. ``chosen`` is true for a home set by a user."""
         if not all(math.isfinite(number) for number in point):
             return "home has no such position"
         if abs(point.latitude_deg) > 90.0 or abs(point.longitude_deg) > 180.0:
@@ -74,7 +74,7 @@ class SafePlaces:
         return None
 
     def has_left_home(self, position_ned_m: Vector3) -> bool:
-        """Tell whether a place is another than home."""
+        """Return True if a position differs from home by more than ``HOME_SPREAD_M``."""
         home = self.home
         x, y, z = position_ned_m
         return distance(x - home.north_m, y - home.east_m, z + home.altitude_m) > HOME_SPREAD_M
@@ -82,43 +82,43 @@ class SafePlaces:
     def check_mission(
         self, items: Sequence[MissionItem], limits: Limits, home: GeoPoint | None = None
     ) -> Rejection | None:
-        """Return why a mission is refused, by itself, by the limits or by the geofence; as seen from ``home``."""
+        """Return why a mission is refused, by its items, the limits or the geofence, relative to ``home``; or None."""
         return check_mission(items, home or self.home_point, limits, self.fence.shape)
 
     def check_fence(
         self, items: Sequence[MissionItem], vehicle_ne_m: tuple[float, float] | None
     ) -> Rejection | None:
-        """Return why a geofence is refused; ``vehicle_ne_m`` is where a flying vehicle is, from the origin."""
+        """Return why a geofence is refused, or None; ``vehicle_ne_m`` is the position of a flying vehicle."""
         if vehicle_ne_m is not None:
             vehicle_ne_m = (vehicle_ne_m[0] - self.home.north_m, vehicle_ne_m[1] - self.home.east_m)
         return check_fence(items, self.home_point, vehicle_ne_m)
 
     def check_rally(self, items: Sequence[MissionItem], limits: Limits) -> Rejection | None:
-        """Return why a list of rally points is refused."""
+        """Return why a list of rally points is refused, or None."""
         return check_rally(items, self.home_point, limits, self.fence.shape)
 
     def set_fence(self, items: Sequence[MissionItem]) -> Fence:
-        """Take a geofence that was checked, and return it."""
+        """Set a checked geofence, and return it."""
         self.fence = Fence.from_items(items, self.frame) if items else NO_FENCE
         return self.fence
 
     def set_rally(self, items: Sequence[MissionItem]) -> None:
-        """Take rally points that were checked."""
+        """Set checked rally points."""
         self._rally_items = tuple(items)
         self.points = rally_points(items, self.frame, self.home_point)
 
     def return_place(
         self, north_m: float, east_m: float, return_type: float, allows: Callable[[ReturnPlace], bool]
     ) -> ReturnPlace | None:
-        """Return where a return from here goes (RTL_TYPE), of the places that the geofence ``allows``, or None."""
+        """Return the destination of a return from here (RTL_TYPE) among those that ``allows`` accepts, or None."""
         points = [point for point in self.points if allows(point)]
         if allows(self.home):
             return choose((north_m, east_m), self.home, points, return_type)
         return choose((north_m, east_m), self.home, points, RALLY_FIRST) if points else None
 
     def ground_m(self, north_m: float, east_m: float, stood: ReturnPlace) -> float:
-        """Return how high the ground is taken to be, above the origin: as at the nearest place known.
+        """Return the assumed ground altitude above the origin, that of the nearest known position.
 
-        Where the vehicle ``stood`` counts before a home at the same place, which may have been set to any altitude.
+        The position where the vehicle ``stood`` precedes a home at the same place, whose altitude a user may have set.
         """
         return choose((north_m, east_m), stood, (self.home, *self.points), NEAREST).altitude_m

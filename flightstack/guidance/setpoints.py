@@ -1,4 +1,4 @@
-"""Offboard setpoints and stick positions, and the record in which the kernels read the newest of them. Pure."""
+"""Offboard setpoints and stick positions, and the record that passes the newest of them to the kernels. Pure."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ IDENTITY = Quaternion(1.0, 0.0, 0.0, 0.0)
 
 
 class PointSetpoint(NamedTuple):
-    """A point of a trajectory in NED; NaN where the sender leaves a number open.
+    """A trajectory point in NED; NaN for values that the sender does not set.
 
-    North and east are given together or not at all. Each direction has at least one of position, velocity
-    and acceleration. Without a heading ``yaw_rate_rad_s`` turns the vehicle; without either it keeps its own.
+    North and east are set together or not at all. Each direction has at least one of position, velocity
+    and acceleration. Without a heading, ``yaw_rate_rad_s`` turns the vehicle; without either, the vehicle keeps its
+    heading.
     """
 
     position_ned_m: Vector3 = NOT_GIVEN
@@ -28,7 +29,7 @@ class PointSetpoint(NamedTuple):
 
 
 class AttitudeSetpoint(NamedTuple):
-    """An attitude, or body rates when ``attitude`` is None, with the thrust as share of the largest one."""
+    """An attitude, or body rates if ``attitude`` is None, with the thrust as share of the maximum thrust."""
 
     attitude: Quaternion | None
     rates_frd_rad_s: Vector3
@@ -70,7 +71,7 @@ STREAM = np.dtype(
 
 
 def empty_stream() -> RecordArray:
-    """Return a stream without setpoint, sticks centred."""
+    """Return a stream without a setpoint, with centred sticks."""
     stream: RecordArray = np.zeros(1, STREAM)
     for name in ("position", "velocity", "acceleration", "yaw", "yaw_rate"):
         stream[name] = math.nan
@@ -79,7 +80,7 @@ def empty_stream() -> RecordArray:
 
 
 def store_setpoint(stream: RecordArray, setpoint: OffboardSetpoint, max_thrust_n: float) -> None:
-    """Make ``setpoint`` the newest of ``stream``; the thrust becomes newtons."""
+    """Store ``setpoint`` in ``stream``; the thrust is converted to newtons."""
     s = stream[0]
     s["age"] = 0.0
     if isinstance(setpoint, PointSetpoint):

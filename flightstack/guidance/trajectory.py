@@ -1,7 +1,7 @@
-"""The reference model: a jerk-limited point that moves to a goal, with its velocity and acceleration.
+"""Reference model: a jerk-limited point that moves to a goal, with its velocity and acceleration.
 
-The outer loop is fed position, velocity and acceleration of this point, so that the vehicle follows without
-lag and without overshoot, and never asks more of the rotors than the limits here.
+The outer loop tracks position, velocity and acceleration of this point, so that the vehicle follows without lag or
+overshoot, within the limits here.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class Trajectory(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """Where to go, and how fast at most.
+    """Target position and heading, and speed limits.
 
-    The heading is reached the short way round, unless ``yaw_is_counted`` (1): then ``yaw_rad`` counts turns
-    from the reference's own ``yaw_rad``, so that a turn has a direction and may be longer than half a circle.
+    The heading is reached by the shorter turn, unless ``yaw_is_counted`` is 1: then ``yaw_rad`` is continuous with the
+    reference's ``yaw_rad``, so that a turn has a direction and may exceed half a circle.
     """
 
     x: float
@@ -61,14 +61,14 @@ POLE_RAD_S = 3.0
 KP = POLE_RAD_S / 3.0
 KV = POLE_RAD_S
 KA = 3.0 * POLE_RAD_S
-BRAKING = 0.5  # share of the acceleration planned for braking; the rest covers the jerk limit's delay
+BRAKING = 0.5  # share of the acceleration used to plan braking; the rest covers the delay of the jerk limit
 
 
 @compiled
 def approach_speed(
     distance_m: float, top_m_s: float, acceleration_m_s2: float, gain_1_s: float = KP
 ) -> float:
-    """Speed at ``distance_m`` from the goal: linear near it, then constant braking, at most ``top``."""
+    """Return the speed at ``distance_m`` from the goal: linear near it, then constant braking, at most ``top_m_s``."""
     braking = BRAKING * acceleration_m_s2
     linear_m = braking / (gain_1_s * gain_1_s)
     if distance_m <= linear_m:
@@ -131,10 +131,10 @@ def _heading(t: Trajectory, goal: Goal, dt_s: float) -> tuple[float, float]:
 
 @compiled
 def trajectory_step(t: Trajectory, goal: Goal, limits: TrajectoryLimits, dt_s: float) -> Trajectory:
-    """Move the reference by ``dt_s`` towards ``goal``; it comes to rest there.
+    """Move the reference by ``dt_s`` towards ``goal``, where it comes to rest.
 
-    A cascade with vector limits: position gives a velocity (square-root approach), velocity an acceleration,
-    acceleration a jerk. Horizontal limits act on the vector, so that a leg from rest is a straight line.
+    A cascade with vector limits: position to velocity (square-root controller), velocity to acceleration, acceleration
+    to jerk. Horizontal limits apply to the vector, so that a leg from rest is a straight line.
     """
     x, y, vx, vy, ax, ay = approach_horizontally(t, goal, limits, dt_s)
     z, vz, az = approach_vertically(t, goal, limits, dt_s)
