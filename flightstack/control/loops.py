@@ -94,16 +94,13 @@ def outer_kernel(
     Both are unchanged if a number is not finite, or if the yaw setpoint is beyond ±10⁴ rad, the limit of ``sin_cos``.
     ``last`` (48,) is the inner loop's row of the previous tick, which shows saturation of the mixer.
     """
-    if not (
-        all_finite(state)
-        and all_finite(setpoint)
-        and abs(position_setpoint(setpoint).yaw_rad) <= LARGEST_ANGLE_RAD
-    ):
+    desired = position_setpoint(setpoint)
+    if not (all_finite(state) and all_finite(setpoint) and abs(desired.yaw_rad) <= LARGEST_ANGLE_RAD):
         return
     advanced, new_target = position_pid_step(
         PositionMemory(*as_tuple(memory, POSITION_MEMORY_SIZE)),
         vehicle_state(state),
-        position_setpoint(setpoint),
+        desired,
         PositionParams(*as_tuple(params, POSITION_PARAMS_SIZE)),
         dt_s,
         _saturation_direction(commanded_wrench(last).thrust_n, achieved_wrench(last).thrust_n, 1e-9),

@@ -78,8 +78,9 @@ def achieved_wrench(row: FloatArray) -> Wrench:
 @compiled
 def store_wrenches(row: FloatArray, commanded: Wrench, achieved: Wrench) -> None:
     """Write both wrenches to a row, shape (48,)."""
-    store(row[_WRENCH:], (commanded.thrust_n, *commanded.torque_frd_n_m))
-    store(row[_ACHIEVED:], (achieved.thrust_n, *achieved.torque_frd_n_m))
+    row[_WRENCH], row[_ACHIEVED] = commanded.thrust_n, achieved.thrust_n
+    store(row[_WRENCH + 1 :], commanded.torque_frd_n_m)
+    store(row[_ACHIEVED + 1 :], achieved.torque_frd_n_m)
 
 
 @compiled
