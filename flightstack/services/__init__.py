@@ -1,1 +1,1 @@
-"""The vehicle's side of its ground links, without I/O: peers, services, telemetry."""
+"""Vehicle side of the MAVLink services: peers, protocols and telemetry. No I/O, no clock."""

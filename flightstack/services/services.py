@@ -1,4 +1,4 @@
-"""The services of the vehicle: their interface, and all of them joined."""
+"""Interface of the vehicle's services, and the list of all of them."""
 
 from __future__ import annotations
 
@@ -36,26 +36,26 @@ from flightstack.vehicle.status import VehicleInfo
 
 
 class Service(Protocol):
-    """A protocol as a state machine: messages in, messages out, no I/O.
+    """A MAVLink protocol as a state machine without I/O.
 
-    ``now_s`` is the links' own clock: it goes on while simulated time stands still.
+    ``now_s`` is the link clock, which runs on while simulated time stands still.
     """
 
     @property
     def handles(self) -> frozenset[str]:
-        """Type names of the messages that ``receive`` wants to see."""
+        """Type names of the messages that ``receive`` takes."""
         ...
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Take a message from ``peer``; what is not for this vehicle is ignored, and nothing is raised."""
+        """Take a message from ``peer``. Ignore messages for other vehicles; never raise."""
         ...
 
     def poll(self, now_s: float) -> Iterable[tuple[Hashable | None, Message]]:
-        """Return the messages to send now, each with its peer; None means every peer that was heard."""
+        """Return the messages to send now, each with its peer; None stands for every peer that was heard."""
         ...
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        """Return the link time of the next poll if no message arrives before; −inf for at once, None for never."""
         ...
 
 
@@ -71,9 +71,9 @@ def make_services(
     peer_at: Callable[[Hashable], Peer],
     has_room: Callable[[Hashable], bool],
 ) -> list[Service]:
-    """Return every service, in the order in which their messages are sent.
+    """Return every service, in sending order.
 
-    ``peer_at`` finds a known peer; ``has_room`` is False for a peer that reads more slowly than it is sent to.
+    ``peer_at`` finds a known peer; ``has_room`` is False for a congested peer.
     """
     metadata = ComponentMetadata(
         parameters_json(vehicle.params.specs.values()), VENDOR, info.model, __version__
@@ -96,7 +96,7 @@ def make_services(
 
 
 def stream_services(own: Address, parts: VehicleParts, info: VehicleInfo) -> tuple[Service, Service]:
-    """Return the services of offboard setpoints and of manual control; each reports the loss of its stream."""
+    """Return the services of offboard setpoints and manual control, each with the monitor of its stream."""
     now = parts.now
 
     def here() -> Here:
@@ -122,7 +122,7 @@ def file_services(
     metadata: ComponentMetadata,
     has_room: Callable[[Hashable], bool],
 ) -> tuple[Service, Service]:
-    """Return the services of MAVLink FTP and of the log protocol."""
+    """Return the MAVLink FTP server and the log server."""
     files = vehicle_files(metadata, lambda arguments: pack_file(vehicle.params, arguments), vehicle.logs)
     return (
         FtpServer(own, files, has_room),

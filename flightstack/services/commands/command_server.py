@@ -1,6 +1,6 @@
-"""Take commands and answer them: the receiver's side of the command protocol, without I/O.
+"""Receiver side of the command protocol, without I/O.
 
-Every command addressed to us is answered, to the peer it came from. Who executes a command calls ``answer``.
+Every command to this vehicle is acknowledged to its peer. The caller executes the command and then calls ``answer``.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ _DONE = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
 
 
 class Command(NamedTuple):
-    """A command, whichever message brought it."""
+    """A command from COMMAND_LONG or COMMAND_INT."""
 
     command: int
     params: tuple[float, float, float, float, float, float, float]
-    """NaN stays NaN. Of a COMMAND_INT, the fifth and sixth are degrees, metres or plain, by its frame."""
+    """NaN stays NaN. Parameters 5 and 6 of a COMMAND_INT are degrees, metres or plain numbers, by its frame."""
     is_int: bool
     frame: int | None
     """MAV_FRAME of a COMMAND_INT; a COMMAND_LONG has none."""
@@ -42,23 +42,23 @@ class Command(NamedTuple):
     confirmation: int
 
 
-class _Memory(NamedTuple):
+class _LastCommand(NamedTuple):
     command: Command
     heard_s: float
     answer: Message | None
 
 
 class CommandServer:
-    """Turns messages into commands, answers what needs no execution, and executes no repetition twice."""
+    """Parses commands, refuses unsupported ones, and repeats the answer to a retransmitted command."""
 
     def __init__(self, own: Address, supported: Collection[int]) -> None:
         self.own = own
         self._supported = frozenset(supported)
-        self._last: dict[tuple[Hashable, Address], _Memory] = {}
+        self._last: dict[tuple[Hashable, Address], _LastCommand] = {}
         self._outbox: list[tuple[Hashable, Message]] = []
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> Command | None:
-        """Return the command to execute, or None if there is none in ``message``."""
+        """Return the command in ``message`` to execute, or None."""
         kind = message.get_type()
         if kind not in ("COMMAND_LONG", "COMMAND_INT") or not is_for(message, self.own):
             return None
@@ -73,14 +73,14 @@ class CommandServer:
             if last.answer is not None:
                 self._outbox.append((peer, last.answer))
             return None
-        self._last[client] = _Memory(command, now_s, None)
+        self._last[client] = _LastCommand(command, now_s, None)
         if len(self._last) > _MAX_CLIENTS:
             del self._last[next(iter(self._last))]
         return command
 
     @staticmethod
-    def _is_repetition(command: Command, last: _Memory, now_s: float) -> bool:
-        """Tell whether ``command`` was executed before. A refused one is tried again: it does no harm."""
+    def _is_repetition(command: Command, last: _LastCommand, now_s: float) -> bool:
+        """Return True if ``command`` was executed before. A refused command is executed again."""
         return (
             command.confirmation > 0
             and now_s - last.heard_s < _REPETITION_S
@@ -89,7 +89,7 @@ class CommandServer:
         )
 
     def answer(self, command: Command, result: int, progress: int = 255, result_param2: int = 0) -> None:
-        """Answer ``command`` with a MAV_RESULT; ``progress`` in percent while IN_PROGRESS, 255 if unknown."""
+        """Acknowledge ``command`` with a MAV_RESULT; ``progress`` [%] while IN_PROGRESS, 255 if unknown."""
         message = ack_of(command, result, progress, result_param2)
         self._outbox.append((command.peer, message))
         last = self._last.get((command.peer, command.source))
@@ -97,12 +97,12 @@ class CommandServer:
             self._last[command.peer, command.source] = last._replace(answer=message)
 
     def poll(self, now_s: float) -> list[tuple[Hashable, Message]]:
-        """Return the messages to send now, each with the peer it goes to."""
+        """Return the messages to send now, each with its peer."""
         outbox, self._outbox = self._outbox, []
         return outbox
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next: -inf for at once, None for never."""
+        """Return the time of the next poll: −inf for at once, None for never."""
         return -math.inf if self._outbox else None
 
 
@@ -124,7 +124,7 @@ def _command_of(message: Message, peer: Hashable) -> Command:
 
 
 def _scaled(value: int, frame: int) -> float:
-    """Return degrees in a global frame, plain numbers in frame MISSION, metres in the local ones."""
+    """Return degrees in a global frame, the plain number in frame MISSION, metres in a local frame."""
     if is_unset(value):
         return math.nan
     if frame in _GLOBAL_FRAMES:
@@ -133,6 +133,6 @@ def _scaled(value: int, frame: int) -> float:
 
 
 def _is_same(one: Command, other: Command) -> bool:
-    """Compare commands and parameters; NaN equals NaN."""
+    """Return True if command and parameters are equal; NaN equals NaN."""
     pairs = zip(one.params, other.params, strict=True)
     return one.command == other.command and all(a == b or (math.isnan(a) and math.isnan(b)) for a, b in pairs)

@@ -1,4 +1,4 @@
-"""Commands of the command protocol: those of a link are answered for the link, the others by the vehicle."""
+"""The command service: executes received commands by the vehicle's handlers or those of the link."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ INJECT_FAILURE = int(mavlink.MAV_CMD_INJECT_FAILURE)
 
 
 class CommandService:
-    """COMMAND_LONG, COMMAND_INT and the old SET_MODE."""
+    """Executes COMMAND_LONG, COMMAND_INT and the deprecated SET_MODE."""
 
     handles = frozenset({"COMMAND_LONG", "COMMAND_INT", "SET_MODE"})
 
@@ -39,8 +39,8 @@ class CommandService:
         self._server = CommandServer(own, [*HANDLERS, *LINK_COMMANDS, INJECT_FAILURE])
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Execute a command and answer it."""
-        if message.get_type() == "SET_MODE":  # has no answer: success shows in the heartbeat
+        """Execute and acknowledge a command."""
+        if message.get_type() == "SET_MODE":  # has no acknowledgement: the heartbeat shows the mode
             if message.target_system in (0, self._own.system):
                 self._report(select_custom_mode(self._vehicle.requests, message.custom_mode), "Mode change")
             return
@@ -65,12 +65,12 @@ class CommandService:
             self._vehicle.journal.say(Severity.WARNING, f"{what}: {answer.reason}")
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Return the answers."""
+        """Return the acknowledgements to send now."""
         for command, answer in self._failures.poll(now_s):
             self._answer(command, answer)
         return list(self._server.poll(now_s))
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next."""
+        """Return the time of the next poll."""
         deadlines = (self._server.next_deadline(), self._failures.next_deadline())
         return min((deadline for deadline in deadlines if deadline is not None), default=None)

@@ -1,4 +1,4 @@
-"""What a command of MAVLink may touch, and how it answers."""
+"""Context and result of the command handlers."""
 
 from __future__ import annotations
 
@@ -30,45 +30,45 @@ UNSUPPORTED_FRAME = 9
 """MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME, which pymavlink's dialect lacks."""
 RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 ABSOLUTE_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, None)
-"""Of altitudes above home and above the sea; a COMMAND_LONG has no frame."""
+"""Frames of altitudes above home (relative) and above sea level (absolute); a COMMAND_LONG has no frame."""
 
 
 class Answer(NamedTuple):
-    """Result of a command, and why it was refused."""
+    """Result of a command, and the reason of a refusal."""
 
     result: int
     reason: str = ""
 
 
 def answer_to(refusal: str | None) -> Answer:
-    """Return the answer of an event that may be refused for the moment."""
+    """Return ACCEPTED, or TEMPORARILY_REJECTED with the refusal."""
     return Answer(ACCEPTED) if refusal is None else Answer(REJECTED, refusal)
 
 
 def frame_answer(command: Command) -> Answer | None:
-    """Return the answer to a command whose place is in a frame that is not known here, or None."""
+    """Return the refusal of a command with an unsupported frame, or None."""
     if command.frame in RELATIVE_FRAMES or command.frame in ABSOLUTE_FRAMES:
         return None
     return Answer(UNSUPPORTED_FRAME, f"frame {command.frame} is not supported")
 
 
 class FailureLink(Protocol):
-    """A simulator that can be asked for failures."""
+    """Interface to inject failures into the simulator."""
 
     @property
     def has_state(self) -> bool:
-        """Whether it ever sent a state."""
+        """True if the simulator has sent a state."""
 
     def ask_for_failure(self, unit: int, failure: int, instance: int) -> None:
-        """Ask for a failure, with the parameters of MAV_CMD_INJECT_FAILURE."""
+        """Request a failure, with the parameters of MAV_CMD_INJECT_FAILURE."""
 
     def take_failure_result(self) -> int | None:
-        """Return the MAV_RESULT of what was asked for, once; None while there is none."""
+        """Return the MAV_RESULT of the request once; None while there is none."""
 
 
 @dataclass
 class VehicleContext:
-    """The vehicle as its commands see it."""
+    """The parts of the vehicle that command handlers use."""
 
     now: FlightState
     journal: Journal
@@ -81,14 +81,14 @@ class VehicleContext:
     params: ParamStore
     simulator: FailureLink
     is_generic: bool = False
-    """Whether the vehicle calls itself a generic autopilot (FS_AUTOPILOT), as it was when it started."""
+    """True if the vehicle reports MAV_AUTOPILOT_GENERIC (FS_AUTOPILOT); fixed at start."""
     shutdown_requested: bool = False
     reboot_requested: bool = False
     prepare_reboot: Callable[[], str | None] = field(default=lambda: None)
-    """Makes ready what a reboot begins with; returns why there can be none, or None."""
+    """Prepare the reboot; return the reason that it is not possible, or None."""
     logs: LogStore = NO_LOGS
     open_log_tail: Callable[[], LogTail | None] = field(default=lambda: None)
-    """Opens the log that is being written, to stream it; None while there is none."""
+    """Open the log in progress for streaming; return None while there is none."""
 
     @classmethod
     def of(
@@ -99,7 +99,7 @@ class VehicleContext:
         is_generic: bool = False,
         logs: LogStore = NO_LOGS,
     ) -> VehicleContext:
-        """Return the context of commands to the vehicle of ``parts``."""
+        """Return the context for the vehicle of ``parts``."""
         return cls(
             parts.now, parts.journal, parts.requests, parts.readiness, parts.mission, parts.area, parts.takeoff,
             parts.places.frame, params, simulator, is_generic, logs=logs,

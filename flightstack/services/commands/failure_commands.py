@@ -1,4 +1,4 @@
-"""MAV_CMD_INJECT_FAILURE: the vehicle passes it to the simulator, whose answer is the command's."""
+"""MAV_CMD_INJECT_FAILURE: forward the failure to the simulator, and answer with the simulator's result."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from flightstack.services.commands.context import (
 )
 
 LONGEST_WAIT_S = 1.5
-"""Silence of the simulator after which the command has failed: MAVSDK asks for 2 s. One answers within a step."""
+"""Timeout of the simulator's answer, which takes one step. MAVSDK waits 2 s for the acknowledgement."""
 _HIGHEST = 255.0
 _REASONS = {
     DENIED: "the simulator has no such motor or battery",
@@ -26,16 +26,16 @@ _REASONS = {
 
 
 class FailureCommands:
-    """Passes on one failure at a time."""
+    """Forwards one failure at a time."""
 
     def __init__(self, simulator: FailureLink, are_allowed: Callable[[], bool]) -> None:
-        """``are_allowed`` tells whether SYS_FAILURE_EN is on."""
+        """``are_allowed`` returns True if SYS_FAILURE_EN is set."""
         self._simulator = simulator
         self._are_allowed = are_allowed
         self._waiting: tuple[Command, float] | None = None
 
     def begin(self, command: Command, now_s: float) -> Answer | None:
-        """Ask the simulator for the failure; return the answer if it is known already."""
+        """Request the failure from the simulator; return the answer if it is refused at once."""
         numbers = command.params[:3]
         if not self._are_allowed():
             return Answer(DENIED, "failures are not allowed: SYS_FAILURE_EN is 0")
@@ -50,7 +50,7 @@ class FailureCommands:
         return None
 
     def poll(self, now_s: float) -> Iterator[tuple[Command, Answer]]:
-        """Yield the command that can be answered now."""
+        """Yield the command that can be answered now, with its answer."""
         if self._waiting is None:
             return
         command, asked_s = self._waiting
@@ -67,5 +67,5 @@ class FailureCommands:
         yield command, answer
 
     def next_deadline(self) -> float | None:
-        """Return when the simulator has been silent for too long, or None."""
+        """Return the time at which the simulator's answer times out, or None."""
         return None if self._waiting is None else self._waiting[1] + LONGEST_WAIT_S

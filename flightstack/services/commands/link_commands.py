@@ -1,4 +1,4 @@
-"""Requests that concern one link only: which messages it gets, and how often."""
+"""Commands of one link: its message intervals, single messages and log stream."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ LINK_COMMANDS = frozenset(
         mavlink.MAV_CMD_LOGGING_STOP,
     }
 )
-FORERUNNERS: dict[int, int] = {
+DEPRECATED_REQUESTS: dict[int, int] = {
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
     mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION,
     mavlink.MAV_CMD_GET_HOME_POSITION: mavlink.MAVLINK_MSG_ID_HOME_POSITION,
 }
-"""Commands from before REQUEST_MESSAGE, and what they ask for."""
+"""Deprecated commands that REQUEST_MESSAGE replaces, and the message that each requests."""
 ULOG = 0.0
 """Format of LOGGING_START."""
 HIGHEST_MESSAGE_ID = 0xFFFFFF
 
 
 def _message_id(value: float) -> int:
-    """Return a message id, or -1 for what is none."""
+    """Return ``value`` as a message id, or −1 if it is none."""
     return int(value) if math.isfinite(value) and 0.0 <= value <= HIGHEST_MESSAGE_ID else -1
 
 
 class LinkCommands:
-    """Answers the commands of a link, and REQUEST_DATA_STREAM, their forerunner."""
+    """Executes the commands of a link, and the deprecated REQUEST_DATA_STREAM."""
 
     handles = frozenset({"REQUEST_DATA_STREAM"})
 
@@ -62,7 +62,7 @@ class LinkCommands:
         self._peer_at = peer_at
 
     def answer(self, peer: Peer, command: Command) -> Answer:
-        """Carry out one of ``LINK_COMMANDS`` for ``peer``."""
+        """Execute one of ``LINK_COMMANDS`` for ``peer``."""
         number, argument = _message_id(command.params[0]), command.params[1]
         if command.command == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             done = peer.streams.set_interval(number, argument)
@@ -71,8 +71,8 @@ class LinkCommands:
             return self._send_interval(peer, number)
         if command.command in (mavlink.MAV_CMD_LOGGING_START, mavlink.MAV_CMD_LOGGING_STOP):
             return self._stream_log(command)
-        if command.command in FORERUNNERS:
-            return self._send_message(peer, FORERUNNERS[command.command], 0.0)
+        if command.command in DEPRECATED_REQUESTS:
+            return self._send_message(peer, DEPRECATED_REQUESTS[command.command], 0.0)
         return self._send_message(peer, number, argument)
 
     def _send_message(self, peer: Peer, number: int, argument: float) -> Answer:
@@ -84,12 +84,14 @@ class LinkCommands:
         if number == mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES:
             peer.streams.add_standard_modes()
         if not is_available(number):
-            return Answer(DENIED)  # without a text: ground stations ask each vehicle for gimbals and cameras
+            return Answer(
+                DENIED
+            )  # no text: ground stations routinely request messages of gimbals and cameras
         peer.outbox.extend(self._telemetry.requested(number, argument))
         return Answer(ACCEPTED)
 
     def _stream_log(self, command: Command) -> Answer:
-        """LOGGING_START streams the present or the next flight's log (format 0, ULog); LOGGING_STOP ends it."""
+        """LOGGING_START (format 0, ULog) streams the log of the current or next flight; LOGGING_STOP ends it."""
         if command.command == mavlink.MAV_CMD_LOGGING_STOP:
             self._log_stream.stop()
             return Answer(ACCEPTED)
@@ -98,20 +100,21 @@ class LinkCommands:
         refusal = self._log_stream.start(command.peer, command.source)
         return Answer(ACCEPTED) if refusal is None else Answer(REJECTED, refusal)
 
-    def _send_interval(self, peer: Peer, about: int) -> Answer:
-        if not 0 <= about <= 0xFFFF:
+    def _send_interval(self, peer: Peer, message_id: int) -> Answer:
+        if not 0 <= message_id <= 0xFFFF:
             return Answer(DENIED, "that message has no place in MESSAGE_INTERVAL")
-        peer.outbox.append(mavlink.MAVLink_message_interval_message(about, peer.streams.interval_us(about)))
+        interval_us = peer.streams.interval_us(message_id)
+        peer.outbox.append(mavlink.MAVLink_message_interval_message(message_id, interval_us))
         return Answer(ACCEPTED)
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Take REQUEST_DATA_STREAM: set the rate of a group of messages, or stop it."""
+        """Take REQUEST_DATA_STREAM: set the rate of a message group, or stop it."""
         if is_for(message, self._own):
             rate_hz = float(message.req_message_rate) if message.start_stop else 0.0
             self._peer_at(peer).streams.set_group(message.req_stream_id, rate_hz)
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Return nothing: answers go into the peer's own outbox."""
+        """Return nothing: answers go to the outbox of the peer."""
         return []
 
     def next_deadline(self) -> float | None:

@@ -1,4 +1,4 @@
-"""Commands that start a mission and choose its current item."""
+"""Commands that start a mission and set its current item."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from flightstack.services.commands.context import ACCEPTED, DENIED, Answer, Hand
 
 
 def start_mission(vehicle: VehicleContext, command: Command) -> Answer:
-    """MISSION_START: selects the mode and arms, as PX4 does; parameter 1 is the first item.
+    """MISSION_START: select MISSION mode and arm, as PX4 does; parameter 1 is the first item.
 
-    Nothing changes unless all of it can be done.
+    A refused command changes nothing.
     """
     first = command.params[0]
-    begins_there = math.isfinite(first) and first > 0.0
-    refusal = vehicle.mission.item_refusal(int(first)) if begins_there else None
+    has_first = math.isfinite(first) and first > 0.0
+    refusal = vehicle.mission.item_refusal(int(first)) if has_first else None
     if refusal is not None:
         return Answer(DENIED, refusal)
-    return answer_to(vehicle.requests.start_mission(int(first) if begins_there else None))
+    return answer_to(vehicle.requests.start_mission(int(first) if has_first else None))
 
 
 def set_current(vehicle: VehicleContext, command: Command) -> Answer:
-    """DO_SET_MISSION_CURRENT: parameter 1 is the item (-1: leave it), parameter 2 restarts the mission.
+    """DO_SET_MISSION_CURRENT: parameter 1 is the item (−1 keeps it); parameter 2 is 1 to restart the mission.
 
-    A command that is denied changes nothing.
+    A denied command changes nothing.
     """
     mission = vehicle.mission
     seq, reset = command.params[0], command.params[1]
-    names_item = not math.isnan(seq) and seq != -1.0
-    if names_item:
+    has_item = not math.isnan(seq) and seq != -1.0
+    if has_item:
         if not math.isfinite(seq) or seq != int(seq):
             return Answer(DENIED, "the item is not a whole number")
         refusal = mission.item_refusal(int(seq))
@@ -38,7 +38,7 @@ def set_current(vehicle: VehicleContext, command: Command) -> Answer:
             return Answer(DENIED, refusal)
     if reset == 1.0:
         mission.restart()
-    if names_item:
+    if has_item:
         mission.set_current(int(seq))
     return Answer(ACCEPTED)
 

@@ -1,4 +1,4 @@
-"""Commands to the vehicle as a system: home, termination, its end."""
+"""Commands to the whole vehicle: home, stored parameters, flight termination, reboot and shutdown."""
 
 from __future__ import annotations
 
@@ -21,29 +21,45 @@ from flightstack.services.commands.context import (
 )
 
 DO_NOTHING, REBOOT, SHUT_DOWN = 0.0, 1.0, 2.0
+_WRITE, _RESET, _FACTORY_RESET = 1.0, 2.0, 4.0
+
+
+def store_or_reset_parameters(vehicle: VehicleContext, command: Command) -> Answer:
+    """PREFLIGHT_STORAGE: parameter 1 is 2 or 4 to reset all parameters; 1 (write) is accepted without effect.
+
+    The store writes every change at once.
+    """
+    action = command.params[0]
+    if action not in (_WRITE, _RESET, _FACTORY_RESET):
+        return Answer(UNSUPPORTED)
+    if action != _WRITE:
+        if vehicle.now.status.armed:
+            return Answer(DENIED, "the vehicle is armed")
+        vehicle.params.reset()
+    return Answer(ACCEPTED)
 
 
 def reboot_or_shut_down(vehicle: VehicleContext, command: Command) -> Answer:
-    """PREFLIGHT_REBOOT_SHUTDOWN: parameter 1 is 1 to reboot, 2 to shut down; neither while flying."""
-    wanted = command.params[0]
-    if wanted == DO_NOTHING:
+    """PREFLIGHT_REBOOT_SHUTDOWN: parameter 1 is 1 to reboot, 2 to shut down; denied in the air."""
+    action = command.params[0]
+    if action == DO_NOTHING:
         return Answer(ACCEPTED)
-    if wanted not in (REBOOT, SHUT_DOWN):
+    if action not in (REBOOT, SHUT_DOWN):
         return Answer(UNSUPPORTED)
     if vehicle.now.status.armed and not vehicle.now.landed:
         return Answer(DENIED, "the vehicle is in the air")
-    if wanted == REBOOT and not vehicle.reboot_requested:
+    if action == REBOOT and not vehicle.reboot_requested:
         problem = vehicle.prepare_reboot()
         if problem is not None:
             return Answer(FAILED, problem)
-    vehicle.shutdown_requested = wanted == SHUT_DOWN
-    vehicle.reboot_requested = wanted == REBOOT
+    vehicle.shutdown_requested = action == SHUT_DOWN
+    vehicle.reboot_requested = action == REBOOT
     return Answer(ACCEPTED)
 
 
 def terminate_flight(vehicle: VehicleContext, command: Command) -> Answer:
-    """DO_FLIGHTTERMINATION: parameter 1 above 0.5 stops the rotors for good, in the air too (PX4's threshold)."""
-    if not command.params[0] > 0.5:  # NaN too
+    """DO_FLIGHTTERMINATION: parameter 1 above 0.5 (PX4's threshold) stops the rotors until a reboot, in the air too."""
+    if not command.params[0] > 0.5:  # True for NaN
         return Answer(DENIED, "parameter 1 must be 1; a termination cannot be taken back")
     if not vehicle.now.status.armed:
         return answer_to(Need.ARMED.value)
@@ -52,9 +68,9 @@ def terminate_flight(vehicle: VehicleContext, command: Command) -> Answer:
 
 
 def set_home(vehicle: VehicleContext, command: Command) -> Answer:
-    """DO_SET_HOME: parameter 1 is 1 for the present place, else latitude, longitude and altitude above the sea.
+    """DO_SET_HOME: parameter 1 is 1 for the current position, else 5 to 7 are latitude, longitude and altitude AMSL.
 
-    A named place stays home for all flights to come; the present one follows the vehicle to where it arms next (PX4).
+    As in PX4, a given position stays home for later flights; otherwise home moves to where the vehicle arms next.
     """
     if command.params[0] == 1.0:
         if not vehicle.readiness.facts.state_is_valid:
@@ -75,6 +91,7 @@ def set_home(vehicle: VehicleContext, command: Command) -> Answer:
 
 
 HANDLERS: dict[int, Handler] = {
+    mavlink.MAV_CMD_PREFLIGHT_STORAGE: store_or_reset_parameters,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: reboot_or_shut_down,
     mavlink.MAV_CMD_DO_FLIGHTTERMINATION: terminate_flight,
     mavlink.MAV_CMD_DO_SET_HOME: set_home,

@@ -30,7 +30,7 @@ from flightstack.services.files.ftp_sessions import (
     checksum_answer,
     refused,
 )
-from flightstack.services.rate_limit import RateLimit, always_has_room, in_turn
+from flightstack.services.rate_limit import RateLimit, always_has_room, rotated
 
 SESSION_TIMEOUT_S = 10.0
 """Silence after which a client's files are closed, as in PX4."""
@@ -239,7 +239,7 @@ class FtpServer:
         sent: list[tuple[Hashable | None, Message]] = []
         allowance = self._pace.allowance(now_s)
         ready = [(key, client) for key, client in self._clients.items() if self._has_room(key[0])]
-        streaming = in_turn(ready, self._turn)
+        streaming = rotated(ready, self._turn)
         while streaming and len(sent) < allowance:
             for key, client in list(streaming):
                 packet = client.next_burst_packet() if len(sent) < allowance else None

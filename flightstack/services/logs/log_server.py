@@ -16,7 +16,7 @@ from flightstack.mavlink.files import VirtualFile
 from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.mavlink.log_messages import BLOCK, log_data_message
 from flightstack.services.logs.log_store import LogInfo, LogStore
-from flightstack.services.rate_limit import RateLimit, always_has_room, in_turn
+from flightstack.services.rate_limit import RateLimit, always_has_room, rotated
 
 CLIENT_TIMEOUT_S = 30.0
 """Silence after which a client's list and open log are given up."""
@@ -120,7 +120,7 @@ class LogServer:
         allowance = self._pace.allowance(now_s)
         clients = self._clients.items()
         busy = [(key, client) for key, client in clients if client.is_busy and self._has_room(key[0])]
-        busy = in_turn(busy, self._turn)
+        busy = rotated(busy, self._turn)
         while busy and len(sent) < allowance:
             for key, client in busy[: allowance - len(sent)]:
                 client.heard_s = now_s
