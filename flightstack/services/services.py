@@ -26,7 +26,7 @@ from flightstack.services.params.param_server import ParamServer
 from flightstack.services.routing.peer import Peer
 from flightstack.services.streams.link_loss import GroundLinkMonitor, stream_monitors
 from flightstack.services.streams.manual_server import ManualServer
-from flightstack.services.streams.setpoint_messages import Here
+from flightstack.services.streams.setpoint_messages import PoseReference
 from flightstack.services.streams.setpoint_server import SetpointServer
 from flightstack.services.streams.timesync import TimeService
 from flightstack.services.telemetry.fields import euler
@@ -99,15 +99,17 @@ def stream_services(own: Address, parts: VehicleParts, info: VehicleInfo) -> tup
     """Return the services of offboard setpoints and manual control, each with the monitor of its stream."""
     now = parts.now
 
-    def here() -> Here:
+    def reference() -> PoseReference:
         state: list[float] = now.state.tolist()
-        return Here(Vector3(*state[:3]), euler(state[6:10])[2], info.frame, parts.area.home.altitude_m)
+        return PoseReference(
+            Vector3(*state[:3]), euler(state[6:10])[2], info.frame, parts.area.home.altitude_m
+        )
 
     offboard, manual = stream_monitors(now, parts.failsafes.links)
     return (
         SetpointServer(
             own,
-            here,
+            reference,
             partial(parts.navigator.set_offboard, max_thrust_n=info.max_thrust_n),
             partial(parts.journal.say, Severity.WARNING),
             offboard,

@@ -12,10 +12,10 @@ from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import AttitudeSetpoint, PointSetpoint
 from flightstack.mavlink.dialect import mavlink
-from flightstack.services.streams.setpoint_messages import Here, read_setpoint
+from flightstack.services.streams.setpoint_messages import PoseReference, read_setpoint
 
 HOME = GeoPoint(47.0, 8.0, 500.0)
-HERE = Here(Vector3(10.0, 20.0, -30.0), math.pi / 2, LocalFrame(HOME), HOME.altitude_m)
+HERE = PoseReference(Vector3(10.0, 20.0, -30.0), math.pi / 2, LocalFrame(HOME), HOME.altitude_m)
 P, V, A, YAW, YAW_RATE = (1.0, 2.0, -3.0), (0.5, -0.25, 0.125), (0.3, 0.2, 0.1), 0.7, 0.2
 LOCAL_FRAMES = (1, 7, 8, 9, 12)
 ALL = 0

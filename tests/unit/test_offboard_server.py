@@ -7,7 +7,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import OffboardSetpoint, PointSetpoint
 from flightstack.mavlink.link import Address
 from flightstack.services.streams.link_loss import StreamMonitor
-from flightstack.services.streams.setpoint_messages import Here
+from flightstack.services.streams.setpoint_messages import PoseReference
 from flightstack.services.streams.setpoint_server import SetpointServer
 from tests.support.streams import local_point
 
@@ -21,9 +21,9 @@ class Vehicle:
         self.lost: list[bool] = []
         self.time_us = 0
 
-    def here(self) -> Here:
+    def reference(self) -> PoseReference:
         home = GeoPoint(47.0, 8.0, 500.0)
-        return Here(Vector3(0.0, 0.0, 0.0), 0.0, LocalFrame(home), 500.0)
+        return PoseReference(Vector3(0.0, 0.0, 0.0), 0.0, LocalFrame(home), 500.0)
 
     def take_offboard(self, setpoint: OffboardSetpoint) -> None:
         self.taken.append(setpoint)
@@ -34,7 +34,7 @@ class Vehicle:
     def server(self) -> SetpointServer:
         return SetpointServer(
             Address(1, 1),
-            self.here,
+            self.reference,
             self.take_offboard,
             self.refuse_offboard,
             StreamMonitor(lambda: self.time_us, lambda: 1.0, self.lost.append),

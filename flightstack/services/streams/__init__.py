@@ -1,1 +1,1 @@
-"""What clients stream to the vehicle: setpoints, manual control, time synchronisation."""
+"""Streams from clients: offboard setpoints, manual control, time synchronisation, heartbeats."""

@@ -1,4 +1,4 @@
-"""Take MANUAL_CONTROL: a pilot's sticks over the link; the last writer wins."""
+"""MANUAL_CONTROL: stick positions of a pilot. The newest message of any sender counts."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _NOT_SUPPLIED = 0x7FFF
 
 
 def read_sticks(message: Message) -> Sticks:
-    """Return the sticks of a MANUAL_CONTROL.
+    """Return the stick positions of a MANUAL_CONTROL, each −1 to 1.
 
-    x is forward, y right and r yaw, −1000 to 1000; the throttle z is 0 to 1000 with the centre at 500, as PX4 and
-    QGroundControl have it. An axis that is not supplied is centred.
+    x is forward, y right and r yaw, −1000 to 1000; z is the throttle, 0 to 1000 with the centre at 500, as in PX4 and
+    QGroundControl. An axis that is not supplied is centred.
     """
     up = 0.0 if message.z == _NOT_SUPPLIED else _axis(2 * message.z - 1000)
     return Sticks(_axis(message.x), _axis(message.y), up, _axis(message.r))
@@ -26,27 +26,27 @@ def _axis(value: int) -> float:
 
 
 class ManualServer:
-    """Hands the sticks to the vehicle and watches over their stream."""
+    """Passes stick positions to the vehicle and monitors their stream."""
 
     handles = frozenset({"MANUAL_CONTROL"})
 
-    def __init__(self, own: Address, take_sticks: Callable[[Sticks], None], watch: StreamMonitor) -> None:
+    def __init__(self, own: Address, take_sticks: Callable[[Sticks], None], monitor: StreamMonitor) -> None:
         self._own = own
         self._take_sticks = take_sticks
-        self._watch = watch
+        self._monitor = monitor
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Take the sticks; MANUAL_CONTROL names a system only."""
+        """Take stick positions. MANUAL_CONTROL has no target component."""
         if message.target not in (0, self._own.system):
             return
         self._take_sticks(read_sticks(message))
-        self._watch.heard(now_s)
+        self._monitor.heard(now_s)
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Send nothing; note a stream that has fallen silent."""
-        self._watch.check(now_s)
+        """Evaluate the stream's timeout. Send nothing."""
+        self._monitor.check(now_s)
         return []
 
     def next_deadline(self) -> float | None:
-        """Return None: a loss counts on the vehicle's clock too, which moves on only between polls."""
+        """Return None: the timeout counts on the vehicle clock too, which advances only between polls."""
         return None

@@ -1,4 +1,4 @@
-"""Offboard setpoints; of several senders the newest message counts."""
+"""Offboard setpoints. The newest message of any sender counts."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from collections.abc import Callable, Hashable
 from flightstack.guidance.setpoints import OffboardSetpoint
 from flightstack.mavlink.link import Address, Message, is_for
 from flightstack.services.streams.link_loss import StreamMonitor
-from flightstack.services.streams.setpoint_messages import Here, read_setpoint
+from flightstack.services.streams.setpoint_messages import PoseReference, read_setpoint
 
-_SILENCE_S = 10.0  # between two texts about refused setpoints: they come at 50 Hz
+_WARNING_INTERVAL_S = 10.0  # setpoints come at 50 Hz
 
 
 class SetpointServer:
-    """SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and SET_ATTITUDE_TARGET."""
+    """Takes SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and SET_ATTITUDE_TARGET."""
 
     handles = frozenset(
         {"SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT", "SET_ATTITUDE_TARGET"}
@@ -23,36 +23,36 @@ class SetpointServer:
     def __init__(
         self,
         own: Address,
-        here: Callable[[], Here],
-        take: Callable[[OffboardSetpoint], None],
-        refuse: Callable[[str], None],
-        watch: StreamMonitor,
+        reference: Callable[[], PoseReference],
+        accept: Callable[[OffboardSetpoint], None],
+        warn: Callable[[str], None],
+        monitor: StreamMonitor,
     ) -> None:
-        """Give accepted setpoints to ``take`` and texts about others to ``refuse``; ``here`` is the vehicle's pose."""
+        """Pass accepted setpoints to ``accept`` and the texts of refusals to ``warn``."""
         self._own = own
-        self._here = here
-        self._take = take
-        self._refuse = refuse
-        self._watch = watch
-        self._said_s = -math.inf
+        self._reference = reference
+        self._accept = accept
+        self._warn = warn
+        self._monitor = monitor
+        self._warned_s = -math.inf
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Take a setpoint; one that is refused neither replaces the last nor keeps the stream alive."""
+        """Take a setpoint. A refused one neither replaces the last one nor restarts the stream's timeout."""
         if not is_for(message, self._own):
             return
-        setpoint = read_setpoint(message, self._here)
+        setpoint = read_setpoint(message, self._reference)
         if not isinstance(setpoint, str):
-            self._take(setpoint)
-            self._watch.heard(now_s)
-        elif now_s - self._said_s >= _SILENCE_S:
-            self._said_s = now_s
-            self._refuse(f"Setpoint refused: {setpoint}")
+            self._accept(setpoint)
+            self._monitor.heard(now_s)
+        elif now_s - self._warned_s >= _WARNING_INTERVAL_S:
+            self._warned_s = now_s
+            self._warn(f"Setpoint refused: {setpoint}")
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Send nothing; note a stream that has fallen silent."""
-        self._watch.check(now_s)
+        """Evaluate the stream's timeout. Send nothing."""
+        self._monitor.check(now_s)
         return []
 
     def next_deadline(self) -> float | None:
-        """Return None: a loss counts on the vehicle's clock too, which moves on only between polls."""
+        """Return None: the timeout counts on the vehicle clock too, which advances only between polls."""
         return None

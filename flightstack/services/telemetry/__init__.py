@@ -1,1 +1,1 @@
-"""Telemetry: which messages, at which rates, and how each is made from the status."""
+"""Telemetry: messages from the vehicle status, and their rates on each link."""

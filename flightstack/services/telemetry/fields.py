@@ -1,4 +1,4 @@
-"""Numbers of the vehicle as fields of single precision hold them, and its clock as the 32-bit fields do."""
+"""Conversion of vehicle values to single-precision and 32-bit time fields."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from flightstack.vehicle.status import VehicleStatus
 
 NAN = math.nan
 _SINGLE_LIMIT = 1e18
-"""Beyond this a number counts as infinite: single-precision fields, and their products, must hold it."""
+"""Larger numbers become infinite: single-precision fields, and products of them, must hold the rest."""
 
 
 def floats(array: FloatArray) -> list[float]:
-    """Return the values for fields of single precision, which not every double fits."""
+    """Return the values as ``singles`` does."""
     return singles(array.tolist())
 
 
 def singles(values: list[float]) -> list[float]:
-    """Return ``values`` with infinity in place of what single precision cannot hold."""
+    """Return ``values`` with infinity for numbers that single precision cannot hold."""
     for value in values:  # in every message: ``any`` takes twice as long
         if abs(value) > _SINGLE_LIMIT:
             return [math.copysign(math.inf, v) if abs(v) > _SINGLE_LIMIT else v for v in values]
@@ -26,7 +26,7 @@ def singles(values: list[float]) -> list[float]:
 
 
 def wrapped(time: int) -> int:
-    """Return a time as a 32-bit field holds it: it wraps."""
+    """Return a time wrapped to 32 bits."""
     return time & 0xFFFFFFFF
 
 
@@ -36,7 +36,7 @@ def boot_ms(f: VehicleStatus) -> int:
 
 
 def euler(q: list[float]) -> tuple[float, float, float]:
-    """Roll, pitch, yaw of a quaternion w, x, y, z (plain Python: telemetry needs no compiled code)."""
+    """Return roll, pitch, yaw [rad] of a quaternion w, x, y, z. Plain Python: telemetry needs no compiled code."""
     w, x, y, z = q
     sin_pitch = min(1.0, max(-1.0, 2.0 * (w * y - z * x)))
     return (
@@ -47,5 +47,5 @@ def euler(q: list[float]) -> tuple[float, float, float]:
 
 
 def heading_deg(q: list[float]) -> float:
-    """Heading in [0, 360) of a quaternion; 0 for one that is not a number."""
+    """Return the heading of a quaternion [deg], in [0, 360); 0 for a NaN quaternion."""
     return math.degrees(euler(q)[2]) % 360.0 if math.isfinite(q[0]) else 0.0

@@ -1,4 +1,4 @@
-"""The vehicle's modes as MAVLink's standard modes service tells them."""
+"""Messages of MAVLink's standard modes protocol."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ADVANCED, NOT_SELECTABLE, AUTOMATIC = 1, 2, 4
 
 
 class ModeEntry(NamedTuple):
-    """A row of the list of modes."""
+    """Entry of AVAILABLE_MODES."""
 
     mode: Mode
     name: str
@@ -40,18 +40,18 @@ _STANDARD = {entry.mode: entry.standard for entry in MODES}
 
 
 def current_mode(f: VehicleStatus) -> Message:
-    """CURRENT_MODE; a mode is entered at once or not at all, so the intended one is the present one."""
+    """CURRENT_MODE. A mode is entered at once or refused, so the intended mode is the current one."""
     number = CUSTOM_MODE[f.mode]
     return mavlink.MAVLink_current_mode_message(_STANDARD[f.mode], number, number)
 
 
 def available_modes_monitor(_f: VehicleStatus) -> Message:
-    """AVAILABLE_MODES_MONITOR: the list of modes never changes."""
+    """AVAILABLE_MODES_MONITOR. The list of modes never changes."""
     return mavlink.MAVLink_available_modes_monitor_message(0)
 
 
 def available_modes(index: float) -> Iterator[Message]:
-    """AVAILABLE_MODES: all of them for index 0, else the one counted from 1; none for what does not exist."""
+    """AVAILABLE_MODES: all modes for index 0, else the mode at the index from 1; nothing if it does not exist."""
     if index == 0.0 or not math.isfinite(index):
         wanted = range(1, len(MODES) + 1)
     else:

@@ -1,4 +1,4 @@
-"""Messages about attitude, position, speed and actuators."""
+"""Messages of attitude, position, velocity and actuators."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def attitude_quaternion(f: VehicleStatus) -> Message:
 
 
 def attitude_target(f: VehicleStatus) -> Message:
-    """ATTITUDE_TARGET: what the outer loop asks of the inner one, and the reference rates."""
+    """ATTITUDE_TARGET: attitude and thrust commanded by the outer loop, and the reference rates."""
     target = floats(f.attitude_target)
     rates = floats(f.row[LoopRow.REFERENCE_RATES])
     thrust = min(1.0, max(0.0, target[4] / f.info.max_thrust_n)) if math.isfinite(target[4]) else 0.0
@@ -72,7 +72,7 @@ def global_position(f: VehicleStatus) -> Message:
 
 
 def gps_raw(f: VehicleStatus) -> Message:
-    """GPS_RAW_INT from the true position: a 3D fix while there are good states; no satellites are simulated."""
+    """GPS_RAW_INT from the true position: a 3D fix while the state is good. Satellites are not simulated."""
     x = floats(f.state)
     point = f.info.frame.to_geo(Vector3(*x[:3]))
     fix = mavlink.GPS_FIX_TYPE_3D_FIX if f.state_is_good else mavlink.GPS_FIX_TYPE_NO_FIX
@@ -86,7 +86,7 @@ def gps_raw(f: VehicleStatus) -> Message:
 
 
 def altitude(f: VehicleStatus) -> Message:
-    """ALTITUDE; the ground is not known to be flat, so terrain and clearance are not told."""
+    """ALTITUDE. Terrain is unknown, so terrain altitude and clearance are NaN."""
     down_m = floats(f.state)[2]
     above_sea_m = f.info.frame.origin.altitude_m - down_m
     return mavlink.MAVLink_altitude_message(
@@ -105,7 +105,7 @@ def odometry(f: VehicleStatus) -> Message:
 
 
 def _into_body(q: list[float], v: list[float]) -> list[float]:
-    """Turn a world vector into the body frame: the transposed rotation matrix of ``q``."""
+    """Rotate a world vector to the body frame, by the transposed rotation matrix of ``q``."""
     w, x, y, z = q
     return [
         (1 - 2 * (y * y + z * z)) * v[0] + 2 * (x * y + w * z) * v[1] + 2 * (x * z - w * y) * v[2],
@@ -115,28 +115,28 @@ def _into_body(q: list[float], v: list[float]) -> list[float]:
 
 
 def esc_status(f: VehicleStatus, first: int = 0) -> Message:
-    """ESC_STATUS of the four rotors from ``first`` on."""
+    """ESC_STATUS of four rotors, beginning with ``first``."""
     speeds = f.row[LoopRow.ROTOR_SPEED].tolist()[first : first + 4]
     rpm = [int32(speed * RPM_PER_RAD_S) for speed in speeds]
     return EscStatus(first, f.time_us, rpm, [NAN] * 4, [NAN] * 4)
 
 
 def _command_shares(f: VehicleStatus) -> list[float]:
-    """Rotor speed commands as shares of the largest speed, in order of the vehicle file."""
+    """Return rotor speed commands as fractions of the maximum speed, in the order of the vehicle file."""
     commands = f.row[LoopRow.ROTOR_COMMAND].tolist()
     shares = [command / top for command, top in zip(commands, f.info.top_speed_rad_s, strict=False)]
     return [min(1.0, max(0.0, share)) if math.isfinite(share) else 0.0 for share in shares]
 
 
 def servo_output(f: VehicleStatus) -> Message:
-    """SERVO_OUTPUT_RAW: rotor speed commands as pulses, 1000 µs for none to 2000 µs for the largest."""
+    """SERVO_OUTPUT_RAW: rotor speed commands as pulses, 1000 µs (stopped) to 2000 µs (maximum speed)."""
     pulses = [1000 + round(1000.0 * share) for share in _command_shares(f)]
     pulses += [0] * (8 - len(pulses))
     return mavlink.MAVLink_servo_output_raw_message(wrapped(f.time_us), 0, *pulses)
 
 
 def actuator_output(f: VehicleStatus) -> Message:
-    """ACTUATOR_OUTPUT_STATUS: rotor speed commands, 0 to 1 of the largest."""
+    """ACTUATOR_OUTPUT_STATUS: rotor speed commands, 0 to 1 of the maximum speed."""
     shares = _command_shares(f)
     return mavlink.MAVLink_actuator_output_status_message(
         f.time_us, (1 << len(shares)) - 1, shares + [0.0] * (32 - len(shares))

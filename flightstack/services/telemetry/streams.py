@@ -1,7 +1,7 @@
-"""Which telemetry one link sends how often. Pure.
+"""Telemetry streams of one link and their rates. Pure.
 
-Rates count simulated time, and never more than the same rate on the link's own clock: at fifty times real
-time a client gets 50 attitudes a second, not 2 500. At speed 1, and over a memory link, both clocks are one.
+Rates count simulated time and are limited to the same rate on the link clock: at 50 times real time a client gets 50
+ATTITUDE messages per second of wall time, not 2500. At real time, and on an in-memory link, both clocks agree.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from flightstack.services.telemetry.telemetry import STREAMED, Telemetry
 M = mavlink
 
 LONGEST_INTERVAL_US = 2**31 - 1
-"""What MESSAGE_INTERVAL can say."""
+"""Range of the field in MESSAGE_INTERVAL."""
 
-# messages per second: PX4's defaults on its two links, in simulation, for what this vehicle has. What pymavlink's
-# releases do not know (ESC_STATUS, CURRENT_MODE, AVAILABLE_MODES_MONITOR, our own dialect) is sent on request only:
+# PX4's default rates on its two links in simulation, for the messages that this vehicle has. Messages that pymavlink's
+# releases lack (ESC_STATUS, CURRENT_MODE, AVAILABLE_MODES_MONITOR, the project's dialect) are sent on request only:
 # MAVProxy and scripts count each message that they cannot decode as a lost packet.
 GROUND_RATES_HZ: dict[int, float] = {
     M.MAVLINK_MSG_ID_ATTITUDE: 50.0,
@@ -44,7 +44,7 @@ STANDARD_MODES_RATES_HZ: dict[int, float] = {
     M.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
     M.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: 0.3,
 }
-"""For clients that ask for AVAILABLE_MODES: they know the protocol of standard modes."""
+"""For clients that request AVAILABLE_MODES: they implement the standard modes protocol."""
 API_RATES_HZ: dict[int, float] = {
     **GROUND_RATES_HZ,
     M.MAVLINK_MSG_ID_ATTITUDE: 100.0,
@@ -84,11 +84,11 @@ GROUPS: dict[int, tuple[int, ...]] = {
         M.MAVLINK_MSG_ID_ALTITUDE,
     ),
 }
-"""Messages of the groups of REQUEST_DATA_STREAM, as ArduPilot divides them."""
+"""Message groups of REQUEST_DATA_STREAM, as in ArduPilot."""
 
 
 class _Stream:
-    """A message of a link, due at ``vehicle_s`` on the vehicle's clock and ``link_s`` on the link's."""
+    """A streamed message, due at ``vehicle_s`` on the vehicle clock and ``link_s`` on the link clock."""
 
     __slots__ = ("interval_s", "link_s", "message_id", "vehicle_s")
 
@@ -98,7 +98,7 @@ class _Stream:
         self.vehicle_s = self.link_s = -math.inf
 
     def sent(self, now_s: float, link_now_s: float) -> None:
-        """Set when it is due next: keep the phase, unless a whole interval was missed."""
+        """Compute the next due times. Keep the phase, unless a whole interval was missed."""
         interval_s = self.interval_s
         upcoming_s = self.vehicle_s + interval_s
         self.vehicle_s = upcoming_s if upcoming_s > now_s else now_s + interval_s
@@ -106,7 +106,7 @@ class _Stream:
 
 
 class Streams:
-    """The messages that one link sends by itself."""
+    """The telemetry streams of one link."""
 
     def __init__(self, rates_hz: dict[int, float]) -> None:
         self._default = rates_hz
@@ -114,14 +114,14 @@ class Streams:
         self._soonest_s = -math.inf
 
     def interval_us(self, message_id: int) -> int:
-        """Interval of a message; −1 if it is not sent, 0 if it is not known."""
+        """Return the interval of a message [µs]; −1 if it is not streamed, 0 if it is not supported."""
         if message_id in self._streams:
             return round(self._streams[message_id].interval_s * 1e6)
         return -1 if message_id in STREAMED else 0
 
     def set_interval(self, message_id: int, interval_us: float) -> bool:
-        """Set an interval as SET_MESSAGE_INTERVAL says (−1 stop, 0 default); tell whether it can be done."""
-        if message_id not in STREAMED or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # nor is NaN
+        """Set an interval as SET_MESSAGE_INTERVAL defines (−1 stops, 0 is the default); return False if denied."""
+        if message_id not in STREAMED or not -1 <= interval_us <= LONGEST_INTERVAL_US:  # True for NaN
             return False
         if interval_us == 0 and message_id in self._default:
             self._streams[message_id] = _Stream(message_id, 1.0 / self._default[message_id])
@@ -133,20 +133,20 @@ class Streams:
         return True
 
     def add_standard_modes(self) -> None:
-        """Send the messages of STANDARD_MODES_RATES_HZ, at their rates unless another one was set."""
+        """Stream the messages of STANDARD_MODES_RATES_HZ that are not streamed yet."""
         for message_id, rate_hz in STANDARD_MODES_RATES_HZ.items():
             if message_id not in self._streams:
                 self.set_interval(message_id, 1e6 / rate_hz)
 
     def set_group(self, group: int, rate_hz: float) -> None:
-        """Set the rate of a MAV_DATA_STREAM group as REQUEST_DATA_STREAM says; 0 stops it."""
+        """Set the rate of a MAV_DATA_STREAM group as REQUEST_DATA_STREAM defines; 0 stops it."""
         interval_us = 1e6 / rate_hz if rate_hz > 0.0 else -1.0
         members = [m for g in GROUPS.values() for m in g] if group == 0 else GROUPS.get(group, ())
         for message_id in members:
             self.set_interval(message_id, interval_us)
 
     def due(self, telemetry: Telemetry, link_now_s: float) -> Iterator[Message]:
-        """Yield the messages that are due by the vehicle's time and by the link's."""
+        """Yield the messages that are due on both the vehicle clock and the link clock."""
         now_s = telemetry.time_us * 1e-6
         if now_s < self._soonest_s:
             return

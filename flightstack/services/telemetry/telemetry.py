@@ -1,4 +1,4 @@
-"""Telemetry of the vehicle: every message from one status per poll."""
+"""Telemetry messages of the vehicle, all from one status per poll."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
     mavlink.MAVLINK_MSG_ID_CURRENT_MODE: modes.current_mode,
     mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES_MONITOR: modes.available_modes_monitor,
 }
-"""What the status alone tells, by message id."""
+"""Constructors of the messages that depend on the status alone, by message id."""
 
 STREAMED = frozenset({*MAKERS, FS_LOOP_TIMING_ID})
 """Messages that can be sent at a rate."""
@@ -49,12 +49,12 @@ _AVAILABLE = STREAMED | {mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES}
 
 
 def is_available(message_id: int) -> bool:
-    """Return True if ``Telemetry`` can make the message."""
+    """Return True if ``Telemetry`` provides the message."""
     return message_id in _AVAILABLE
 
 
 class Telemetry:
-    """Makes each message once per poll, for all links."""
+    """Builds each message once per poll, for all links."""
 
     def __init__(
         self,
@@ -69,7 +69,7 @@ class Telemetry:
         self._made: dict[int, tuple[Message, ...]] = {}
 
     def begin_poll(self) -> None:
-        """Forget the status and the messages of the poll before."""
+        """Discard the status and the messages of the last poll."""
         self._status = None
         self._made.clear()
 
@@ -87,11 +87,11 @@ class Telemetry:
 
     @property
     def boot_ms(self) -> int:
-        """Vehicle time as the field ``time_boot_ms``."""
+        """Vehicle time for the field ``time_boot_ms``."""
         return wrapped(self.time_us // 1000)
 
     def messages(self, message_id: int) -> tuple[Message, ...]:
-        """Return a message that can be sent at a rate, as of this poll."""
+        """Return a message of ``STREAMED``, as of this poll."""
         made = self._made.get(message_id)
         if made is None:
             made = self._made[message_id] = tuple(self._make(message_id))
@@ -105,7 +105,7 @@ class Telemetry:
         return self.messages(message_id)
 
     def farewell(self) -> Message:
-        """Return the last HEARTBEAT, MAV_STATE_POWEROFF."""
+        """Return the final HEARTBEAT with MAV_STATE_POWEROFF."""
         self.begin_poll()
         return vehicle.heartbeat(self.status, leaving=True)
 

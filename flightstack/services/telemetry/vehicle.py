@@ -1,4 +1,4 @@
-"""Messages about the vehicle as a whole: who it is, how it is, and where home is."""
+"""Messages of the whole vehicle: state, health, mission, battery, home, version."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ MAVLINK_2 = 200
 NO_MISSION = 0xFFFF
 """MISSION_CURRENT.total of a vehicle without a mission."""
 NAME_IN_VERSION = list(b"flightst")
-"""In place of a Git hash, eight octets: who reads it sees that this is not PX4."""
+"""Eight bytes in place of a Git hash; they distinguish the vehicle from PX4."""
 
 _OWN_TARGETS = (Mode.TAKEOFF, Mode.MISSION, Mode.HOLD, Mode.RETURN, Mode.LAND)
 
 
 def heartbeat(f: VehicleStatus, leaving: bool = False) -> Message:
-    """HEARTBEAT, with PX4's custom mode; the base mode's flags are those that PX4 sets in each mode."""
+    """HEARTBEAT with PX4's custom mode and, in each mode, PX4's base mode flags."""
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_HIL_ENABLED
     base |= mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
     if f.mode in _OWN_TARGETS:
@@ -46,7 +46,7 @@ def heartbeat(f: VehicleStatus, leaving: bool = False) -> Message:
 
 
 def system_status(f: VehicleStatus) -> int:
-    """Return MAV_STATE: critical while a failsafe acts, emergency when its action ends the flight."""
+    """Return MAV_STATE: critical while a failsafe is active, emergency if its action ends the flight."""
     if f.mode is Mode.TERMINATION:
         return int(mavlink.MAV_STATE_FLIGHT_TERMINATION)
     if f.armed and f.failsafe_action >= Action.LAND:
@@ -81,9 +81,9 @@ def extended_state(f: VehicleStatus) -> Message:
 
 
 def mission_current(f: VehicleStatus) -> Message:
-    """MISSION_CURRENT; the field ``total`` has a number of its own for no mission, and 0 would be "not supported"."""
+    """MISSION_CURRENT. ``total`` is 0xFFFF without a mission, since 0 stands for "not supported"."""
     total = f.mission_count or NO_MISSION
-    # a finished mission's current item would be one past its last
+    # the current item of a finished mission is one past the last
     current = min(f.mission.current, max(0, f.mission_count - 1))
     mission_mode = 1 if f.mode is Mode.MISSION else 2
     return mavlink.MAVLink_mission_current_message(
@@ -100,11 +100,11 @@ SENSORS = (
     | mavlink.MAV_SYS_STATUS_AHRS
     | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 )
-"""What stands for the true state that the simulator sends: clients count a vehicle without them as ill."""
+"""Sensors reported for the true state from the simulator: clients count a vehicle without them as unhealthy."""
 
 
 def sys_status(f: VehicleStatus) -> Message:
-    """SYS_STATUS: the health bits by which MAVSDK and QGroundControl judge a vehicle."""
+    """SYS_STATUS with the health bits that MAVSDK and QGroundControl evaluate."""
     present = SENSORS | mavlink.MAV_SYS_STATUS_GEOFENCE | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     healthy = present if f.state_is_good else 0
     if not f.can_arm:
@@ -121,7 +121,7 @@ def sys_status(f: VehicleStatus) -> Message:
 
 
 def _battery_fields(f: VehicleStatus) -> tuple[int, int, int]:
-    """Voltage [mV], current [cA] and charge [%], or what stands for not known."""
+    """Return voltage [mV], current [cA] and charge [%], or MAVLink's values for unknown."""
     b = f.battery
     if not b.valid:
         return 0xFFFF, -1, -1
@@ -136,11 +136,11 @@ CHARGE_STATES = (
     mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL,
     mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY,
 )
-"""By the level that arming and failsafes go by."""
+"""By the battery level of arming checks and failsafes."""
 
 
 def battery_status(f: VehicleStatus) -> Message:
-    """BATTERY_STATUS: one pack, its cells not told apart."""
+    """BATTERY_STATUS of one battery, without cell voltages."""
     voltage, current, remaining = _battery_fields(f)
     known = f.battery.valid and math.isfinite(f.battery.remaining)
     charge = CHARGE_STATES[f.battery_level] if known else mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
@@ -151,7 +151,7 @@ def battery_status(f: VehicleStatus) -> Message:
 
 
 def system_time(f: VehicleStatus) -> Message:
-    """SYSTEM_TIME: time since boot; simulated time knows no date."""
+    """SYSTEM_TIME: time since boot. Simulated time has no date."""
     return mavlink.MAVLink_system_time_message(0, boot_ms(f))
 
 
@@ -166,7 +166,7 @@ def home_position(f: VehicleStatus) -> Message:
 
 
 def origin(f: VehicleStatus) -> Message:
-    """GPS_GLOBAL_ORIGIN: where the local frame begins."""
+    """GPS_GLOBAL_ORIGIN: origin of the local frame."""
     point = f.info.frame.to_geo(Vector3(0.0, 0.0, 0.0))
     return mavlink.MAVLink_gps_global_origin_message(
         int32(point.latitude_deg * 1e7), int32(point.longitude_deg * 1e7), int32(point.altitude_m * 1e3),
@@ -175,7 +175,7 @@ def origin(f: VehicleStatus) -> Message:
 
 
 def estimator_status(f: VehicleStatus) -> Message:
-    """ESTIMATOR_STATUS: the true state, so nothing to innovate."""
+    """ESTIMATOR_STATUS: the state is the true one, so innovations are zero."""
     flags = (
         mavlink.ESTIMATOR_ATTITUDE | mavlink.ESTIMATOR_VELOCITY_HORIZ | mavlink.ESTIMATOR_VELOCITY_VERT
         | mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS | mavlink.ESTIMATOR_POS_VERT_ABS
@@ -187,7 +187,7 @@ def estimator_status(f: VehicleStatus) -> Message:
 
 
 def flight_information(f: VehicleStatus) -> Message:
-    """FLIGHT_INFORMATION: arming, takeoff and landing of the present flight, on the vehicle's clock."""
+    """FLIGHT_INFORMATION: vehicle time of arming, takeoff and landing of the current flight."""
     times = f.flight
     return mavlink.MAVLink_flight_information_message(
         boot_ms(f), times.armed_us, times.takeoff_us, times.armed_us, times.landing_us // 1000
@@ -195,10 +195,10 @@ def flight_information(f: VehicleStatus) -> Message:
 
 
 def fence_status(f: VehicleStatus) -> Message:
-    """FENCE_STATUS: whether the fence is broken now; the number of breaches, and kind and time of the latest."""
+    """FENCE_STATUS: breach state, number of breaches, kind and time of the latest."""
     breaches = f.fence_breaches
     kind = mavlink.FENCE_BREACH_NONE
-    if breaches.number:  # of several limits the boundary is reported: it takes longer to return
+    if breaches.number:  # the boundary goes before the altitude: its breach takes longer to end
         too_high = breaches.flags is FenceBreach.TOO_HIGH
         kind = mavlink.FENCE_BREACH_MAXALT if too_high else mavlink.FENCE_BREACH_BOUNDARY
     return mavlink.MAVLink_fence_status_message(
@@ -224,7 +224,7 @@ CAPABILITIES = (
 
 
 def autopilot_version(f: VehicleStatus) -> Message:
-    """AUTOPILOT_VERSION: what this vehicle can do, and which version of the stack it runs."""
+    """AUTOPILOT_VERSION: capabilities and version of the flight stack."""
     major, minor, patch = (int(part) for part in __version__.split(".")[:3])
     version = major << 24 | minor << 16 | patch << 8
     nothing = [0] * 8
@@ -234,7 +234,7 @@ def autopilot_version(f: VehicleStatus) -> Message:
 
 
 def protocol_version(f: VehicleStatus) -> Message:
-    """PROTOCOL_VERSION: MAVLink 2 is spoken, MAVLink 1 understood."""
+    """PROTOCOL_VERSION: sends MAVLink 2, accepts MAVLink 1 and 2."""
     nothing = [0] * 8
     return mavlink.MAVLink_protocol_version_message(MAVLINK_2, 100, MAVLINK_2, nothing, nothing)
 
@@ -243,12 +243,12 @@ STATUSTEXT_SIZE = 50
 
 
 def status_texts(severity: int, text: str) -> Iterator[Message]:
-    """STATUSTEXT, in chunks of 50 octets when it is longer; the last chunk is the one that is not full."""
-    octets = text.encode("utf-8")
-    if len(octets) <= STATUSTEXT_SIZE:
-        yield mavlink.MAVLink_statustext_message(severity, octets, 0, 0)
+    """STATUSTEXT, in chunks if longer than 50 bytes; the last chunk is not full."""
+    data = text.encode("utf-8")
+    if len(data) <= STATUSTEXT_SIZE:
+        yield mavlink.MAVLink_statustext_message(severity, data, 0, 0)
         return
-    identity = 1 + sum(octets) % 0xFFFF
-    for chunk, start in enumerate(range(0, len(octets) + 1, STATUSTEXT_SIZE)):
-        part = octets[start : start + STATUSTEXT_SIZE]
+    identity = 1 + sum(data) % 0xFFFF
+    for chunk, start in enumerate(range(0, len(data) + 1, STATUSTEXT_SIZE)):
+        part = data[start : start + STATUSTEXT_SIZE]
         yield mavlink.MAVLink_statustext_message(severity, part, identity, chunk)
