@@ -1,1 +1,1 @@
-"""MAVLink FTP and the files that it serves."""
+"""The MAVLink FTP server and its files."""

@@ -1,6 +1,6 @@
-"""Component metadata: the files that tell a ground station what this vehicle is, and the message that names them.
+"""Component metadata files, and the message with their URI.
 
-https://mavlink.io/en/services/component_metadata.html. The files lie where PX4 has them.
+https://mavlink.io/en/services/component_metadata.html. The paths are those of PX4.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ FOLDER = "etc/extras"
 GENERAL = f"{FOLDER}/component_general.json"
 PARAMETERS = f"{FOLDER}/parameters.json"
 PARAMETER_PACK = "@PARAM/param.pck"
-"""Where ArduPilot's clients ask for all parameters at once."""
+"""Path at which clients of ArduPilot read all parameters at once."""
 LOGS_FLAT = "@MAV_LOG"
 LOGS_DATED = "fs/microsd/log"
 _PARAMETER_TYPE = 1  # COMP_METADATA_TYPE_PARAMETER
@@ -27,7 +27,7 @@ _MAX_BOOT_MS = 0xFFFF_FFFF
 
 
 class ComponentMetadata:
-    """The metadata files of one component, made once: they are the same from start to end.
+    """The metadata files of one component, which do not change after the start.
 
     ``parameters_json`` is the parameter metadata (COMP_METADATA_TYPE_PARAMETER) as text; ``version`` is
     major.minor.patch.
@@ -63,12 +63,12 @@ class ComponentMetadata:
         self._crc = mavlink_crc32(packed_general)
 
     def message(self, boot_ms: int) -> Message:
-        """Return COMPONENT_METADATA; ``boot_ms`` is the vehicle's time since its start."""
+        """Return COMPONENT_METADATA; ``boot_ms`` is vehicle time."""
         return component_metadata_message(boot_ms, self._crc, f"mftp:///{GENERAL}.xz")
 
 
 def _compressed(content: bytes) -> bytes:
-    """Return ``content`` as .xz, with the one checksum that every decoder knows."""
+    """Return ``content`` as .xz with CRC32, the checksum that every decoder supports."""
     return lzma.compress(content, check=lzma.CHECK_CRC32, preset=1)
 
 
@@ -82,10 +82,10 @@ def vehicle_files(
     parameter_pack: Callable[[str], bytes | None] | None,
     logs: LogStore,
 ) -> FileTree:
-    """Return all that a vehicle shows over MAVLink FTP.
+    """Return the files that a vehicle serves over MAVLink FTP.
 
-    ``parameter_pack`` makes ``@PARAM/param.pck`` from the arguments after its "?"; None: there is none, and
-    clients take the parameters one by one.
+    ``parameter_pack`` returns ``@PARAM/param.pck`` for the arguments after its "?". If it is None, the file does not
+    exist, and clients read the parameters one by one.
     """
     files = {} if metadata is None else dict(metadata.files)
     if parameter_pack is not None:

@@ -1,7 +1,7 @@
-"""The vehicle's side of MAVLink FTP, without I/O: reads only, for any number of clients at once.
+"""Vehicle side of MAVLink FTP, read-only, for several clients at once. No I/O.
 
-https://mavlink.io/en/services/ftp.html, with what PX4 and ArduPilot do where it is silent. Every request is
-answered, those that would write by FILE_PROTECTED. A burst goes out in small parts, one per ``poll``.
+https://mavlink.io/en/services/ftp.html; where it is silent, the server does as PX4 and ArduPilot do. Every request is
+answered, a write with FILE_PROTECTED. Each ``poll`` sends a part of a burst.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from flightstack.services.files.ftp_sessions import (
 from flightstack.services.rate_limit import RateLimit, always_has_room, rotated
 
 SESSION_TIMEOUT_S = 10.0
-"""Silence after which a client's files are closed, as in PX4."""
+"""Timeout after which the files of a silent client are closed, as in PX4."""
 MAX_CLIENTS = 64
 MAX_ANSWERS = 256
-"""Answers that may wait for the next poll; a client that floods us has to ask again."""
+"""Answers that may be queued for the next poll; further requests are dropped."""
 
 _REMEMBERED = (Opcode.OPEN_FILE_RO, Opcode.TERMINATE_SESSION, Opcode.RESET_SESSIONS, Opcode.CALC_FILE_CRC32)
 _WRITING = (
@@ -52,18 +52,18 @@ _WRITING = (
 
 
 class _Result(NamedTuple):
-    """What an acknowledged request gives."""
+    """Data of an ACK."""
 
     data: bytes = b""
     session: int | None = None
-    """The session, where it is not that of the request."""
+    """Session, if it differs from that of the request."""
 
 
 _Work = Callable[[FtpSessions, Packet, float], _Result | None]
 
 
 class FtpServer:
-    """Serves ``files`` to all clients. Each keeps its own sessions; a silent one loses them."""
+    """Serves ``files``. Each client has its own sessions, which close when it is silent."""
 
     handles = frozenset({"FILE_TRANSFER_PROTOCOL"})
 
@@ -74,7 +74,7 @@ class FtpServer:
         has_room: Callable[[Hashable], bool] = always_has_room,
         pace: RateLimit | None = None,
     ) -> None:
-        """Bursts go to peers that ``has_room`` is true for, the others' wait; answers always go."""
+        """A burst waits while ``has_room`` is False for its peer. Answers are always sent."""
         self.own = own
         self._files = files
         self._has_room = has_room
@@ -95,11 +95,11 @@ class FtpServer:
 
     @property
     def client_count(self) -> int:
-        """Clients that are remembered, at most MAX_CLIENTS."""
+        """Number of known clients, at most MAX_CLIENTS."""
         return len(self._clients)
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Take any message from ``peer``; what is no request to us is ignored."""
+        """Take a message from ``peer``. Ignore all but requests to this vehicle."""
         if message.get_type() not in self.handles or not is_for(message, self.own):
             return
         request = read_packet(message)
@@ -114,12 +114,12 @@ class FtpServer:
                 self._reply(peer, client, request, answer)
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Return the messages to send now, each with the peer it goes to."""
-        if not (self._clients or self._outbox):  # most of the time, a hundred times a second
+        """Return the messages to send now, each with its peer."""
+        if not (self._clients or self._outbox):  # the usual case
             return []
         for (peer, _), client in self._clients.items():
             if client.is_streaming and not self._has_room(peer):
-                client.heard_s = now_s  # it waits for us
+                client.heard_s = now_s  # it waits for data
             if client.checksum is not None:
                 self._step_checksum(peer, client, client.checksum)
         self._close_silent(now_s)
@@ -127,7 +127,7 @@ class FtpServer:
         return [*outbox, *self._bursts(now_s)]
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        """Return the time of the next poll if no message arrives before; −inf for at once, None for never."""
         clients = self._clients.values()
         if self._outbox or any(client.checksum is not None for client in clients):
             return -math.inf
@@ -140,7 +140,7 @@ class FtpServer:
     def _client(self, peer: Hashable, address: Address, now_s: float) -> FtpSessions:
         client = self._clients.pop((peer, address), None) or FtpSessions(address, now_s)
         client.heard_s = now_s
-        self._clients[peer, address] = client  # the longest silent one comes first
+        self._clients[peer, address] = client  # sorted by the time of the last request
         if len(self._clients) > MAX_CLIENTS:
             self._clients.pop(next(iter(self._clients))).close_all()
         return client
@@ -154,7 +154,7 @@ class FtpServer:
     # -- answers
 
     def _answer(self, client: FtpSessions, request: Packet, now_s: float) -> Packet | None:
-        """Do what ``request`` asks for, and return the answer; None when it comes later."""
+        """Execute ``request`` and return the answer; None if it follows later."""
         sequence = next_sequence(request.sequence)
         try:
             if request.size > MAX_DATA:
@@ -203,7 +203,7 @@ class FtpServer:
             if len(data) + len(line) > MAX_DATA:
                 break
             data += line
-        if not data:  # for an empty directory too: clients that get nothing ask for ever
+        if not data:  # for an empty directory too: on an empty ACK clients repeat the request without end
             raise FtpRefusal(FtpError.END_OF_FILE)
         return _Result(data)
 
@@ -229,13 +229,13 @@ class FtpServer:
     def _read(self, client: FtpSessions, request: Packet, now_s: float) -> _Result:
         return _Result(client.session(request.session, now_s).read(request.offset, request.size))
 
-    # -- what takes longer
+    # -- bursts and checksums
 
     def _burst(self, client: FtpSessions, request: Packet, now_s: float) -> None:
         client.begin_burst(request, now_s)
 
     def _bursts(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Return the next packets of all bursts, fairly shared."""
+        """Return the next packets of all bursts, in turn."""
         sent: list[tuple[Hashable | None, Message]] = []
         allowance = self._pace.allowance(now_s)
         ready = [(key, client) for key, client in self._clients.items() if self._has_room(key[0])]
@@ -246,7 +246,7 @@ class FtpServer:
                 if packet is None:
                     streaming.remove((key, client))
                 else:
-                    client.heard_s = now_s  # however long a burst takes: it has an end
+                    client.heard_s = now_s  # the client is not silent: a burst needs no requests
                     sent.append((key[0], ftp_message(client.address, packet)))
         self._pace.take(len(sent))
         self._turn += len(sent)
@@ -272,7 +272,7 @@ class FtpServer:
 
 
 def _line(entry: Entry) -> bytes:
-    """Return an entry as the wire has it; one that never fits is skipped, but counted."""
+    """Return an entry of a listing as bytes; "S" (skipped) for one that does not fit, since offsets count it."""
     text = f"D{entry.name}" if entry.size is None else f"F{entry.name}\t{entry.size}"
     line = text.encode(errors="replace") + b"\x00"
     return line if len(line) <= MAX_DATA else b"S\x00"

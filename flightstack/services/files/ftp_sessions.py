@@ -1,4 +1,4 @@
-"""Open files of one MAVLink FTP client: sessions, bursts and running checksums. No messages, no clock."""
+"""Sessions, bursts and checksums of one MAVLink FTP client. No messages, no clock."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from flightstack.mavlink.link import Address
 
 MAX_SESSIONS = 4
 ABANDONED_S = 1.0
-"""A session this silent gives way to a new one of the same client."""
+"""Silence after which a new session of the same client may replace a session."""
 BURST_PACKETS = 500
-"""Packets in one burst, as ArduPilot sends: then the client must ask again, which shows that it is there."""
+"""Packets in one burst, as in ArduPilot. The client requests the next burst, which shows that it is connected."""
 CRC_CHUNK = 256 * 1024
-"""Bytes checked at once: about 0.2 ms."""
+"""Bytes per checksum step, about 0.2 ms."""
 
 
 class FtpRefusal(Exception):  # noqa: N818  # an answer of the protocol, not an error of the program
-    """A request that is answered by a NAK."""
+    """A request is answered with a NAK."""
 
     def __init__(self, error: FtpError, errno: int | None = None) -> None:
         super().__init__(error.name)
@@ -36,7 +36,7 @@ class FtpRefusal(Exception):  # noqa: N818  # an answer of the protocol, not an 
 
 @dataclass
 class Burst:
-    """A burst under way."""
+    """A burst in progress."""
 
     sequence: int
     offset: int
@@ -52,15 +52,15 @@ class Session:
     heard_s: float
     burst: Burst | None = None
     is_done: bool = False
-    """Whether its end has been sent."""
+    """True if the end of the file was sent."""
 
     def read(self, offset: int, size: int) -> bytes:
-        """Return up to ``size`` bytes (0: as many as fit); raise FtpRefusal at the end, and OSError."""
+        """Return up to ``size`` bytes (0: as many as fit). Raise FtpRefusal at the end of the file, or OSError."""
         if offset >= self.file.size:
             self.is_done = True
             raise FtpRefusal(FtpError.END_OF_FILE)
         data = self.file.read(offset, min(size or MAX_DATA, MAX_DATA, self.file.size - offset))
-        if not data:  # it is shorter than it was when it was opened
+        if not data:  # the file was truncated since it was opened
             self.is_done = True
             raise FtpRefusal(FtpError.END_OF_FILE)
         self.is_done = self.is_done or offset + len(data) >= self.file.size
@@ -69,7 +69,7 @@ class Session:
 
 @dataclass
 class Checksum:
-    """A checksum under way, and the request that is answered by it."""
+    """A checksum in progress, and its request."""
 
     request: Packet
     file: VirtualFile
@@ -77,7 +77,7 @@ class Checksum:
     crc: int = 0
 
     def step(self) -> bool:
-        """Check the next bytes; return whether all are. Raise OSError."""
+        """Add the next bytes; return True at the end of the file. Raise OSError."""
         data = self.file.read(self.offset, min(CRC_CHUNK, self.file.size - self.offset))
         self.crc = mavlink_crc32(data, self.crc)
         self.offset += len(data)
@@ -86,27 +86,27 @@ class Checksum:
 
 @dataclass
 class FtpSessions:
-    """One client of the server. Session numbers are its own: clients that always use 0 are served at once."""
+    """Sessions of one client. Numbers are per client, so that several clients can use session 0 at once."""
 
     address: Address
     heard_s: float
     sessions: dict[int, Session] = field(default_factory=dict)
     checksum: Checksum | None = None
     last: tuple[Packet, Packet] | None = None
-    """The last request that changed something, and its answer, for when that gets lost."""
+    """The last request that changed state, and its answer, which is repeated if the client repeats the request."""
 
     @property
     def is_streaming(self) -> bool:
-        """Whether a burst is under way."""
+        """True while a burst is in progress."""
         return any(session.burst is not None for session in self.sessions.values())
 
     def open(self, file: VirtualFile, wanted: int, now_s: float) -> int:
-        """Return the session number of ``file``; raise FtpRefusal when too many are open.
+        """Open a session for ``file`` and return its number; raise FtpRefusal if too many are open.
 
-        It is the number of the request when that is free, as in ArduPilot: MAVProxy drops answers with another.
+        The number is that of the request if it is free, as in ArduPilot: MAVProxy drops answers with another number.
 
-        A session whose end was sent, or which is silent, is closed: the message that ends it gets lost, and
-        clients that ignore the number in the answer (MAVSDK) would go on to read the old file.
+        Finished and silent sessions are closed first: TERMINATE_SESSION may be lost, and clients that ignore the
+        number in the answer (MAVSDK) would continue to read the old file.
         """
         for number, session in list(self.sessions.items()):
             is_silent = session.burst is None and now_s - session.heard_s >= ABANDONED_S
@@ -120,7 +120,7 @@ class FtpSessions:
         return number
 
     def session(self, number: int, now_s: float) -> Session:
-        """Return an open session, which counts as heard; raise FtpRefusal."""
+        """Return an open session and restart its silence; raise FtpRefusal."""
         session = self.sessions.get(number)
         if session is None:
             raise FtpRefusal(FtpError.INVALID_SESSION)
@@ -128,25 +128,25 @@ class FtpSessions:
         return session
 
     def close(self, number: int) -> None:
-        """Close a session; one that is not open is ignored."""
+        """Close a session if it is open."""
         session = self.sessions.pop(number, None)
         if session is not None:
             session.file.close()
 
     def close_all(self) -> None:
-        """Close all sessions, and end the checksum under way."""
+        """Close all sessions, and cancel the checksum in progress."""
         for number in list(self.sessions):
             self.close(number)
         self.end_checksum()
 
     def end_checksum(self) -> None:
-        """Give up the checksum under way."""
+        """Close the file of the checksum in progress."""
         if self.checksum is not None:
             self.checksum.file.close()
             self.checksum = None
 
     def begin_burst(self, request: Packet, now_s: float) -> None:
-        """Begin a burst, or begin it anew at another place; raise FtpRefusal."""
+        """Start or restart a burst at the offset of ``request``; raise FtpRefusal."""
         session = self.session(request.session, now_s)
         if request.offset >= session.file.size:
             session.is_done, session.burst = True, None
@@ -155,7 +155,7 @@ class FtpSessions:
         session.burst = Burst(next_sequence(request.sequence), request.offset, size, BURST_PACKETS)
 
     def next_burst_packet(self) -> Packet | None:
-        """Return the next packet of a burst; None when none is under way."""
+        """Return the next packet of a burst, or None."""
         for number, session in self.sessions.items():
             if session.burst is not None:
                 return _burst_packet(number, session, session.burst)
@@ -175,8 +175,8 @@ def _burst_packet(number: int, session: Session, burst: Burst) -> Packet:
         return refused(sequence, number, Opcode.BURST_READ_FILE, offset, failure)
     burst.sequence, burst.offset = next_sequence(sequence), offset + len(data)
     burst.packets_left -= 1
-    # The last packet of the file says so itself. A NAK after it, as PX4 sends, would make MAVSDK drop the
-    # whole file when this packet gets lost; clients that want the NAK ask for the next burst and get it.
+    # The last packet of the file has the burst_complete flag. A NAK after it, as PX4 sends, would make MAVSDK drop
+    # the whole file if this packet is lost; clients that need the NAK get it for their next burst request.
     is_last = burst.packets_left == 0 or burst.offset >= session.file.size
     if is_last:
         session.burst = None
@@ -192,7 +192,7 @@ def refused(sequence: int, session: int, request: int, offset: int, refusal: Ftp
 
 
 def checksum_answer(checksum: Checksum) -> Packet:
-    """Return the answer of a checksum that is done."""
+    """Return the ACK of a completed checksum."""
     request = checksum.request
     data = UINT32.pack(checksum.crc)
     return Packet(next_sequence(request.sequence), request.session, Opcode.ACK, 4, request.opcode, data=data)

@@ -1,7 +1,7 @@
-"""The vehicle's side of the log protocol (LOG_REQUEST_LIST, _DATA, _END, LOG_ERASE), without I/O.
+"""Vehicle side of the log protocol (LOG_REQUEST_LIST, _DATA, _END, LOG_ERASE). No I/O.
 
-Ids count from 0, the oldest first, as in PX4. A client downloads from the list that it was shown: a log that appears
-meanwhile moves no id. Any number of clients at once; what they asked for goes out in small parts.
+As in PX4, ids count from 0, the oldest log first. A client downloads from the list that it received, so new logs do
+not change its ids. Several clients may download at once; each ``poll`` sends a part.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from flightstack.services.logs.log_store import LogInfo, LogStore
 from flightstack.services.rate_limit import RateLimit, always_has_room, rotated
 
 CLIENT_TIMEOUT_S = 30.0
-"""Silence after which a client's list and open log are given up."""
+"""Timeout after which the list and the open log of a silent client are closed."""
 MAX_CLIENTS = 64
 MAX_RANGES = 64
 SMALL_REQUEST = 10 * BLOCK
-"""Requests up to this size fill gaps, and wait for each other; a larger one begins anew, as all are in PX4."""
+"""Requests up to this size fill gaps and are queued. A larger one replaces the queue, as every request in PX4."""
 
 _MAX_UINT32 = 0xFFFF_FFFF
 _NOTICE, _WARNING = int(mavlink.MAV_SEVERITY_NOTICE), int(mavlink.MAV_SEVERITY_WARNING)
@@ -31,7 +31,7 @@ _NOTICE, _WARNING = int(mavlink.MAV_SEVERITY_NOTICE), int(mavlink.MAV_SEVERITY_W
 
 @dataclass
 class _Range:
-    """Bytes still to be sent of a log."""
+    """Remaining bytes of a request."""
 
     log_id: int
     offset: int
@@ -40,7 +40,7 @@ class _Range:
 
 @dataclass
 class _Client:
-    """What one client asked for."""
+    """Requests of one client."""
 
     heard_s: float
     logs: Sequence[LogInfo] | None = None
@@ -64,8 +64,8 @@ class _Client:
 class LogServer:
     """Lists, sends and erases the logs of ``store``.
 
-    ``is_armed`` forbids to erase; ``say`` tells everybody (MAV_SEVERITY, text) what came of it, since the
-    protocol has no answer to LOG_ERASE.
+    An armed vehicle refuses to erase. ``say`` reports the result (MAV_SEVERITY, text), since LOG_ERASE has no
+    acknowledgement.
     """
 
     handles = frozenset({"LOG_REQUEST_LIST", "LOG_REQUEST_DATA", "LOG_REQUEST_END", "LOG_ERASE"})
@@ -79,7 +79,7 @@ class LogServer:
         has_room: Callable[[Hashable], bool] = always_has_room,
         pace: RateLimit | None = None,
     ) -> None:
-        """What a peer asked for waits while ``has_room`` is false for it, as in PX4."""
+        """The requests of a peer wait while ``has_room`` is False for it, as in PX4."""
         self.own = own
         self._store = store
         self._is_armed = is_armed
@@ -90,11 +90,11 @@ class LogServer:
         self._turn = 0
 
     def backlog(self) -> list[int]:
-        """Return how many requested ranges wait for each client, at most MAX_RANGES."""
+        """Return the number of queued ranges of each client, at most MAX_RANGES."""
         return [len(client.ranges) for client in self._clients.values()]
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Take any message from ``peer``; what is not of this protocol or not for us is ignored."""
+        """Take a message from ``peer``. Ignore other protocols and other targets."""
         kind = message.get_type()
         if kind not in self.handles or not is_for(message, self.own):
             return
@@ -109,12 +109,12 @@ class LogServer:
             self._on_erase()
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Return the messages to send now, each with the peer it goes to, fairly shared."""
-        if not self._clients:  # most of the time
+        """Return the messages to send now, each with its peer; clients are served in turn."""
+        if not self._clients:  # the usual case
             return []
         for (peer, _), client in self._clients.items():
             if client.is_busy and not self._has_room(peer):
-                client.heard_s = now_s  # it waits for us
+                client.heard_s = now_s  # it waits for data
         self._forget_silent(now_s)
         sent: list[tuple[Hashable | None, Message]] = []
         allowance = self._pace.allowance(now_s)
@@ -131,7 +131,7 @@ class LogServer:
         return sent
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; None for never."""
+        """Return the time of the next poll if no message arrives before; None for never."""
         clients = self._clients.values()
         if any(client.is_busy for client in clients):
             return self._pace.ready_s()
@@ -161,19 +161,19 @@ class LogServer:
     # -- requests
 
     def _on_list(self, client: _Client, start: int, end: int) -> None:
-        """Send the entries of a range, which is brought into bounds as in PX4; no log is one empty entry."""
+        """Queue the entries of a range, limited to valid ids as in PX4. Without logs the answer is one empty entry."""
         if start == 0:
-            client.close()  # a new list; one that begins later asks for entries that got lost
+            client.close()  # a new list; a range that starts later repeats lost entries
         last = max(0, len(self._listed(client)) - 1)
         client.entries = deque(range(min(start, last), min(end, last) + 1))
 
     def _on_data(self, client: _Client, log_id: int, offset: int, count: int) -> None:
-        wanted = _Range(log_id, offset, min(offset + count, _MAX_UINT32))
+        requested = _Range(log_id, offset, min(offset + count, _MAX_UINT32))
         client.entries.clear()
         if count > SMALL_REQUEST:
             client.ranges.clear()
-        if wanted not in client.ranges and len(client.ranges) < MAX_RANGES:
-            client.ranges.append(wanted)
+        if requested not in client.ranges and len(client.ranges) < MAX_RANGES:
+            client.ranges.append(requested)
 
     def _on_erase(self) -> None:
         if self._is_armed():
@@ -193,13 +193,13 @@ class LogServer:
     def _next_message(self, client: _Client) -> Message:
         if client.entries:
             return self._entry(client, client.entries.popleft())
-        wanted = client.ranges[0]
-        data = self._read(client, wanted)
-        message = log_data_message(wanted.log_id, wanted.offset, data)
-        wanted.offset += len(data)
-        # A short block says that the log ends here. A log of whole blocks ends with an empty one, but only for
-        # who asked for more than there is.
-        if len(data) < BLOCK or wanted.offset >= wanted.end:
+        requested = client.ranges[0]
+        data = self._read(client, requested)
+        message = log_data_message(requested.log_id, requested.offset, data)
+        requested.offset += len(data)
+        # A short block marks the end of the log. If the size is a multiple of the block, an empty block follows, but
+        # only for a request beyond the end.
+        if len(data) < BLOCK or requested.offset >= requested.end:
             client.ranges.popleft()
         return message
 
@@ -211,12 +211,12 @@ class LogServer:
         size = min(info.size, _MAX_UINT32)
         return mavlink.MAVLink_log_entry_message(log_id, len(logs), len(logs) - 1, info.time_utc_s, size)
 
-    def _read(self, client: _Client, wanted: _Range) -> bytes:
-        """Return the next bytes of a range; nothing at the end of a log, or if it cannot be read."""
-        file = self._file(client, wanted.log_id)
+    def _read(self, client: _Client, requested: _Range) -> bytes:
+        """Return the next bytes of a range; none at the end of the log, or if it cannot be read."""
+        file = self._file(client, requested.log_id)
         with contextlib.suppress(OSError):
             if file is not None:
-                return file.read(wanted.offset, max(0, min(BLOCK, wanted.end - wanted.offset)))
+                return file.read(requested.offset, max(0, min(BLOCK, requested.end - requested.offset)))
         return b""
 
     def _file(self, client: _Client, log_id: int) -> VirtualFile | None:

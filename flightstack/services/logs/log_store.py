@@ -1,4 +1,4 @@
-"""A vehicle's flight logs as its link services see them, wherever they are kept."""
+"""Interface to the stored flight logs, and their directories for MAVLink FTP."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class LogInfo(NamedTuple):
     name: str
     """File name, unique among the logs."""
     size: int
-    """Bytes so far; the log of the flight under way still grows."""
+    """Size [bytes]; the log of the current flight still grows."""
     time_utc_s: int
-    """When it was last written, in seconds since 1970; 0 if unknown."""
+    """Time of the last write, in seconds since 1970; 0 if unknown."""
 
     @property
     def day(self) -> str:
-        """The day of ``time_utc_s``, as PX4 names the directories of its logs."""
+        """Date of ``time_utc_s``, in the format of PX4's log directories."""
         return datetime.fromtimestamp(self.time_utc_s, UTC).strftime("%Y-%m-%d")
 
 
@@ -29,23 +29,23 @@ class LogStore(Protocol):
     """The logs of one vehicle."""
 
     def logs(self) -> Sequence[LogInfo]:
-        """Return all logs, the oldest first: the same object until something changes."""
+        """Return all logs, oldest first. The same object is returned until a log changes."""
         ...
 
     def open(self, name: str) -> VirtualFile | None:
-        """Open a log; None if there is none of this name. Raise OSError when it cannot be read."""
+        """Open a log; return None if the name does not exist. Raise OSError if it cannot be read."""
         ...
 
     def erase(self) -> int:
-        """Erase all logs but the one that is being written; return how many were. Raise OSError."""
+        """Erase all logs but the one in progress; return their number. Raise OSError."""
         ...
 
 
 class NoLogs:
-    """The logs of a vehicle that keeps none."""
+    """Store of a vehicle without logs."""
 
     def logs(self) -> Sequence[LogInfo]:
-        """Return nothing."""
+        """Return an empty list."""
         return ()
 
     def open(self, name: str) -> VirtualFile | None:
@@ -61,31 +61,31 @@ NO_LOGS = NoLogs()
 
 
 class FlatLogs:
-    """Logs as one directory: what QGroundControl looks for at ``@MAV_LOG``."""
+    """All logs in one directory, for QGroundControl at ``@MAV_LOG``."""
 
     def __init__(self, store: LogStore) -> None:
         self._store = store
-        self._shown: Sequence[LogInfo] = ()
+        self._listed: Sequence[LogInfo] = ()
         self._entries: list[Entry] = []
 
     def list(self, path: str) -> list[Entry] | None:
-        """Return the logs, in the order of their ids."""
+        """Return the logs in the order of their ids."""
         logs = self._store.logs()
-        if logs is not self._shown:
-            self._shown, self._entries = logs, [Entry(log.name, log.size) for log in logs]
+        if logs is not self._listed:
+            self._listed, self._entries = logs, [Entry(log.name, log.size) for log in logs]
         return None if path else self._entries
 
     def open(self, path: str) -> VirtualFile | None:
-        """Open a log by its name."""
+        """Open a log by name."""
         return None if "/" in path else self._store.open(path)
 
 
 class DatedLogs:
-    """Logs in a directory for each day: as PX4 keeps them in ``/fs/microsd/log``."""
+    """Logs in one directory per day, as PX4 in ``/fs/microsd/log``."""
 
     def __init__(self, store: LogStore) -> None:
         self._store = store
-        self._shown: Sequence[LogInfo] = ()
+        self._listed: Sequence[LogInfo] = ()
         self._by_day: dict[str, dict[str, Entry]] = {}
 
     def list(self, path: str) -> list[Entry] | None:
@@ -101,11 +101,11 @@ class DatedLogs:
         return self._store.open(name) if name in self._days().get(day, {}) else None
 
     def _days(self) -> dict[str, dict[str, Entry]]:
-        """Return the logs of each day by name, the days in order; made anew only when the logs have changed."""
+        """Return the logs of each day by name, days in order; cached until the logs change."""
         logs = self._store.logs()
-        if logs is not self._shown:
+        if logs is not self._listed:
             by_day: dict[str, dict[str, Entry]] = {}
             for log in logs:
                 by_day.setdefault(log.day, {})[log.name] = Entry(log.name, log.size)
-            self._shown, self._by_day = logs, dict(sorted(by_day.items()))
+            self._listed, self._by_day = logs, dict(sorted(by_day.items()))
         return self._by_day

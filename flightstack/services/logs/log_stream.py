@@ -1,8 +1,8 @@
-"""Stream the flight's log over MAVLink while it is written: LOGGING_START, LOGGING_DATA, LOGGING_STOP. No I/O.
+"""Log streaming over MAVLink while the log is written: LOGGING_START, LOGGING_DATA, LOGGING_STOP. No I/O.
 
-As PX4 does: what a reader cannot do without (header, formats, subscriptions) goes in LOGGING_DATA_ACKED, one
-message at a time until it is acknowledged; data follows in LOGGING_DATA, unacknowledged. Sequence numbers show
-what was lost, and ``first_message_offset`` where a reader may go on.
+As in PX4, the definitions (header, formats, subscriptions) go in LOGGING_DATA_ACKED, one message at a time, repeated
+until it is acknowledged. Data follows in LOGGING_DATA without acknowledgement. Sequence numbers show lost messages;
+``first_message_offset`` is where a parser may continue after a loss.
 """
 
 from __future__ import annotations
@@ -21,37 +21,37 @@ GIVE_UP_S = 5.0
 _FILE_HEADER_SIZE = 16
 _MESSAGE_HEADER_SIZE = 3
 _DEFINITIONS = frozenset(b"BFIMPQA")
-"""Types of the messages that describe the log; the first of another type begins its data."""
+"""ULog message types of the definitions; the first message of another type starts the data section."""
 
 
 class LogTail(Protocol):
-    """A log that is being written, read from its beginning."""
+    """Reader of the log in progress, from its beginning."""
 
     def read(self, count: int) -> bytes:
-        """Return the next bytes, at most ``count``; none if nothing new is there."""
+        """Return the next bytes, at most ``count``; none if there are no new ones."""
         ...
 
     @property
     def ended(self) -> bool:
-        """Whether the log is complete, so that nothing will be added."""
+        """True if the log is complete."""
         ...
 
     def close(self) -> None:
-        """Stop reading."""
+        """Close the reader."""
         ...
 
 
 class _Boundaries:
-    """Follows the messages of a ULog file through chunks of any size."""
+    """Finds the message boundaries of a ULog file in chunks of any size."""
 
     def __init__(self) -> None:
-        self._to_next = _FILE_HEADER_SIZE  # octets until the next message begins
+        self._to_next = _FILE_HEADER_SIZE  # bytes to the next message
         self._header = b""
         self.in_data = False
-        """Whether a message that is no definition has begun."""
+        """True once the data section has started."""
 
     def scan(self, chunk: bytes) -> int:
-        """Take the next chunk; return where in it the first message begins, or 255."""
+        """Take the next chunk; return the offset of the first message that starts in it, or 255."""
         at, first = 0, NO_MESSAGE_BEGINS
         while at < len(chunk):
             if self._to_next:
@@ -85,7 +85,7 @@ class _Stream:
 
 
 class LogStream:
-    """Streams the log of the present or the next flight to one client at a time."""
+    """Streams the log of the current or next flight to one client at a time."""
 
     handles = frozenset({"LOGGING_ACK"})
 
@@ -95,9 +95,9 @@ class LogStream:
         open_tail: Callable[[], LogTail | None],
         has_room: Callable[[Hashable], bool] = always_has_room,
     ) -> None:
-        """``open_tail`` returns the log that is being written, or None while there is none.
+        """``open_tail`` opens the log in progress, or returns None while there is none.
 
-        The stream waits while ``has_room`` is false for its peer.
+        The stream waits while ``has_room`` is False for its peer.
         """
         self._own = own
         self._open_tail = open_tail
@@ -106,7 +106,7 @@ class LogStream:
         self._pace = RateLimit()
 
     def start(self, peer: Hashable, client: Address) -> str | None:
-        """Begin to stream to ``client``; return why not, or None. A client that begins again starts afresh."""
+        """Start a stream to ``client``; return the refusal, or None. A repeated start restarts the stream."""
         stream = self._stream
         if stream is not None and (stream.peer, stream.client) != (peer, client):
             return "the log is being streamed to another client"
@@ -115,7 +115,7 @@ class LogStream:
         return None
 
     def stop(self) -> None:
-        """End the stream; without one, do nothing."""
+        """End the stream, if any."""
         self._end()
 
     def _end(self) -> None:
@@ -133,7 +133,7 @@ class LogStream:
             stream.waiting = None
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Return the pieces of the log that are due."""
+        """Return the messages to send now, each with its peer."""
         stream = self._stream
         if stream is None:
             return []
@@ -184,7 +184,7 @@ class LogStream:
         return message
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next: at once while a stream is open, since its log may have grown."""
+        """Return the time of the next poll; with a stream open at the message rate, since its log may have grown."""
         stream = self._stream
         if stream is None:
             return None

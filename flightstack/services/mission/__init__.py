@@ -1,1 +1,1 @@
-"""The mission service: missions, geofences and rally points uploaded, kept and downloaded."""
+"""The mission service: upload, storage and download of missions, geofences and rally points."""

@@ -1,7 +1,7 @@
-"""Mission items that belong to no mission: where to go now, as older clients of ArduPilot ask for it.
+"""Guided mission items, by which older clients of ArduPilot reposition the vehicle.
 
-Current 2 goes to the item's place (dronekit's ``simple_goto``), current 3 to its altitude alone. Each is answered by
-MISSION_ACK. Newer clients use DO_REPOSITION, which does the same here.
+An item with current 2 gives a position (dronekit's ``simple_goto``), with current 3 an altitude. Each is answered with
+MISSION_ACK. Newer clients use DO_REPOSITION, which has the same effect.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _RESULTS: Mapping[int, MissionResult] = {
     UNSUPPORTED_FRAME: MissionResult.UNSUPPORTED_FRAME,
 }
 DEGREES = 1e-7
-"""Of MISSION_ITEM_INT."""
+"""Unit of latitude and longitude in MISSION_ITEM_INT [deg]."""
 
 
 class GuidedItems:
-    """Takes items that are to be flown at once."""
+    """Executes guided items as DO_REPOSITION."""
 
     handles = frozenset({"MISSION_ITEM", "MISSION_ITEM_INT"})
 
@@ -39,7 +39,7 @@ class GuidedItems:
         self._outbox: list[tuple[Hashable | None, Message]] = []
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Go where an item says, if it is one of these."""
+        """Execute a guided item; ignore other items."""
         if message.current not in (GOES_THERE, CHANGES_ALTITUDE) or not is_for(message, self._own):
             return
         result = MissionResult.UNSUPPORTED
@@ -52,7 +52,7 @@ class GuidedItems:
         self._outbox.append((peer, ack))
 
     def _go(self, message: Message, peer: Hashable) -> Answer:
-        """Do what DO_REPOSITION with the same place would; an item's heading does not count, as with ArduPilot."""
+        """Execute DO_REPOSITION with the position of the item. As in ArduPilot, its heading is ignored."""
         scale = DEGREES if message.get_type() == "MISSION_ITEM_INT" else 1.0
         place = (message.x * scale, message.y * scale)
         if message.current == CHANGES_ALTITUDE:
@@ -64,10 +64,10 @@ class GuidedItems:
         )
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Return the answers."""
+        """Return the acknowledgements."""
         outbox, self._outbox = self._outbox, []
         return outbox
 
     def next_deadline(self) -> float | None:
-        """Return −∞ while an answer waits, else None."""
+        """Return −inf while an acknowledgement is queued, else None."""
         return -math.inf if self._outbox else None

@@ -1,6 +1,6 @@
-"""The downloads under way. Each serves the mission as it was when the client asked for its count.
+"""Downloads in progress. Each serves the plan that was in force when the client requested its count.
 
-So a mission that is replaced meanwhile never reaches a client half old and half new.
+If a plan is replaced during a download, the client must not receive a mix of both.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from flightstack.plan.vocabulary import MissionType
 from flightstack.services.mission.mission_upload import Client
 
 _FORGET_AFTER_S = 30.0
-_MAX_DOWNLOADS = 64  # a bound on memory, should clients never end theirs
+_MAX_DOWNLOADS = 64  # bounds memory if clients do not finish their downloads
 
 
 class _Download(NamedTuple):
     items: tuple[MissionItem, ...]
     plan_id: int
     served: int
-    """How many of the items were asked for, from the first on."""
+    """Number of items requested so far."""
     heard_s: float
     is_switched: bool = False
-    """Whether it took the place of one of another plan that was half across."""
+    """True if it replaced an incomplete download of another plan."""
 
     @property
     def is_half_done(self) -> bool:
@@ -41,21 +41,21 @@ class Downloads:
     def begin(
         self, client: Client, kind: int, items: tuple[MissionItem, ...], plan_id: int, now_s: float
     ) -> tuple[int, int]:
-        """Begin a download of ``items``, and return their count and id.
+        """Start a download of ``items``, and return their count and id.
 
-        In the middle of a download this is a new one, or a late copy of the request: nobody can tell. If the
-        plan has changed meanwhile, ``answer`` holds back the rest of it until the client has begun anew.
+        During a download, the request is a new one or a late copy, which cannot be distinguished. If the plan has
+        changed, ``answer`` withholds further items until the client requests the first one again.
         """
-        before = self._by_client.get((client, kind))
-        is_half_done = before is not None and before.is_half_done and now_s - before.heard_s < _FORGET_AFTER_S
-        if before is not None and is_half_done and before.plan_id == plan_id:
-            self._keep(client, kind, before._replace(heard_s=now_s))
+        last = self._by_client.get((client, kind))
+        is_half_done = last is not None and last.is_half_done and now_s - last.heard_s < _FORGET_AFTER_S
+        if last is not None and is_half_done and last.plan_id == plan_id:
+            self._keep(client, kind, last._replace(heard_s=now_s))
         else:
             self._keep(client, kind, _Download(items, plan_id, 0, now_s, is_half_done))
         return len(items), plan_id
 
     def end(self, client: Client, kind: int) -> None:
-        """Forget a download."""
+        """Remove a download."""
         self._by_client.pop((client, kind), None)
 
     def answer(
@@ -66,12 +66,12 @@ class Downloads:
         current_seq: int,
         now_s: float,
     ) -> Message | None:
-        """Return the item asked for, or None if there is none of that number.
+        """Return the requested item, or None if its number does not exist.
 
-        A client that goes on where it was in a plan that has been replaced gets the count again, with another id.
+        A client that continues in a plan that was replaced gets MISSION_COUNT again, with another id.
 
-        Without a download under way it is the stored mission's. A client that asks with the deprecated
-        MISSION_REQUEST gets a MISSION_ITEM, as from PX4: those that still ask so know no other.
+        Without a download in progress the item is that of the stored plan. As in PX4, the deprecated MISSION_REQUEST
+        is answered with MISSION_ITEM: clients that send it may not support MISSION_ITEM_INT.
         """
         kind = request.mission_type
         items = stored
@@ -96,7 +96,7 @@ class Downloads:
         )
 
     def _keep(self, client: Client, kind: int, download: _Download) -> None:
-        self._by_client.pop((client, kind), None)  # the order of the dictionary is that of the last request
+        self._by_client.pop((client, kind), None)  # sorted by the time of the last request
         self._by_client[client, kind] = download
         if len(self._by_client) > _MAX_DOWNLOADS:
             del self._by_client[next(iter(self._by_client))]

@@ -1,8 +1,7 @@
-"""The vehicle's side of the mission protocol, without I/O: mission, geofence and rally points.
+"""Vehicle side of the mission protocol for missions, geofences and rally points. No I/O.
 
-A stored plan is replaced only by a whole one that passed its check. Of each type there is one upload at a time, so
-that plans of different types, or of different clients, never mix; downloads go to any number of clients at once.
-Everything is answered to the peer it came from.
+An upload replaces the stored plan only when it is complete and passes its check. There is one upload at a time per
+plan type, so that the items of different clients do not mix. Several clients may download at once.
 """
 
 from __future__ import annotations
@@ -26,18 +25,18 @@ from flightstack.services.mission.mission_store import (
 )
 from flightstack.services.mission.mission_upload import Client, Upload
 
-_MAX_ENDED = 32  # a bound on memory: uploads whose acknowledgement can be repeated
+_MAX_ENDED = 32  # uploads whose acknowledgement can be repeated; bounds memory
 
 
 class MissionServer:
-    """Keeps one plan of each type in ``checks``, and lets clients upload, download and clear it."""
+    """Serves upload, download and clearing of one plan of each type in ``checks``."""
 
     def __init__(
         self, own: Address, checks: Mapping[MissionType, Check], timing: Timing = DEFAULT_TIMING
     ) -> None:
         self.own = own
         self.current_seq = 0
-        """The item being flown, for the ``current`` flag of a download; the owner keeps it."""
+        """Current mission item, for the ``current`` flag of a download; set by the owner."""
         self._timing = timing
         self._store = PlanStore(checks)
         self._uploads: dict[int, Upload] = {}
@@ -55,7 +54,7 @@ class MissionServer:
         return self._store.plan_id(mission_type)
 
     def restore(self, mission_type: MissionType, items: Items) -> Rejection | None:
-        """Put a plan in force that was accepted before; return why it no longer is, or None."""
+        """Restore a plan that was accepted before; return its rejection, or None."""
         outcome = self._store.replace(mission_type, items)
         if isinstance(outcome, Rejection):
             self._refused(outcome.result, outcome.seq, outcome.reason, mission_type)
@@ -64,7 +63,7 @@ class MissionServer:
         return None
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Take any message from ``peer``; what is not of this protocol or not for us is ignored."""
+        """Take a message from ``peer``. Ignore other protocols and other targets."""
         kind = message.get_type()
         if kind not in PROTOCOL or not is_for(message, self.own):
             return
@@ -87,7 +86,7 @@ class MissionServer:
             self._on_item(message, client, now_s)
 
     def poll(self, now_s: float) -> list[tuple[Hashable, Message]]:
-        """Return the messages to send now, each with the peer it goes to."""
+        """Return the messages to send now, each with its peer."""
         for upload in list(self._uploads.values()):
             if now_s < upload.deadline_s:
                 continue
@@ -100,13 +99,13 @@ class MissionServer:
         return outbox
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        """Return the time of the next poll if no message arrives before; −inf for at once, None for never."""
         if self._outbox:
             return -math.inf
         return min((upload.deadline_s for upload in self._uploads.values()), default=None)
 
     def events(self) -> list[MissionEvent]:
-        """Return what happened since the last call."""
+        """Return the events since the last call."""
         events, self._events = self._events, []
         return events
 
@@ -116,7 +115,7 @@ class MissionServer:
         kind, count = message.mission_type, message.count
         if self._is_busy_for(client, [kind], kind):
             return
-        # the same client begins again: nothing of its first try may mix in
+        # a restart by the same client: discard the items of its first attempt
         self._uploads.pop(kind, None)
         self._ended.pop((kind, client), None)
         reason = self._store.too_long(kind, count)
@@ -133,7 +132,7 @@ class MissionServer:
         kind = message.mission_type
         upload = self._uploads.get(kind)
         if upload is None or upload.client != client:
-            # The last item again: our MISSION_ACK got lost.
+            # a repeated last item: the MISSION_ACK was lost
             last_seq, ack = self._ended.get((kind, client), (None, None))
             if ack is not None and last_seq == message.seq:
                 self._send(client, ack)
@@ -156,14 +155,14 @@ class MissionServer:
         kind = upload.mission_type
         del self._uploads[kind]
         ack = self._ack(upload.client, result, kind)
-        # as it was, should it be needed again: the plan in force, and its id, may be another client's by then
-        self._ended.pop((kind, upload.client), None)  # the order of the dictionary is that of the ends
+        # keep the acknowledgement itself: the plan in force, and its id, may be another client's when it is repeated
+        self._ended.pop((kind, upload.client), None)  # sorted by the end of the upload
         self._ended[kind, upload.client] = (upload.count - 1, ack)
         if len(self._ended) > _MAX_ENDED:
             del self._ended[next(iter(self._ended))]
 
     def _is_busy_for(self, client: Client, kinds: Iterable[int], asked: int) -> bool:
-        """Deny ``client`` while another one uploads; the upload goes on unharmed."""
+        """Deny ``client`` and return True while another client uploads one of ``kinds``."""
         for kind in kinds:
             upload = self._uploads.get(kind)
             if upload is not None and upload.client != client:
@@ -175,18 +174,18 @@ class MissionServer:
         return False
 
     def _on_ack(self, message: Message, client: Client, now_s: float) -> None:
-        """A client ends its download, or calls off its upload: any error does."""
+        """End the client's download; any error cancels its upload."""
         kind, result = message.mission_type, message.type
         self._downloads.end(client, kind)
         upload = self._uploads.get(kind)
         if upload is None or upload.client != client:
             return
         if result == MissionResult.UNSUPPORTED and upload.change_kind(now_s):
-            return  # it may know the other kind of request: PX4 reads this answer the same way
+            return  # it may support the other request message; PX4 does the same
         if result != MissionResult.ACCEPTED:
             del self._uploads[kind]
 
-    # -- the rest
+    # -- download, clearing and the current item
 
     def _on_list(self, message: Message, client: Client, now_s: float) -> None:
         kind = message.mission_type

@@ -1,4 +1,4 @@
-"""Mission, fence and rally points: the mission protocol joined to the autopilot."""
+"""Connects the mission protocol to the autopilot."""
 
 from __future__ import annotations
 
@@ -41,17 +41,18 @@ class MissionService:
         }
 
     def plans(self) -> KeptPlans:
-        """Return the plans in force; a mission that was flown to its end begins anew."""
+        """Return the plans in force. A finished mission restarts at its first item."""
         mission, fence, rally = (self._server.items(kind) for kind in self._setters)
         places, progress = self._vehicle.places, self._vehicle.now.progress
-        goes_on = not progress.finished and progress.current < len(mission)
+        continues = not progress.finished and progress.current < len(mission)
         home = places.home_point if places.home_is_chosen else None
-        return KeptPlans(mission, fence, rally, progress.current if goes_on else 0, home)
+        return KeptPlans(mission, fence, rally, progress.current if continues else 0, home)
 
     def restore(self, plans: KeptPlans) -> str | None:
-        """Put plans in force that were before; return the first reason against one of them, or None.
+        """Restore plans that were in force before; return the first refusal, or None.
 
-        Home and the geofence come first: the others were checked against them, and are not taken without them.
+        Home and the geofence come first, since the other plans were checked against them. If one of them is refused,
+        the rest is not restored.
         """
         refusal = None if plans.home is None else self._vehicle.area.set_home(plans.home)
         if refusal is not None:
@@ -82,13 +83,13 @@ class MissionService:
         return outbox
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next."""
+        """Return the time of the next poll."""
         return self._server.next_deadline()
 
     def _take_events(self) -> None:
         journal = self._vehicle.journal
         events = self._server.events()
-        if not events:  # most of the time: nor have the plans' numbers changed
+        if not events:  # the usual case: the plan ids have not changed
             return
         for event in events:
             if isinstance(event, MissionReplaced):

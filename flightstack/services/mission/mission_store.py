@@ -1,4 +1,4 @@
-"""The plans in force on the vehicle, one of each type, and what happens to them."""
+"""Storage of the plans in force, one of each type, and the events of the mission protocol."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MAX_ITEMS: Mapping[MissionType, int] = {
 
 
 class MissionReplaced(NamedTuple):
-    """A new plan is in force. A plan equal to the old one counts, with ``is_changed`` false."""
+    """A new plan is in force; ``is_changed`` is False if it equals the old one."""
 
     mission_type: MissionType
     items: Items
@@ -43,13 +43,13 @@ class MissionCleared(NamedTuple):
 
 
 class CurrentRequested(NamedTuple):
-    """A client asks to continue at this item of the mission, which exists."""
+    """A client requests an existing mission item as the current one."""
 
     seq: int
 
 
 class MissionRefused(NamedTuple):
-    """A client's wish was refused; the reason is for a STATUSTEXT, since MISSION_ACK has no room for it."""
+    """A request was refused. The reason goes to a STATUSTEXT, since MISSION_ACK has no text."""
 
     result: MissionResult
     seq: int | None
@@ -61,7 +61,7 @@ MissionEvent: TypeAlias = MissionReplaced | MissionCleared | CurrentRequested | 
 
 
 class PlanStore:
-    """Keeps one plan of each type in ``checks``; a plan is replaced only by a whole one that passed its check."""
+    """Stores one plan of each type in ``checks``. A new plan must pass its check."""
 
     def __init__(self, checks: Mapping[MissionType, Check]) -> None:
         self._checks: dict[int, Check] = {int(kind): check for kind, check in checks.items()}
@@ -70,30 +70,30 @@ class PlanStore:
 
     @property
     def kinds(self) -> tuple[MissionType, ...]:
-        """The types of plans that are kept."""
+        """Plan types of the store."""
         return tuple(MissionType(kind) for kind in self._items)
 
     def has(self, kind: int) -> bool:
-        """Tell whether plans of this MAV_MISSION_TYPE, any number, are kept."""
+        """Return True if plans of this MAV_MISSION_TYPE are supported. Any number is allowed."""
         return kind in self._items
 
     def items(self, kind: int) -> Items:
-        """Return the plan in force; empty also for a type that is not kept."""
+        """Return the plan in force; empty for an unsupported type."""
         return self._items.get(kind, ())
 
     def plan_id(self, kind: int) -> int:
-        """Return MAVLink's opaque id of the plan in force: it changes with every change of it, 0 for none."""
+        """Return MAVLink's opaque id of the plan in force, which changes with the plan; 0 for none."""
         return self._ids.get(kind, 0)
 
     def too_long(self, kind: int, count: int) -> str | None:
-        """Return why a plan of ``count`` items has no room, or None."""
+        """Return the reason that a plan of ``count`` items is too long, or None."""
         most = MAX_ITEMS[MissionType(kind)]
         if count <= most:
             return None
         return f"the {PLAN_NAMES[MissionType(kind)]} has {count} items, and at most {most} are allowed"
 
     def replace(self, kind: int, items: Items) -> MissionReplaced | Rejection:
-        """Put a whole plan in force if it passes its check."""
+        """Replace the plan in force by a complete one that passes its check."""
         rejection = self._checks[kind](items)
         if rejection is not None:
             return rejection

@@ -1,1 +1,1 @@
-"""The parameter service."""
+"""The parameter server."""

@@ -1,7 +1,7 @@
-"""The vehicle's side of the parameter protocol, without I/O.
+"""Vehicle side of the parameter protocol, without I/O: https://mavlink.io/en/services/parameter.html
 
-Lists go to any number of clients at once, each at a bounded rate; a change goes to everybody; a refused one is
-answered with PARAM_ERROR, then with the value that stays. The protocol: https://mavlink.io/en/services/parameter.html
+Lists go to several clients at once, at a bounded rate. A change is sent to every peer. A refused change is answered
+with PARAM_ERROR and the value in force.
 """
 
 from __future__ import annotations
@@ -32,26 +32,26 @@ TYPE_MISMATCH = 7
 
 STEP_S = 0.01
 PER_PEER = 10
-"""List entries per peer and step: 1000 a second, 37 kB/s; 200 parameters take a fifth of a second."""
+"""List entries per peer and step: 1000 per second, 37 kB/s; 200 parameters take 0.2 s."""
 PER_STEP = 20
-"""List entries and announced changes of all peers per step, so that many clients do not hold up the loops."""
+"""List entries per step, and announced changes per step, of all peers: many clients must not delay the loops."""
 MAX_ERRORS = 100
 TEXTS_AT_ONCE, TEXTS_PER_S = 10, 2.0
-_HASH_ENTRY = -1  # the place in a list before the first parameter
+_HASH_ENTRY = -1  # index of the digest, before the first parameter
 
 
-class _Text(NamedTuple):
-    """How many more texts may be said, as of a time."""
+class _TextBudget(NamedTuple):
+    """Number of texts that may be sent, as of a link time."""
 
     left: float = float(TEXTS_AT_ONCE)
     at_s: float = -math.inf
 
 
 class ParamServer:
-    """Lists, reads and sets the parameters of ``store``; ``say`` gets the reason of every refusal.
+    """Lists, reads and sets the parameters of ``store``; ``say`` gets the reason of a refusal.
 
-    A ground station that took the parameters from ArduPilot's ``param.pck`` (MAVProxy) sets integers as REAL32:
-    that is taken when it is a whole number. Any other type than the parameter's is refused.
+    A ground station that read ArduPilot's ``param.pck`` (MAVProxy) sets integers as REAL32, which is accepted for
+    whole numbers. Any other type than the parameter's is refused.
     """
 
     handles = frozenset({"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"})
@@ -70,18 +70,18 @@ class ParamServer:
         self._errors: deque[tuple[Hashable, Message]] = deque(maxlen=MAX_ERRORS)
         self._changed: dict[str, None] = {}
         self._next_step_s = -math.inf
-        self._texts = _Text()
+        self._texts = _TextBudget()
         store.subscribe(lambda name, _value: self._changed.update({name: None}))
 
     # ------------------------------------------------------------------ receiving
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Take a message from ``peer``; what is not of this protocol or not for us is ignored."""
+        """Take a message from ``peer``. Ignore other protocols and other targets."""
         kind = message.get_type()
         if kind not in self.handles or not is_for(message, self.own):
             return
         if kind == "PARAM_REQUEST_LIST":
-            # a ground station that asks again found the digest unknown, or lost too much
+            # a repeated request: the client did not accept the digest, or lost messages
             self._lists[peer] = 0 if peer in self._lists else _HASH_ENTRY
         elif kind == "PARAM_REQUEST_READ":
             self._read(message, peer)
@@ -99,7 +99,7 @@ class ParamServer:
 
     def _set(self, message: Message, peer: Hashable, now_s: float) -> None:
         name = message.param_id
-        if name == HASH_NAME:  # the ground station knows all values: it wants no more of the list
+        if name == HASH_NAME:  # the client has all values in its cache: stop the list
             self._lists.pop(peer, None)
             return
         if name not in self._index:
@@ -109,18 +109,18 @@ class ParamServer:
         value = self._value_of(message)
         if value is None:
             self._refuse(message, peer, TYPE_MISMATCH)
-            self._explain(f"Parameter {name} refused: it is {self._type_words(name)}", now_s)
+            self._explain(f"Parameter {name} refused: it is {self._type_name(name)}", now_s)
         else:
             refusal = self._store.set(name, value)
             if refusal is None:
-                self._changed[name] = None  # answered also when it is the old value
+                self._changed[name] = None  # answers an unchanged value too
                 return
             self._refuse(message, peer, OUT_OF_RANGE)
             self._explain(f"Parameter {name} refused: {refusal}", now_s)
         self._answers[peer, name] = None
 
     def _value_of(self, message: Message) -> float | None:
-        """Return the number in a PARAM_SET; None when its type is not the parameter's."""
+        """Return the value in a PARAM_SET; None if its type is not the parameter's."""
         is_integer = self._store.specs[message.param_id].is_integer
         if message.param_type == REAL32:
             value = float(message.param_value)
@@ -129,7 +129,7 @@ class ParamServer:
             return float(integer_of(message.param_value))
         return None
 
-    def _type_words(self, name: str) -> str:
+    def _type_name(self, name: str) -> str:
         return "an integer (INT32)" if self._store.specs[name].is_integer else "a real number (REAL32)"
 
     def _refuse(self, message: Message, peer: Hashable, error: int, index: int = -1) -> None:
@@ -137,18 +137,18 @@ class ParamServer:
         self._errors.append((peer, mavlink.MAVLink_param_error_message(*sender(message), name, index, error)))
 
     def _explain(self, reason: str, now_s: float) -> None:
-        """Say why; a client that asks nonsense without end is not heard by all the others."""
+        """Report a refusal, at a bounded rate."""
         left = min(float(TEXTS_AT_ONCE), self._texts.left + TEXTS_PER_S * max(0.0, now_s - self._texts.at_s))
         if left >= 1.0:
             self._say(reason)
             left -= 1.0
-        self._texts = _Text(left, now_s)
+        self._texts = _TextBudget(left, now_s)
 
     # ------------------------------------------------------------------ sending
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Return the messages to send now, each with its peer; None means every peer that was heard."""
-        if not (self._changed or self._lists or self._answers or self._errors):  # most of the time
+        """Return the messages to send now, each with its peer; None stands for every peer that was heard."""
+        if not (self._changed or self._lists or self._answers or self._errors):  # the usual case
             return []
         outbox: list[tuple[Hashable | None, Message]] = [*self._errors]
         self._errors.clear()
@@ -163,7 +163,7 @@ class ParamServer:
         return outbox + self._list_entries()
 
     def _list_entries(self) -> list[tuple[Hashable | None, Message]]:
-        """Return the next entries of as many lists as a step has room for; those go to the end of the queue."""
+        """Return the next list entries of this step, and move the served peers to the end of the queue."""
         entries: list[tuple[Hashable | None, Message]] = []
         for peer in list(self._lists)[: PER_STEP // PER_PEER]:
             begin = self._lists.pop(peer)
@@ -189,7 +189,7 @@ class ParamServer:
         return digest((name, self._store.value(name), specs[name].is_integer) for name in self._names)
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next: -inf for at once, None for never."""
+        """Return the time of the next poll: −inf for at once, None for never."""
         if self._errors or self._answers:
             return -math.inf
         return self._next_step_s if self._changed or self._lists else None

@@ -1,1 +1,1 @@
-"""Peers of the vehicle, routing between them, and signing."""
+"""Peers of the vehicle, message routing between them, and message signing."""

@@ -1,7 +1,7 @@
-"""All ground stations and companions of the vehicle, without I/O: links, services and telemetry.
+"""Hub of all ground stations and companions: links, services and telemetry. No I/O.
 
-Each peer has a link of its own (sequence numbers, rates). Times here are the links' own clock: the wall clock
-in a process, simulated time in tests. Telemetry counts simulated time too (``mavlink.streams``).
+Each peer has its own link (sequence numbers, message rates). Times are on the link clock: wall time in a process,
+simulated time in tests. Telemetry rates count simulated time too (``telemetry.streams``).
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from flightstack.vehicle.status import VehicleInfo
 HEARTBEAT_S = 1.0
 PEER_FORGOTTEN_S = 30.0
 MAX_PEERS = 64
-"""Peers that came by themselves; those addressed unasked, and TCP clients, have limits of their own."""
+"""Limit of peers that are not permanent."""
 KEPT_TEXTS = 16
-"""Texts that wait while no peer is heard, so that a ground station learns what happened at the start."""
+"""Texts that are kept until a peer is heard, so that a ground station gets the texts of the start."""
 FORWARDED_A_POLL = 64
 MAX_TO_FORWARD = 4096
 
 
 class GroundHub:
-    """Receives bytes of any peer on any channel and returns the bytes to send."""
+    """Takes the bytes that peers send on all channels, and returns the bytes to send."""
 
     def __init__(
         self, vehicle: VehicleContext, parts: VehicleParts, telemetry: Telemetry, info: VehicleInfo
@@ -65,17 +65,17 @@ class GroundHub:
         self._home = parts.area.home
         self._texts: list[Text] = []
         self.signing: Signing | None = None
-        """What peers are signed with; set by ``use_signing``."""
+        """Signing of the links; set by ``use_signing``."""
         self._router: Router[PeerAddress] = Router(self._own)
         self._to_forward: deque[tuple[PeerAddress, bytes]] = deque(maxlen=MAX_TO_FORWARD)
         self._forget_due_s = -math.inf
         self.last_heard_s = -math.inf
-        """When any peer was last heard, forgotten ones too; −inf if none ever was."""
+        """Link time at which any peer was last heard, dropped ones included; −inf if none was."""
 
     def use_signing(self, signing: Signing, store: Callable[[bytes], None]) -> None:
-        """Sign what is sent to peers that are added from now on, and check what they send.
+        """Sign messages to peers that are added from now on, and check the signatures of their messages.
 
-        A new key that a ground station of this machine sends is kept by ``store``, which may raise OSError.
+        ``store`` saves a new key from a ground station on this machine, and may raise OSError.
         """
         self.signing = signing
         self._setup.use(signing, store)
@@ -83,7 +83,7 @@ class GroundHub:
     # ------------------------------------------------------------------ peers
 
     def add_peer(self, address: PeerAddress, permanent: bool = False) -> Peer:
-        """Begin to talk to ``address``; a permanent one gets heartbeats before it was ever heard."""
+        """Add a peer. A permanent one gets heartbeats before it is heard."""
         rates = API_RATES_HZ if address.channel == API else GROUND_RATES_HZ
         signing = link_signing(self.signing, address)
         link = Link(*self._own, keeps_unknown=True, signing=signing)
@@ -94,15 +94,15 @@ class GroundHub:
 
     @property
     def forward_backlog(self) -> int:
-        """Frames that wait to be passed on to peers, at most MAX_TO_FORWARD."""
+        """Number of frames waiting to be forwarded, at most MAX_TO_FORWARD."""
         return len(self._to_forward)
 
     def addresses(self) -> list[tuple[PeerAddress, bool]]:
-        """Return every peer's address, and whether it is permanent."""
+        """Return the address of every peer, with True for a permanent one."""
         return [(address, peer.permanent) for address, peer in self._peers.items()]
 
     def adopt_plans(self, other: GroundHub) -> None:
-        """Take the plans that another hub's vehicle holds; before a reboot it was this one's."""
+        """Take over the plans of the hub before a reboot."""
         self.restore_plans(other.plans())
 
     def plans(self) -> KeptPlans:
@@ -110,29 +110,29 @@ class GroundHub:
         return self._missions().plans()
 
     def restore_plans(self, plans: KeptPlans) -> str | None:
-        """Put plans in force that were before; return the first reason against one of them, or None."""
+        """Restore plans that were in force before; return the first refusal, or None."""
         return self._missions().restore(plans)
 
     def _missions(self) -> MissionService:
         return next(service for service in self._services if isinstance(service, MissionService))
 
     def drop_peer(self, address: PeerAddress) -> None:
-        """Forget a peer whose connection has ended."""
+        """Remove a peer whose connection has ended."""
         self._peers.pop(address, None)
         self._router.forget(address)
 
     def heard_s(self, address: PeerAddress) -> float:
-        """Return when the last valid message of ``address`` came; −inf if none did, or too long ago."""
+        """Return the link time of the last valid message of ``address``; −inf if the peer is unknown or was dropped."""
         peer = self._peers.get(address)
         return -math.inf if peer is None else peer.heard_s
 
     def _peer_at(self, address: Hashable) -> Peer:
-        """Find the peer that a service names: one that it heard, in the same call."""
+        """Return the peer of a message that a service handles."""
         assert isinstance(address, PeerAddress)
         return self._peers[address]
 
     def _has_room(self, address: Hashable) -> bool:
-        """Return False for a peer that is not to get file data now: it reads too slowly, or has fallen silent."""
+        """Return False for a peer that gets no file data now: it is congested or silent."""
         peer = self._peers.get(address) if isinstance(address, PeerAddress) else None
         return peer is None or (address not in self._congested and peer.is_served(self._polled_s))
 
@@ -149,14 +149,17 @@ class GroundHub:
                     self.drop_peer(address)
 
     def _admit(self, address: PeerAddress, data: bytes, now_s: float) -> Peer | None:
-        """Add the sender of a valid frame, signed where a signature is required, if there is room."""
+        """Add the sender of a valid frame, if a slot is free and the signature (where required) is valid.
+
+        A new peer may replace a silent one.
+        """
         signing = link_signing(self.signing, address)
         frames = [frame.data for frame in FrameReader().feed(data) if frame.known]
         if not any(signing is None or signing.authenticates(frame) for frame in frames):
             return None
-        passing = [(peer.heard_s, where) for where, peer in self._peers.items() if not peer.permanent]
-        if len(passing) >= MAX_PEERS:
-            _, longest_silent = min(passing)
+        temporary = [(peer.heard_s, where) for where, peer in self._peers.items() if not peer.permanent]
+        if len(temporary) >= MAX_PEERS:
+            _, longest_silent = min(temporary)
             if not self._peers[longest_silent].is_silent(now_s):
                 return None
             self.drop_peer(longest_silent)
@@ -165,10 +168,10 @@ class GroundHub:
     # ------------------------------------------------------------------ receiving
 
     def receive(self, address: PeerAddress, data: bytes, now_s: float) -> None:
-        """Take a datagram, or a piece of a stream; whatever it holds, nothing is raised.
+        """Take a datagram or a part of a stream. Never raise, whatever it contains.
 
-        A message without the signature that the link requires (RADIO_STATUS may come so) has no effect: its
-        sender does not count as heard, and no route is learned from it.
+        A message without the signature that the link requires (RADIO_STATUS may come unsigned) has no effect: its
+        sender does not count as heard, and the router learns nothing from it.
         """
         peer = self._peers.get(address) or self._admit(address, data, now_s)
         if peer is None:
@@ -191,21 +194,21 @@ class GroundHub:
     def poll(
         self, now_s: float, congested: Set[PeerAddress] = frozenset()
     ) -> Iterator[tuple[PeerAddress, bytes]]:
-        """Yield (address, bytes) of all that is to be sent now.
+        """Yield (address, bytes) to send now.
 
-        Telemetry and file data wait for peers that are ``congested``, answers and texts do not.
+        ``congested`` peers get answers and texts, but no telemetry or file data.
 
-        A caller with little time may take some of it now and the rest later, but before its next call of ``poll``;
-        ``receive`` may be called in between.
+        The caller may take a part of the iterator now and the rest later, but before its next call of ``poll``. It may
+        call ``receive`` in between.
         """
         self._congested, self._polled_s = congested, now_s
         changed = self._note_changes()
         for service in self._services:
             self._collect(service.poll(now_s))
-        self._spread_texts()
+        self._send_texts()
         self._telemetry.begin_poll()
         for address, peer in list(self._peers.items()):
-            if self._peers.get(address) is peer:  # it may have gone while its turn had not come
+            if self._peers.get(address) is peer:  # the caller may have dropped it since
                 due = self._due(peer, changed, now_s, streams=address not in congested)
                 frames = [peer.link.encode_shared(message) for message in due]
                 for frame in frames:
@@ -214,7 +217,7 @@ class GroundHub:
         self._forget_silent(now_s)
 
     def _forwarded(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
-        """Pass on what peers sent each other, so much at a time."""
+        """Yield queued frames to forward, at most FORWARDED_A_POLL."""
         for _ in range(min(FORWARDED_A_POLL, len(self._to_forward))):
             address, frame = self._to_forward.popleft()
             peer = self._peers.get(address)
@@ -224,12 +227,12 @@ class GroundHub:
     def _collect(self, addressed: Iterable[tuple[Hashable | None, Message]]) -> None:
         for address, message in addressed:
             if address is None:
-                self._to_all(message)
+                self._send_to_all(message)
             elif isinstance(address, PeerAddress) and address in self._peers:
                 self._peers[address].outbox.append(message)
 
     def _due(self, peer: Peer, changed: bool, now_s: float, streams: bool) -> Iterator[Message]:
-        """Yield what ``peer`` is to get now; texts wait for one that has fallen silent, and may speak again."""
+        """Yield the messages to send to ``peer`` now. Keep texts for a silent peer, which may be heard again."""
         if (peer.heard or peer.permanent) and (changed or now_s >= peer.heartbeat_due_s):
             peer.heartbeat_due_s = now_s + HEARTBEAT_S
             yield from self._telemetry.messages(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
@@ -243,7 +246,7 @@ class GroundHub:
             yield from peer.streams.due(self._telemetry, now_s)
 
     def _note_changes(self) -> bool:
-        """Announce reached items and a change of home; return True if mode or arming changed."""
+        """Announce reached items and a change of home; return True if mode or arming has changed."""
         reached = self._take_events()
         changed = self._now.status != self._shown
         self._shown = self._now.status
@@ -255,41 +258,41 @@ class GroundHub:
         return changed
 
     def _take_events(self) -> bool:
-        """Take the journal's events: texts wait for ``_spread_texts``; return True if an item was reached."""
+        """Take the events of the journal, and queue its texts; return True if an item was reached."""
         reached = False
         for event in self._journal.take_events():
             if isinstance(event, ItemReached):
                 reached = True
-                self._to_all(mavlink.MAVLink_mission_item_reached_message(event.seq))
+                self._send_to_all(mavlink.MAVLink_mission_item_reached_message(event.seq))
             else:
                 self._texts.append(event)
         return reached
 
-    def _spread_texts(self) -> None:
-        """Send the texts to the peers that were heard; until there is one, the newest wait."""
-        self._take_events()  # of the services in this poll
+    def _send_texts(self) -> None:
+        """Send queued texts to the peers that were heard; keep the newest until there is one."""
+        self._take_events()  # texts of the services in this poll
         if not any(peer.heard for peer in self._peers.values()):
             del self._texts[:-KEPT_TEXTS]
             return
         for text in self._texts:
             for message in status_texts(text.severity, text.text):
-                self._to_all(message)
+                self._send_to_all(message)
         self._texts.clear()
 
     def _announce(self, message_id: int) -> None:
         for message in self._telemetry.requested(message_id):
-            self._to_all(message)
+            self._send_to_all(message)
 
-    def _to_all(self, message: Message) -> None:
+    def _send_to_all(self, message: Message) -> None:
         for peer in self._peers.values():
             if peer.heard:
                 peer.outbox.append(message)
 
     def farewell(self) -> Iterator[tuple[PeerAddress, bytes]]:
-        """Yield the last bytes of an orderly end: waiting answers, then a heartbeat that says so."""
+        """Yield the bytes to send at shutdown: queued answers, then a heartbeat with MAV_STATE_POWEROFF."""
         for service in self._services:
             self._collect(service.poll(0.0))
-        self._spread_texts()
+        self._send_texts()
         for address, peer in self._peers.items():
             for message in [*peer.outbox, self._telemetry.farewell()]:
                 yield address, peer.link.encode(message)

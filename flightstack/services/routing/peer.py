@@ -1,4 +1,4 @@
-"""One ground station or companion: where it is, its link, and what waits to be sent to it."""
+"""A ground station or companion: address, link, streams and outbox."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flightstack.services.telemetry.streams import Streams
 
 
 class PeerAddress(NamedTuple):
-    """Where a peer is: the channel it uses, and its address there."""
+    """Channel of a peer, and its address there."""
 
     channel: str
     host: str
@@ -20,33 +20,33 @@ class PeerAddress(NamedTuple):
 
 @dataclass
 class Peer:
-    """One ground station or companion."""
+    """A ground station or companion."""
 
     link: Link
     streams: Streams
     permanent: bool
     connected: bool = False
-    """Whether it has a TCP connection: it is there until the connection ends."""
+    """True for a TCP client, which stays until its connection ends."""
     is_signed: bool = False
-    """Whether only signed frames are taken from it."""
+    """True if only signed frames of it are accepted."""
     heard_s: float = -math.inf
     heartbeat_due_s: float = -math.inf
     outbox: list[Message] = field(default_factory=list)
 
     @property
     def heard(self) -> bool:
-        """Whether it has sent a valid message and is not forgotten since: only then it gets heartbeats unasked."""
+        """True if it has sent a valid message and was not forgotten since. Other peers get no telemetry."""
         return self.heard_s > -math.inf
 
     def is_silent(self, now_s: float) -> bool:
-        """Return True if nothing valid came for SILENT_AFTER_S."""
+        """Return True if it has sent no valid message for SILENT_AFTER_S."""
         return now_s - self.heard_s > SILENT_AFTER_S
 
     def is_served(self, now_s: float) -> bool:
         """Return True if it gets more than heartbeats.
 
-        The address of a datagram may be forged: a sender that falls silent gets no more. A connection, an address that
-        the user configured and a signature are no such sender's.
+        The address of a datagram may be forged, so a silent sender gets nothing more. This does not apply to TCP
+        clients, configured addresses and signed links.
         """
         known = self.connected or self.permanent or self.is_signed
         return self.heard and (known or not self.is_silent(now_s))

@@ -1,4 +1,4 @@
-"""Signing of the ground links: which links are signed, and SETUP_SIGNING, which changes the key."""
+"""Message signing on the ground links, and SETUP_SIGNING, which changes the key."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from flightstack.vehicle.assembly import VehicleParts
 class SigningSetup:
     """Changes the key, if the vehicle is disarmed and the message came over a secure link.
 
-    ``is_secure`` tells so of a peer: whoever listens on the link learns the key. While there is a key, a new one is
-    taken from who has the old one alone, also where unsigned messages are taken else: a router on this machine
-    makes what comes from elsewhere look as if it came from here. Before ``use`` every key is refused. The message
-    has no answer: ``say`` gets a text.
+    ``is_secure`` returns True for a peer on such a link; on other links the key could be intercepted. While a key is
+    in use, a new one must be signed with it, even on links that accept unsigned messages: a router on this machine
+    makes remote messages appear local. Before ``use`` every key is refused. SETUP_SIGNING has no acknowledgement, so
+    ``say`` gets a text.
     """
 
     handles = frozenset({"SETUP_SIGNING"})
@@ -39,15 +39,15 @@ class SigningSetup:
         self._say = say
 
     def use(self, signing: Signing, store: Callable[[bytes], None]) -> None:
-        """Change the key of ``signing`` from now on, which has checked what ``receive`` gets.
+        """Change the key of ``signing`` from now on. The links have checked the messages that ``receive`` gets.
 
-        ``store`` keeps the key for the next start and may raise OSError; then the old one stays.
+        ``store`` saves the key for the next start. If it raises OSError, the old key stays.
         """
         self._signing = signing
         self._store = store
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
-        """Take a SETUP_SIGNING that is meant for this vehicle alone: the key must never be broadcast."""
+        """Take a SETUP_SIGNING addressed to this vehicle. A broadcast is ignored: a key must not be broadcast."""
         if (
             message.get_type() not in self.handles
             or not is_for(message, self._own)
@@ -62,7 +62,7 @@ class SigningSetup:
             self._say("Signing is off" if key == NO_KEY else "Signing is on: a new key is in use")
 
     def _refusal(self, message: Message, peer: Hashable) -> str:
-        """Return why the message may not change the key; empty if it may."""
+        """Return the reason that the message may not change the key; empty if it may."""
         if self._signing is None:
             return "flightstack was started without --signing-key"
         if self._is_armed():
@@ -74,7 +74,7 @@ class SigningSetup:
         return ""
 
     def _change(self, key: bytes, initial_timestamp: int) -> str:
-        """Use the key; return why not, empty if done."""
+        """Save and use the key; return the reason of a failure, or an empty text."""
         assert self._signing is not None
         try:
             self._store(key)
@@ -84,29 +84,29 @@ class SigningSetup:
         return ""
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
-        """Return nothing: there is no answer."""
+        """Return nothing: the message has no acknowledgement."""
         return []
 
     def next_deadline(self) -> float | None:
-        """Return None: there is never anything to send."""
+        """Return None: there is nothing to send."""
         return None
 
 
 NEVER_FORWARDED = frozenset({"SETUP_SIGNING"})
-"""A key that came over a safe link must not go out on another."""
+"""A key that came over a secure link must not be sent on another."""
 _LINK_IDS = {GROUND: 0, API: 1}
 _OTHER_LINK_ID = 2
 
 
 def link_signing(signing: Signing | None, address: PeerAddress) -> LinkSigning | None:
-    """Return how to sign the link to ``address``; each channel has a link id of its own."""
+    """Return the signing of the link to ``address``, or None. Each channel has its own link id."""
     if signing is None:
         return None
     return LinkSigning(signing, _LINK_IDS.get(address.channel, _OTHER_LINK_ID))
 
 
 def signing_setup(own: Address, vehicle: VehicleParts) -> SigningSetup:
-    """Return the service that refuses new keys until it is to ``use`` a signing, from this machine then."""
+    """Return the service that takes keys from this machine, once ``use`` was called."""
     return SigningSetup(
         own,
         lambda: vehicle.now.status.armed,
