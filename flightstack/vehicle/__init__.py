@@ -1,1 +1,1 @@
-"""The autopilot: estimation, guidance, control and commander joined in one tick."""
+"""The autopilot: composition of guidance, control and commander, and their common tick."""

@@ -1,4 +1,4 @@
-"""Where the vehicle may fly, where it returns to, and how high the ground is. No I/O, no clock."""
+"""Flight area: home, geofence, rally points and height of the ground. No I/O, no clock."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.mission import Mission
 
 CEILING_MARGIN_M = 1.0
-"""A return stays this far below GF_MAX_VER_DIST: a breach of it ends there (``fence.HYSTERESIS_M``)."""
+"""Distance of a return below GF_MAX_VER_DIST, so that a breach of it ends (``fence.HYSTERESIS_M``)."""
 
 
 class FlightArea:
@@ -40,15 +40,15 @@ class FlightArea:
         self._mission = mission
         self._navigator = navigator
         self._journal = journal
-        self._ground_m = -math.inf  # above the origin, where a return or landing ends
-        self._stood = HOME  # where the vehicle armed or landed last
+        self._ground_m = -math.inf  # above the origin, at the end of a return or landing
+        self._last_ground = HOME  # position where the vehicle armed or landed last
         self.set_bounds()
 
     # ------------------------------------------------------------------ home
 
     @property
     def home(self) -> GeoPoint:
-        """Destination of a return, and the zero of relative altitudes."""
+        """Destination of a return, and reference of relative altitudes."""
         return self._places.home_point
 
     @property
@@ -58,14 +58,14 @@ class FlightArea:
 
     @property
     def home_follows(self) -> bool:
-        """True if home moves to the place where the vehicle arms."""
+        """True if home moves to the position where the vehicle arms."""
         return bool(self._now.behaviour.home_follows) and not self._places.home_is_chosen
 
     def set_home(self, point: GeoPoint, chosen: bool = True) -> str | None:
         """Move home; return the refusal, or None. Relative altitudes of the mission and limits of the fence follow.
 
-        A ``chosen`` home stays when the vehicle arms elsewhere. Refused are a home that a return could not fly to and
-        one that would spoil the mission in flight.
+        A ``chosen`` home stays when the vehicle arms elsewhere. A home is refused if a return could not reach it, or
+        if it would make the mission in flight invalid.
         """
         return self._home_refusal(point) or self._move_home(point, chosen)
 
@@ -73,8 +73,8 @@ class FlightArea:
         """Move home to the vehicle; return the refusal, or None."""
         return self.set_home(self._places.frame.to_geo(self._here()), chosen=False)
 
-    def bring_home(self) -> float:
-        """Move home to the vehicle, which arms; return the change of its height [m]."""
+    def move_home_on_arming(self) -> float:
+        """Move home to the arming vehicle if it follows; return the change of its altitude [m]."""
         places, here = self._places, self._here()
         before_m = places.home.altitude_m
         if self.home_follows and places.has_left_home(here):
@@ -88,14 +88,14 @@ class FlightArea:
         places, now, behaviour = self._places, self._now, self._now.behaviour
         there = places.frame.to_ned(point)
         if not all(math.isfinite(number) for number in there):
-            return None  # ``SafePlaces.set_home`` refuses it with its reason
+            return None  # ``SafePlaces.set_home`` returns the refusal
         if not places.fence.shape.allows(there.x, there.y):
             return "home would be outside the geofence"
         if not now.status.armed:
             return None
-        spoils = self._mission.home_refusal(point) if now.status.mode is Mode.MISSION else None
-        if spoils is not None:
-            return spoils
+        refusal = self._mission.home_refusal(point) if now.status.mode is Mode.MISSION else None
+        if refusal is not None:
+            return refusal
         farthest_m = behaviour.fence_max_distance_m
         away_m = distance(now.state[0] - there.x, now.state[1] - there.y)
         if 0.0 < farthest_m < away_m and not now.landed and behaviour.fence_action > 0.0:
@@ -115,23 +115,26 @@ class FlightArea:
 
     # ------------------------------------------------------------------ ground
 
-    def stands_here(self) -> None:
-        """Note that there is ground where the vehicle stands."""
+    def set_ground_here(self) -> None:
+        """Store the vehicle's position as a point on the ground."""
         here = self._here()
-        self._stood = ReturnPlace(here.x, here.y, -here.z)
+        self._last_ground = ReturnPlace(here.x, here.y, -here.z)
         self.set_bounds()
 
     @property
     def stood_down_m(self) -> float:
-        """Height at which the vehicle armed or landed last [m NED]."""
-        return -self._stood.altitude_m
+        """Down coordinate at which the vehicle armed or landed last [m NED]."""
+        return -self._last_ground.altitude_m
 
     def ground_m(self, north_m: float, east_m: float) -> float:
         """Return the estimated height of the ground above the origin at a position [m]."""
-        return self._places.ground_m(north_m, east_m, self._stood)
+        return self._places.ground_m(north_m, east_m, self._last_ground)
 
     def find_ground(self, return_place: ReturnPlace | None) -> None:
-        """Estimate the ground at the end of a return or landing that begins: there, or at the nearest known place."""
+        """Estimate the height of the ground at the end of a starting return or landing.
+
+        It is that of the return place or, for a landing, of the nearest known ground.
+        """
         self._ground_m = -math.inf
         if return_place is not None:
             self._ground_m = return_place.altitude_m
@@ -141,9 +144,9 @@ class FlightArea:
         self.set_bounds()
 
     def set_bounds(self) -> None:
-        """Give guidance the height of the ground, and the ceiling of climbs that no plan asks for.
+        """Set the height of the ground in guidance, and the ceiling of climbs outside a plan.
 
-        A descent is slow from the highest known ground on: home or a rally point may have been placed too low.
+        A descent slows down from the highest known ground: home or a rally point may have been placed too low.
         """
         now = self._now
         home_m, limit_m = self._places.home.altitude_m, now.behaviour.fence_max_altitude_m
@@ -151,7 +154,7 @@ class FlightArea:
             self._ground_m = -math.inf
         below_m = max(limit_m - CEILING_MARGIN_M, 0.5 * limit_m)
         ceiling_m = home_m + below_m if limit_m > 0.0 else math.inf
-        self._navigator.set_bounds(-max(self._ground_m, home_m, self._stood.altitude_m), -ceiling_m)
+        self._navigator.set_bounds(-max(self._ground_m, home_m, self._last_ground.altitude_m), -ceiling_m)
 
     # ------------------------------------------------------------------ return
 
@@ -173,23 +176,23 @@ class FlightArea:
     # ------------------------------------------------------------------ geofence and rally points
 
     def way_refusal(self, here: tuple[float, float, float], there: tuple[float, float, float]) -> str | None:
-        """Return why the geofence denies the straight way to a position (north, east, above home) [m], or None."""
+        """Return the reason that the geofence denies the direct path to a position (north, east, above home) [m]."""
         return self.fence.way_refusal(here, there) if self._now.behaviour.fence_action else None
 
     def check_fence(self, items: Sequence[MissionItem]) -> Rejection | None:
-        """Return why the vehicle would refuse a geofence, or None: in flight, one that it would breach at once."""
+        """Return the rejection of a geofence, or None. In flight, a fence that is breached at once is rejected."""
         now = self._now
         acts_in_air = not now.landed and now.behaviour.fence_action > 0.0
         return self._places.check_fence(items, (now.state[0], now.state[1]) if acts_in_air else None)
 
     def set_fence(self, items: Sequence[MissionItem]) -> None:
-        """Take a geofence that was checked; no items remove it."""
+        """Set a checked geofence; no items remove it."""
         self.fence.set_fence(self._places.set_fence(items))
 
     def check_rally(self, items: Sequence[MissionItem]) -> Rejection | None:
-        """Return why the vehicle would refuse a list of rally points, or None."""
+        """Return the rejection of a list of rally points, or None."""
         return self._places.check_rally(items, plan_limits(self._now.behaviour))
 
     def set_rally(self, items: Sequence[MissionItem]) -> None:
-        """Take rally points that were checked, for the next return; no items remove them."""
+        """Set checked rally points for the next return; no items remove them."""
         self._places.set_rally(items)

@@ -1,4 +1,4 @@
-"""The parts of a vehicle, and how they are joined."""
+"""Composition of the parts of a vehicle."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from flightstack.vehicle.takeoff import Takeoff
 
 
 class VehicleParts(NamedTuple):
-    """A vehicle without links, clock and simulator."""
+    """Parts of a vehicle without links, clock and simulator."""
 
     vehicle: Vehicle
     now: FlightState
@@ -54,7 +54,7 @@ class VehicleParts(NamedTuple):
         self.failsafes.warm_up()
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
-        """Take new parameters of guidance and commander, from the next outer tick on."""
+        """Set the parameters of guidance and commander, effective in the next outer tick."""
         limits, self.now.behaviour = plan_limits(self.now.behaviour), behaviour
         self.navigator.set_params(guidance_params(behaviour, self.vehicle.weight_n))
         self.failsafes.set_behaviour(behaviour)
@@ -75,9 +75,10 @@ def assemble(
     rotor_speed_rad_s: FloatArray,
     source: StateSource,
 ) -> VehicleParts:
-    """Join the parts of a vehicle on the ground at ``home``.
+    """Assemble a vehicle on the ground at ``home``.
 
-    ``source`` writes ``state`` (13,) and ``rotor_speed_rad_s`` (8,) in place. An outer tick is every ``divisor``-th.
+    ``source`` writes ``state`` (13,) and ``rotor_speed_rad_s`` (8,) in place. The outer loop runs every ``divisor``
+    ticks.
     """
     navigator = Navigator(guidance_params(behaviour, vehicle.weight_n), outer_hz)
     idle_row = np.zeros(LoopRow.SIZE)
@@ -96,10 +97,10 @@ def assemble(
         now, journal, readiness, failsafes, ground, mission, area, takeoff, navigator, backend
     )
     requests = FlightRequests(now, journal, modes, readiness, failsafes, mission, navigator)
-    watch = FlightMonitor(
+    monitor = FlightMonitor(
         now, journal, modes, failsafes, ground, mission, area, takeoff, navigator, vehicle.weight_n
     )
-    autopilot = Autopilot(now, watch, failsafes, navigator, backend, recorder, divisor)
+    autopilot = Autopilot(now, monitor, failsafes, navigator, backend, recorder, divisor)
     return VehicleParts(
         vehicle, now, journal, places, mission, area, takeoff, readiness, modes, requests, failsafes, navigator,
         backend, autopilot,

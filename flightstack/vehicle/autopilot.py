@@ -11,7 +11,7 @@ from flightstack.vehicle.flight_monitor import FlightMonitor
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Recorder
 
-# used in every tick: a member of an enumeration takes seven times as long to look up as a name
+# module constants for every tick: looking up an enumeration member takes seven times as long
 _MISSION = Mode.MISSION
 _COMMANDS = LoopRow.ROTOR_COMMAND
 _OUTER_DUE, _SET_TARGET, _RESET = int(LoopFlags.OUTER_DUE), int(LoopFlags.SET_TARGET), int(LoopFlags.RESET)
@@ -23,7 +23,7 @@ class Autopilot:
     def __init__(
         self,
         now: FlightState,
-        watch: FlightMonitor,
+        monitor: FlightMonitor,
         failsafes: FailsafeMonitor,
         navigator: Navigator,
         backend: ControlBackend,
@@ -32,7 +32,7 @@ class Autopilot:
     ) -> None:
         """Run the outer loop every ``divisor`` ticks."""
         self.now = now
-        self._watch = watch
+        self._monitor = monitor
         self._failsafes = failsafes
         self._navigator = navigator
         self._backend = backend
@@ -48,7 +48,7 @@ class Autopilot:
         outer_due = self._tick % self._divisor == 0
         self._tick += 1
         if outer_due:
-            self._watch.update()
+            self._monitor.update()
             self._guide()
         row, flags = self._recorder.inner_row(time_us), 0
         if now.rests or not now.flying:
@@ -58,28 +58,28 @@ class Autopilot:
             row[:] = self._good_row
             row[LoopRow.STATUS] = LoopStatus.INPUT_STALE
         else:
-            aims = outer_due and not now.attitude_is_given
-            self._backend.step(now.state, now.setpoint, now.rotor_speed, aims, row)
+            runs_outer = outer_due and not now.attitude_is_given
+            self._backend.step(now.state, now.setpoint, now.rotor_speed, runs_outer, row)
             failsafes.follow_rotors(row)
-            flags = _OUTER_DUE if aims else _SET_TARGET
+            flags = _OUTER_DUE if runs_outer else _SET_TARGET
             if now.loops_reset:
                 flags |= _RESET
                 now.loops_reset = False
         now.row = row
         if outer_due:
-            if failsafes.states.is_new:  # commands computed from a stale state are not worth holding
+            if failsafes.states.is_new:  # hold no commands computed from a stale state
                 self._good_row[:] = row
             self._recorder.outer(time_us, now.state, now.setpoint, now.attitude_target, flags)
         commands: FloatArray = row[_COMMANDS]
         return commands
 
     def _guide(self) -> None:
-        """Advance guidance, and reset the loops at contact with the ground; hold both while the state is stale."""
+        """Advance guidance, and reset the loops at ground contact. Hold both while the state is stale."""
         now, navigator = self.now, self._navigator
         flying = now.flying
         rested, now.rests = now.rests, False
         armed, mode = now.status
-        waits = armed and mode is _MISSION  # on the ground
+        waits = armed and mode is _MISSION  # on the ground before takeoff
         if self._failsafes.states.holds_rotors or not (flying or waits):
             return
         target = None

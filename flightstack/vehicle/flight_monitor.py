@@ -16,14 +16,14 @@ from flightstack.vehicle.mode_control import ModeControl
 from flightstack.vehicle.takeoff import Takeoff
 
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
-"""Modes that take a vehicle off the ground, now or later."""
+"""Modes that take off, at once or after a delay."""
 
 # used in every outer tick: a member of an enumeration takes seven times as long to look up as a name
 _MISSION, _TAKEOFF = Mode.MISSION, Mode.TAKEOFF
 
 
 class FlightMonitor:
-    """Turns what failsafes, guidance and the land detector find into events, once per outer tick."""
+    """Generates events from failsafes, guidance and the land detector, once per outer tick."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class FlightMonitor:
         failsafes.on_ground = now.landed or navigator.touches_ground
         conditions = failsafes.update(now.time_us, now.status, now.landed, now.setpoint, now.row)
         if conditions is not None:
-            self._meet_failsafes(conditions)
+            self._apply_failsafes(conditions)
         if not now.status.armed:
             return
         for rotor in failsafes.take_unmeasured():
@@ -65,17 +65,17 @@ class FlightMonitor:
                 Severity.WARNING, f"Rotor {rotor}: speed not measured, failures of it are not detected"
             )
         if now.landed or navigator.landed:
-            self._watch_ground()
+            self._update_ground()
         mode = now.status.mode
         if mode is _MISSION:
-            self._watch_mission()
+            self._update_mission()
         elif mode is _TAKEOFF and now.flying and self._takeoff.is_reached:
             self._modes.apply(Event.TAKEOFF_REACHED)
         elif now.landed and mode in STREAM_MODES and self._modes.takes_off() is not now.flying:
             self._modes.choose_loops()
 
-    def _meet_failsafes(self, conditions: frozenset[Failsafe]) -> None:
-        """Evaluate the failsafes and carry out their decision."""
+    def _apply_failsafes(self, conditions: frozenset[Failsafe]) -> None:
+        """Evaluate the failsafes and apply their decision."""
         now, failsafes = self._now, self._failsafes
         before = failsafes.decision
         phase = phase_of(now.status.armed, now.landed, now.status.mode, self._navigator.goes_elsewhere)
@@ -93,15 +93,15 @@ class FlightMonitor:
                 failsafes.action_applied()
                 break
 
-    def _watch_ground(self) -> None:
-        """Note takeoff and landing, and disarm a vehicle that stands too long."""
+    def _update_ground(self) -> None:
+        """Update takeoff and landing, and apply a due disarming on the ground."""
         now, landed = self._now, self._navigator.landed
         if landed != now.landed:
             now.landed = landed
             self._ground.took_off_or_landed(now.time_us)
             if landed:
                 now.landing_us = now.time_us
-                self._area.stands_here()
+                self._area.set_ground_here()
             else:
                 now.takeoff_us = now.takeoff_us or now.time_us
             self._journal.landed(landed)
@@ -117,15 +117,15 @@ class FlightMonitor:
             self._modes.apply(event)
 
     def _due_on_ground(self) -> Event | None:
-        """Return the event that is due on the ground: disarming after a landing, or without a takeoff."""
+        """Return the event due on the ground: disarming after a landing, or without a takeoff."""
         now = self._now
-        goes_on = now.status.mode in AIRBORNE_MODES or (now.status.mode in STREAM_MODES and now.flying)
+        takes_off = now.status.mode in AIRBORNE_MODES or (now.status.mode in STREAM_MODES and now.flying)
         lift = float(now.attitude_target[4]) / self._weight_n
-        standing = Standing(goes_on, now.flying, float(now.state[2]), float(now.state[5]), lift)
+        standing = Standing(takes_off, now.flying, float(now.state[2]), float(now.state[5]), lift)
         return self._ground.due_event(now.time_us, standing, now.behaviour)
 
-    def _watch_mission(self) -> None:
-        """Report progress of the mission, and begin what follows its end."""
+    def _update_mission(self) -> None:
+        """Report progress of the mission, and apply the events of its end."""
         now = self._now
         if self._mission.report_progress():
             self._modes.choose_loops()

@@ -45,7 +45,7 @@ class FlightState:
     loops_reset: bool = False
     """True if the loops were reset since the last tick."""
     rests: bool = False
-    """True while the vehicle touches the ground and needs no control, before the land detector has found it landed."""
+    """True while the vehicle rests on the ground without control, before the land detector reports landed."""
     attitude_is_given: bool = False
     """True while guidance commands attitude and thrust instead of the outer loop."""
     throttle: float = 0.0

@@ -1,4 +1,4 @@
-"""What happened in the flight: events for telemetry, records for the flight log."""
+"""Events of the flight: texts and reached items for telemetry, records for the flight log."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flightstack.vehicle.flight_state import FlightState
 
 
 class Recorder(Protocol):
-    """The flight log as the autopilot writes it; ``flight_log.recorder`` implements it."""
+    """Interface of the flight log to the autopilot; implemented by ``flight_log.recorder``."""
 
     def inner_row(self, time_us: int) -> FloatArray:
         """Return the row, shape (48,), that the inner loop fills in this tick."""
@@ -26,7 +26,7 @@ class Recorder(Protocol):
         attitude_target: FloatArray,
         loop_flags: int,
     ) -> None:
-        """Record one outer tick; ``loop_flags`` say what the loops began it with, 0 while they rest."""
+        """Record one outer tick; ``loop_flags`` is a set of ``LoopFlags``, 0 while the loops do not run."""
 
     def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
         """Record a change of mode, arming, or failsafe."""

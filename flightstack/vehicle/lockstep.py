@@ -1,9 +1,8 @@
-"""How the loops follow the simulator's clock in lockstep. No I/O: the machine's time is an argument.
+"""Ticks of the loops on the simulator clock in lockstep. No I/O: wall time is an argument.
 
-The loops run at their own fixed step whatever the simulator's is: each state is followed by as many ticks as its time
-makes due. That is one where both steps are the same, two of 2 ms after a state 4 ms later, and none where a state
-comes early or twice: it is answered with the last commands. So no loop, timer or failsafe counts another time than
-the simulator's.
+The step of the loops is fixed and independent of the simulator's. Each state is followed by the ticks that its time
+makes due: one tick if both steps are equal, two of 2 ms after a state 4 ms later, and none after an early or repeated
+state, which is answered with the last commands. Loops, timers and failsafes thus all count simulator time.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from flightstack.simulator_link.state_steps import is_gap
 from flightstack.vehicle.autopilot import Autopilot
 
 STALL_NS = 1_000_000_000
-"""When states keep coming whose time has stood still for so long, the vehicle's clock goes on by the machine's."""
+"""If states arrive whose time has not changed for this wall time, the vehicle clock advances with wall time."""
 
 
 class Lockstep:
@@ -27,15 +26,15 @@ class Lockstep:
         self._now = autopilot.now
         self._interval_us = interval_us
         self._begun = False
-        self._lead_us = 0  # time that the vehicle's clock went on while the simulator's stood still
-        self._seen_us = 0  # the simulator's time at the last tick or look out of step
-        self._seen_ns = 0  # the machine's time then
+        self._lead_us = 0  # advance of the vehicle clock while the simulator clock stood still
+        self._seen_us = 0  # simulator time at the last call of ``_update_stall``
+        self._seen_ns = 0  # wall time then
         self._stalled = False
 
     def tick(self, now_ns: int) -> FloatArray:
-        """Run what the newest state makes due; return the commands to answer it with."""
+        """Run the ticks that the newest state makes due; return the commands to answer it with."""
         time_us = self._now.time_us + self._interval_us
-        if self._link.time_us + self._lead_us == time_us and self._begun:  # the usual
+        if self._link.time_us + self._lead_us == time_us and self._begun:  # the usual case
             return self._autopilot.tick(time_us)
         return self._catch_up(now_ns)
 
@@ -45,13 +44,11 @@ class Lockstep:
             self._begun = True
             self._seen_us, self._seen_ns = link.time_us, now_ns
             return self._autopilot.tick(link.time_us)
-        self._watch_clock(now_ns)
+        self._update_stall(now_ns)
         due_us = link.time_us + self._lead_us - self._now.time_us
-        ticks = (
-            due_us + interval_us // 2
-        ) // interval_us  # to the nearest: clocks are rounded to microseconds
+        ticks = (due_us + interval_us // 2) // interval_us  # rounded: clocks have a resolution of 1 µs
         arrived = link.has_arrived
-        if is_gap(due_us):  # the loops must not take the state after a gap for one of before
+        if is_gap(due_us):  # ticks before the last one must not use the state after the gap as new
             link.has_arrived = False
         for left in reversed(range(ticks)):
             if left == 0:
@@ -60,8 +57,8 @@ class Lockstep:
         commands: FloatArray = self._now.row[LoopRow.ROTOR_COMMAND]
         return commands
 
-    def _watch_clock(self, now_ns: int) -> None:
-        """Find out whether the simulator's clock stands still, and let the machine's stand in for it."""
+    def _update_stall(self, now_ns: int) -> None:
+        """Detect a stall of the simulator clock, and advance the vehicle clock by wall time during it."""
         if self._link.time_us != self._seen_us:
             self._seen_us, self._seen_ns = self._link.time_us, now_ns
             if self._stalled:

@@ -15,7 +15,7 @@ from flightstack.vehicle.journal import Journal
 
 
 class Mission:
-    """Holds the items that MISSION mode flies, and hands them to guidance."""
+    """Holds the items of the mission, and loads them into guidance."""
 
     def __init__(self, now: FlightState, places: SafePlaces, navigator: Navigator, journal: Journal) -> None:
         self.items: tuple[MissionItem, ...] = ()
@@ -28,14 +28,14 @@ class Mission:
     # ------------------------------------------------------------------ checks
 
     def check(self, items: Sequence[MissionItem], home: GeoPoint | None = None) -> Rejection | None:
-        """Return why the vehicle would refuse ``items``, seen from ``home`` (default: home in force), or None."""
+        """Return the rejection of ``items`` as a mission from ``home`` (default: home in force), or None."""
         return self._places.check_mission(items, plan_limits(self._now.behaviour), home)
 
     def refusal(self) -> str | None:
-        """Return why the mission in force is refused now, or None.
+        """Return the reason that the mission in force is refused now, or None.
 
-        Home, limits or geofence may have changed since its upload. A check of 2000 items takes long and SYS_STATUS
-        repeats the question, so the result is kept until one of them changes.
+        Home, limits or geofence may have changed since its upload. SYS_STATUS needs the result repeatedly and a check
+        of 2000 items takes long, so the result is cached until one of them changes.
         """
         places = self._places
         basis = (self.items, places.home_point, plan_limits(self._now.behaviour), places.fence)
@@ -45,9 +45,9 @@ class Mission:
         return self._checked[1]
 
     def home_refusal(self, home: GeoPoint) -> str | None:
-        """Return why home may not move to ``home`` while this mission is flown, or None.
+        """Return the reason that home may not move to ``home`` during this mission, or None.
 
-        The height of home must stay: a mission's relative altitudes would follow it at once, even into the ground.
+        The altitude of home must not change: relative altitudes of the mission would follow it, even into the ground.
         """
         step_m = abs(home.altitude_m - self._places.home_point.altitude_m)
         if step_m > HOME_SPREAD_M and any(item.altitude_is_relative for item in self.items):
@@ -56,19 +56,19 @@ class Mission:
         return None if rejection is None else f"the mission in flight would not do: {rejection.reason}"
 
     def takes_off(self, first: int | None = None) -> bool:
-        """Return True if a vehicle on the ground takes off from item ``first``, or the current one, on."""
+        """Return True if the mission takes off a vehicle on the ground, from item ``first`` or the current item."""
         progress = self._navigator.progress
-        current = 0 if progress.finished else progress.current  # a finished mission begins again
+        current = 0 if progress.finished else progress.current  # a finished mission restarts
         return takes_off(self.items, current if first is None else first)
 
     def item_refusal(self, seq: int) -> str | None:
-        """Return why ``seq`` cannot be the current item, or None."""
+        """Return the reason that ``seq`` cannot be the current item, or None."""
         return None if 0 <= seq < len(self.items) else f"there is no mission item {seq}"
 
     # ------------------------------------------------------------------ changes
 
     def set(self, items: Sequence[MissionItem]) -> None:
-        """Take a mission that was checked; in flight it begins with its first item."""
+        """Set a checked mission; it starts at its first item, in flight too."""
         self.items = tuple(items)
         self._navigator.set_plan(*plan_table(self.items, self._places.frame, self._home_m))
         self._restarted()
@@ -91,7 +91,7 @@ class Mission:
         self._restarted()
 
     def restart_if_finished(self) -> None:
-        """Restart a mission that was flown to its end."""
+        """Restart a finished mission."""
         self._now.mission_complete = False
         if self._navigator.progress.finished and self.items:
             self.restart()

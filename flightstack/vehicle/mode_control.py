@@ -1,4 +1,4 @@
-"""What events do to mode and arming, and which loops and guidance fly then. No I/O, no clock."""
+"""Transitions of mode and arming, and the start of loops and guidance that follows. No I/O, no clock."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from flightstack.vehicle.takeoff import Takeoff
 
 
 class ModeControl:
-    """Applies events by the table of ``commander.transitions``."""
+    """Applies events by the transition table of ``commander.transitions``."""
 
     def __init__(
         self,
@@ -65,7 +65,7 @@ class ModeControl:
         return None
 
     def check_mission_in_flight(self) -> None:
-        """Hold if the mission in flight has become one to refuse: home or limits have changed."""
+        """Hold if a change of home or limits makes the mission in flight invalid."""
         status = self._now.status
         refusal = self._mission.refusal() if status.armed and status.mode is Mode.MISSION else None
         if refusal is not None:
@@ -73,7 +73,7 @@ class ModeControl:
             self.apply(Event.SELECT_HOLD)
 
     def mission_cleared(self) -> None:
-        """Hold if the mission in flight was cleared. Not a user's choice of mode: it overrides no failsafe."""
+        """Hold if the mission in flight was cleared. Unlike a mode selection, this overrides no failsafe."""
         if self._now.status.mode is Mode.MISSION:
             self.apply(Event.SELECT_HOLD)
 
@@ -85,7 +85,7 @@ class ModeControl:
         now.status = after
         if after.armed and not before.armed:
             self._begin_flight()
-        if before.armed and not after.armed:  # before the status, which ends the log
+        if before.armed and not after.armed:  # before the status record, which ends the log
             if now.landed:
                 journal.say(Severity.NOTICE, "Disarmed")
             else:
@@ -99,7 +99,7 @@ class ModeControl:
             now.landed = True
             self._navigator.set_speed(SpeedOverrides())
         if after.mode is Mode.MISSION and before.mode is not Mode.MISSION:
-            self._mission.restart_if_finished()  # before the loops: a finished mission does not take off
+            self._mission.restart_if_finished()  # before ``choose_loops``: a finished mission does not take off
         if event is Event.MISSION_FINISHED:
             self._navigator.hold_at_last_item()
         continues = event in (Event.TAKEOFF_REACHED, Event.MISSION_FINISHED)
@@ -107,23 +107,22 @@ class ModeControl:
         self.choose_loops(entering=not continues and (after.mode is not before.mode or reentered))
 
     def _begin_flight(self) -> None:
-        """Forget the flight before: the vehicle arms."""
+        """Reset the state of the last flight on arming."""
         now = self._now
         now.armed_us = now.time_us
         now.takeoff_us = now.landing_us = 0
         self._failsafes.armed()
         self._ground.armed(now.time_us)
-        self._takeoff.altitude_m += self._area.bring_home()
+        self._takeoff.altitude_m += self._area.move_home_on_arming()
         now.landed = True
-        self._area.stands_here()
-        self._navigator.reset_on_ground(
-            now.state
-        )  # guidance may hold the end of a flight that was disarmed in the air
+        self._area.set_ground_here()
+        # guidance may hold the end of a flight that was disarmed in the air
+        self._navigator.reset_on_ground(now.state)
 
     # ------------------------------------------------------------------ loops and guidance
 
     def choose_loops(self, entering: bool = False) -> None:
-        """Start or stop the loops; ``entering`` makes guidance begin the mode."""
+        """Start or stop the loops; with ``entering``, guidance enters the mode."""
         now = self._now
         flying = now.status.armed and (not now.landed or self.takes_off())
         starting = flying and not now.flying
@@ -141,7 +140,7 @@ class ModeControl:
         now.flying = flying
 
     def takes_off(self) -> bool:
-        """Return True if the mode takes a vehicle off the ground now."""
+        """Return True if the mode makes a vehicle on the ground take off now."""
         mode = self._now.status.mode
         if mode in STREAM_MODES:
             return self._navigator.wants_to_rise(mode, self._area.stood_down_m)

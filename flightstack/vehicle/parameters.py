@@ -1,4 +1,4 @@
-"""The vehicle's parameters, put together: where they come from, and who has to know of a change."""
+"""Parameters of the vehicle: declaration, loading, and propagation of changes."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from flightstack.vehicle.assembly import VehicleParts
 
 
 class Parameters(NamedTuple):
-    """The parameters of a vehicle that is about to start."""
+    """Parameters of a vehicle at its start."""
 
     store: ParamStore
     loaded: LoadedParams
-    """What the parameter file held."""
+    """Content of the parameter file."""
 
 
 def declared(config: StackConfig, backend: ControlBackend) -> list[ParamSpec]:
-    """Return the declarations of all parameters; raise ConfigError when a controller takes a name that has an owner."""
+    """Return the declarations of all parameters; raise ConfigError if a controller redeclares a name."""
     specs = {spec.name: spec for spec in (*SPECS.values(), *identity_specs(config.system_id))}
     for spec in backend.parameter_specs:
         if specs.setdefault(spec.name, spec) is not spec:
@@ -35,9 +35,9 @@ def declared(config: StackConfig, backend: ControlBackend) -> list[ParamSpec]:
 
 
 def load_parameters(config: StackConfig, backend: ControlBackend) -> Parameters:
-    """Make the parameters of a vehicle and give the loops theirs; raise ConfigError.
+    """Load the parameters of a vehicle and set those of the loops; raise ConfigError.
 
-    Defaults, those of the loops from the gains file; then the parameter file; then what the configuration says
+    In rising precedence: defaults (for the loops from the gains file), the parameter file, and the configuration
     (``--param``), which is not saved.
     """
     store = ParamStore(declared(config, backend))
@@ -55,13 +55,13 @@ def load_parameters(config: StackConfig, backend: ControlBackend) -> Parameters:
 
 
 def behaviour_of(store: ParamStore) -> Behaviour:
-    """Return the behaviour that the parameters describe."""
+    """Return the parameters of guidance and commander."""
     values: dict[str, float] = {field: store.value(name) for name, field in FIELDS.items()}
     return Behaviour(**values)  # type: ignore[arg-type]  # an integer parameter's value is an int
 
 
 def connect_parameters(store: ParamStore, parts: VehicleParts, recorder: FlightRecorder) -> None:
-    """Let every change reach guidance and commander, the loops, and the log, before the next tick."""
+    """Propagate every change to guidance, commander, loops and log, before the next tick."""
     backend = parts.backend
     loops = {spec.name for spec in backend.parameter_specs}
 

@@ -12,7 +12,7 @@ from flightstack.vehicle.mission import Mission
 
 
 class Readiness:
-    """Answers the questions of the transition table and of the arming checks."""
+    """Provides the facts of the transition table and the results of the arming checks."""
 
     def __init__(
         self, now: FlightState, failsafes: FailsafeMonitor, ground: GroundMonitor, mission: Mission
@@ -38,9 +38,9 @@ class Readiness:
         )
 
     def arming_refusals(self, mode: Mode | None = None, first: int | None = None) -> tuple[str, ...]:
-        """Return every reason against arming now, or in ``mode``; empty if the vehicle would arm.
+        """Return every reason against arming, in the current mode or in ``mode``; empty if the vehicle would arm.
 
-        ``first`` is the item with which the mission would begin, if that is not the current one.
+        ``first`` is the first mission item (default: the current one).
         """
         now = self._now
         mode = now.status.mode if mode is None else mode
@@ -50,7 +50,7 @@ class Readiness:
         return arming_refusals(known, now.behaviour)
 
     def _fault_on_ground(self, mode: Mode, first: int | None) -> str | None:
-        """Return why ``mode`` does not take a vehicle off the ground, now or later, or None."""
+        """Return the reason that ``mode`` cannot take off, or None."""
         if mode in (Mode.RETURN, Mode.LAND):
             return f"{mode.name.lower()} mode cannot take off: select another mode first"
         if mode is not Mode.MISSION:

@@ -1,4 +1,4 @@
-"""Requests of users and companions to the flight, and when they are granted. No I/O, no clock."""
+"""Flight requests of users and companions, and their refusals. No I/O, no clock."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from flightstack.vehicle.readiness import Readiness
 PHASE_OF_REQUEST: dict[Event, Phase] = {
     rule.event: PHASE_OF_MODE[rule.mode] for rule in RULES if rule.mode is not None and rule.selects
 }
-"""Events that select a mode, and the phase of flight that each begins."""
+"""Events that select a mode, and the phase of flight that each enters."""
 
 
 class FlightRequests:
-    """Grants a request, or returns the refusal as a sentence."""
+    """Applies requests, or returns the reason of the refusal."""
 
     def __init__(
         self,
@@ -50,8 +50,8 @@ class FlightRequests:
     def request(self, event: Event, takeoff_altitude_m: float | None = None) -> str | None:
         """Apply ``event`` for a user; return the refusal, or None.
 
-        Arming is refused with all reasons at once. A selected mode overrides the active failsafes that can be
-        overridden. ``takeoff_altitude_m`` is above home.
+        A refusal to arm lists all reasons. A mode selection overrides the active failsafes that can be overridden.
+        ``takeoff_altitude_m`` is above home.
         """
         if event in PHASE_OF_REQUEST:
             return self._select(event, PHASE_OF_REQUEST[event], takeoff_altitude_m)
@@ -71,7 +71,7 @@ class FlightRequests:
         return refusal
 
     def _failsafe_refusal(self, phase: Phase) -> str | None:
-        """Return the reason that an active failsafe denies ``phase``, or None; a disarmed vehicle is denied nothing."""
+        """Return the reason that an active failsafe denies ``phase``, or None. Applies to an armed vehicle only."""
         return self._failsafes.refusal(phase) if self._now.status.armed else None
 
     def start_mission(self, first: int | None) -> str | None:
@@ -105,7 +105,7 @@ class FlightRequests:
     # ------------------------------------------------------------------ guided flight
 
     def take_sticks(self, sticks: Sticks) -> None:
-        """Take the newest manual control; POSITION and ALTITUDE fly it."""
+        """Take the newest stick positions, for POSITION and ALTITUDE mode."""
         self._now.throttle = sticks.up
         self._navigator.set_sticks(sticks)
 
@@ -122,13 +122,13 @@ class FlightRequests:
         return refusal
 
     def set_speeds(self, **speeds: float) -> None:
-        """Fly at other speeds [m/s] until disarmed, fields of ``SpeedOverrides``; NaN restores the parameter's."""
+        """Override speeds [m/s] (fields of ``SpeedOverrides``) until disarmed; NaN restores the parameter."""
         self._navigator.set_speed(self._navigator.speeds._replace(**speeds))
 
     # ------------------------------------------------------------------ mission
 
     def set_mission(self, items: Sequence[MissionItem]) -> None:
-        """Take a mission that was checked; one without items clears it."""
+        """Set a checked mission; no items clear it."""
         self._mission.set(items)
         if not items:
             self._modes.mission_cleared()

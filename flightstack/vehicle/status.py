@@ -50,7 +50,7 @@ class PlanIds(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class VehicleStatus:
-    """A snapshot: the arrays are copies."""
+    """Snapshot of the vehicle; the arrays are copies."""
 
     info: VehicleInfo
     time_us: int
@@ -96,7 +96,7 @@ def vehicle_info(vehicle: Vehicle, system_id: int, is_generic: bool, frame: Loca
 
 
 def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> VehicleStatus:
-    """Return the status of now."""
+    """Return the current status."""
     now, failsafes, fence = parts.now, parts.failsafes, parts.area.fence
     return VehicleStatus(
         info=info,
