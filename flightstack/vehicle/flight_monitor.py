@@ -119,9 +119,9 @@ class FlightMonitor:
     def _due_on_ground(self) -> Event | None:
         """Return the event due on the ground: disarming after a landing, or without a takeoff."""
         now = self._now
-        takes_off = now.status.mode in AIRBORNE_MODES or (now.status.mode in STREAM_MODES and now.flying)
+        flies_on = now.status.mode in AIRBORNE_MODES or (now.status.mode in STREAM_MODES and now.flying)
         lift = float(now.attitude_target[4]) / self._weight_n
-        standing = Standing(takes_off, now.flying, float(now.state[2]), float(now.state[5]), lift)
+        standing = Standing(flies_on, now.flying, float(now.state[2]), float(now.state[5]), lift)
         return self._ground.due_event(now.time_us, standing, now.behaviour)
 
     def _update_mission(self) -> None:

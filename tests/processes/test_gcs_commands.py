@@ -79,7 +79,7 @@ def test_a_refusal_tells_the_vehicles_reason() -> None:
 def test_a_vehicle_that_does_not_answer_is_a_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
     quick = functools.partial(CommandClient, timing=CommandTiming(timeout_s=0.02))
     monkeypatch.setattr(calls, "CommandClient", quick)
-    result = told(FakeVehicle(deaf_to={ARM}), "arm")
+    result = told(FakeVehicle(ignored={ARM}), "arm")
     assert result.returncode == 3
     assert "did not answer MAV_CMD_COMPONENT_ARM_DISARM" in result.stderr
 
@@ -279,7 +279,7 @@ def test_perf_shows_the_loops() -> None:
 
 
 def test_perf_of_a_vehicle_without_loop_timing() -> None:
-    result = told(FakeVehicle(mute={"FS_LOOP_TIMING"}), "--timeout", "0.3", "perf")
+    result = told(FakeVehicle(unsent={"FS_LOOP_TIMING"}), "--timeout", "0.3", "perf")
     assert result.returncode == 3
     assert "FS_LOOP_TIMING" in result.stderr
 

@@ -24,19 +24,19 @@ from flightstack.params.vehicle import load_vehicle
 from gcs_cli.pil.result import target_checks
 from gcs_cli.pil.target_record import STATES, read_record
 from tests.firmware.app_support import SAFE, Target, mavlink
-from tests.support.lossy_line import FAIR, LossyLine, Weather
+from tests.support.lossy_line import NO_FAULTS, LineFaults, LossyLine
 
 HASH = bytes(range(1, 9))
 """What the application of the tests tells."""
 SPEEDS = np.zeros(8, np.float32)
 WEATHERS = {
-    "fair": FAIR,
-    "loses octets": Weather(loss=5e-4),
-    "changes octets": Weather(change=5e-4),
-    "doubles pieces": Weather(doubling=0.2),
-    "delays beyond the time-out": Weather(delay=0.02),
-    "is noisy": Weather(noise=0.2),
-    "does everything": Weather(2e-4, 2e-4, 0.1, 0.01, 0.3, 0.1),
+    "fair": NO_FAULTS,
+    "loses octets": LineFaults(loss=5e-4),
+    "changes octets": LineFaults(change=5e-4),
+    "doubles pieces": LineFaults(doubling=0.2),
+    "delays beyond the time-out": LineFaults(delay=0.02),
+    "is noisy": LineFaults(noise=0.2),
+    "does everything": LineFaults(2e-4, 2e-4, 0.1, 0.01, 0.3, 0.1),
 }
 
 
@@ -250,7 +250,7 @@ def test_the_farewell_outlasts_a_line_that_loses_much(device, tmp_path) -> None:
         line = LossyLine(device, seed=seed)
         loops = connected(line)
         drive(loops, 3)
-        line.weather = Weather(loss=0.005)  # a third of all exchanges
+        line.faults = LineFaults(loss=0.005)  # a third of all exchanges
         assert checks_of(loops, tmp_path / str(seed), 3) == []
 
 
@@ -258,7 +258,7 @@ def test_a_slow_line_has_its_own_time_for_the_farewell(device, tmp_path) -> None
     line = LossyLine(device)
     loops = connected(line, timing=PilTiming(2.0, 20))
     drive(loops, 3)
-    line.weather = Weather(delay=1.0, delay_s=0.9)
+    line.faults = LineFaults(delay=1.0, delay_s=0.9)
     assert checks_of(loops, tmp_path, 3) == []
 
 

@@ -17,7 +17,7 @@ from flightstack.process.assembly import build
 from gcs_cli.report.analysis import read_flight
 from tests.firmware.app_support import Target
 from tests.parity.recorded_loops import record
-from tests.support.lossy_line import LossyLine, Weather
+from tests.support.lossy_line import LineFaults, LossyLine
 from tests.support.world import World, item
 
 SPEEDS = np.zeros(8, np.float32)
@@ -201,7 +201,7 @@ def on_a_bad_line(monkeypatch) -> Iterator[list[LossyLine]]:
     device, lines = Target(), []
 
     def open_bad_line(_: object) -> LossyLine:
-        lines.append(LossyLine(device, Weather(2e-4, 2e-4, 0.05, 0.002, 0.3, 0.02), seed=4))
+        lines.append(LossyLine(device, LineFaults(2e-4, 2e-4, 0.05, 0.002, 0.3, 0.02), seed=4))
         return lines[-1]
 
     monkeypatch.setattr("flightstack.firmware.targets.open_link", open_bad_line)

@@ -1,4 +1,4 @@
-"""The command lines of the programs, run within the test: a new interpreter takes a second to start."""
+"""The programs' command lines, run in the test process: a new interpreter takes a second to start."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import sim_bridge.__main__
 
 
 class Ended(NamedTuple):
-    """What a process would have left."""
+    """Output and exit code of a run."""
 
     stdout: str
     stderr: str
@@ -29,17 +29,17 @@ def gcs(*arguments: object) -> Ended:
 
 
 def flightstack_command(*arguments: object) -> Ended:
-    """Run ``flightstack``; it must end by itself, at ``--check`` or with an error."""
+    """Run ``flightstack`` with arguments by which it ends: ``--check``, or an error."""
     return _run("flightstack", flightstack.__main__.main, arguments)
 
 
 def sim_bridge_command(*arguments: object) -> Ended:
-    """Run ``sim-bridge``; it must end by itself."""
+    """Run ``sim-bridge`` with arguments by which it ends."""
     return _run("sim-bridge", sim_bridge.__main__.main, arguments)
 
 
 def _run(name: str, main: Callable[[], int | None], arguments: tuple[object, ...]) -> Ended:
-    """Call ``main`` as the script ``name`` does; restore the signal handlers that it sets."""
+    """Call ``main`` as the script ``name`` does; restore the signal handlers."""
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     out, err = io.StringIO(), io.StringIO()
     try:

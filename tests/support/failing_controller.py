@@ -1,4 +1,4 @@
-"""An attitude controller whose law fails at a roll rate of 1 rad/s and beyond."""
+"""An attitude controller whose law raises an error at a roll rate of 1 rad/s or more."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Faults that provoke failsafes of a world in flight."""
+"""Faults that trigger failsafes of a ``World`` in flight."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.support.world import World, item
 
 
 def nothing(world: World) -> None:
-    """Nothing is to be done before the phase, or at the fault."""
+    """Do nothing."""
 
 
 def stop_heartbeats(world: World) -> None:
@@ -29,7 +29,7 @@ def stop_stream(name: str) -> Callable[[World], None]:
 
 
 def begin_setpoints(world: World) -> None:
-    """Let setpoints come in every phase; on the ground the mode must be selected for them to matter."""
+    """Stream setpoints; on the ground also select OFFBOARD, without which their loss has no effect."""
     world.streams["setpoint"] = setpoint(world)
     world.run(0.1)
     if world.altitude < 0.1:
@@ -44,7 +44,7 @@ def begin_sticks(world: World) -> None:
 
 
 def breach_fence(world: World) -> None:
-    """Fence in a place where the vehicle is not; home is inside, unless the vehicle is there."""
+    """Set a fence that the vehicle is outside of; home is inside, unless the vehicle is at home."""
     north = float(world.position[0]) - 20.5 if world.position[0] > 0.9 else -100.0
     far = item(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, north=north, p1=20.0)
     frame = LocalFrame(world.config.home)
@@ -57,13 +57,13 @@ def lose_states(world: World) -> None:
 
 
 def tip_over(world: World) -> None:
-    """Turn the vehicle by 100° about its roll axis, at once."""
+    """Rotate the vehicle instantly by 100° about its roll axis."""
     world.simulator.plant.memory[0]["body"][6:10] = math.cos(0.87), math.sin(0.87), 0.0, 0.0  # type: ignore[attr-defined]
     world.run(0.004)
 
 
 def blow_away(world: World) -> None:
-    """Put the vehicle 30 m to the east, at once."""
+    """Move the vehicle instantly by 30 m to the east."""
     world.simulator.plant.memory[0]["body"][1] += 30.0  # type: ignore[attr-defined]
 
 

@@ -1,4 +1,4 @@
-"""How a world enters each phase of flight of the failsafe table."""
+"""Functions that bring a ``World`` into each phase of flight of the failsafe table."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ HEIGHT = 6.0
 
 
 def select_mode(world: World, mode: Mode) -> None:
-    """Select a mode; the vehicle must enter it."""
+    """Select a mode; fail if the vehicle does not enter it."""
     number = CUSTOM_MODE[mode]
     result = world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, number >> 16 & 0xFF, number >> 24)
     assert result == 0, (mode, world.texts)
@@ -36,19 +36,19 @@ def select_mode(world: World, mode: Mode) -> None:
 
 
 def _hover(world: World) -> None:
-    """Hover at ``HEIGHT``, some metres north of home."""
+    """Hover at ``HEIGHT``, 8 m north of home."""
     world.upload([item(22, z=HEIGHT), item(16, north=8.0, z=HEIGHT)])
     assert world.start_mission() == 0, world.texts
     world.until(lambda: world.mode is Mode.HOLD, 30.0)
 
 
 def setpoint(world: World) -> Callable[[], Message]:
-    """Stay where the vehicle is now."""
+    """Return the constructor of a setpoint at the vehicle's current position."""
     north, east, down = world.position.tolist()
-    stay = mavlink.MAVLink_set_position_target_local_ned_message(
+    message = mavlink.MAVLink_set_position_target_local_ned_message(
         0, 1, 1, 1, 0b110111111000, north, east, down, 0, 0, 0, 0, 0, 0, 0, 0
     )
-    return lambda: stay
+    return lambda: message
 
 
 def disarmed(world: World, before: Callable[[], None]) -> None:

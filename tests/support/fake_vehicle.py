@@ -1,6 +1,6 @@
-"""A vehicle for the ground station's tests: pymavlink's codec, a mission server and scripted behaviour.
+"""A vehicle with scripted behaviour for tests of the ground station. No I/O, except for ``serve``.
 
-It knows nothing of our services, so that both sides cannot share a mistake. It does no I/O; ``serve`` does.
+It uses pymavlink's codec and none of flightstack's services, so that both sides cannot share a defect.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ DENIED = 14
 
 @dataclass
 class FakeVehicle:
-    """Flies one mission item in each poll once it is started."""
+    """Completes one mission item per poll while the mission runs."""
 
     system_id: int = 1
     refusals: dict[int, str] = field(default_factory=dict)
-    """Command → the reason of its refusal."""
-    deaf_to: set[Any] = field(default_factory=set)
-    """Names of messages and numbers of commands that are ignored."""
-    mute: set[str] = field(default_factory=set)
-    """Names of messages that never arrive."""
+    """Reason of the refusal, by command."""
+    ignored: set[Any] = field(default_factory=set)
+    """Names of messages and numbers of commands to ignore."""
+    unsent: set[str] = field(default_factory=set)
+    """Names of messages that are not sent."""
     mission_result: int = ACCEPTED
     mission_refusal: str = ""
     refused_type: int | None = None
     """MAV_MISSION_TYPE whose uploads are refused."""
     unknown_types: tuple[int, ...] = ()
-    """MAV_MISSION_TYPEs that it does not know."""
+    """Unsupported MAV_MISSION_TYPEs."""
     healthy_after_s: float = 0.0
     stop_at_item: int | None = None
-    """Item at which it does ``at_stop``: "disarm", "silence", "power off" or "hover"."""
+    """Item at which ``at_stop`` happens: "disarm", "silence", "power off" or "hover"."""
     at_stop: str = "disarm"
     ends_in_air: bool = False
     simulated_s_per_item: float = 5.0
@@ -64,8 +64,8 @@ class FakeVehicle:
         self._heartbeat_due_s = self._began_s = -1.0
         self._now_s = 0.0
 
-    def greet(self) -> None:
-        """Be heard at once by a new peer."""
+    def make_heartbeat_due(self) -> None:
+        """Send a heartbeat in the next poll, for a new peer."""
         self._heartbeat_due_s = -1.0
 
     # -- receiving
@@ -77,12 +77,12 @@ class FakeVehicle:
             name = message.get_type()
             self.heard.append(name)
             handler = getattr(self, f"_on_{name.lower()}", None)
-            if handler is not None and name not in self.deaf_to:
+            if handler is not None and name not in self.ignored:
                 handler(message)
 
     def _on_command_long(self, message: Any) -> None:
         command = message.command
-        if command in self.deaf_to:
+        if command in self.ignored:
             return
         params = tuple(getattr(message, f"param{i}") for i in range(1, 8))
         self.commands.append((command, params))
@@ -183,7 +183,7 @@ class FakeVehicle:
         if self.silent:
             return []
         self.silent = self.powered_off
-        return [self._encode(message) for message in messages if message.get_type() not in self.mute]
+        return [self._encode(message) for message in messages if message.get_type() not in self.unsent]
 
     def _encode(self, message: Any) -> bytes:
         frame = bytes(message.pack(self.codec))
@@ -264,7 +264,7 @@ class FakeVehicle:
         ]
 
     def _on_request(self) -> dict[int, Any]:
-        """What is streamed only when it was asked for, by message id."""
+        """Return the messages that are streamed on request only, by message id."""
         ms = int(self.time_s * 1e3)
         timing = FsLoopTiming(
             ms * 1000, ms // 2, 3, 0, 500.0, 100.0, 52.5, 12.0, 20.0, 90.0, 0.0, 0.0, 0.0, 0
@@ -275,9 +275,9 @@ class FakeVehicle:
 
 @contextmanager
 def serve(vehicle: FakeVehicle, to_port: int | None = None) -> Iterator[UdpSocket]:
-    """Run ``vehicle`` on a free UDP port in a thread; it sends to ``to_port`` first, if given."""
+    """Run ``vehicle`` on a free UDP port in a thread. If ``to_port`` is given, the vehicle sends to it first."""
     socket = UdpSocket("127.0.0.1")
-    vehicle.greet()
+    vehicle.make_heartbeat_due()
     stopped = threading.Event()
 
     def run() -> None:

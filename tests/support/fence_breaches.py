@@ -1,4 +1,4 @@
-"""Ways to fly out of a geofence, and how far a vehicle gets."""
+"""Flights out of a geofence, and the distance that the vehicle reaches."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tests.support.world import World, item
 RADIUS = 20.0
 SPEED = 4.0
 BRAKING = SPEED**2 / (2.0 * 0.5 * 3.0) + 1.5
-"""Way to a halt with half of MPC_ACC_HOR, and what the beginning of the braking takes [m]."""
+"""Braking distance at half of MPC_ACC_HOR, and the distance until braking starts [m]."""
 ACCEPTED, DENIED = 0, 2
 
 
 def hovering(*params: str) -> World:
-    """Hover above home."""
+    """Return a world whose vehicle hovers above home."""
     world = World(vehicle="x_quad", params=[*QUICK, *params])
     assert world.arm() == ACCEPTED, world.texts
     assert world.takeoff(HEIGHT) == ACCEPTED
@@ -60,7 +60,7 @@ MOVEMENTS: tuple[Movement, ...] = (fly_mission, fly_goto, fly_offboard, fly_stic
 
 
 def until_breach(world: World, movement: Movement) -> Mode:
-    """Fly north and out of a fence that is uploaded on the way; what leaves a known one is refused."""
+    """Fly north out of a fence that is uploaded in flight: setpoints beyond a known fence are refused."""
     mode = movement(world)
     world.until(lambda: world.position[0] > 3.0, 20.0)
     assert isinstance(world.upload([circle((0.0, 0.0), RADIUS)], MissionType.FENCE), Done)
@@ -72,7 +72,7 @@ def until_breach(world: World, movement: Movement) -> Mode:
 
 
 def farthest_until(world: World, condition: Callable[[], bool], limit_s: float = 60.0) -> float:
-    """Fly on; return the greatest distance from home."""
+    """Run until ``condition`` is true; return the largest distance from home [m]."""
     far = 0.0
 
     def watch() -> bool:

@@ -13,7 +13,7 @@ Place = tuple[float, float]
 
 
 def degrees(place: Place, home: GeoPoint = HOME) -> tuple[float, float]:
-    """Latitude and longitude of a place north and east of home [m]."""
+    """Return latitude and longitude [deg] of a place north and east of home [m]."""
     point = LocalFrame(home).to_geo(Vector3(place[0], place[1], 0.0))
     return point.latitude_deg, point.longitude_deg
 
@@ -29,14 +29,14 @@ def _item(
 def vertex_items(
     command: int, points_deg: Sequence[tuple[float, float]], group: float = 0.0
 ) -> list[MissionItem]:
-    """The items of one polygon."""
+    """Return the items of a polygon."""
     return [_item(command, point, float(len(points_deg)), group) for point in points_deg]
 
 
 def polygon(
     places: Sequence[Place], inclusion: bool = True, group: float = 0.0, home: GeoPoint = HOME
 ) -> list[MissionItem]:
-    """A polygon of places north and east of home."""
+    """Return the items of a polygon of places north and east of home [m]."""
     command = FenceCommand.POLYGON_VERTEX_INCLUSION if inclusion else FenceCommand.POLYGON_VERTEX_EXCLUSION
     return vertex_items(command, [degrees(place, home) for place in places], group)
 
@@ -44,22 +44,22 @@ def polygon(
 def circle(
     centre: Place, radius_m: float, inclusion: bool = True, group: float = 0.0, home: GeoPoint = HOME
 ) -> MissionItem:
-    """A circle."""
+    """Return the item of a circle."""
     command = FenceCommand.CIRCLE_INCLUSION if inclusion else FenceCommand.CIRCLE_EXCLUSION
     return _item(command, degrees(centre, home), radius_m, group)
 
 
 def return_point(place: Place, altitude_m: float = 10.0) -> MissionItem:
-    """The return point of a geofence."""
+    """Return the return point of a geofence."""
     return _item(FenceCommand.RETURN_POINT, degrees(place), frame=Frame.GLOBAL_RELATIVE_ALT, z=altitude_m)
 
 
 def rally_point(place: Place, altitude_m: float = 0.0, home: GeoPoint = HOME) -> MissionItem:
-    """A rally point."""
+    """Return a rally point."""
     return _item(RALLY_POINT, degrees(place, home), frame=Frame.GLOBAL_RELATIVE_ALT, z=altitude_m)
 
 
 def square(half_m: float, at: Place = (0.0, 0.0)) -> list[Place]:
-    """The corners of a square."""
+    """Return the corners of a square."""
     north, east = at
     return [(north + half_m * n, east + half_m * e) for n, e in ((1, 1), (1, -1), (-1, -1), (-1, 1))]

@@ -1,4 +1,4 @@
-"""Samples of a made flight, for tests of the comparison and verdict of PIL reports."""
+"""Samples of a synthetic flight, for tests of the comparison and verdict of PIL reports."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gcs_cli.pil.signals import SIGNALS
 
 
 def flight(ticks: int = 10, height_m: float = 2.0, start_us: int = 1_000_000) -> FlightSamples:
-    """A vehicle that stands in the first tick and hovers afterwards; every signal is 1, each at its own rate."""
+    """Return a flight that is on the ground in the first tick and hovers afterwards. All other signals are 1."""
     time_us = start_us + 2000 * np.arange(ticks, dtype=np.int64)
     signals = {}
     for signal in SIGNALS:

@@ -1,4 +1,4 @@
-"""A flight of the ground station with a fake vehicle, in memory and in simulated time."""
+"""A flight of ``gcs fly`` with a fake vehicle, in memory and in simulated time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HOP = (TAKEOFF, WAYPOINT, LAND)
 
 @dataclass
 class Story:
-    """A flight with a vehicle; ``now_s`` is everybody's clock."""
+    """A flight with a fake vehicle; ``now_s`` is the common clock."""
 
     vehicle: FakeVehicle
     items: tuple[MissionItem, ...] = HOP

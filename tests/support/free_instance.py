@@ -1,4 +1,4 @@
-"""An instance whose ports nobody uses, so that a flight or another test run on this machine does not disturb."""
+"""An instance with free ports, so that tests do not collide with a flight or another test run on this machine."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from gcs_cli.fly.fly_options import check_ports
 FIRST, COUNT = 60, 40
 WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-"""Test processes side by side: each has instances of its own, so that none takes what another has just found free."""
+"""Parallel test processes: each has its own range of instances, so that two do not take the same one."""
 
 
 def free_instance() -> int:
-    """Return an instance with free ports; test runs side by side begin to search at different ones."""
+    """Return an instance with free ports. Parallel test runs start the search at different instances."""
     own = range(FIRST + WORKER, FIRST + COUNT, WORKERS)
     for offset in range(len(own)):
         options = FlyOptions(Path(), instance=own[(os.getpid() + offset) % len(own)])

@@ -1,4 +1,4 @@
-"""A hub of ground stations without a process, and the stations connected to it."""
+"""A ground hub without a process, and the stations connected to it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAN = math.nan
 
 
 class Station:
-    """One ground station's end of its link."""
+    """A ground station and its end of the link."""
 
     def __init__(self, net: Net, address: PeerAddress, system: int = 255, component: int = 190) -> None:
         self.net, self.address = net, address
@@ -36,7 +36,7 @@ class Station:
         self.send(mavlink.MAVLink_command_long_message(system, component, number, 0, *values))
 
     def take(self, kind: str) -> list:
-        """The messages of a kind that came since the last call."""
+        """Return the messages of a type received since the last call."""
         found = [message for message in self.inbox if message.get_type() == kind]
         self.inbox = [message for message in self.inbox if message.get_type() != kind]
         return found
@@ -51,7 +51,7 @@ class Station:
 
 
 class Net:
-    """A hub without a process, on a clock of its own, with which vehicle time moves unless told otherwise."""
+    """A hub without a process, with its own clock; by default vehicle time advances with it."""
 
     def __init__(self) -> None:
         stack = build(StackConfig(system_id=7), lambda: None)

@@ -1,4 +1,4 @@
-"""Print the kernels that flights compile, or read from the cache, after the vehicle was built: there are none."""
+"""Print the kernels that flights compile, or load from the cache, after the vehicle was built. Expected: none."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.support.world import World
 
 
 def kernels() -> set[tuple[str, int]]:
-    """Name and number of compiled signatures of each kernel in use."""
+    """Return name and number of compiled signatures of each kernel in use."""
     found = (kernel for kernel in gc.get_objects() if isinstance(kernel, Dispatcher))
     return {
         (f"{kernel.py_func.__module__}.{kernel.py_func.__name__}", len(kernel.overloads)) for kernel in found
@@ -20,7 +20,7 @@ def kernels() -> set[tuple[str, int]]:
 
 
 def fly_streams(world: World) -> None:
-    """Fly offboard and by hand, and land."""
+    """Fly in OFFBOARD and POSITION mode, and land."""
     world.arm()
     world.takeoff(3.0)
     world.until(lambda: world.mode is Mode.HOLD, 30.0)
@@ -48,7 +48,7 @@ def fly_mission(world: World) -> None:
 
 
 def main() -> None:
-    """Fly in wind, so that the vehicle leans as it touches the ground."""
+    """Fly in wind, so that the vehicle is tilted at touchdown."""
     world = World(vehicle="x_quad", wind=(5.0, 0.0, 0.0), gust=1.0)
     before = kernels()
     fly_streams(world)

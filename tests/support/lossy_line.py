@@ -1,6 +1,6 @@
-"""A serial line that loses, changes, doubles and delays octets, from a seed, with a target at its end. No clock.
+"""A simulated serial line to a target, with seeded loss, corruption, duplication and delay of bytes. No clock.
 
-Time is the line's own: it passes while ``read`` waits.
+The line has its own time, which advances while ``read`` waits.
 """
 
 from __future__ import annotations
@@ -11,32 +11,32 @@ from typing import NamedTuple, Protocol
 
 
 class Device(Protocol):
-    """What is at the line's end."""
+    """Device at the end of the line."""
 
     def give(self, data: bytes) -> None:
-        """Take octets."""
+        """Take received bytes."""
 
     def take(self) -> bytes:
-        """Return the octets to send."""
+        """Return the bytes to send."""
 
     def poll(self, passed_ms: int) -> None:
-        """Let time pass."""
+        """Advance the device by ``passed_ms``."""
 
 
-class Weather(NamedTuple):
-    """Probabilities per octet (``loss``, ``change``) and per write (``doubling``, ``delay``)."""
+class LineFaults(NamedTuple):
+    """Probabilities per byte (``loss``, ``change``) and per write (``doubling``, ``delay``)."""
 
     loss: float = 0.0
     change: float = 0.0
     doubling: float = 0.0
     delay: float = 0.0
     delay_s: float = 0.3
-    """How long a delayed piece takes, and all that follows it: longer than the time-out of a step."""
+    """Delay of a write and of all later ones; longer than the timeout of a step."""
     noise: float = 0.0
-    """Probability that up to 40 octets of noise come before a piece."""
+    """Probability of up to 40 bytes of noise before a write."""
 
 
-FAIR = Weather()
+NO_FAULTS = LineFaults()
 LATENCY_S = 0.001
 POLL_S = 0.01
 
@@ -46,8 +46,8 @@ class LossyLine:
 
     name = "the lossy line"
 
-    def __init__(self, device: Device, weather: Weather = FAIR, seed: int = 0) -> None:
-        self._device, self.weather = device, weather
+    def __init__(self, device: Device, faults: LineFaults = NO_FAULTS, seed: int = 0) -> None:
+        self._device, self.faults = device, faults
         self._random = random.Random(seed)
         self._events: list[tuple[float, int, bool, bytes]] = []
         self._last_s = [0.0, 0.0]
@@ -56,7 +56,7 @@ class LossyLine:
         self.now_s = 0.0
         self.is_closed = False
         self.is_cut = False
-        """Nothing arrives any more, in either direction."""
+        """If True, no byte arrives in either direction."""
 
     def clock(self) -> float:
         return self.now_s
@@ -96,17 +96,17 @@ class LossyLine:
     def _send(self, data: bytes, to_device: bool) -> None:
         if self.is_cut:
             return
-        weather, chance = self.weather, self._random.random
-        arrival_s = self.now_s + LATENCY_S + (weather.delay_s if chance() < weather.delay else 0.0)
-        arrival_s = max(arrival_s, self._last_s[to_device])  # what was sent first comes first
-        for _ in range(2 if chance() < weather.doubling else 1):
+        faults, chance = self.faults, self._random.random
+        arrival_s = self.now_s + LATENCY_S + (faults.delay_s if chance() < faults.delay else 0.0)
+        arrival_s = max(arrival_s, self._last_s[to_device])  # the order is kept
+        for _ in range(2 if chance() < faults.doubling else 1):
             piece = bytearray()
-            if chance() < weather.noise:
+            if chance() < faults.noise:
                 piece += self._random.randbytes(self._random.randrange(40))
-            for octet in data:
-                if chance() < weather.loss:
+            for byte in data:
+                if chance() < faults.loss:
                     continue
-                piece.append(self._random.randrange(256) if chance() < weather.change else octet)
+                piece.append(self._random.randrange(256) if chance() < faults.change else byte)
             self._count += 1
             self._last_s[to_device] = arrival_s
             heapq.heappush(self._events, (arrival_s, self._count, to_device, bytes(piece)))

@@ -1,4 +1,4 @@
-"""A small run of the paper's experiments for tests of its report: real flights at low rates, other parts by hand."""
+"""Results of the paper's experiments for tests of its report: flights at low rates, other parts made by hand."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SIMPLE = [one for one in cases.CONDITIONS if one.name in (cases.PLAIN, cases.IDE
 
 @cache
 def small_flights() -> Flown:
-    """Fly three contenders along each trajectory at low rates: these are not the paper's figures."""
+    """Fly three contenders along each trajectory. The rates are low, so the figures are not the paper's."""
     chosen = cases.matrix((cases.DESIRED,), (cases.SMALL_ANGLE, cases.RIGID), CONTENDERS, SIMPLE[:1])
     chosen += cases.matrix((cases.SMOOTH, cases.HARD), (cases.SMALL_ANGLE,), CONTENDERS, SIMPLE)
     chosen += cases.matrix(cases.STEPS, (cases.SMALL_ANGLE,), CONTENDERS, SIMPLE[:1])
@@ -33,14 +33,14 @@ def _quick(case: Case) -> Case:
 
 
 def small_results() -> dict[str, Any]:
-    """Return the content of results.json of these flights; the caller may change it."""
+    """Return the content of results.json for ``small_flights``. The caller may change it."""
     return results_of(small_flights(), {})
 
 
 def full_results() -> dict[str, Any]:
-    """Return results with every case of ``gcs paper``, with figures of the few flights: for the size of the page."""
+    """Return results with every case of ``gcs paper``, filled with ``small_flights``, to test the size of the page."""
     flown = small_flights()
-    alike = {
+    sources = {
         (name, trajectory): cases.key(name, trajectory)
         for name in (cases.PID, cases.BACKSTEPPING)
         for trajectory in (*cases.PATHS, *cases.STEPS)
@@ -48,7 +48,7 @@ def full_results() -> dict[str, Any]:
     entries, recordings = {}, {}
     for case in cases.all_cases(multibody=True):
         controller = cases.PID if case.controller == "pid" else cases.BACKSTEPPING
-        source = alike[controller, case.trajectory]
+        source = sources[controller, case.trajectory]
         entries[case.key], recordings[case.key] = flown.entries[source], flown.recordings[source]
     results = results_of(Flown(entries, recordings), {})
     linear, onset = linear_part(), onset_part()
@@ -67,7 +67,7 @@ def full_results() -> dict[str, Any]:
 
 
 def _distinct(axes: dict[str, Any], index: int) -> dict[str, Any]:
-    """Return axes whose gains and margins differ from those of other indices."""
+    """Return axes whose gains and overshoot depend on ``index``."""
     return {
         name: {
             **of,
@@ -79,7 +79,7 @@ def _distinct(axes: dict[str, Any], index: int) -> dict[str, Any]:
 
 
 def linear_part() -> dict[str, Any]:
-    """Return a linear analysis of one loop, as it stands in results.json."""
+    """Return the linear analysis of one loop, as in results.json."""
     law = {"kp": 100.0, "ki": 0.0, "kd": 16.0, "rate_feedforward": 1.0, "acceleration_feedforward": 0.0}
     margin = {
         "gain_db": 12.34,
@@ -117,7 +117,7 @@ def linear_part() -> dict[str, Any]:
 
 
 def onset_part() -> list[dict[str, Any]]:
-    """Return two onsets, one of them at no rate."""
+    """Return two onsets of instability, one of them without a rate."""
     found = {
         "controller": "pid",
         "gains": "paper",
@@ -131,7 +131,7 @@ def onset_part() -> list[dict[str, Any]]:
 
 
 def pil_part() -> dict[str, Any]:
-    """Return the comparison of a flight on the emulated target, as it stands in results.json."""
+    """Return the comparison of a flight on the emulated target, as in results.json."""
     stage = {
         "count": 100,
         "min": 891.0,

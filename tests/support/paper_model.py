@@ -1,7 +1,7 @@
-"""The paper's equations in SymPy, as printed and as corrected, and the mechanics that they must follow from.
+"""The paper's equations in SymPy, as printed and as corrected, and their derivation from rigid-body mechanics.
 
-Angles φ θ ψ turn about x, y, z in the order ψ, θ, φ (equation 1), whichever way z points. ``q`` are the angles, ``v``
-their derivatives, ``a`` the second ones; ``W`` maps v to the body rates.
+Angles φ θ ψ rotate about x, y, z in the order ψ, θ, φ (equation 1), for either direction of z. ``q`` are the angles,
+``v`` and ``a`` their first and second derivatives; ``W`` maps v to the body rates.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ ROTATION = about_z(psi) * about_y(theta) * about_x(phi)
 
 
 def in_time(expression: sp.Expr | sp.Matrix) -> sp.Expr | sp.Matrix:
-    """Differentiate by time: angles by ``V``, those by ``A``, h by h'."""
+    """Differentiate with respect to time; the derivatives of angles, ``V`` and h are ``V``, ``A`` and h'."""
     moving = (*zip(ANGLES, V, strict=True), *zip(V, A, strict=True), (H, H_DOT))
     return sum((expression.diff(symbol) * rate for symbol, rate in moving), 0 * expression)
 
 
 def reduced(expression: sp.Expr) -> sp.Expr:
-    """Bring a polynomial in sines and cosines of the angles to a form that is zero only if it is zero."""
+    """Return the normal form of a polynomial in sines and cosines of the angles: 0 if and only if it is zero."""
     expression = sp.expand(expression)
     for angle in ANGLES:
         sine, cosine = sp.sin(angle), sp.cos(angle)
@@ -101,7 +101,7 @@ def euler_lagrange() -> sp.Matrix:
 
 
 def newton_euler(rates: sp.Matrix, acceleration: sp.Matrix) -> sp.Matrix:
-    """I ω' + ω × (I ω + h e_z) + h' e_z: the torque that a body with spinning rotors needs."""
+    """I ω' + ω × (I ω + h e_z) + h' e_z: torque on a body with spinning rotors."""
     momentum = INERTIA * rates + sp.Matrix([0, 0, H])
     return INERTIA * acceleration + rates.cross(momentum) + sp.Matrix([0, 0, H_DOT])
 

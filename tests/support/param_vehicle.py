@@ -1,4 +1,4 @@
-"""A vehicle with parameters for the ground station's tests: pymavlink's codec, and metadata over MAVLink FTP."""
+"""A fake vehicle with parameters, and their metadata over MAVLink FTP, for tests of the ground station."""
 
 from __future__ import annotations
 
@@ -31,10 +31,9 @@ METADATA: list[dict[str, Any]] = [
 
 @dataclass
 class ParamVehicle(FakeVehicle):
-    """Refuses what its metadata does not allow, with a PARAM_ERROR and a text."""
+    """Refuses values outside the ranges of its metadata, with PARAM_ERROR and a text."""
 
-    tells: bool = True
-    """Whether it has metadata."""
+    has_metadata: bool = True
     values: dict[str, float] = field(
         default_factory=lambda: {"MPC_XY_CRUISE": 4.0, "MPC_YAW_MODE": 0, "ROLL_P": 0.3872983455657959}
     )
@@ -42,7 +41,7 @@ class ParamVehicle(FakeVehicle):
     def __post_init__(self) -> None:
         super().__post_init__()
         document = json.dumps({"version": 1, "parameters": METADATA}).encode()
-        files = {"etc/extras/parameters.json.xz": fixed(lzma.compress(document))} if self.tells else {}
+        files = {"etc/extras/parameters.json.xz": fixed(lzma.compress(document))} if self.has_metadata else {}
         self._ftp = FtpServer(Address(1, 1), FileTree(files, {}))
         self._about = {entry["name"]: entry for entry in METADATA}
 
@@ -56,7 +55,7 @@ class ParamVehicle(FakeVehicle):
     def _is_integer(self, name: str) -> bool:
         return self._about.get(name, {}).get("type") == "Int32"
 
-    def _tell(self, name: str) -> None:
+    def _send_value(self, name: str) -> None:
         value, kind = self.values[name], REAL32
         if self._is_integer(name):
             kind = INT32
@@ -68,12 +67,12 @@ class ParamVehicle(FakeVehicle):
 
     def _on_param_request_list(self, _message: Any) -> None:
         for name in self.values:
-            self._tell(name)
+            self._send_value(name)
 
     def _on_param_request_read(self, message: Any) -> None:
         name = message.param_id if message.param_index < 0 else list(self.values)[message.param_index]
         if name in self.values:
-            self._tell(name)
+            self._send_value(name)
         else:
             self._out.append(mavlink.MAVLink_param_error_message(255, 190, name.encode(), -1, 1))
 
@@ -87,7 +86,7 @@ class ParamVehicle(FakeVehicle):
         else:
             self._out.append(mavlink.MAVLink_param_error_message(255, 190, name.encode(), -1, 2))
             self.say(f"Parameter {name} refused: {value:g} is outside {about['min']:g} to {about['max']:g}")
-        self._tell(name)
+        self._send_value(name)
 
     def execute(self, command: int, params: tuple[float, ...]) -> int:
         if (command, params[0]) != (STORAGE, RESET_ALL):

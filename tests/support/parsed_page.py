@@ -10,7 +10,7 @@ VOID = {"meta", "wbr", "br", "hr", "img", "link", "input"}
 
 
 class Checker(HTMLParser):
-    """Fails on tags that do not match; collects the text that is shown, attributes, and charts by name."""
+    """Fails on tags that do not match; collects visible text, attributes, and charts by name."""
 
     def __init__(self) -> None:
         super().__init__()

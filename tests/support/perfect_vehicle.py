@@ -1,4 +1,4 @@
-"""A vehicle that is where guidance wants it: flies guidance alone, without loops and plant."""
+"""A vehicle that follows the setpoint of guidance exactly, without control loops and plant."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NAN = math.nan
 
 
 class PerfectVehicle:
-    """Follows the setpoint exactly, and stands on the ground at z = 0."""
+    """Follows the setpoint exactly. The ground is at z = 0."""
 
     def __init__(self, outer_hz: float = 50.0, **params: float) -> None:
         behaviour = Behaviour()
@@ -50,7 +50,7 @@ class PerfectVehicle:
         return self._turned_rad
 
     def plan(self, *rows: tuple[float, ...], jumps: dict[int, float] | None = None) -> None:
-        """Load items: command, parameters 1–4, north, east, down; what is left out is zero or NaN."""
+        """Load items: command, parameters 1 to 4, north, east, down. Omitted values are NaN."""
         table = np.full((len(rows), 8), NAN)
         for index, row in enumerate(rows):
             table[index, : len(row)] = row
@@ -64,7 +64,7 @@ class PerfectVehicle:
         self.navigator.enter(mode, altitude_m)
 
     def airborne_at(self, north: float, east: float, down: float) -> None:
-        """Put the vehicle into the air, at rest, no longer landed."""
+        """Place the vehicle in the air, at rest and not landed."""
         self.state[:3] = north, east, down
         self.navigator.reset_on_ground(self.state)
         self.navigator._land[:] = LandMemory(0.0, 0.0, 0.0, down)
@@ -92,7 +92,7 @@ class PerfectVehicle:
             self.tick()
 
     def until(self, condition: Callable[[], bool], limit_s: float = 200.0) -> float:
-        """Fly until ``condition`` holds; return the time it took."""
+        """Run until ``condition`` is true; return the elapsed time [s]."""
         began_s = self.time_s
         while not condition():
             assert self.time_s - began_s < limit_s, (self.navigator.progress, self.position)

@@ -1,6 +1,6 @@
-"""A process of ours whose output is read as it comes.
+"""A Python module run as a process, whose output is read line by line.
 
-Waits are for events (a line of output, the end of the process); their bounds only keep a broken run from hanging.
+Waits are for events (a line of output, the end of the process); their timeouts are hang guards.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MOST_LINES = 200
 
 
 def start(module: str, arguments: Sequence[str], listens: bool) -> Program | subprocess.Popen[str]:
-    """Start a program of ours from the server that has it in memory, another one as usual."""
+    """Start one of ``PROGRAMS`` from the warm server, another module in a new interpreter."""
     if module in PROGRAMS:
         return Program(module, arguments, listens=listens, joins_output=True)
     return subprocess.Popen(
@@ -33,7 +33,7 @@ def start(module: str, arguments: Sequence[str], listens: bool) -> Program | sub
 
 
 def children_of(pid: int) -> dict[str, int]:
-    """Name and process id of the children of a process, from /proc."""
+    """Return module name and process id of the children of a process, from /proc."""
     found = {}
     for entry in Path("/proc").iterdir():
         if not entry.name.isdigit():
@@ -41,7 +41,7 @@ def children_of(pid: int) -> dict[str, int]:
         try:
             parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
             arguments = (entry / "cmdline").read_text().split("\0")
-        except (OSError, IndexError):  # it ended meanwhile
+        except (OSError, IndexError):  # the process has ended
             continue
         if parent == pid and "-m" in arguments:
             found[arguments[arguments.index("-m") + 1]] = int(entry.name)
@@ -52,7 +52,7 @@ class Process:
     """A Python module that runs as a process; standard error is read together with standard output."""
 
     def __init__(self, module: str, *arguments: str, listens: bool = False) -> None:
-        """Start it; with ``listens`` it gets the lines of :meth:`tell`, else no input."""
+        """Start the process; with ``listens`` its standard input is the lines of :meth:`tell`, else empty."""
         self.name = module
         self._popen = start(module, arguments, listens)
         self._fresh: Queue[str | None] = Queue()
@@ -69,7 +69,7 @@ class Process:
         self._fresh.put(None)
 
     def next_line(self) -> str | None:
-        """Return the next line of output, or None: the process ended, or was silent too long."""
+        """Return the next line of output; None at its end, or after BOUND_S without output."""
         try:
             return self._fresh.get(timeout=BOUND_S)
         except Empty:
@@ -84,7 +84,7 @@ class Process:
         raise AssertionError(f"{self.name} did not say {text!r} in {MOST_LINES} lines: {self.output}")
 
     def tell(self, line: str) -> None:
-        """Write a line to the process's standard input."""
+        """Write a line to the standard input of the process."""
         assert self._popen.stdin is not None
         self._popen.stdin.write(line + "\n")
         self._popen.stdin.flush()

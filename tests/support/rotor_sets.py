@@ -1,4 +1,4 @@
-"""Vehicles for tests: any rotor set, without a file."""
+"""Vehicles with any rotor set, without a vehicle file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def multirotor(
 
 
 def ring(count: int, radius_m: float = 0.25, first_deg: float = 0.0) -> Vehicle:
-    """Return ``count`` rotors evenly on a circle, spins alternating."""
+    """Return a vehicle with ``count`` rotors evenly on a circle, spins alternating."""
     angles = [math.radians(first_deg + 360.0 * index / count) for index in range(count)]
     positions = [(radius_m * math.cos(angle), radius_m * math.sin(angle)) for angle in angles]
     return multirotor(positions, [1 if index % 2 == 0 else -1 for index in range(count)])
@@ -38,7 +38,7 @@ def ring(count: int, radius_m: float = 0.25, first_deg: float = 0.0) -> Vehicle:
 
 @st.composite
 def irregular_vehicles(draw: st.DrawFn) -> Vehicle:
-    """Return a ring whose rotors are shifted and at different radii: it hovers, but not evenly."""
+    """Return a ring with irregular angles and radii: rotor thrusts differ in hover."""
     count = draw(st.sampled_from([4, 6, 8]))
     positions = []
     for index in range(count):

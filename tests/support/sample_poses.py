@@ -1,4 +1,4 @@
-"""A short flight made of formulas, as poses: up, and along a circle."""
+"""Poses of a short synthetic flight: a climb and a circle."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from flightstack.flight_log.poses_file import Poses
 
 
 def sample_poses(seconds: float = 4.0, rotors: int = 4, vehicle: str = "paper_quad") -> Poses:
-    """Return ``seconds`` of flight at 50 Hz: it climbs to 2 m and circles, banked, its nose along the way."""
+    """Return ``seconds`` of flight at 50 Hz: a climb to 2 m and a banked circle, heading along the path."""
     time_s = np.arange(0.0, seconds + 0.01, 0.02)
     turn = 0.8 * time_s
     position = np.column_stack((3.0 * np.sin(turn), 3.0 * (1.0 - np.cos(turn)), -np.minimum(2.0, time_s)))

@@ -1,4 +1,4 @@
-"""Messages that a companion or a pilot streams, and how to stream them to a ``World``."""
+"""Messages of a companion or a pilot, and functions that stream them to a ``World``."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from flightstack.mavlink.link import Message
 from flightstack.params.config import DEFAULT_HOME
 from tests.support.world import World
 
-NOTHING_GIVEN = 0b1101_1111_1111
-"""A type mask that ignores everything."""
-RATE_S = 0.02
+IGNORE_ALL = 0b1101_1111_1111
+"""Type mask that ignores all fields."""
+INTERVAL_S = 0.02
 CHANGE_MODE = 1.0
-"""The flag of DO_REPOSITION by which the vehicle goes to HOLD."""
+"""Flag of DO_REPOSITION that selects HOLD."""
 
 Triple = tuple[float, float, float]
 
@@ -30,8 +30,8 @@ def local_point(
     frame: int = mavlink.MAV_FRAME_LOCAL_NED,
     target: tuple[int, int] = (1, 1),
 ) -> Message:
-    """SET_POSITION_TARGET_LOCAL_NED with what is given; NaN leaves out a single number."""
-    mask = NOTHING_GIVEN
+    """Return SET_POSITION_TARGET_LOCAL_NED with the given values; NaN omits a single number."""
+    mask = IGNORE_ALL
     for bits, given in (
         (0x7, position),
         (0x38, velocity),
@@ -47,27 +47,27 @@ def local_point(
 
 
 def attitude(q: tuple[float, float, float, float], thrust: float) -> Message:
-    """SET_ATTITUDE_TARGET with an attitude."""
+    """Return SET_ATTITUDE_TARGET with an attitude."""
     return mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 7, list(q), 0.0, 0.0, 0.0, thrust)
 
 
 def body_rates(rates: Triple, thrust: float) -> Message:
-    """SET_ATTITUDE_TARGET with body rates."""
+    """Return SET_ATTITUDE_TARGET with body rates [rad/s]."""
     return mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 128, [1.0, 0.0, 0.0, 0.0], *rates, thrust)
 
 
 def sticks(forward: float = 0.0, right: float = 0.0, up: float = 0.0, yaw: float = 0.0) -> Message:
-    """MANUAL_CONTROL with sticks from −1 to 1."""
+    """Return MANUAL_CONTROL for stick positions of −1 to 1."""
     x, y, r = (round(1000.0 * stick) for stick in (forward, right, yaw))
     return mavlink.MAVLink_manual_control_message(1, x, y, round(500.0 + 500.0 * up), r, 0)
 
 
 def stream(world: World, message: Message | Callable[[float], Message], seconds: float) -> None:
-    """Send a message, or what a function of the time since the start makes, at 50 Hz."""
+    """Send a message, or the result of a function of the time since the start, at 50 Hz."""
     began_s = world.time_s
-    for _ in range(round(seconds / RATE_S)):
+    for _ in range(round(seconds / INTERVAL_S)):
         world.send(message(world.time_s - began_s) if callable(message) else message)
-        world.run(RATE_S)
+        world.run(INTERVAL_S)
 
 
 def select(world: World, main: int) -> int | None:
@@ -84,7 +84,7 @@ def go_to(
     speed: float = -1.0,
     flags: float = CHANGE_MODE,
 ) -> int | None:
-    """DO_REPOSITION as a COMMAND_LONG: altitude above sea level from one above home."""
+    """Send DO_REPOSITION as a COMMAND_LONG; ``altitude`` is above home [m]. Return its MAV_RESULT."""
     place = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, 0.0))
     latitude, longitude = place.latitude_deg, place.longitude_deg
     altitude += DEFAULT_HOME.altitude_m
@@ -92,10 +92,10 @@ def go_to(
 
 
 def level(yaw_rad: float = 0.0) -> tuple[float, float, float, float]:
-    """Quaternion of a level vehicle."""
+    """Return the quaternion of a level vehicle."""
     return math.cos(0.5 * yaw_rad), 0.0, 0.0, math.sin(0.5 * yaw_rad)
 
 
 def hover_thrust(world: World) -> float:
-    """Share of the largest thrust that carries the vehicle."""
+    """Return hover thrust as a fraction of the maximum thrust."""
     return world.stack.vehicle.weight_n / world.stack.vehicle.max_thrust_n

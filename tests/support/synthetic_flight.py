@@ -1,4 +1,4 @@
-"""A flight made of formulas, written through the flight log: takeoff, a square, landing."""
+"""A synthetic flight, written by ``FlightLog``: takeoff, a square, landing."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ PARAMETERS: Mapping[str, float] = {"MIS_DIST_1WP": 900.0, "MPC_XY_CRUISE": 3.0, 
 
 
 def _path(time_s: float) -> np.ndarray[Any, Any]:
-    """Setpoint NED [m] of the flight at ``time_s`` after takeoff began."""
+    """Return the position setpoint [m NED] at ``time_s`` after the start of the takeoff."""
     points = [(0.0, 0.0, 0.0), (0.0, 0.0, -3.0), *CORNERS_NED_M, (0.0, 0.0, 0.0)]
     durations = [CLIMB_S] + [LEG_S] * 4 + [CLIMB_S]
     for (start, end), duration in zip(pairwise(points), durations, strict=True):
@@ -129,7 +129,7 @@ def _events(log: FlightLog, tick_ms: int, total: int) -> None:
 
 
 def write_synthetic_flight(file: Any, inner_ms: int = 2, outer_ms: int = 10, seconds: float = 36.0) -> None:
-    """Write the flight into ``file``; items: 0 takeoff, 1–4 corners, 5 land."""
+    """Write the flight to ``file``. Items: 0 takeoff, 1 to 4 corners, 5 land."""
     log = FlightLog(file, rotors=4)
     log.start(0, INFO, PARAMETERS, HOME)
     log.event("home_position", 0, lat=HOME.latitude_deg, lon=HOME.longitude_deg, alt=HOME.altitude_m)
@@ -150,7 +150,7 @@ def write_synthetic_flight(file: Any, inner_ms: int = 2, outer_ms: int = 10, sec
 
 
 class KeptBytes(io.BytesIO):
-    """A file whose content outlives its closing."""
+    """A file in memory, readable after it was closed."""
 
     def close(self) -> None:
         self.content = self.getvalue()
@@ -158,7 +158,7 @@ class KeptBytes(io.BytesIO):
 
 
 def synthetic_flight_bytes(inner_ms: int = 2, outer_ms: int = 10, seconds: float = 36.0) -> bytes:
-    """Return the bytes of the synthetic flight's log."""
+    """Return the log of the synthetic flight as bytes."""
     file = KeptBytes()
     write_synthetic_flight(file, inner_ms, outer_ms, seconds)
     return file.content

@@ -1,4 +1,4 @@
-"""The status of which telemetry messages are made, for tests: a vehicle in flight at a known state."""
+"""Status of a vehicle in flight at a known state, for tests of telemetry."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ X, Y, Z, W = Rotation.from_euler("ZYX", EULER[::-1]).as_quat()
 
 
 def status(info: dict[str, object] | None = None, **changes: object) -> VehicleStatus:
-    """Return the status with ``changes``, and with those of ``info`` in its constant part."""
+    """Return the status with ``changes``; ``info`` changes its ``VehicleInfo``."""
     row = np.zeros(LoopRow.SIZE)
     row[LoopRow.REFERENCE_RATES] = 0.4, 0.5, 0.6
     row[LoopRow.WRENCH_ACHIEVED] = 6.0, 0.0, 0.0, 0.0
@@ -49,6 +49,6 @@ def usual_timing() -> Message:
 
 
 def telemetry(of: VehicleStatus | None = None, timing: Callable[[], Message] = usual_timing) -> Telemetry:
-    """Return telemetry of a status that does not change."""
+    """Return telemetry of a constant status."""
     shown = of or status()
     return Telemetry(lambda: shown, lambda: shown.time_us, timing)

@@ -1,4 +1,4 @@
-"""What the machine gives the tests: tools (without one a test is skipped, but fails on CI), and time."""
+"""Requirements of tests: external tools, and nightly runs."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import NoReturn
 import pytest
 
 NIGHTLY = bool(os.environ.get("NIGHTLY"))
-"""True if all samples and combinations are run, however long it takes; otherwise a part of them."""
+"""True to run all samples and combinations instead of a part of them."""
 
 
 def missing(sentence: str) -> NoReturn:
-    """Skip the test because of a tool that is not there; in continuous integration that is an error."""
+    """Skip the test because of a missing tool; fail in continuous integration."""
     if os.environ.get("CI"):
         pytest.fail(sentence, pytrace=False)
     pytest.skip(sentence)

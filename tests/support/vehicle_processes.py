@@ -1,4 +1,4 @@
-"""A simulator and a flight stack as real processes, for tests that talk to them over real sockets."""
+"""Simulator and flight stack as processes, for tests over real sockets."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from tests.support.free_instance import free_instance
 from tests.support.programs import Program
 
 LONG_S = 60.0
-"""A hang guard: no process of a test lives longer."""
+"""Hang guard [s]."""
 
 
 @dataclass
 class VehicleProcesses:
-    """Where the vehicle is."""
+    """Processes and instance number of a vehicle."""
 
     instance: int
     simulator: Program | None
@@ -28,16 +28,16 @@ class VehicleProcesses:
 
     @property
     def link(self) -> str:
-        """What ``gcs --connect`` needs."""
+        """Argument of ``gcs --connect``."""
         return vehicle_connection(self.instance)
 
     def wait_until_healthy(self) -> None:
-        """Wait for the simulator's first state: until then the vehicle refuses to arm."""
+        """Wait for the first state of the simulator, before which the vehicle refuses to arm."""
         wait_until_healthy(self.link)
 
 
 def wait_until_healthy(link: str) -> None:
-    """Wait until the vehicle at ``link`` has a valid state; ask, because telemetry stands still before it."""
+    """Wait until the vehicle at ``link`` has a valid state. It sends SYS_STATUS only on request before."""
     with Connection(parse_endpoint(link)) as connection:
         connection.meet(LONG_S)
         while not connection.session.view.healthy:
@@ -50,7 +50,7 @@ def wait_until_healthy(link: str) -> None:
 def vehicle(
     folder: Path, *arguments: object, speed: object = 10, with_simulator: bool = True
 ) -> Iterator[VehicleProcesses]:
-    """Run both; ``arguments`` go to the flight stack. Both are ended, whatever happens."""
+    """Run both and end them at exit; ``arguments`` are those of the flight stack."""
     instance = free_instance()
     with contextlib.ExitStack() as ends:
 

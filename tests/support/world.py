@@ -1,6 +1,6 @@
-"""A whole flight in one process: simulator, flight stack and ground station on the bytes that sockets carry.
+"""A flight in one process: simulator, flight stack and ground station exchange the bytes of their sockets.
 
-Time is simulated; nothing here reads a clock. A scenario is a story of verbs:
+Time is simulated; no clock is read. Example:
 
     world = World(vehicle="x_quad", wind=(4.0, 0.0, 0.0))
     world.upload("square.plan")
@@ -50,12 +50,12 @@ SERVICE_LIMIT_S = 30.0
 STREAM_STEP_S = 0.05
 
 
-class TookTooLongError(AssertionError):
-    """A story's condition did not come true within its simulated time."""
+class SimulationTimeoutError(AssertionError):
+    """A condition was not met within its limit of simulated time."""
 
 
 class LogBuffer(io.BytesIO):
-    """A log file in memory that can be read after it was closed."""
+    """A log file in memory, readable after it was closed."""
 
     content = b""
 
@@ -65,7 +65,7 @@ class LogBuffer(io.BytesIO):
 
 
 class World:
-    """One vehicle, its simulator and a ground station."""
+    """A vehicle, its simulator and a ground station."""
 
     def __init__(
         self,
@@ -94,11 +94,11 @@ class World:
         self.simulator.set_interval_us(self.stack.rates.interval_us)
         self._lockstep = Lockstep(self.stack.simulator, self.stack.autopilot, self.stack.rates.interval_us)
         self.machine_ns = 0
-        """Time of the machine that flies, for a simulator whose clock stands still."""
+        """Wall time for a simulator whose clock stands still."""
         self.actuators = ActuatorsFrame()
         self._simulator_codec = Link(1, SIMULATOR_COMPONENT)
         self.held_s = 0.0
-        """How long messages were exchanged while simulated time stood still."""
+        """Link time of exchanges while simulated time stood still."""
         self._link = Link(*GCS)
         autopilot = Address(self.config.system_id, 1)
         self._missions = MissionClient(autopilot, GCS)
@@ -109,12 +109,12 @@ class World:
         self.texts: list[str] = []
         self.reached: list[int] = []
         self.sends_heartbeats = True
-        """As a ground station; else as a companion, whose heartbeats keep no data link alive."""
+        """If True, heartbeats of a ground station; otherwise of a companion, which do not count for the data link."""
         self.loses_states = False
-        """Ticks go on without states, as they do in real time when a simulator hangs."""
+        """If True, ticks go on without states, as in real time when a simulator hangs."""
         self._missed_us = 0
         self.streams: dict[str, Callable[[], Message]] = {}
-        """Makers of messages that are sent twenty times a second: offboard setpoints, sticks."""
+        """Constructors of messages that are sent at 20 Hz: offboard setpoints, sticks."""
         self._stream_due_s = -math.inf
         self._next_log_us = 0
         self._ticks = 0
@@ -126,7 +126,7 @@ class World:
         self.logs.append(LogBuffer())
         return FlightLog(self.logs[-1], len(self.stack.vehicle.rotors))
 
-    # ------------------------------------------------------------------ what is
+    # ------------------------------------------------------------------ state
 
     @property
     def time_s(self) -> float:
@@ -163,11 +163,11 @@ class World:
     # ------------------------------------------------------------------ time
 
     def link_now_s(self) -> float:
-        """Time of the link: simulated time, and the time that exchanges took while it stood still."""
+        """Return link time: simulated time and ``held_s``."""
         return self.time_s + self.held_s
 
     def tick(self) -> None:
-        """One exchange: state to the stack, actuators back, all as bytes."""
+        """Run one exchange: state to the stack, actuators back, all as bytes."""
         stack = self.stack
         if self._missed_us:
             commands = stack.autopilot.tick(stack.simulator.time_us + self._missed_us)
@@ -190,7 +190,7 @@ class World:
             assert stack.simulator.receive(memoryview(self.states()))
 
     def states(self) -> bytes | memoryview:
-        """The bytes that the simulator sends for one step."""
+        """Return the bytes that the simulator sends for one step."""
         return self.simulator.outgoing()
 
     def take_answer(self, answer: bytes | memoryview) -> None:
@@ -198,7 +198,7 @@ class World:
         assert self.actuators.open(answer)
 
     def _pass_requests(self) -> None:
-        """Carry what the vehicle asks of the simulator, and the answers."""
+        """Pass the vehicle's requests to the simulator, and the answers back."""
         requests = self.stack.simulator.take_requests()
         for request in self._simulator_codec.decode(requests) if requests else ():
             result = inject_failure(self.simulator, request.param1, request.param2, request.param3)
@@ -206,28 +206,28 @@ class World:
             self.stack.simulator.receive(memoryview(self._simulator_codec.encode(ack)))
 
     def run(self, seconds: float) -> None:
-        """Let simulated time pass."""
+        """Run for ``seconds`` of simulated time."""
         for _ in range(round(seconds * self.stack.rates.inner_hz)):
             self.tick()
 
     def until(self, condition: Callable[[], bool], limit_s: float = 120.0) -> None:
-        """Fly until ``condition`` holds; fail after ``limit_s`` of simulated time."""
+        """Run until ``condition`` is true; raise SimulationTimeoutError after ``limit_s`` of simulated time."""
         for _ in range(round(limit_s * self.stack.rates.inner_hz)):
             if condition():
                 return
             self.tick()
-        raise TookTooLongError(
+        raise SimulationTimeoutError(
             f"not within {limit_s} s; mode {self.mode.name}, position {self.position}, {self.texts}"
         )
 
     def until_disarmed(self, limit_s: float = 180.0) -> None:
-        """Fly until the vehicle has disarmed itself."""
+        """Run until the vehicle is disarmed."""
         self.until(lambda: not self.armed, limit_s)
 
     # ------------------------------------------------------------------ ground station
 
     def exchange_with_ground(self) -> None:
-        """Carry what both sides have to say, once."""
+        """Exchange all pending messages between vehicle and ground station once."""
         now_s = self.link_now_s()
         ground = self.stack.ground
         kind = mavlink.MAV_TYPE_GCS if self.sends_heartbeats else mavlink.MAV_TYPE_ONBOARD_CONTROLLER
@@ -246,11 +246,11 @@ class World:
                 self._take(message, now_s)
 
     def inject(self, fault: str) -> None:
-        """Begin a fault of the simulator, written as ``sim-bridge --fault`` takes it."""
+        """Start a fault of the simulator, in the syntax of ``sim-bridge --fault``."""
         self.simulator.inject(parse_fault(fault, len(self.stack.vehicle.rotors)))
 
     def send(self, message: Message) -> None:
-        """Send a message of the ground station's."""
+        """Send a message from the ground station."""
         self.stack.ground.receive(PEER, self._link.encode(message), self.link_now_s())
 
     def _take(self, message: Message, now_s: float) -> None:
@@ -268,18 +268,18 @@ class World:
         self._commands.receive(message, now_s)
 
     def _serve(self, done: Callable[[], bool]) -> None:
-        """Exchange messages while simulated time stands still, until ``done``."""
+        """Exchange messages until ``done`` while simulated time stands still."""
         began_s = self.held_s
         while not done():
             self.held_s += HELD_STEP_S
             self.exchange_with_ground()
             if self.held_s - began_s > SERVICE_LIMIT_S:
-                raise TookTooLongError("no answer from the vehicle")
+                raise SimulationTimeoutError("no answer from the vehicle")
 
     def upload(
         self, plan: str | Sequence[MissionItem], kind: MissionType = MissionType.MISSION
     ) -> Done | Failed:
-        """Upload a mission file of ``missions/`` or a list of items of a plan type; return how it ended."""
+        """Upload a mission file of ``missions/`` or the items of a plan; return the result."""
         items = load_plan(MISSIONS / plan).items if isinstance(plan, str) else plan
         missions = self._missions
         if kind is not MissionType.MISSION:
@@ -293,7 +293,7 @@ class World:
             self._missions = missions
 
     def download(self) -> tuple[MissionItem, ...]:
-        """Download the mission."""
+        """Download and return the mission."""
         self._missions.start_download()
         self._serve(lambda: self._missions.result is not None)
         assert isinstance(self._missions.result, Done), self._missions.result
@@ -336,7 +336,7 @@ class World:
 
 
 def item(command: int, north: float = 0.0, east: float = 0.0, z: float = 0.0, p1: float = 0.0) -> MissionItem:
-    """Mission item at a place relative to the default home, altitude above home."""
+    """Return a mission item at a position relative to the default home [m], altitude above home."""
     place = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, 0.0))
     position = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
     if command in (93, 115, 177, 178):

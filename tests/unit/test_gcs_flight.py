@@ -58,7 +58,7 @@ def test_a_refused_part_of_the_plan_is_named(kind: MissionType, name: str) -> No
 
 
 def test_no_vehicle() -> None:
-    story = Story(FakeVehicle(mute={"HEARTBEAT"}), connect_s=3.0).run()
+    story = Story(FakeVehicle(unsent={"HEARTBEAT"}), connect_s=3.0).run()
     assert story.reason.startswith(
         "no vehicle answered within 3 s: flightstack has not begun; compiling its loops"
     )
@@ -97,9 +97,9 @@ def test_refused_command_tells_the_vehicles_reason(command: int, text: str) -> N
     assert story.orders[-1] == SHUT_DOWN
 
 
-@pytest.mark.parametrize(("deaf_to", "said"), [("MISSION_COUNT", "upload"), (ARM, "COMPONENT_ARM_DISARM")])
-def test_a_vehicle_that_does_not_answer(deaf_to: object, said: str) -> None:
-    story = Story(FakeVehicle(deaf_to={deaf_to})).run()
+@pytest.mark.parametrize(("ignored", "said"), [("MISSION_COUNT", "upload"), (ARM, "COMPONENT_ARM_DISARM")])
+def test_a_vehicle_that_does_not_answer(ignored: object, said: str) -> None:
+    story = Story(FakeVehicle(ignored={ignored})).run()
     assert said in story.reason
     assert story.code == NO_ANSWER
 
@@ -122,7 +122,7 @@ def test_a_vehicle_that_never_gets_ready() -> None:
 
 
 @pytest.mark.parametrize(
-    "mute",
+    "unsent",
     [
         {"MISSION_ITEM_REACHED"},
         {"STATUSTEXT", "MISSION_ITEM_REACHED", "EXTENDED_SYS_STATE", "LOCAL_POSITION_NED"},
@@ -130,13 +130,13 @@ def test_a_vehicle_that_never_gets_ready() -> None:
         {"MISSION_ITEM_REACHED", "ATTITUDE", "FS_LOOP_TIMING"},
     ],
 )
-def test_no_single_message_is_needed_to_see_the_end(mute: set[str]) -> None:
-    story = Story(FakeVehicle(mute=mute)).run()
+def test_no_single_message_is_needed_to_see_the_end(unsent: set[str]) -> None:
+    story = Story(FakeVehicle(unsent=unsent)).run()
     assert story.outcome is Code.COMPLETED
 
 
 def test_landing_at_the_last_item_counts_when_only_the_item_is_known() -> None:
-    vehicle = FakeVehicle(stop_at_item=2, mute={"MISSION_ITEM_REACHED"})
+    vehicle = FakeVehicle(stop_at_item=2, unsent={"MISSION_ITEM_REACHED"})
     assert Story(vehicle).run().outcome is Code.COMPLETED
 
 
@@ -242,6 +242,6 @@ def test_a_vehicle_that_is_gone_is_not_waited_for() -> None:
 
 
 def test_a_vehicle_that_ignores_the_shut_down_does_not_hold_us() -> None:
-    story = Story(FakeVehicle(deaf_to={SHUT_DOWN})).run(most_s=30.0)
+    story = Story(FakeVehicle(ignored={SHUT_DOWN})).run(most_s=30.0)
     assert story.outcome is Code.COMPLETED
     assert not story.flight.shut_down_accepted

@@ -91,7 +91,7 @@ def test_the_list_shows_the_default_of_what_was_changed(vehicle: ParamVehicle) -
 
 
 def test_a_vehicle_without_metadata_is_listed_all_the_same() -> None:
-    result = told(ParamVehicle(tells=False), "list", "MPC_*")
+    result = told(ParamVehicle(has_metadata=False), "list", "MPC_*")
     assert result.returncode == 0
     assert [line.split() for line in result.stdout.splitlines()[-2:]] == [
         ["MPC_XY_CRUISE", "4"],
@@ -184,7 +184,7 @@ def test_reset_needs_to_know_what(vehicle: ParamVehicle) -> None:
 
 
 def test_reset_without_known_defaults_changes_nothing() -> None:
-    vehicle = ParamVehicle(tells=False)
+    vehicle = ParamVehicle(has_metadata=False)
     vehicle.values["MPC_XY_CRUISE"] = 9.0
     result = told(vehicle, "reset", "MPC_XY_CRUISE")
     assert result.returncode == 1
@@ -227,7 +227,7 @@ def test_diff_from_the_defaults(vehicle: ParamVehicle) -> None:
     lines = told(vehicle, "diff").stdout.splitlines()
     assert lines[-1].split()[:4] == ["MPC_XY_CRUISE", "9", "m/s", "4"]
     assert len(lines) == 3
-    result = told(ParamVehicle(tells=False), "diff")
+    result = told(ParamVehicle(has_metadata=False), "diff")
     assert result.returncode == 1
     assert "name a file" in result.stderr
 
@@ -241,7 +241,7 @@ def test_a_bad_file_is_a_usage_error_before_anything_is_asked(tmp_path: Path) ->
 
 def test_a_vehicle_that_does_not_answer_about_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gcs_cli.transfers.param_calls.TIMING", ParamTiming(timeout_s=0.1, retries=1))
-    vehicle = ParamVehicle(deaf_to={"PARAM_REQUEST_READ"})
+    vehicle = ParamVehicle(ignored={"PARAM_REQUEST_READ"})
     result = told(vehicle, "get", "ROLL_P")
     assert (result.returncode, result.stdout) == (3, "")
     assert "did not answer about ROLL_P" in result.stderr

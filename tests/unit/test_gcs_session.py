@@ -148,7 +148,7 @@ def test_a_refusal_carries_the_text_that_follows_it() -> None:
 
 
 def test_a_refusal_without_a_text_names_the_result() -> None:
-    vehicle = FakeVehicle(refusals={ARM: "?"}, mute={"STATUSTEXT"})
+    vehicle = FakeVehicle(refusals={ARM: "?"}, unsent={"STATUSTEXT"})
     session = met(Session(), vehicle)
     answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
     assert not answer.accepted
@@ -156,18 +156,18 @@ def test_a_refusal_without_a_text_names_the_result() -> None:
 
 
 def test_texts_of_before_explain_nothing() -> None:
-    vehicle = FakeVehicle(mute={"COMMAND_ACK"})
+    vehicle = FakeVehicle(unsent={"COMMAND_ACK"})
     session = met(Session(), vehicle)
     vehicle.say("Battery is low")
     met(session, vehicle)
-    vehicle.mute = {"STATUSTEXT"}
+    vehicle.unsent = {"STATUSTEXT"}
     vehicle.refusals = {ARM: "?"}
     answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
     assert "Battery" not in answer.reason
 
 
 def test_silence_is_told_from_refusal() -> None:
-    vehicle = FakeVehicle(deaf_to={ARM})
+    vehicle = FakeVehicle(ignored={ARM})
     session = met(Session(), vehicle)
     answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
     assert answer.silent

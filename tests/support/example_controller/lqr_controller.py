@@ -34,7 +34,7 @@ class Params(NamedTuple):
 
 @compiled
 def step(memory: Memory, inputs: AttitudeInputs, params: Params, dt_s: float) -> tuple[Memory, Vector3]:
-    """State feedback around the reference, whose acceleration is fed forward."""
+    """Compute state feedback around the reference, with its acceleration fed forward."""
     error, rates = inputs.error_rad, inputs.rates_frd_rad_s
     wanted, ahead = inputs.reference.rates_frd_rad_s, inputs.reference.acceleration_frd_rad_s2
     roll = params.angle_roll * error.x + params.rate_roll * (wanted.x - rates.x) + ahead.x
@@ -44,7 +44,7 @@ def step(memory: Memory, inputs: AttitudeInputs, params: Params, dt_s: float) ->
 
 
 def lqr_gains(angle_rad: float, rate_rad_s: float, acceleration_rad_s2: float) -> tuple[float, float]:
-    """Gains for one axis, a double integrator, weighted by the largest values that are acceptable.
+    """Return the gains of one axis, a double integrator, from the largest acceptable values.
 
     Bryson's rule: Q = diag(1/angle², 1/rate²), R = 1/acceleration²; the Riccati equation has this solution.
     """
@@ -53,7 +53,7 @@ def lqr_gains(angle_rad: float, rate_rad_s: float, acceleration_rad_s2: float) -
 
 
 def read_params(vehicle: Vehicle, gains: Table) -> Params:
-    """Read ``[attitude_lqr]``; every key has a default, so that any gains file will do."""
+    """Read ``[attitude_lqr]``. Every key has a default, so that any gains file is accepted."""
     angle = gains.numbers("largest_angle_rad", 3, 1e-3, 3.0, (0.2, 0.2, 0.2))
     rate = gains.numbers("largest_rate_rad_s", 3, 1e-2, 100.0, (2.5, 2.5, 1.0))
     acceleration = gains.numbers("largest_acceleration_rad_s2", 3, 1e-1, 1e4, (40.0, 40.0, 5.0))
