@@ -1,4 +1,4 @@
-"""Our programs as processes of their own, with the part of ``subprocess.Popen``'s interface that tests use."""
+"""The programs as processes, with the part of ``subprocess.Popen``'s interface that tests use."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _server() -> socket.socket:
 
 
 class Program:
-    """A program that runs: ``stdin``, if asked for, and ``stdout`` and ``stderr`` are pipes of text."""
+    """A running program; ``stdin`` (with ``listens``), ``stdout`` and ``stderr`` are text pipes."""
 
     def __init__(
         self,
@@ -107,7 +107,7 @@ class Program:
         self.send_signal(signal.SIGKILL)
 
     def communicate(self, timeout: float | None = None) -> tuple[str, str]:
-        """Read all that it still writes, wait for its end and close the pipes; raise TimeoutExpired."""
+        """Read the remaining output, wait for the end and close the pipes; raise TimeoutExpired."""
         texts = ["", ""]
 
         def read(index: int, stream: IO[str] | None) -> None:
