@@ -128,14 +128,18 @@ def target_numbers(
         "FS_JR": vehicle.mean_rotor_inertia_kg_m2,
         **_mixer_values(vehicle),
     }
+    _check_ranges(values)
+    return values
+
+
+def _check_ranges(values: Mapping[str, float]) -> None:
     for number in TARGET_NUMBERS:
         value = values.get(number.name, number.low)
         if not number.low <= value <= number.high:
             limits = f"{number.low:g} to {number.high:g}"
             raise ConfigError(
-                "--loops", f"{number.name}={value:g}", f"is beyond what a target takes, {limits}"
+                "--loops", f"{number.name}={value:g}", f"is outside the target's range {limits}"
             )
-    return values
 
 
 def _loop_values(numbers: LoopNumbers, controller: AttitudeController) -> dict[str, float]:

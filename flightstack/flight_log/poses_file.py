@@ -105,6 +105,15 @@ def _checked(path: Path, content: dict[str, np.ndarray[Any, Any]]) -> Poses:
         str(content.get("title", "")),
         numbers("waypoint_numbers", default=NO_NUMBERS),
     )
+    _check_rows(path, poses)
+    norm = np.linalg.norm(poses.attitude, axis=1, keepdims=True)
+    if (norm < 0.5).any():
+        raise ConfigError(path, "attitude", "holds what is no quaternion")
+    return poses._replace(attitude=poses.attitude / norm)
+
+
+def _check_rows(path: Path, poses: Poses) -> None:
+    """Raise ConfigError unless rows match ``time_s``, poses are finite and waypoint numbers are whole."""
     labels = poses.waypoint_numbers
     if (
         not np.isfinite(labels).all()
@@ -113,12 +122,9 @@ def _checked(path: Path, content: dict[str, np.ndarray[Any, Any]]) -> Poses:
     ):
         raise ConfigError(path, "waypoint_numbers", "is not a whole number for each of waypoints_ned_m")
     for name in ("position_ned_m", "attitude", "rotor_speed_rad_s", "target_ned_m"):
-        if len(getattr(poses, name)) != count:
-            raise ConfigError(path, name, f"has {len(getattr(poses, name))} rows, time_s has {count}")
+        rows, expected = len(getattr(poses, name)), len(poses.time_s)
+        if rows != expected:
+            raise ConfigError(path, name, f"has {rows} rows, time_s has {expected}")
     for name in ("position_ned_m", "attitude"):
         if not np.isfinite(getattr(poses, name)).all():
             raise ConfigError(path, name, "holds what is not a number")
-    norm = np.linalg.norm(poses.attitude, axis=1, keepdims=True)
-    if (norm < 0.5).any():
-        raise ConfigError(path, "attitude", "holds what is no quaternion")
-    return poses._replace(attitude=poses.attitude / norm)

@@ -112,19 +112,19 @@ def build(
     Raise ConfigError for anything in the configuration that cannot fly.
     """
     vehicle = vehicle_of(config)
-    pace = rates(config.inner_hz, config.outer_hz)
+    loop_rates = rates(config.inner_hz, config.outer_hz)
     setup = LoopsSetup(
         vehicle,
         load_controller(config.controller),
         open_gains(config.gains),
         math.radians(config.behaviour.max_tilt_deg),
-        pace.inner_hz,
-        pace.outer_hz,
-        pace.divisor,
+        loop_rates.inner_hz,
+        loop_rates.outer_hz,
+        loop_rates.divisor,
     )
     backend = make(config.loops, setup, config.lockstep)
     try:
-        return _join(config, vehicle, pace, backend, open_log, logs)
+        return _join(config, vehicle, loop_rates, backend, open_log, logs)
     except BaseException:
         backend.close()  # a target may be a process, or hold a line
         raise
@@ -133,54 +133,53 @@ def build(
 def _join(
     config: StackConfig,
     vehicle: Vehicle,
-    pace: Rates,
+    loop_rates: Rates,
     backend: ControlBackend,
     open_log: OpenLog,
     logs: LogStore,
 ) -> Stack:
-    log_info: dict[str, str | int | float] = {
+    params, loaded = load_parameters(config, backend)
+    behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
+    info = _log_info(config, vehicle, loop_rates, backend.version)
+    recorder = FlightRecorder(open_log, info, params.values, config.home)
+    simulator = SimulatorEndpoint(vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us)
+    parts = assemble(
+        vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
+        simulator.state, simulator.rotor_speed_rad_s, simulator,
+    )  # fmt: skip
+    parts.warm_up()
+    connect_parameters(params, parts, recorder)
+    timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
+    report = TimingReport(timing, loop_rates, config.lockstep)
+    generic = params.value(AUTOPILOT) == GENERIC
+    vehicle_id = vehicle_info(vehicle, system_id, generic, parts.places.frame)
+
+    def status() -> VehicleStatus:
+        return vehicle_status(vehicle_id, parts, simulator.battery)
+
+    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message)
+    context = VehicleContext.of(parts, params, simulator, generic, logs)
+    ground = GroundHub(context, parts, telemetry, vehicle_id)
+    return Stack(
+        vehicle, loop_rates, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status
+    )  # fmt: skip
+
+
+def _log_info(
+    config: StackConfig, vehicle: Vehicle, loop_rates: Rates, loops_version: str
+) -> dict[str, str | int | float]:
+    """Return the information messages of a log."""
+    return {
         "sys_name": "flightstack",
         "ver_sw": __version__,
         **vehicle_fields(vehicle),
         "controller": config.controller,
         "gains": config.gains,
         "loops": config.loops,
-        "ver_loops": backend.version,
-        "inner_hz": pace.inner_hz,
-        "outer_hz": pace.outer_hz,
+        "ver_loops": loops_version,
+        "inner_hz": loop_rates.inner_hz,
+        "outer_hz": loop_rates.outer_hz,
     }
-    params, loaded = load_parameters(config, backend)
-    behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
-    recorder = FlightRecorder(open_log, log_info, params.values, config.home)
-    simulator = SimulatorEndpoint(vehicle, config.home, config.lockstep, system_id, pace.interval_us)
-    parts = assemble(
-        vehicle,
-        backend,
-        behaviour,
-        config.home,
-        pace.divisor,
-        pace.outer_hz,
-        recorder,
-        simulator.state,
-        simulator.rotor_speed_rad_s,
-        simulator,
-    )
-    parts.warm_up()
-    connect_parameters(params, parts, recorder)
-    timing = LoopTiming(round(1e9 / pace.inner_hz))
-    report = TimingReport(timing, pace, config.lockstep)
-    generic = params.value(AUTOPILOT) == GENERIC
-    info = vehicle_info(vehicle, system_id, generic, parts.places.frame)
-
-    def status() -> VehicleStatus:
-        return vehicle_status(info, parts, simulator.battery)
-
-    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message)
-    context = VehicleContext.of(parts, params, simulator, generic, logs)
-    ground = GroundHub(context, parts, telemetry, info)
-    return Stack(
-        vehicle, pace, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status
-    )
 
 
 def reboot_config(stack: Stack, config: StackConfig) -> StackConfig:
