@@ -1,4 +1,4 @@
-"""Wire layout of a message of our dialect, and the pymavlink message class made from it."""
+"""Wire layout of a dialect message, and the pymavlink message class made from it."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ class Field(NamedTuple):
     unit: str
     declared_index: int
     is_extension: bool = False
-    """Whether the field was added later: a sender may leave it out, and then it is zero."""
+    """True for an extension field, which is zero if not sent."""
 
     @property
     def is_text(self) -> bool:
-        """Whether this is an array of characters, which pymavlink takes as bytes and gives as a string."""
+        """True for an array of characters, which pymavlink takes as bytes and returns as a string."""
         return self.type == "char" and self.is_array
 
     @property
     def code(self) -> str:
-        """Format of the whole field for ``struct``."""
+        """``struct`` format of the field."""
         return f"{self.length}{self.format}" if self.length > 1 else self.format
 
     @property
     def zero(self) -> Any:
-        """The value of an extension field that was left out."""
+        """Default value of an extension field."""
         if self.is_text:
             return b""
         return [0] * self.length if self.is_array else 0
 
 
 class Layout(NamedTuple):
-    """One message: its fields in wire order (largest type first, as MAVLink lays them out)."""
+    """A message with its fields in wire order (MAVLink sorts them by type size)."""
 
     message_id: int
     name: str
@@ -50,7 +50,7 @@ class Layout(NamedTuple):
 
     @property
     def format(self) -> str:
-        """Struct format of the whole payload."""
+        """``struct`` format of the payload."""
         return "<" + "".join(field.code for field in self.fields)
 
     @property
@@ -60,7 +60,7 @@ class Layout(NamedTuple):
 
 
 def message_class(layout: Layout) -> Any:
-    """Return a message class for ``layout`` that pymavlink encodes and decodes as one of its own."""
+    """Return a message class for ``layout`` that pymavlink can encode and decode."""
     fields = layout.fields
     declared = layout.declared_fields
     unpacker = struct.Struct(layout.format)

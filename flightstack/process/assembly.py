@@ -1,6 +1,6 @@
-"""Put a flight stack together from its configuration: everything but clock and transports.
+"""Build a flight stack from its configuration, without clock and transports, and transfer state at a reboot.
 
-The process (``app``) and the tests that fly in one process build the same stack here.
+The process (``app``) and in-process tests use the same stack.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ LoopsMaker: TypeAlias = Callable[[str, LoopsSetup, bool], ControlBackend]
 
 
 class Stack(NamedTuple):
-    """The parts that a process or a test drives."""
+    """The parts of a flight stack that a process or a test uses."""
 
     vehicle: Vehicle
     rates: Rates
@@ -61,19 +61,19 @@ class Stack(NamedTuple):
     report: TimingReport
     params: ParamStore
     loaded_params: LoadedParams
-    """What the parameter file held at the start."""
+    """Contents of the parameter file at startup."""
     loops: ControlBackend
     status: Callable[[], VehicleStatus]
-    """Returns the status of now."""
+    """Returns the current status."""
 
     @property
     def autopilot(self) -> Autopilot:
-        """The part that runs the ticks."""
+        """The autopilot, which runs ticks."""
         return self.parts.autopilot
 
     @property
     def now(self) -> FlightState:
-        """The newest values of the flight."""
+        """The current flight state."""
         return self.parts.now
 
     @property
@@ -88,7 +88,7 @@ class Stack(NamedTuple):
 
     @property
     def area(self) -> FlightArea:
-        """Where the vehicle may fly."""
+        """The area in which the vehicle may fly."""
         return self.parts.area
 
 
@@ -99,7 +99,7 @@ def vehicle_of(config: StackConfig) -> Vehicle:
 
 
 def kernels_of(config: StackConfig) -> tuple[str, ...]:
-    """Names of the kernels that ``build`` compiles, or reads from the cache, in this order."""
+    """Return the names of the kernels that ``build`` compiles or loads, in order."""
     needs_loops = config.loops == PYTHON
     return tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
 
@@ -107,9 +107,9 @@ def kernels_of(config: StackConfig) -> tuple[str, ...]:
 def build(
     config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS, make: LoopsMaker = make_loops
 ) -> Stack:
-    """Build a stack that serves ``logs`` to ground stations and flies the loops that ``make`` returns.
+    """Build a stack with the loops of ``make`` that serves ``logs`` to ground stations.
 
-    Raise ConfigError for anything in the configuration that cannot fly.
+    Raise ConfigError for an invalid configuration.
     """
     vehicle = vehicle_of(config)
     loop_rates = rates(config.inner_hz, config.outer_hz)
@@ -126,7 +126,7 @@ def build(
     try:
         return _join(config, vehicle, loop_rates, backend, open_log, logs)
     except BaseException:
-        backend.close()  # a target may be a process, or hold a line
+        backend.close()  # a target may hold a process or a serial port
         raise
 
 
@@ -183,7 +183,7 @@ def _log_info(
 
 
 def reboot_config(stack: Stack, config: StackConfig) -> StackConfig:
-    """Return the configuration to boot with: without a parameter file, the values of now are handed on."""
+    """Return the configuration after a reboot; without a parameter file it contains the current values."""
     if config.params_file is not None:
         return config
     changed = [name for name in stack.params.specs if not stack.params.is_default(name)]
@@ -191,11 +191,10 @@ def reboot_config(stack: Stack, config: StackConfig) -> StackConfig:
 
 
 def transfer_state(old: Stack, new: Stack) -> None:
-    """Give the new stack what a reboot must not lose: peers, plans, home, and the newest state.
+    """Copy peers, plans, home and the newest state to the new stack at a reboot.
 
-    What begins anew: the vehicle's clock, modes and failsafes, sequence numbers, transfers of files and missions,
-    counters, timing. What the process keeps for all stacks: signing with the time stamps of its streams, the number
-    of the next log, the parameter file.
+    Vehicle clock, modes, failsafes, sequence numbers, transfers, counters and timing restart. The process keeps signing
+    timestamps, the number of the next log, and the parameter file for all stacks.
     """
     for address, permanent in old.ground.addresses():
         new.ground.add_peer(address, permanent)

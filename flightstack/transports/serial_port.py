@@ -1,4 +1,4 @@
-"""A serial port, or a pseudo-terminal, as a line of octets."""
+"""A serial port or pseudo-terminal as ``ByteLink``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _PIECE = 4096
 
 
 class SerialPort:
-    """An open serial port, 8N1 without flow control; implements ``ByteLink``. Nobody else can open it meanwhile."""
+    """An open serial port, 8N1 without flow control; opened exclusively; implements ``ByteLink``."""
 
     def __init__(self, device: str, baud: int) -> None:
         """Open ``device``; raise LineError."""
@@ -40,14 +40,14 @@ class SerialPort:
         self._poll.register(self._port.fileno(), select.POLLIN)
 
     def write(self, data: bytes) -> None:
-        """Send octets; raise LineError when the line is gone."""
+        """Send bytes; raise LineError if the connection is lost."""
         try:
             self._port.write(data)
         except (serial.SerialException, OSError) as error:
             raise LineError(f"{self.name}: the line is gone: {_reason(error)}") from error
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what has come, b"" when nothing does within ``timeout_s``; raise LineError when it is gone."""
+        """Return received bytes, b"" after ``timeout_s`` without any; raise LineError if the connection is lost."""
         try:
             if not self._poll.poll(max(0.0, timeout_s) * 1000.0):
                 return b""
@@ -59,12 +59,12 @@ class SerialPort:
         return data
 
     def close(self) -> None:
-        """Close the line; a second call does nothing."""
+        """Close the port; a second call does nothing."""
         self._port.close()
 
 
 def _reason(error: Exception) -> str:
-    """Return why, in words; pyserial keeps the system's number in the text alone when it sets a port up."""
+    """Return the reason as text; while opening a port, pyserial has the errno in its message only."""
     number = getattr(error, "errno", None)
     if number is None and (found := re.search(r"\((\d+), ", str(error))):
         number = int(found[1])

@@ -144,7 +144,7 @@ def test_a_fault_is_a_sentence(octet: bytes) -> None:
 def test_a_target_that_does_not_come_back_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(emulator, "LONGEST_RUN", 100_000)
     target = troubled()
-    with pytest.raises(EmulationError, match="did not come back"):
+    with pytest.raises(EmulationError, match="did not return"):
         target.exchange(b"l", 0)
 
 

@@ -189,7 +189,7 @@ def test_a_target_that_restarts_in_flight_ends_it_with_a_sentence(device) -> Non
     drive(loops, 10)
     other = Target()
     changing.now = other
-    with pytest.raises(TargetError, match=r"expects step 0, not 10: it has lost its place"):
+    with pytest.raises(TargetError, match=r"expects step 0, not 10: it may have been restarted"):
         drive(loops, 1)
     other.close()
 
@@ -198,7 +198,7 @@ def test_bad_input_ends_the_flight_and_the_target_has_stopped_its_rotors(device)
     loops = connected(LossyLine(device))
     drive(loops, 10)
     state = np.array([math.nan] + [0.0] * 5 + [1.0] + [0.0] * 6)
-    with pytest.raises(TargetError, match=r"stopped its rotors at step 10: it was given bad input"):
+    with pytest.raises(TargetError, match=r"stopped its rotors at step 10 because of invalid input"):
         loops.step(state, np.zeros(11), SPEEDS, True, np.zeros(LoopRow.SIZE))
     assert device.state == SAFE
 
@@ -289,7 +289,7 @@ def test_a_silent_line_is_no_target() -> None:
         def poll(self, passed_ms: int) -> None: ...
 
     line = LossyLine(Nobody())
-    with pytest.raises(TargetError, match="did not answer when asked for FS_PIL_IDENTITY, 20 times"):
+    with pytest.raises(TargetError, match="did not answer 20 requests for FS_PIL_IDENTITY"):
         TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
     assert line.now_s == pytest.approx(5.0)
 
@@ -307,7 +307,7 @@ def test_a_line_full_of_noise_is_no_target() -> None:
         def poll(self, passed_ms: int) -> None: ...
 
     line = LossyLine(Noise())
-    with pytest.raises(TargetError, match="did not answer when asked for FS_PIL_IDENTITY"):
+    with pytest.raises(TargetError, match="did not answer 20 requests for FS_PIL_IDENTITY"):
         TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
     assert line.now_s < 6.0
 

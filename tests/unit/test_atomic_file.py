@@ -125,5 +125,5 @@ def test_an_existing_file_is_refused_unless_it_may_be_overwritten(tmp_path: Path
     check_new(path, overwrite=False)
     path.write_text("mine")
     check_new(path, overwrite=True)
-    with pytest.raises(ConfigError, match=r"a.txt: exists already: name another file, or give --overwrite$"):
+    with pytest.raises(ConfigError, match=r"a.txt: exists already: name another file or give --overwrite$"):
         check_new(path, overwrite=False)

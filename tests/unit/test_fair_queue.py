@@ -58,6 +58,6 @@ def test_who_is_forgotten_has_nothing_waiting() -> None:
     queue: FairQueue[str] = FairQueue()
     queue.push("a", b"hello", nobody)
     assert "a" in queue
-    queue.forget("a")
-    queue.forget("never")
+    queue.drop("a")
+    queue.drop("never")
     assert list(queue.take(1000)) == []

@@ -57,10 +57,10 @@ def changed(**values: object) -> str:
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("", "is damaged or not all there"),
-        (KEPT[:-20], "is damaged or not all there"),
-        ("[]", "is no file of kept plans"),
-        (changed(fileType="Plan"), "is no file of kept plans"),
+        ("", "is damaged or truncated"),
+        (KEPT[:-20], "is damaged or truncated"),
+        ("[]", "is not a file of saved plans"),
+        (changed(fileType="Plan"), "is not a file of saved plans"),
         (changed(version=2), "is of version 2, and this program reads version 1"),
         (changed(version=None), "is of version None, and"),
         (changed(plans=None), "its checksum is wrong"),
@@ -146,9 +146,7 @@ def test_a_damaged_file_gives_no_plan_and_is_put_aside(tmp_path: Path) -> None:
         path.write_text(KEPT[:-20])
         stack, file, problem = stack_with(path)
         aside = tmp_path / f"plans.refused{number}.json"
-        assert problem == (
-            f"plans not restored: {path}: is damaged or not all there; the file is now {aside}"
-        )
+        assert problem == (f"plans not restored: {path}: is damaged or truncated; the file is now {aside}")
         assert stack.ground.plans() == KeptPlans()
         give(stack, "square.plan")
         save(stack, file)

@@ -76,18 +76,18 @@ BAD = {
     "a column too many": ("1\t1\tFS_SPEED\t5\t9\t", "has 6 columns between tabs, expected 5"),
     "half a line": ("1\t1\tFS_SPE", "has 3 columns between tabs, expected 5"),
     "vehicle": ("x\t1\tFS_SPEED\t5\t9", "vehicle 'x' and component '1' must be numbers"),
-    "digits of another script": ("١\t1\tFS_SPEED\t5\t9", "holds characters that no parameter has"),
+    "digits of another script": ("١\t1\tFS_SPEED\t5\t9", "contains characters that are not ASCII"),
     "other component": (
         "1\t25\tFS_SPEED\t5\t9",
         "FS_SPEED belongs to component 25, not to the autopilot, 1",
     ),
-    "name": ("1\t1\tFS SPEED\t5\t9", "'FS SPEED' is no name of a parameter"),
-    "long name": ("1\t1\tA2345678901234567\t5\t9", "'A2345678901234567' is no name of a parameter"),
+    "name": ("1\t1\tFS SPEED\t5\t9", "'FS SPEED' is not a parameter name"),
+    "long name": ("1\t1\tA2345678901234567\t5\t9", "'A2345678901234567' is not a parameter name"),
     "value": ("1\t1\tFS_SPEED\tfast\t9", "FS_SPEED: 'fast' is not a number"),
     "not finite": ("1\t1\tFS_SPEED\tnan\t9", "FS_SPEED: 'nan' is not a number"),
     "underscore": ("1\t1\tFS_SPEED\t1_0\t9", "FS_SPEED: '1_0' is not a number"),
     "huge": ("1\t1\tFS_MODE\t1e999\t6", "FS_MODE: '1e999' is not a number"),
-    "type": ("1\t1\tFS_SPEED\t5\t11", "FS_SPEED: '11' is no MAV_PARAM_TYPE of a number"),
+    "type": ("1\t1\tFS_SPEED\t5\t11", "FS_SPEED: '11' is not a numeric MAV_PARAM_TYPE"),
     "fraction": ("1\t1\tFS_MODE\t0.5\t6", "FS_MODE: '0.5' is not a whole number, as type 6 demands"),
     "real for an integer": ("1\t1\tFS_MODE\t3\t9", "FS_MODE: is an integer, type 6, in the vehicle"),
     "integer for a real": ("1\t1\tFS_SPEED\t3\t6", "FS_SPEED: is a real number, type 9, in the vehicle"),
@@ -109,7 +109,7 @@ def test_a_line_that_cannot_be_is_a_sentence_with_file_and_line(tmp_path: Path, 
 
 
 def test_a_parameter_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="line 2: FS_GAIN stands in line 1 already"):
+    with pytest.raises(ConfigError, match="line 2: FS_GAIN is already set in line 1"):
         parse_params("1\t1\tFS_GAIN\t2.5\t9\n1\t1\tFS_GAIN\t2.5\t9\n", "f")
 
 
@@ -132,9 +132,7 @@ def test_a_file_of_qgroundcontrol_is_read(tmp_path: Path) -> None:
     loaded = load_into(store, path)
     assert store.values() == {"FS_GAIN": 0.35, "FS_MODE": 3, "FS_SPEED": 4.0}
     assert loaded.unknown == ("SYS_AUTOSTART",)
-    assert (
-        loaded.warning(path) == f"{path}: kept, but of no use to this vehicle and controller: SYS_AUTOSTART"
-    )
+    assert loaded.warning(path) == f"{path}: not used by this vehicle and controller, but kept: SYS_AUTOSTART"
 
 
 def test_only_what_differs_is_saved_with_what_is_unknown_and_without_overrides(tmp_path: Path) -> None:

@@ -131,7 +131,7 @@ def test_a_target_that_is_elsewhere_is_asked_again_at_once_and_then_given_up() -
         assert client.poll(0.1)
     client.receive(report(0, OUT_OF_ORDER), 0.1)
     assert client.poll(0.1) == b""
-    assert client.failure == "expects step 0, not 7: it has lost its place (was it restarted?)"
+    assert client.failure == "expects step 0, not 7: it may have been restarted"
 
 
 def test_one_old_refusal_does_not_end_a_step() -> None:
@@ -145,7 +145,7 @@ def test_one_old_refusal_does_not_end_a_step() -> None:
 def test_bad_input_fails_at_once() -> None:
     client = stepping(2)
     client.receive(report(2, BAD_INPUT | 1), 0.1)
-    assert client.failure == "stopped its rotors at step 2: it was given bad input"
+    assert client.failure == "stopped its rotors at step 2 because of invalid input"
     assert client.next_deadline() is None
 
 
@@ -195,7 +195,7 @@ def test_a_message_is_asked_for_and_refused() -> None:
     client.receive(packed(mavlink.MAVLink_command_ack_message(512, 0)), 0.1)
     assert client.failure is None
     client.receive(packed(mavlink.MAVLink_command_ack_message(512, 3)), 0.1)
-    assert client.failure == "does not know FS_PIL_STATUS: other firmware runs there"
+    assert client.failure == "does not support FS_PIL_STATUS: it runs other firmware"
 
 
 def test_a_message_that_has_no_room_yet_is_asked_for_again() -> None:

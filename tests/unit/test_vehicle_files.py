@@ -132,7 +132,7 @@ BAD = {
         value("mass_kg", "1" + "0" * 400),
         "body.mass_kg: a number that large is outside the allowed",
     ),
-    "5000 digits": (value("mass_kg", "1" + "0" * 5000), "is not sane TOML"),
+    "5000 digits": (value("mass_kg", "1" + "0" * 5000), "is not usable TOML"),
     "two inertias": (value("inertia_kg_m2", "[1, 2]"), "body.inertia_kg_m2: must be a list of 3 numbers"),
     "zero inertia": (
         value("inertia_kg_m2", "[0, 1, 1]"),
@@ -205,7 +205,7 @@ BAD = {
     "name that is no text": (value("name", "5"), "name: 5 is not a string"),
     "not TOML": ("mass = = 3", "is not valid TOML: "),
     "not UTF-8": (b"name = '\xff'", "is not valid TOML: "),
-    "endless nesting": ("a = " + "[" * 20_000, "is not sane TOML"),
+    "endless nesting": ("a = " + "[" * 20_000, "is not usable TOML"),
 }
 
 
