@@ -42,9 +42,7 @@ def write_bytes_atomically(
             if survives_power_loss and _is_replaceable(temporary):
                 os.fsync(file.fileno())
     except OSError as error:
-        raise OSError(
-            error.errno, error.strerror, str(path)
-        ) from error  # the error may name the temporary file
+        raise OSError(error.errno, error.strerror, str(path)) from error  # not the temporary file
     if survives_power_loss:
         _sync_folder(Path(os.path.realpath(path)).parent)
 

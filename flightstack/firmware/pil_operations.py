@@ -188,9 +188,8 @@ class Request:
             self.failure = f"does not support {self._name}: it runs other firmware"
 
     def silence(self, attempts: int) -> str:
-        """Return why there is no message."""
-        asked = f"did not answer {attempts} requests for {self._name}"
-        return f"{asked}: check its firmware and the baud rate"
+        """Return why the request fails."""
+        return f"did not answer {attempts} requests for {self._name}: check its firmware and the baud rate"
 
 
 _NOT_REFUSED = (

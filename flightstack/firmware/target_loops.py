@@ -148,7 +148,7 @@ class TargetLoops:
         if client.failure is not None:
             sentence = f"the target on {link.name} {client.failure}"
             if client.texts:
-                sentence += f"; it said: {client.texts[-1][1]}"
+                sentence += f"; its last message: {client.texts[-1][1]}"
             self.ending = sentence
             raise TargetError(sentence)
         return client.result

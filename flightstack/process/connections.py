@@ -111,14 +111,14 @@ def connect_simulator(process: ProcessConfig, between_tries: Callable[[], None])
 
 
 def wait_for_state(
-    simulator: TcpClient, stack: Stack, process: ProcessConfig, meanwhile: Callable[[], None]
+    simulator: TcpClient, stack: Stack, process: ProcessConfig, while_waiting: Callable[[], None]
 ) -> None:
-    """Wait for the first state, calling ``meanwhile`` repeatedly; raise Ended after the timeout."""
+    """Wait for the first state, calling ``while_waiting`` repeatedly; raise Ended after the timeout."""
     link, interval_us = stack.simulator, stack.rates.interval_us
     began_s = time.monotonic()
     is_fallback_requested = has_warned = False
     while True:
-        meanwhile()
+        while_waiting()
         data = simulator.receive()
         if data is not None and link.receive(data):
             break

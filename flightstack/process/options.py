@@ -21,7 +21,7 @@ OuterHz = Annotated[
     float | None,
     typer.Option(help="Rate of the outer loop, Hz; must divide the inner rate.  [default: about 100]"),
 ]
-Clock = Annotated[str, typer.Option(help="lockstep (the simulator owns time) or realtime.")]
+Clock = Annotated[str, typer.Option(help="lockstep (the simulator drives the time) or realtime.")]
 Loops = Annotated[
     str,
     typer.Option(

@@ -1,4 +1,4 @@
-"""The options about ports, made into a ``PortsConfig``, and said back in words."""
+"""Port options: validation and description."""
 
 from __future__ import annotations
 

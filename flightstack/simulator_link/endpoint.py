@@ -85,7 +85,7 @@ class SimulatorEndpoint:
         """Frame parser of received bytes."""
         self._state_us = 0  # time stamp of the newest state
         self.has_arrived = False
-        """True if a state of a new time has come since ``freshness`` was last asked for."""
+        """True if a state with a new time arrived since the last call of ``freshness``."""
         self._arrived_us = 0
         self._changed_us = 0
         self._seen = b""

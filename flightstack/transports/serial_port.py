@@ -11,15 +11,15 @@ import serial
 from flightstack.transports.byte_link import LineError
 
 _REASONS = {
-    errno.ENOENT: "there is no such device",
-    errno.EACCES: "permission denied: let your user into the group that owns it (dialout or uucp), and log in again",
-    errno.EPERM: "permission denied: let your user into the group that owns it (dialout or uucp), and log in again",
-    errno.EBUSY: "another program uses it",
-    errno.EAGAIN: "another program uses it",
-    errno.EWOULDBLOCK: "another program uses it",
-    errno.ENXIO: "there is no such device",
-    errno.ENOTTY: "is no serial port",
-    errno.EINVAL: "does not take these settings",
+    errno.ENOENT: "no such device",
+    errno.EACCES: "permission denied: add your user to its group (dialout or uucp) and log in again",
+    errno.EPERM: "permission denied: add your user to its group (dialout or uucp) and log in again",
+    errno.EBUSY: "in use by another program",
+    errno.EAGAIN: "in use by another program",
+    errno.EWOULDBLOCK: "in use by another program",
+    errno.ENXIO: "no such device",
+    errno.ENOTTY: "is not a serial port",
+    errno.EINVAL: "does not support these settings",
     errno.EISDIR: "is a directory",
 }
 _PIECE = 4096
@@ -44,7 +44,7 @@ class SerialPort:
         try:
             self._port.write(data)
         except (serial.SerialException, OSError) as error:
-            raise LineError(f"{self.name}: the line is gone: {_reason(error)}") from error
+            raise LineError(f"{self.name}: connection lost: {_reason(error)}") from error
 
     def read(self, timeout_s: float) -> bytes:
         """Return received bytes, b"" after ``timeout_s`` without any; raise LineError if the connection is lost."""
@@ -53,9 +53,9 @@ class SerialPort:
                 return b""
             data: bytes = self._port.read(_PIECE)
         except (serial.SerialException, OSError) as error:
-            raise LineError(f"{self.name}: the line is gone: {_reason(error)}") from error
+            raise LineError(f"{self.name}: connection lost: {_reason(error)}") from error
         if not data:
-            raise LineError(f"{self.name}: the line is gone: its other end closed it")
+            raise LineError(f"{self.name}: connection lost: closed by the other end")
         return data
 
     def close(self) -> None:

@@ -167,7 +167,7 @@ def test_a_busy_tcp_port_is_named(start, instance: int) -> None:
         (["--gcs", "127.0.0.1:http"], "must be HOST:PORT"),
         (["--gcs", "127.0.0.1:70000"], "is outside 1 to 65535"),
         (["--gcs", "192.0.2.1:14550"], "add --listen 0.0.0.0"),
-        (["--listen", "no.such.host.invalid"], "names no host"),
+        (["--listen", "no.such.host.invalid"], "is not a host"),
         (["--tcp-port", "70000"], "is outside 1 to 65535"),
     ],
 )

@@ -110,8 +110,8 @@ def test_a_target_that_dies_in_flight_ends_it_with_a_sentence(tmp_path: Path) ->
         process.kill()
     assert process.returncode == 3
     assert "flightstack ended with code 3" in said
-    assert "the line is gone" in (out / "flightstack.log").read_text()
-    assert "the line is gone" in json.loads((out / "pil-link.json").read_text())["ending"]
+    assert "connection lost" in (out / "flightstack.log").read_text()
+    assert "connection lost" in json.loads((out / "pil-link.json").read_text())["ending"]
 
 
 def _is_flying(out: Path) -> bool:
@@ -138,8 +138,8 @@ def test_who_ends_a_flight_leaves_no_program_behind(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("loops", "sentence"),
     [
-        ("serial:/dev/no-such-port", "there is no such device"),
-        ("serial:/dev/null:9600", "is no serial port"),
+        ("serial:/dev/no-such-port", "no such device"),
+        ("serial:/dev/null:9600", "is not a serial port"),
         ("serial:/", "is a directory"),
         ("fast", "is not one of python, c, host, emulated and serial:DEVICE[:BAUD]"),
     ],
@@ -178,7 +178,7 @@ def test_a_port_that_another_program_uses_is_refused() -> None:
         port.close()
         os.close(ours)
         os.close(theirs)
-    assert (code, said) == (2, f"flightstack: --loops: serial:{name}: another program uses it\n")
+    assert (code, said) == (2, f"flightstack: --loops: serial:{name}: in use by another program\n")
 
 
 def test_the_firmware_behind_a_serial_port_flies(tmp_path: Path, in_c: ULog) -> None:

@@ -146,7 +146,7 @@ def test_a_number_that_c_refuses_is_named() -> None:
     ("word", "sentence"),
     [
         ("fortran", "is not one of python, c, host"),
-        ("c:", "is none of"),
+        ("c:", "is not one of"),
         ("serial", "has no device"),
         ("serial:", "has no device"),
         ("serial:/dev/ttyS9:5", "baud rate below the minimum of 1200"),

@@ -95,7 +95,7 @@ def test_a_file_behind_a_descriptor_is_written_to_not_replaced(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o664, 0o755])
-def test_a_replaced_file_keeps_its_permissions(tmp_path: Path, mode: int) -> None:
+def test_replaced_file_keeps_permissions(tmp_path: Path, mode: int) -> None:
     path = tmp_path / "a.txt"
     path.write_text("old")
     path.chmod(mode)

@@ -365,7 +365,7 @@ def test_what_a_flight_that_never_began_has_left_does_not_stay_beside_the_next_o
 
 def test_a_directory_without_permission_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gcs_cli.report.run_directory.os.access", lambda *_: False)  # root may write anywhere
-    with pytest.raises(CliError, match="is not writable: permission denied") as error:
+    with pytest.raises(CliError, match="nothing can be written there: permission denied") as error:
         make_run_directory(HOP, tmp_path)
     assert error.value.exit_code == USAGE
 

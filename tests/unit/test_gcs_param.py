@@ -310,7 +310,10 @@ def test_a_file_brings_every_value_back(
         ("1 1 NAME 1 9", "line 1: has 1 columns between tabs"),
         ("# fine\n\n1\t1\tNAME\tx\t9", "line 3: NAME: 'x' is not a number"),
         ("1\t1\tNAME\tnan\t9", "line 1: NAME: 'nan' is not a number"),
-        ("1\t1\tNAME_OF_TOO_MANY_LETTERS\t1\t9", "line 1: 'NAME_OF_TOO_MANY_LETTERS' is no name"),
+        (
+            "1\t1\tNAME_OF_TOO_MANY_LETTERS\t1\t9",
+            "line 1: 'NAME_OF_TOO_MANY_LETTERS' is not a parameter name",
+        ),
         ("1\t1\tA\t1\t9\n1\t1\tA\t2\t9", "line 2: A is already set in line 1"),
     ],
 )

@@ -41,7 +41,7 @@ homes = st.none() | st.builds(GeoPoint, *3 * [st.floats(allow_nan=False, allow_i
 
 
 @given(st.builds(KeptPlans, plans, plans, plans, st.integers(0, 1000), homes))
-def test_what_is_kept_is_read_with_the_same_ids(kept: KeptPlans) -> None:
+def test_saved_plans_are_read_with_same_ids(kept: KeptPlans) -> None:
     read = plans_from_text(plans_to_text(kept), "file")
     assert read == kept
     assert [mission_id(part) for part in read[:3]] == [mission_id(part) for part in kept[:3]]
@@ -68,7 +68,7 @@ def changed(**values: object) -> str:
         (KEPT.replace('"current": 0', '"current": 1'), "its checksum is wrong"),
     ],
 )
-def test_a_file_that_is_not_whole_is_refused(text: str, problem: str) -> None:
+def test_truncated_file_is_refused(text: str, problem: str) -> None:
     with pytest.raises(ConfigError, match=f"^file: .*{problem}"):
         plans_from_text(text, "file")
 

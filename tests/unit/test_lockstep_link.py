@@ -31,7 +31,7 @@ def free_to_move() -> Iterator[None]:
     os.sched_setaffinity(0, PROCESSORS)
 
 
-def test_what_the_peer_sends_is_received_and_back(link: tuple[TcpClient, socket.socket]) -> None:
+def test_data_is_received_both_ways(link: tuple[TcpClient, socket.socket]) -> None:
     client, peer = link
     peer.sendall(b"state")
     data = client.receive()

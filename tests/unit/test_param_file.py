@@ -52,7 +52,7 @@ def test_what_is_written_is_read(parameters: dict[str, float], system_id: int) -
 
 
 @given(st.dictionaries(names, values, min_size=1), st.data())
-def test_a_file_of_ours_that_is_cut_short_is_never_taken_for_whole(parameters, data) -> None:
+def test_truncated_parameter_file_is_refused(parameters, data) -> None:
     lines = [ParamLine(name, value, isinstance(value, int)) for name, value in parameters.items()]
     text = format_params(lines)
     cut = data.draw(st.integers(text.index("# Stack: flightstack\n") + 21, len(text) - 2))
@@ -61,7 +61,7 @@ def test_a_file_of_ours_that_is_cut_short_is_never_taken_for_whole(parameters, d
 
 
 @given(st.text(max_size=300) | st.text("#\t19FS_GAIN.-e\n", max_size=100))
-def test_any_text_is_read_or_refused_in_one_sentence(text: str) -> None:
+def test_any_text_parses_or_raises_one_sentence(text: str) -> None:
     said = ""
     try:
         read = parse_params(text, "file")
@@ -135,7 +135,7 @@ def test_a_file_of_qgroundcontrol_is_read(tmp_path: Path) -> None:
     assert loaded.warning(path) == f"{path}: not used by this vehicle and controller, but kept: SYS_AUTOSTART"
 
 
-def test_only_what_differs_is_saved_with_what_is_unknown_and_without_overrides(tmp_path: Path) -> None:
+def test_saves_changed_and_unknown_but_no_overridden_parameters(tmp_path: Path) -> None:
     path = tmp_path / "my.params"
     path.write_text("1\t1\tLQR_Q\t2.5\t9\n1\t1\tFS_SPEED\t5.5\t9\n1\t1\tFS_GAIN\t2.0\t9\n")
     store = ParamStore(SPECS)
@@ -227,7 +227,7 @@ def test_a_disk_that_fails_is_reported_once(tmp_path: Path) -> None:
     assert saver.take_error() is None
 
 
-def test_a_row_of_failed_saves_is_one_sentence() -> None:
+def test_series_of_failed_saves_is_reported_once() -> None:
     errors: list[OSError | None] = [OSError(28, "full"), OSError(28, "full"), None, OSError(5, "broken")]
 
     def write() -> None:

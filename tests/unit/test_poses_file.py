@@ -58,7 +58,7 @@ def test_targets_waypoints_and_speeds_may_be_left_out(tmp_path: Path) -> None:
         ),
         (
             {"waypoints_ned_m": np.zeros((1, 3)), "waypoint_numbers": np.array([np.inf])},
-            "waypoint_numbers: is not a whole number",
+            "waypoint_numbers: must be one integer",
         ),
         ({"waypoints_ned_m": np.zeros(())}, "waypoints_ned_m: is not an array of numbers of shape (n, 3)"),
     ],
