@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.ports import free_instance
 from benchmarks.three_processes import ROOT
 from flightstack.core.port_numbers import ground_station_port, simulator_port
-from flightstack.process.clock import DeadlineScheduler, LoopTiming, ask_for_punctual_sleeps
+from flightstack.process.clock import DeadlineScheduler, LoopTiming, minimise_timer_slack
 
 PERIOD_NS = 2_000_000
 SLICES = 5
@@ -47,7 +47,7 @@ def _our_scheduler(count: int) -> list[float]:
     timing = LoopTiming(PERIOD_NS)
     kept: list[float] = []
     timing.lateness.add = kept.append  # type: ignore[assignment,method-assign]
-    ask_for_punctual_sleeps()
+    minimise_timer_slack()
     scheduler = DeadlineScheduler(timing)
     while len(kept) < count:
         scheduler.wait()

@@ -134,7 +134,7 @@ def failsafes_page() -> str:
     """Return the page of the failsafe table."""
     rows = [
         f"| {title(rule)} | {WATCHED[rule.failsafe.name]} | {parameter_of(rule)} "
-        f"| {'yes' if rule.holds_first else 'no'} | {'yes' if rule.user_may else 'no'} | {rule.begins} |\n"
+        f"| {'yes' if rule.holds_first else 'no'} | {'yes' if rule.allows_takeover else 'no'} | {rule.begins} |\n"
         for rule in RULES
     ]
     severity = "; ".join(ACTIONS[action.name] for action in Action if action > Action.NONE)

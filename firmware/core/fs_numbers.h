@@ -44,7 +44,7 @@ typedef struct {
     fs_real r_rad_s;
 } fs_reference_memory;
 
-/* Second-order filter: natural frequency (0: pass the target through) and limits. */
+/* Second-order filter: natural frequency (0: no filter), damping ratio and limits. */
 typedef struct {
     fs_real bandwidth_rad_s;
     fs_real damping;
@@ -59,7 +59,7 @@ typedef struct {
     fs_real yaw;
 } fs_pid_memory;
 
-/* Gains in angular acceleration per error, which fit any vehicle; its inertia turns them into torque. */
+/* Gains in angular acceleration per error, independent of the vehicle; its inertia converts them to torque. */
 typedef struct {
     fs_real kp_roll;
     fs_real kp_pitch;
@@ -77,7 +77,7 @@ typedef struct {
     fs_real iz_kg_m2;
 } fs_pid_params;
 
-/* c1 to c6 [1/s] of the paper's Table III, inertias, and how much of x_d' and x_d'' is fed in (0 or 1). */
+/* c1 to c6 [1/s] of the paper's Table III, feed-forward of x_d' and x_d'' (0 to 1), and inertias. */
 typedef struct {
     fs_real c1;
     fs_real c2;

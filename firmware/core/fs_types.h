@@ -17,7 +17,7 @@
 #define FS_STATUS_INPUT_STALE 128U
 
 /* World frame NED, body frame FRD, quaternions Hamilton, scalar first, body to world. SI units. */
-/* A vector; its name tells frame and unit. */
+/* A vector; the name of the variable states frame and unit. */
 typedef struct {
     fs_real x;
     fs_real y;
@@ -40,7 +40,7 @@ typedef struct {
     fs_vector3 rates_frd_rad_s;
 } fs_vehicle_state;
 
-/* What guidance asks of the outer loop: a point of a trajectory and the heading. */
+/* Input of the outer loop: a point of a trajectory and the heading. */
 typedef struct {
     fs_vector3 position_ned_m;
     fs_vector3 velocity_ned_m_s;
@@ -49,7 +49,7 @@ typedef struct {
     fs_real yaw_rate_rad_s;
 } fs_position_setpoint;
 
-/* What the outer loop asks of the inner loop: an attitude and the collective thrust. */
+/* Output of the outer loop and input of the inner loop: attitude and collective thrust. */
 typedef struct {
     fs_quaternion attitude;
     fs_real thrust_n;

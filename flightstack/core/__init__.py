@@ -1,1 +1,1 @@
-"""Types, arrays, geometry, geodesy and compilation: what every other package builds on."""
+"""Types, arrays, geometry, geodesy and compilation, used by every other package."""

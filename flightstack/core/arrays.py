@@ -1,4 +1,4 @@
-"""Between the types of ``contract`` and their array form, inside compiled code."""
+"""Conversions between the types of ``contract`` and their array form, for compiled code."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def store_status(row: FloatArray, status: int) -> None:
 def store_outer_row(
     out: FloatArray, state: FloatArray, setpoint: FloatArray, target: FloatArray, flags: int
 ) -> None:
-    """Write state (13,), setpoint (11,), attitude target (5,) and flags, one after the other, to ``out`` (30,)."""
+    """Write state (13,), setpoint (11,), attitude target (5,) and flags in this order to ``out`` (30,)."""
     at = 0
     for part in (state, setpoint, target):
         for value in part:

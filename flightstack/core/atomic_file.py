@@ -1,4 +1,4 @@
-"""Write a file whole or not at all. The only place that names temporary files beside files of the user."""
+"""Atomic file replacement."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from pathlib import Path
 from flightstack.core.errors import ConfigError
 
 OWNER_ONLY = 0o600
-_OPEN_TO_ALL = 0o666  # less the umask of the process
+_OPEN_TO_ALL = 0o666  # reduced by the umask
 _LONGEST_TAIL = 60
-"""Characters of a file's name that its temporary name ends with: the suffix is among them."""
+"""Characters of the file name, suffix included, that end the name of its temporary file."""
 
 
 def check_new(path: Path, overwrite: bool) -> None:
-    """Raise ConfigError if a file that the user named is there already, unless it may be overwritten."""
+    """Raise ConfigError if the file exists and must not be overwritten."""
     if not overwrite and path.is_file():
-        raise ConfigError(path, "", "exists already: name another file, or give --overwrite")
+        raise ConfigError(path, "", "exists already: name another file or give --overwrite")
 
 
 def write_text_atomically(path: Path, text: str) -> None:
-    """Replace the file at ``path``; the old one stays when writing fails. Raise OSError then."""
+    """Replace the file at ``path``; raise OSError and keep the old file if writing fails."""
     write_bytes_atomically(path, text.encode())
 
 
 def write_bytes_atomically(
     path: Path, data: bytes, mode: int | None = None, *, survives_power_loss: bool = True
 ) -> None:
-    """Replace the file at ``path``; raise OSError when that fails, and the old one stays.
+    """Replace the file at ``path``; raise OSError and keep the old file if writing fails.
 
-    The new file is on the disk before it takes the old one's name, and the name before this returns: a loss of power
-    leaves the one or the other. Without ``survives_power_loss`` it does not wait for the disk.
+    File and directory are synced, so that after a power loss either the old or the new file is there. Without
+    ``survives_power_loss`` nothing is synced.
     """
     try:
         with replacing(path, mode) as temporary, open(temporary, "wb") as file:
@@ -42,21 +42,20 @@ def write_bytes_atomically(
             if survives_power_loss and _is_replaceable(temporary):
                 os.fsync(file.fileno())
     except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error  # it may name the temporary file
+        raise OSError(error.errno, error.strerror, str(path)) from error  # not the temporary file
     if survives_power_loss:
         _sync_folder(Path(os.path.realpath(path)).parent)
 
 
 @contextlib.contextmanager
 def replacing(path: Path, mode: int | None = None) -> Iterator[Path]:
-    """Give a new, empty file with the suffix of ``path``, which takes its place at the end; raise OSError.
+    """Yield a new, empty temporary file with the suffix of ``path``, and rename it to ``path`` at the end.
 
-    Its name is random and the file is made by this call, so that no file or link that was put there is written to.
-    If anything fails the temporary file is removed and ``path`` stays as it was. The target of a link is replaced,
-    not the link; a device or a pipe is written to, not replaced. Without ``mode`` the new file has the permissions of
-    the old one.
+    Its name is random and it is created exclusively, so that an existing file or link is never written to. On an
+    error the temporary file is removed and ``path`` is unchanged. The target of a link is replaced, not the link; a
+    device or a pipe is yielded itself. Without ``mode`` the new file has the permissions of the old one. Raise OSError.
     """
-    if not _is_replaceable(path):  # before links are resolved: that of /dev/stdout may lead to "pipe:[1]"
+    if not _is_replaceable(path):  # before links are resolved: /dev/stdout may link to "pipe:[1]"
         yield path
         return
     path = Path(os.path.realpath(path))
@@ -67,7 +66,7 @@ def replacing(path: Path, mode: int | None = None) -> Iterator[Path]:
     os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode))
     try:
         if is_kept:
-            temporary.chmod(mode)  # whatever the umask is now
+            temporary.chmod(mode)  # independent of the umask
         yield temporary
         temporary.replace(path)
     finally:
@@ -75,13 +74,13 @@ def replacing(path: Path, mode: int | None = None) -> Iterator[Path]:
 
 
 def _is_replaceable(path: Path) -> bool:
-    """Tell whether this is a regular file or none at all, and not the name of an open descriptor like /dev/stdout."""
+    """Return True for a regular or missing file that is no open descriptor such as /dev/stdout."""
     folder = os.path.realpath(path.parent)
     return folder != "/dev" and not folder.startswith("/proc/") and (path.is_file() or not path.exists())
 
 
 def _sync_folder(folder: Path) -> None:
-    with contextlib.suppress(OSError):  # some file systems cannot, and the file itself is safe
+    with contextlib.suppress(OSError):  # not supported by some file systems; the file itself is synced
         descriptor = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(descriptor)

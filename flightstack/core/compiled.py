@@ -1,10 +1,10 @@
-"""Compile the numeric core with Numba, cached on disk, and the same in plain Python for debugging.
+"""Compile numeric functions with Numba and cache them on disk.
 
 ``@compiled`` marks a plain function over floats, NamedTuples of floats and float64 arrays. It is compiled on
 its first call and read from the cache afterwards. With ``NUMBA_DISABLE_JIT=1`` it is the plain function.
 
-Arrays are the interface of a compiled *kernel* towards Python, because passing them costs a tenth of passing
-NamedTuples. Inside, functions pass NamedTuples, so that a control law reads as in a textbook.
+Python passes arrays to a compiled *kernel*, at a tenth of the cost of NamedTuples. Compiled functions pass NamedTuples
+to each other, which keeps control laws readable.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from flightstack.core.kernel_cache import directory, is_own
 
 
 def _import_without_scipy() -> None:
-    """Import Numba's array functions without their early search for a BLAS, which imports scipy.linalg: 0.2 s.
+    """Import Numba's array functions without their search for BLAS, which imports scipy.linalg and takes 0.2 s.
 
-    A kernel that needs BLAS, of a user's controller say, makes the same search when it is compiled.
+    A kernel that needs BLAS, such as a plug-in controller, repeats the search when it is compiled.
     """
     search, linalg.ensure_blas = linalg.ensure_blas, lambda: None
     try:
@@ -42,16 +42,16 @@ _import_without_scipy()
 F = TypeVar("F", bound=Callable[..., Any])
 
 specialised: dict[tuple[Callable[..., Any], str], Callable[..., Any]] = {}
-"""The kernels that ``specialise`` made in this process, by template and key."""
+"""Kernels made by ``specialise`` in this process, by template and key."""
 
 for _function in portable_math.FUNCTIONS:
     register_jitable(error_model="numpy")(_function)
 
 
 def _compile(function: F, modules: frozenset[str]) -> F:
-    """Compile ``function``, cached among the kernels that are made from ``modules``."""
+    """Compile ``function`` with a cache keyed by the sources of ``modules``."""
     cache = is_own(function.__module__)
-    if cache and "NUMBA_CACHE_DIR" not in os.environ:  # Numba reads the setting here, for each function
+    if cache and "NUMBA_CACHE_DIR" not in os.environ:  # Numba reads this setting for each function
         numba.config.CACHE_DIR = str(directory(modules, numba.__version__))
     return numba.njit(cache=cache, error_model="numpy")(function)  # type: ignore[no-any-return]
 
@@ -59,16 +59,16 @@ def _compile(function: F, modules: frozenset[str]) -> F:
 def compiled(function: F) -> F:
     """Compile ``function`` with Numba on first use; IEEE division (no exception), no fast-math, no FMA.
 
-    A function of another package is not cached by itself, only within a kernel whose key names its sources.
+    A function of another package is cached only as part of a kernel whose key includes its sources.
     """
     return _compile(function, frozenset({function.__module__}))
 
 
 def direct(kernel: Callable[..., Any], *examples: Any) -> Callable[..., Any]:
-    """Return ``kernel`` for arguments of the types of ``examples``, without Numba's look at the types in each call.
+    """Return ``kernel`` compiled for the types of ``examples``, without Numba's type check at each call.
 
-    That look costs 40 ns an array and 115 ns a record. The compiled code takes what it gets for what it was made for:
-    arrays must be contiguous and of the examples' types (TypeError for another size of the numbers only).
+    The check costs 40 ns per array and 115 ns per record. Without it, arrays must be contiguous and have the examples'
+    types; TypeError is raised for another item size only.
     """
     if isinstance(kernel, FunctionType):  # NUMBA_DISABLE_JIT
         return kernel
@@ -80,9 +80,9 @@ def direct(kernel: Callable[..., Any], *examples: Any) -> Callable[..., Any]:
 def specialise(template: Callable[..., Any], key: str, **names: Any) -> Callable[..., Any]:
     """Compile a copy of ``template`` whose global ``names`` are bound to the given functions and types.
 
-    This is how a kernel is joined with a controller chosen at run time without losing the disk cache, which
-    closures would (their contents differ from process to process). ``key`` must identify what is bound: within
-    a process the same template and key are the same kernel, read from the disk once.
+    This binds a kernel to a controller chosen at run time and keeps the disk cache, which closures would defeat because
+    their contents differ between processes. ``key`` must identify the bound names: within a process the same template
+    and key return the same kernel.
     """
     assert isinstance(template, FunctionType)
     known = specialised.get((template, key))
@@ -102,9 +102,9 @@ def as_tuple(array: Any, count: int) -> Any:
 
 
 @overload(as_tuple, prefer_literal=True)
-def _as_tuple(array, count):  # type: ignore[no-untyped-def]  # Numba compares the two signatures, annotations too
+def _as_tuple(array, count):  # type: ignore[no-untyped-def]  # Numba compares both signatures with annotations
     if isinstance(count, numba.types.Literal):
-        return lambda array, count: to_fixed_tuple(array, count)  # noqa: PLW0108  # its names are compared too
+        return lambda array, count: to_fixed_tuple(array, count)  # noqa: PLW0108  # Numba compares the names too
     return None
 
 
@@ -112,8 +112,8 @@ def _as_tuple(array, count):  # type: ignore[no-untyped-def]  # Numba compares t
 def store(out: np.ndarray[Any, np.dtype[np.float64]], values: Any) -> None:
     """Write a flat tuple or an array of floats to the start of ``out``.
 
-    An array is written item by item because ``out[:] = values`` takes Numba two seconds to compile: it comes with
-    the sentence about shapes that do not match.
+    Items are written one by one because ``out[:] = values`` takes Numba two seconds to compile, for the message about
+    shapes that do not match.
     """
     for index in range(len(values)):
         out[index] = values[index]

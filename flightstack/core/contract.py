@@ -1,9 +1,9 @@
-"""The types that cross the borders of the flight stack; the C port has the same ones in ``fs_types.h``.
+"""Types shared by all packages of the flight stack and by the C port (``fs_types.h``).
 
 World frame NED, body frame FRD, quaternions Hamilton, scalar first, body to world. SI units, radians.
 
-Each type has an array form, the fields in order as float64, which kernels exchange with Python and with the C
-backends (``flightstack.core.arrays``).
+Each type has an array form, its fields in order as float64, in which Python, kernels and the C backends exchange it
+(``flightstack.core.arrays``).
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ ATTITUDE_TARGET_SIZE = 5
 
 
 class LoopRow:
-    """Columns of what the inner loop writes in each tick: its inputs, each stage's output, and a status.
+    """Columns of the row that the inner loop writes each tick: its inputs, the output of each stage, and a status.
 
-    Logs, processor-in-the-loop checks and tests read the loops through this row.
+    Logs, processor-in-the-loop checks and tests read this row.
     """
 
     STATE = slice(0, 13)
@@ -55,18 +55,18 @@ class LoopStatus:
 
 
 class LoopFlags:
-    """Bits that say what a tick of the loops begins with; FS_PIL_STEP and the log carry them."""
+    """Bits that control one tick of the loops; sent in FS_PIL_STEP and logged."""
 
     OUTER_DUE = 1
     """The outer loop runs on the setpoint."""
     SET_TARGET = 2
-    """Guidance gives the attitude target, in place of the outer loop."""
+    """Guidance provides the attitude target instead of the outer loop."""
     RESET = 4
-    """The loops forget the past: they begin to fly."""
+    """The loops reset their memory at the start of a flight."""
 
 
 class Vector3(NamedTuple):
-    """A vector; its name tells frame and unit."""
+    """A vector; the name of the variable states frame and unit."""
 
     x: float
     y: float
@@ -92,7 +92,7 @@ class VehicleState(NamedTuple):
 
 
 class PositionSetpoint(NamedTuple):
-    """What guidance asks of the outer loop: a point of a trajectory and the heading."""
+    """Input of the outer loop: a point of a trajectory and the heading."""
 
     position_ned_m: Vector3
     velocity_ned_m_s: Vector3
@@ -102,7 +102,7 @@ class PositionSetpoint(NamedTuple):
 
 
 class AttitudeTarget(NamedTuple):
-    """What the outer loop asks of the inner loop: an attitude and the collective thrust."""
+    """Output of the outer loop and input of the inner loop: attitude and collective thrust."""
 
     attitude: Quaternion
     thrust_n: float

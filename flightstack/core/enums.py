@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Mode(IntEnum):
-    """What the vehicle is asked to do; armed or not is a matter of its own."""
+    """Flight mode, independent of the arming state."""
 
     HOLD = 0
     TAKEOFF = 1
@@ -20,7 +20,7 @@ class Mode(IntEnum):
 
 
 STREAM_MODES = (Mode.OFFBOARD, Mode.POSITION, Mode.ALTITUDE)
-"""Modes in which a stream from the ground says where to fly, and whether to leave the ground."""
+"""Modes controlled by a stream of setpoints or stick positions from the ground, which also command takeoff."""
 
 _AUTO = 4 << 16
 CUSTOM_MODE: dict[Mode, int] = {

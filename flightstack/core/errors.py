@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+# the packages of the extras by name: ``pip install 'flightstack[…]'`` needs a release on PyPI
 INSTALL_MULTIBODY = "pip install mujoco pillow imageio-ffmpeg"
 INSTALL_FIRMWARE = "pip install ziglang unicorn"
 
 
 class ConfigError(Exception):
-    """A bad configuration file; its text is one sentence fit for the user."""
+    """Invalid option or configuration file."""
 
     def __init__(self, file: object, key: str, problem: str) -> None:
         where = f"{file}: {key}: " if key else f"{file}: "
@@ -15,13 +16,13 @@ class ConfigError(Exception):
         self._parts = (str(file), key, problem)
 
     def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
-        """Travel between processes: an exception is else made anew from its text alone, and this one takes three."""
+        """Support pickling: the default passes the text alone to a constructor with three arguments."""
         return type(self), self._parts
 
 
 class TargetError(RuntimeError):
-    """The target cannot be flown any further; the text is one sentence for the user."""
+    """The loops on the target cannot continue."""
 
 
 class WrongFirmwareError(TargetError):
-    """The target answers, but it cannot fly what it is asked to."""
+    """The target answers but runs incompatible firmware."""

@@ -1,4 +1,4 @@
-"""WGS 84 positions and the local tangent plane: the only copy in the project (no compiled code)."""
+"""WGS 84 positions and the local tangent plane. Not compiled."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ECCENTRICITY_SQUARED = 6.694379990141316e-3
 
 
 class GeoPoint(NamedTuple):
-    """A WGS 84 position; its altitude is above mean sea level, which stands for the ellipsoid's here."""
+    """A WGS 84 position; altitude above mean sea level, which is taken as the ellipsoid."""
 
     latitude_deg: float
     longitude_deg: float
@@ -23,7 +23,7 @@ class GeoPoint(NamedTuple):
 class LocalFrame:
     """Flat earth (NED) around an origin, with the ellipsoid's two radii of curvature there.
 
-    ``to_geo`` is the inverse of ``to_ned``, to rounding. Down is the difference of altitudes. Against the
+    ``to_geo`` inverts ``to_ned`` up to rounding. Down is the difference of altitudes. Against the
     tangent plane, at 47° and 488 m above the ellipsoid, a position is off horizontally by 9 mm at 100 m,
     0.15 m at 1 km and 10 m at 10 km (the origin's altitude and the change of the parallel's radius with
     latitude are left out), and vertically by the earth's curvature: 0.08 m at 1 km, 7.9 m at 10 km.

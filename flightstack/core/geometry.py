@@ -1,4 +1,4 @@
-"""Quaternions, Euler angles and vectors in compiled code: the only copy in the project.
+"""Quaternions, Euler angles and vectors for compiled code.
 
 Quaternions are Hamilton, scalar first, body FRD to world NED. Euler angles are yaw, pitch, roll (3-2-1).
 Operations and their order are those of ``firmware/core/fs_geometry.h``.
@@ -13,9 +13,9 @@ from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.portable_math import LARGEST_SQUARE, arc_tangent_series, asin, atan2, sin_cos
 
 LEAST_LENGTH = 1e-30
-"""Stands for zero where a length divides."""
+"""Replaces zero as a divisor."""
 SMALL_SQUARE = 0.01
-"""Of half the angle [rad²] of a short step: 11 degrees."""
+"""Square of half the rotation angle [rad²] up to which Taylor series are used: 11 degrees."""
 
 
 @compiled
@@ -65,7 +65,7 @@ def rotate(q: Quaternion, v: Vector3) -> Vector3:
 
 @compiled
 def blend(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
-    """Attitude at ``fraction`` of the short way from ``a`` to ``b``, for small angles between them."""
+    """Attitude at ``fraction`` of the shortest rotation from ``a`` to ``b``, for small angles."""
     near = a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z
     to = fraction if near >= 0.0 else -fraction
     left = 1.0 - fraction
@@ -76,9 +76,9 @@ def blend(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
 
 @compiled
 def rotation_vector(q: Quaternion) -> Vector3:
-    """Logarithm of a quaternion of any length: axis times angle [rad], the angle in [0, π]; zero of the zero.
+    """Logarithm of a quaternion of any length: axis times angle [rad], angle in [0, π]; zero for the zero quaternion.
 
-    On a single axis it is the angle itself, which the paper's Euler errors are too.
+    For a single axis it equals the Euler angle, as in the paper's errors.
     """
     square, w_square = q.x * q.x + q.y * q.y + q.z * q.z, q.w * q.w
     if square < LARGEST_SQUARE * w_square:  # below 45 degrees: 2 atan(norm / w) / norm, without the norm
@@ -97,7 +97,7 @@ def rotation_vector(q: Quaternion) -> Vector3:
 
 @compiled
 def rotation_over(rates: Vector3, dt_s: float) -> Quaternion:
-    """Rotation that constant body rates make in ``dt_s``; with 1, the exponential of a rotation vector."""
+    """Rotation by constant body rates over ``dt_s``; with ``dt_s`` = 1 the exponential of a rotation vector."""
     rate_square = rates.x * rates.x + rates.y * rates.y + rates.z * rates.z
     half_dt = 0.5 * dt_s
     square = rate_square * (half_dt * half_dt)

@@ -1,6 +1,6 @@
-"""Attitudes in bulk, for logs and reports: NumPy over many rows, without compiled code.
+"""Attitude conversions over many rows with NumPy, for logs and reports.
 
-The loops use ``flightstack.core.geometry``; a test holds the two equal.
+The loops use ``flightstack.core.geometry``; a test checks that both agree.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def euler_from_quaternions(q: FloatArray) -> FloatArray:
 
 
 def quaternions_from_euler(euler_rad: FloatArray) -> FloatArray:
-    """Unit quaternions of roll, pitch, yaw (3-2-1), shape (n, 3) to (n, 4): the way back."""
+    """Unit quaternions of roll, pitch, yaw (3-2-1), shape (n, 3) to (n, 4)."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(euler_rad.T / 2.0), np.sin(euler_rad.T / 2.0)
     return np.column_stack((
         cr * cp * cy + sr * sp * sy,

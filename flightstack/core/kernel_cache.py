@@ -1,9 +1,8 @@
-"""Where compiled kernels are cached: one directory for each state of the sources that a kernel is made from.
+"""Cache directories of compiled kernels, keyed by the sources of each kernel.
 
-Numba's cache notices a change in the file of a function, not in a file that it calls into. A compiled function can
-only use names that its module imports, so the sources that count are the module's and all that it imports, directly
-or not, within our packages. An edited function is never flown in an older version, and an edit elsewhere
-recompiles nothing.
+Numba's cache detects a change in the file of a function, but not in the files that it calls into. A compiled function
+only uses names that its module imports, so the key covers the module and everything that it imports from our packages,
+directly or not. An edit of any of them recompiles the kernel, and an edit elsewhere recompiles nothing.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from pathlib import Path
 
 OWN_PACKAGES = ("flightstack", "sim_bridge")
 _KEPT_S = 14 * 86_400.0
-"""Time for which a directory that no process opened is kept."""
+"""Lifetime of a directory after its last use."""
 _IMPORT = re.compile(
     rf"^[ \t]*(?:from[ \t]+((?:{'|'.join(OWN_PACKAGES)})[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]+)"
     rf"|import[ \t]+((?:{'|'.join(OWN_PACKAGES)})[^\n]*))",
@@ -29,7 +28,7 @@ _IMPORT = re.compile(
 
 
 def is_own(module_name: str) -> bool:
-    """Return whether a module is this project's, so that the digest of its imports covers its sources."""
+    """Return True if a module belongs to this project, so that ``digest`` covers its sources."""
     return module_name.partition(".")[0] in OWN_PACKAGES
 
 
@@ -43,7 +42,7 @@ def _path(top: Path, module_name: str) -> Path | None:
 
 
 def _imports(text: str) -> set[str]:
-    """Return every module name that a source may import; a name from a module may be a module of its own."""
+    """Return all module names that a source may import; an imported name may itself be a module."""
     found: set[str] = set()
     for package, names, plain in _IMPORT.findall(text):
         if plain:
@@ -57,7 +56,7 @@ def _imports(text: str) -> set[str]:
 
 @cache
 def read_source(path: Path) -> tuple[bytes, frozenset[str]]:
-    """Return the content of a source file and the names that it imports; read once in a process."""
+    """Return the content of a source file and the names that it imports; cached per process."""
     content = path.read_bytes()
     return content, frozenset(_imports(content.decode("utf-8", "replace")))
 
@@ -76,7 +75,7 @@ def sources(top: Path, module_names: Iterable[str]) -> list[Path]:
 
 
 def digest(top: Path, module_names: Iterable[str], version: str) -> str:
-    """Return a digest of ``version`` and of all sources that code of these modules can be made from."""
+    """Return a digest of ``version`` and of all sources of these modules."""
     result = hashlib.sha256(version.encode())
     for path in sources(top, module_names):
         result.update(str(path.relative_to(top)).encode())
@@ -90,7 +89,7 @@ def _base() -> Path:
     try:
         base.mkdir(parents=True, exist_ok=True)
         _remove_old(base)
-    except OSError:  # a read-only home: compile anew in each process
+    except OSError:  # read-only home: compile in each process
         return Path(tempfile.mkdtemp(prefix="flightstack-kernels-"))
     return base
 

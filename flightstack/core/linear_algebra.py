@@ -1,7 +1,6 @@
-"""Linear algebra of a few rows in plain floats: the same bits on every processor.
+"""Linear algebra for small matrices in plain floats, with bit-identical results on every processor.
 
-LAPACK and BLAS choose their kernels by the processor, and with them the order of operations. What a flight is made of
-is small enough for loops whose order is written here.
+LAPACK and BLAS select kernels, and with them the order of operations, by processor. The functions here fix the order.
 """
 
 from __future__ import annotations
@@ -13,9 +12,9 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 
-_SWEEPS = 30  # Jacobi's method converges quadratically: seven sweeps were the most for a random 6 × 6 matrix
+_SWEEPS = 30  # Jacobi's method converges quadratically: random 6 × 6 matrices took at most seven sweeps
 
-_LEAST_REST = 1e-9  # share of a row that the rows before it must leave of it
+_LEAST_REST = 1e-9  # relative residual below which a row counts as dependent on earlier rows
 
 
 def dot(a: Sequence[float], b: Sequence[float]) -> float:
@@ -27,17 +26,17 @@ def dot(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def pseudo_inverse(matrix: FloatArray) -> FloatArray:
-    """Return the pseudo-inverse, shape (n, m), of a matrix A, shape (m, n), by rows of very different sizes too.
+    """Return the pseudo-inverse, shape (n, m), of a matrix A, shape (m, n), also if its rows differ much in size.
 
-    A = L·Q: the rows are made orthonormal one after the other by Gram and Schmidt's method, each row twice; one that
-    depends on those before it adds nothing to Q. Then A⁺ = Qᵀ·L⁺.
+    A = L·Q by Gram-Schmidt orthonormalisation with each row processed twice; a dependent row adds nothing to Q. Then
+    A⁺ = Qᵀ·L⁺.
     """
     lower, orthonormal = _orthonormal_rows(matrix.tolist())
     if not orthonormal:
         return np.zeros(matrix.shape[::-1])
     if len(orthonormal) == len(lower):
         inverse = _triangular_inverse(lower)
-    else:  # L has more rows than columns, which are independent
+    else:  # L has more rows than columns, and independent columns
         inverse = pseudo_inverse(np.array(lower).T).T.tolist()
     columns, places = list(zip(*inverse, strict=True)), list(zip(*orthonormal, strict=True))
     return np.array([[dot(place, column) for column in columns] for place in places])

@@ -1,9 +1,9 @@
-"""The vehicle's channels, and the numbers of instance N: ports that no other instance uses, and the system id.
+"""Ports and system id of vehicle instance N, unique to each instance.
 
-The vehicle's own ports are PX4's (18570 + N, 14580 + N), the simulator's too (4560 + N), and the TCP port is
-ArduPilot's (5760 + 10·N). Those of clients, which the vehicle calls unasked, are PX4's for the first ten instances:
-14540 + N, and 14550 + N for ground stations, where PX4 calls 14550 from all. Further up these ranges meet each
-other and the vehicles' own, so that each further ten instances begin 1000 ports higher.
+The vehicle's local ports (18570 + N, 14580 + N) and the simulator's port (4560 + N) are PX4's; the TCP port
+(5760 + 10·N) is ArduPilot's. The vehicle sends first to API clients at 14540 + N, as PX4 does, and to ground stations
+at 14550 + N, where every PX4 instance uses 14550. To avoid overlaps, each further ten instances use client ports 1000
+higher.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from __future__ import annotations
 import ipaddress
 
 GROUND, API, TCP = "ground", "api", "tcp"
-"""The channels of ground stations, of companions, and of TCP clients, which get the rates of a ground station."""
+"""Channels for ground stations, companion computers, and TCP clients; the latter get the rates of ground stations."""
 
 INSTANCES = 250
-"""Instances are numbered from 0; the last one has the highest system id of a vehicle."""
+"""Number of instances, counted from 0; the last one has the highest system id of a vehicle."""
 
 _BLOCK, _BLOCK_STEP = 10, 1000
 
 
 def system_id(instance: int) -> int:
-    """Return the MAVLink system id, unless MAV_SYS_ID says another."""
+    """Return the default MAVLink system id, which MAV_SYS_ID overrides."""
     return instance + 1
 
 
@@ -40,17 +40,17 @@ def vehicle_ground_port(instance: int) -> int:
 
 
 def vehicle_api_port(instance: int) -> int:
-    """Return the UDP port of the vehicle for companions."""
+    """Return the UDP port of the vehicle for companion computers."""
     return 14580 + instance
 
 
 def ground_station_port(instance: int) -> int:
-    """Return the UDP port of the ground station that the vehicle calls unasked."""
+    """Return the UDP port of the ground station that the vehicle sends to first."""
     return _in_blocks(14550, instance)
 
 
 def api_client_port(instance: int) -> int:
-    """Return the UDP port of the API client that the vehicle calls unasked."""
+    """Return the UDP port of the API client that the vehicle sends to first."""
     return _in_blocks(14540, instance)
 
 
@@ -60,5 +60,5 @@ def _in_blocks(first: int, instance: int) -> int:
 
 
 def is_loopback(host: str) -> bool:
-    """Return True if an IPv4 address reaches this machine only."""
+    """Return True for an IPv4 address that is local to this machine."""
     return ipaddress.IPv4Address(host).is_loopback

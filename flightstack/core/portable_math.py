@@ -1,12 +1,11 @@
-"""Functions of a mathematics library from + − × ÷ and √ alone: the same bits on every processor.
+"""Elementary functions with bit-identical results on every processor, built from + − × ÷ and √ alone.
 
-IEEE 754 rounds these five operations in one way. libm's functions have variants that a processor's features choose
-(FMA, AVX2), and these differ in the last place. So whatever a flight computes uses the functions here: the same
-polynomials in the same order as ``firmware/core/fs_math.c`` and ``fs_geometry.h`` with double.
+IEEE 754 fixes the rounding of these five operations. libm selects variants by processor features (FMA, AVX2) that
+differ in the last place. Everything that a flight computes uses the functions here, which have the same polynomials in
+the same order as ``firmware/core/fs_math.c`` and ``fs_geometry.h`` in double precision.
 
-Plain Python, which ``compiled`` makes known to Numba: compiled code calls them as any other function, and a program
-that needs no compiled code does not import it. Errors are in units of the last place of the result, measured over a
-million arguments (tests/unit/test_portable_math.py).
+They are plain Python, which ``compiled`` registers with Numba; programs without compiled code do not import Numba.
+Errors are in units in the last place (ulp), measured over a million arguments (tests/unit/test_portable_math.py).
 """
 
 from __future__ import annotations
@@ -14,16 +13,16 @@ from __future__ import annotations
 import math
 
 LARGEST_ANGLE_RAD = 1e4
-"""Angles up to this, of either sign, have a sine: 1591 turns."""
+"""Largest angle of either sign for ``sin_cos``: 1591 turns."""
 LARGEST_SQUARE = 0.1715
-"""Of the tangent of an angle up to 22.5°, for ``arc_tangent_series``."""
+"""Square of the tangent of 22.5°, the largest argument of ``arc_tangent_series``."""
 _HALF_PI, _HALF_PI_REST = 1.5707963267948966, 6.123233995736766e-17
-_LN2_1, _LN2_2 = 0.693147180369123816490, 1.90821492927058770002e-10  # the first one has 33 bits
+_LN2_1, _LN2_2 = 0.693147180369123816490, 1.90821492927058770002e-10  # the first part has 33 bits
 _LEAST_EXPONENT, _LARGEST_EXPONENT = -745.2, 709.78
 
 
 def sin_cos(angle_rad: float) -> tuple[float, float]:
-    """Return sine and cosine, within 1.4 ulp in a turn; both NaN beyond ``LARGEST_ANGLE_RAD``."""
+    """Return sine and cosine, within 1.4 ulp within one turn; both NaN beyond ``LARGEST_ANGLE_RAD``."""
     if not abs(angle_rad) <= LARGEST_ANGLE_RAD:
         return math.nan, math.nan
     turns = angle_rad * 0.6366197723675814  # 2/π
@@ -65,14 +64,14 @@ def sin_cos(angle_rad: float) -> tuple[float, float]:
 
 
 def tan(angle_rad: float) -> float:
-    """Return the tangent, within 3 ulp in a turn; see ``sin_cos``."""
+    """Return the tangent, within 3 ulp within one turn; see ``sin_cos``."""
     sine, cosine = sin_cos(angle_rad)
     return sine / cosine
 
 
 def arc_tangent_series(square: float) -> float:
-    """Arc tangent of a ratio, divided by it, less one; of the ratio's square up to ``LARGEST_SQUARE``."""
-    # Chebyshev's nodes; off by 5e-18 at most
+    """Return atan(r)/r − 1 for ``square`` = r² up to ``LARGEST_SQUARE``."""
+    # Chebyshev nodes; error at most 5e-18
     series = -0.01917454357202133
     series = series * square + 0.039229744536612224
     series = series * square - 0.05085383488842831
@@ -167,9 +166,9 @@ def log(number: float) -> float:
 
 
 def distance(x: float, y: float, z: float = 0.0) -> float:
-    """Return the length of a vector; of lengths below 1e150, whose squares are finite."""
+    """Return the length of a vector, below 1e150 so that squares are finite."""
     return math.sqrt(x * x + y * y + z * z)
 
 
 FUNCTIONS = (sin_cos, tan, arc_tangent_series, atan2, asin, acos, exp, log, distance)
-"""What compiled code may call."""
+"""Functions available to compiled code."""

@@ -1,1 +1,1 @@
-"""The firmware in C: its sources, how it is built, and the numbers it is given."""
+"""Firmware in C: sources, build, parameters, and loops that run in C or on a target."""

@@ -1,7 +1,7 @@
-"""Compile the firmware for this machine: once for each state of sources, compiler and flags.
+"""Compile the firmware for this machine, cached by sources, compiler and flags.
 
-What is made lies in ``~/.cache/flightstack/firmware``. It is written under another name and renamed, so that
-processes which start together cannot meet half a file.
+The cache is ``~/.cache/flightstack/firmware``. Files are renamed into it when complete, so that concurrent processes
+never see a partial file.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from flightstack.core.errors import INSTALL_FIRMWARE
 from flightstack.firmware.sources import PORTABLE, c_files, digest, files, firmware_root, source_hash
 
 EXACT = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-fast-math", "-fno-math-errno")
-"""Every operation is rounded as it is written, on every compiler."""
+"""Flags that make every compiler round each operation as written."""
 KEPT_STATES = 24
 COMPILE_LIMIT_S = 300.0
 
 
 class BuildError(RuntimeError):
-    """Nothing could be compiled; the text is one sentence for the user."""
+    """Compilation failed; the text is one sentence for the user."""
 
 
 class Compiler(NamedTuple):
@@ -41,7 +41,7 @@ class Compiler(NamedTuple):
 
 @functools.cache
 def host_compiler() -> Compiler:
-    """Return the compiler that $CC names, or the first of cc, gcc, clang and zig's; raise BuildError."""
+    """Return the compiler in $CC, or the first of cc, gcc, clang and zig; raise BuildError."""
     named = os.environ.get("CC")
     tried = [shlex.split(named)] if named else []
     tried += [["cc"], ["gcc"], ["clang"]]
@@ -52,11 +52,11 @@ def host_compiler() -> Compiler:
     if version := compiler_version(zig):
         return Compiler((*zig, "-fno-sanitize=all"), f"zig {version}")
     names = ", ".join([*([named] if named else []), "cc", "gcc", "clang"])
-    raise BuildError(f"there is no C compiler: tried {names} and zig ({INSTALL_FIRMWARE})")
+    raise BuildError(f"no C compiler found: tried {names} and zig ({INSTALL_FIRMWARE})")
 
 
 def compiler_version(command: Sequence[str]) -> str:
-    """Return the first line that a compiler says of itself; empty when it cannot be run."""
+    """Return the first line of a compiler's version, empty if it cannot be run."""
     try:
         done = subprocess.run(
             [*command, "--version"], capture_output=True, text=True, check=False, timeout=COMPILE_LIMIT_S
@@ -69,9 +69,9 @@ def compiler_version(command: Sequence[str]) -> str:
 def cached(
     name: str, compiler: Compiler, flags: Sequence[str], sources: Sequence[Path], headers: Sequence[Path] = ()
 ) -> Path:
-    """Return what ``compiler flags sources -o`` makes, compiled now if it is not there; raise BuildError.
+    """Return the output of ``compiler flags sources -o``, from the cache or compiled now; raise BuildError.
 
-    ``headers``: files that the sources include, which count for the state as they do.
+    ``headers`` are included by the sources and part of the cache key.
     """
     named = [path for path in (*sources, *headers) if path.is_relative_to(firmware_root())]
     state = digest(sorted({*named, *files(*PORTABLE)})).hex()[:16]
@@ -84,7 +84,7 @@ def cached(
 
 
 def _folder(state: str) -> Path:
-    """Return the folder for a state of the sources; the oldest states are forgotten."""
+    """Return the folder for a state of the sources; delete the oldest folders."""
     base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flightstack" / "firmware"
     folder = base / state
     try:
@@ -93,7 +93,7 @@ def _folder(state: str) -> Path:
         states = sorted(base.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
         for old in states[KEPT_STATES:]:
             shutil.rmtree(old, ignore_errors=True)
-    except OSError:  # a read-only home, or another process tidies up
+    except OSError:  # read-only home, or concurrent deletion
         if not os.access(folder, os.W_OK):
             return Path(tempfile.mkdtemp(prefix="flightstack-firmware-"))
     return folder
@@ -109,7 +109,7 @@ def _compile(place: Path, command: list[str]) -> None:
                 timeout=COMPILE_LIMIT_S,
             )  # fmt: skip
             if done.returncode != 0:
-                said = next((line for line in done.stderr.splitlines() if "error" in line), "it said nothing")
+                said = next((line for line in done.stderr.splitlines() if "error" in line), "no message")
                 raise BuildError(f"the firmware does not compile with {command[0]}: {said}")
             fresh.replace(place)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -117,19 +117,19 @@ def _compile(place: Path, command: list[str]) -> None:
 
 
 def definitions(compiler: Compiler) -> list[str]:
-    """Return the flags that tell a port the hash of its sources, and its compiler."""
-    octets = ",".join(f"0x{octet:02x}" for octet in source_hash())
+    """Return the flags that define source hash and compiler for a port."""
+    digits = ",".join(f"0x{byte:02x}" for byte in source_hash())
     plain = "".join(c for c in compiler.version if c.isalnum() or c in " .-+()")[:47]
-    return [f"-DFS_SOURCE_HASH={octets}", f'-DFS_COMPILER="{plain}"']
+    return [f"-DFS_SOURCE_HASH={digits}", f'-DFS_COMPILER="{plain}"']
 
 
 def includes(*folders: str) -> list[str]:
-    """Return the flags for the headers of folders."""
+    """Return the include flags of folders."""
     return [f"-I{firmware_root() / folder}" for folder in folders]
 
 
 def host_library(real: str = "float") -> Path:
-    """Return the loops as a shared library for ``c_loops``, of ``float`` or ``double``; raise BuildError."""
+    """Return the shared library of the loops in ``float`` or ``double``; raise BuildError."""
     compiler = host_compiler()
     flags = [*EXACT, "-shared", "-fPIC", *includes("core", "ports/host")]
     if real == "double":
@@ -141,7 +141,7 @@ def host_library(real: str = "float") -> Path:
 
 
 def host_program() -> Path:
-    """Return the firmware as a program that serves a pseudo-terminal; raise BuildError."""
+    """Return the firmware as a host program on a pseudo-terminal; raise BuildError."""
     compiler, port = host_compiler(), firmware_root() / "ports" / "host"
     parts = [port / f"{name}.c" for name in ("fs_host", "fs_host_app", "fs_host_program")]
     flags = [*EXACT, *definitions(compiler), *includes(*PORTABLE, "ports/host")]

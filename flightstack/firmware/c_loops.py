@@ -1,4 +1,4 @@
-"""The loops in C as a ``ControlBackend``, wherever they are computed: in this process, or on a target."""
+"""The loops in C as a ``ControlBackend``, run in this process or on a target."""
 
 from __future__ import annotations
 
@@ -28,37 +28,37 @@ from flightstack.params.vehicle import Vehicle
 
 INPUT_SIZE, OUTPUT_SIZE = 29, 32
 SETPOINT_AT, TARGET_AT = 13, 24
-"""Where setpoint and attitude target begin in the input; the state comes first."""
+"""Offsets of setpoint and attitude target in the input; the state is first."""
 STAGES = slice(LoopRow.REFERENCE_ATTITUDE.start, LoopRow.ROTOR_SPEED.start)
-"""Reference, wrenches and rotor commands: beside each other in the row as in the output."""
+"""Reference, wrenches and rotor commands: contiguous in the row and in the output."""
 NOT_FINITE = LoopStatus.INPUT_NOT_FINITE | LoopStatus.OUTPUT_NOT_FINITE
 
 
 class LoopExecutor(Protocol):
-    """What computes a tick of the loops."""
+    """Runs single ticks of the loops."""
 
     input: FloatArray
     """State (13), setpoint (11), attitude target (5); shape (29,), written by the caller before a step."""
     output: FloatArray
     """Attitude target (5), reference (10), wrench (4), wrench achieved (4), rotor commands (8), status."""
     version: str
-    """What computes, for the log."""
+    """Description for the log."""
 
     def set(self, name: str, value: float) -> None:
-        """Change a number from the next step on."""
+        """Set a number from the next step on."""
 
     def get(self, name: str) -> float:
-        """Return a number as the executor has it."""
+        """Return the current value of a number."""
 
     def step(self, flags: int) -> None:
-        """Compute a tick from ``input`` into ``output``; ``flags`` are ``LoopFlags``."""
+        """Run a tick from ``input`` to ``output``; ``flags`` are ``LoopFlags``."""
 
     def close(self) -> None:
-        """End; nothing is computed after it."""
+        """Release resources; no step may follow."""
 
 
 class LoopsSetup(NamedTuple):
-    """What loops are made of."""
+    """Configuration of the loops."""
 
     vehicle: Vehicle
     controller: AttitudeController
@@ -69,21 +69,23 @@ class LoopsSetup(NamedTuple):
     divisor: int
 
     def numbers(self) -> dict[str, float]:
-        """Return the numbers for C by name; raise ConfigError when C cannot fly this."""
+        """Return the numbers for C by name; raise ConfigError for an unsupported configuration."""
         values = target_numbers(
             self.vehicle, self.controller, self.gains, self.max_tilt_rad, self.inner_hz, self.divisor
         )
-        return {name: value + 0.0 for name, value in values.items()}  # a target's FPU may know no -0
+        return {
+            name: value + 0.0 for name, value in values.items()
+        }  # + 0.0 turns -0 into 0: not every target's FPU supports -0
 
 
 class CLoops:
     """The loops in C; implements ``ControlBackend``.
 
-    A reset takes place in the next step, at that step's state, as on a target that hears of it with the step.
+    A reset takes effect in the next step, because a target receives it with the step.
     """
 
     def __init__(self, name: str, executor: LoopExecutor, setup: LoopsSetup) -> None:
-        """Fly on ``executor``, which has been given the numbers of ``setup``; raise ConfigError."""
+        """Use ``executor``, which has the numbers of ``setup``; raise ConfigError."""
         self.name = name
         self.version = executor.version
         self.executor = executor
@@ -100,7 +102,7 @@ class CLoops:
         self._target: FloatArray = executor.input[TARGET_AT:INPUT_SIZE]
 
     def get_parameter(self, name: str) -> float:
-        """Return a parameter as the loops use it; raise KeyError if they have none of that name."""
+        """Return a parameter as the loops use it; raise KeyError if unknown."""
         if name not in self._names:
             raise KeyError(name)
         return self.executor.get(name)
@@ -112,18 +114,18 @@ class CLoops:
         self.executor.set(name, value)
 
     def warm_up(self, state: FloatArray, setpoint: FloatArray, rotor_speed_rad_s: FloatArray) -> None:
-        """Begin at ``state``; the core was compiled before, and a target counts only steps that are flown."""
+        """Reset at ``state``; the C code is compiled already, and a target must not count extra steps."""
         self.reset(state)
 
     def reset(self, state: FloatArray) -> None:
-        """Forget the past: integrators zero, the reference at the present attitude, at rest."""
+        """Reset integrators to zero and the reference to the current attitude at rest."""
         self._pending = LoopFlags.RESET
         self.attitude_target[:4] = state[6:10]
         self.attitude_target[4] = 0.0
         self._last[:] = 0.0
 
     def set_attitude_target(self, target: FloatArray) -> None:
-        """Fly ``target``, shape (5,), in place of the outer loop's: call it once in each outer period."""
+        """Use ``target``, shape (5,), instead of the outer loop's; call once per outer period."""
         self._pending |= LoopFlags.SET_TARGET
         self._target[:] = target
         self.attitude_target[:] = target
@@ -145,7 +147,7 @@ class CLoops:
         output = self._output
         self.attitude_target[:] = output[:ATTITUDE_TARGET_SIZE]
         status = output[-1]
-        if int(status) & NOT_FINITE:  # the last sound row is repeated
+        if int(status) & NOT_FINITE:  # repeat the last valid row
             row[:] = self._last
         else:
             row[:STATE_SIZE] = state
@@ -155,11 +157,11 @@ class CLoops:
         row[LoopRow.STATUS] = status
 
     def idle(self, state: FloatArray, rotor_speed_rad_s: FloatArray, armed: bool, row: FloatArray) -> None:
-        """Write ``row`` for a vehicle that must not fly: rotors at idle speed when armed, else stopped."""
+        """Write ``row`` for a vehicle on the ground: rotors at idle speed if armed, else stopped."""
         self._idle.write(state, rotor_speed_rad_s, armed, row)
 
     def close(self) -> None:
-        """End; the loops fly no more."""
+        """Release the executor."""
         self.executor.close()
 
 
@@ -167,10 +169,10 @@ _DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 
 class HostLoops:
-    """One set of loops; implements ``c_loops.LoopExecutor``. A step allocates nothing."""
+    """Loops in this process through ``firmware/ports/host/fs_sil.h``; implements ``LoopExecutor``."""
 
     def __init__(self, library: Path, numbers: Mapping[str, float]) -> None:
-        """Load the library that ``build.host_library`` made and give its loops their numbers."""
+        """Load a library of ``build.host_library`` and set its numbers."""
         self._functions = functions = ctypes.CDLL(str(library))
         functions.fs_sil_size.restype = ctypes.c_uint32
         functions.fs_sil_get.restype = ctypes.c_double
@@ -180,9 +182,7 @@ class HostLoops:
         functions.fs_sil_init.restype = functions.fs_sil_step.restype = None
         functions.fs_sil_init.argtypes = [ctypes.c_void_p]
         functions.fs_sil_step.argtypes = [ctypes.c_void_p, _DOUBLES, ctypes.c_uint32, _DOUBLES]
-        self._memory = (
-            ctypes.c_double * (functions.fs_sil_size() // 8 + 1)
-        )()  # doubles: aligned for all it holds
+        self._memory = (ctypes.c_double * (functions.fs_sil_size() // 8 + 1))()  # doubles for alignment
         self._loops = ctypes.cast(self._memory, ctypes.c_void_p)
         self.input: FloatArray = np.zeros(INPUT_SIZE)
         self.output: FloatArray = np.zeros(OUTPUT_SIZE)
@@ -201,7 +201,7 @@ class HostLoops:
         self._step(self._loops, self._in, flags, self._out)
 
     def set(self, name: str, value: float) -> None:
-        """Change a number; raise KeyError for a name that C has not, ValueError for a value it refuses."""
+        """Set a number; raise KeyError if unknown, ValueError if out of range."""
         result = self._functions.fs_sil_set(self._loops, name.encode(), value)
         if result == 2:
             raise KeyError(name)
@@ -209,8 +209,8 @@ class HostLoops:
             raise ValueError(f"{name}={value:g} is out of range")
 
     def get(self, name: str) -> float:
-        """Return a number as C has it; 0 for a name that it has not."""
+        """Return a number; 0 if unknown."""
         return float(self._functions.fs_sil_get(self._loops, name.encode()))
 
     def close(self) -> None:
-        """End: the memory goes with the object."""
+        """Do nothing: memory is freed with the object."""

@@ -1,4 +1,4 @@
-"""Compile the firmware for an emulated Cortex-M4F, and what counts its instructions."""
+"""Compile the firmware for the emulated Cortex-M4F, and the instruction counter."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from flightstack.firmware.emulator import EmulatedTarget
 from flightstack.firmware.sources import PORTABLE, c_files, files, firmware_root
 
 CPU = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")
-"""The processor, as clang of zig names it: single precision in hardware, doubles forbidden by the sources."""
+"""Target flags of zig's clang: hardware single precision; the sources use no doubles."""
 BARE = (
     "-fno-sanitize=all", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables", "-ffunction-sections", "-flto",
     "-nostdlib", "-Wl,--gc-sections", "-Wl,--build-id=none", "-Wl,-e,fs_emulated_exchange",
 )  # fmt: skip
-"""No library, no operating system; functions may be inlined across files."""
+"""Freestanding build with link-time optimisation."""
 _IMPLIED = ("__aeabi_memcpy", "__aeabi_memcpy4", "__aeabi_memclr", "__aeabi_memclr4", "__aeabi_memset4")
-"""Calls that the compiler adds after it has decided what is not called."""
+"""Calls added after link-time optimisation, so that their functions must be kept."""
 _PORT = "ports/cortex_m4"
 
 
 @functools.cache
 def cross_compiler() -> Compiler:
-    """Return zig's C compiler, which needs no installation but pip's; raise BuildError."""
+    """Return zig's C compiler, installed by pip; raise BuildError."""
     zig = (sys.executable, "-m", "ziglang", "cc")
     version = compiler_version(zig)
     if not version:
@@ -51,7 +51,7 @@ def cortex_m4_image() -> Path:
 
 
 def emulated_image(name: str, sources: Sequence[Path], *parts: str, flags: Sequence[str] = ()) -> Path:
-    """Return an image of ``sources`` and ``parts`` of the port with the entry that ``Emulator`` calls."""
+    """Return an image of ``sources`` and ``parts`` of the port with the entry point of ``Emulator``."""
     compiler, port = cross_compiler(), firmware_root() / _PORT
     own = [port / part for part in (*parts, "emulated_start.c", "support.c")]
     kept = [f"-Wl,-u,{call}" for call in _IMPLIED]
@@ -76,5 +76,5 @@ def instruction_counter() -> Path:
 
 
 def emulated_target(now_s: Callable[[], float] | None = None) -> EmulatedTarget:
-    """Compile the firmware if need be and start it on an emulated Cortex-M4F; raise BuildError, EmulationError."""
+    """Start the firmware on an emulated Cortex-M4F, compiled if needed; raise BuildError, EmulationError."""
     return EmulatedTarget(cortex_m4_image(), instruction_counter(), now_s)

@@ -1,4 +1,4 @@
-"""Segments and symbols of an ELF file for a 32-bit ARM: what an emulator needs to load one."""
+"""Segments and symbols of an ELF file for 32-bit ARM."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _SYMBOL_SIZE = 16
 
 
 class ElfError(ValueError):
-    """The bytes are no executable for a 32-bit ARM, or are damaged."""
+    """The data is not an executable for 32-bit ARM, or is damaged."""
 
 
 class Elf:
@@ -32,7 +32,7 @@ class Elf:
 
 
 def _headers(data: bytes, place: int, sizes: int, words: int) -> Sequence[tuple[int, ...]]:
-    """Return a table of headers: its start is written at ``place``, size and number of entries at ``sizes``."""
+    """Return a table of headers, with its offset at ``place`` and entry size and count at ``sizes``."""
     (start,) = struct.unpack_from("<I", data, place)
     size, count = struct.unpack_from("<HH", data, sizes)
     return [struct.unpack_from(f"<{words}I", data, start + size * index) for index in range(count)]

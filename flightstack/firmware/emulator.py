@@ -1,4 +1,4 @@
-"""A Cortex-M4F inside the process: unicorn executes an image, and every instruction is counted.
+"""Emulated Cortex-M4F: unicorn runs an image and counts its instructions, behind a ``ByteLink``.
 
 Host memory is mapped into the emulated machine, so an exchange is one call: the mailbox
 (``firmware/ports/cortex_m4/fs_mailbox.h``) is filled, the target runs from ``fs_emulated_exchange`` to
@@ -22,15 +22,15 @@ RAM_AT, RAM_SIZE = 0x2000_0000, 128 * 1024
 MAILBOX_AT, MAILBOX_SIZE = 0x4000_0000, 20 * 1024
 MAX_RECEIVED, MAX_SENT = 4096, 12288
 LONGEST_RUN = 100_000_000
-"""Instructions after which a run that does not end is stopped; a step takes some thousands."""
+"""Maximum instructions per run; a step takes some thousands."""
 MOST_RUNS = 1000
-"""Runs of one exchange: what is sent in more of them is more than any answer."""
+"""Maximum runs per exchange."""
 PAINT = 0xA5
 _THUMB = 1
 
 
 class EmulationError(RuntimeError):
-    """The emulated target cannot be loaded, faulted, or did not come back."""
+    """The emulated target cannot be loaded, faulted, or did not return."""
 
 
 class Mailbox(ctypes.Structure):
@@ -49,7 +49,7 @@ class Mailbox(ctypes.Structure):
 
 
 class _Counter(ctypes.Structure):
-    """The fields of ``fs_counter`` that come before its table of blocks."""
+    """The fields of ``fs_counter`` before its table of blocks."""
 
     _fields_: ClassVar = [
         ("clock", ctypes.c_void_p),
@@ -103,7 +103,7 @@ class Emulator:
         return engine
 
     def _count(self, library: Path, clock: int) -> None:
-        """Let the compiled counter see every block: a callback into Python would cost more than the block."""
+        """Register the compiled counter for all blocks; a Python callback would cost more than a block."""
         counting = ctypes.CDLL(str(library))
         self._table = ctypes.create_string_buffer(counting.fs_counter_size())
         self._counter = _Counter.from_buffer(self._table)
@@ -123,16 +123,16 @@ class Emulator:
             *everywhere,
         )
         if status != unicorn_const.UC_ERR_OK:
-            raise EmulationError(f"unicorn does not call the counter: error {status}")
+            raise EmulationError(f"unicorn rejected the instruction counter: error {status}")
 
     def exchange(self, data: bytes, now_ms: int) -> bytes:
-        """Let the target take ``data`` at time ``now_ms`` and return what it sends. Raise EmulationError."""
+        """Pass ``data`` to the target at time ``now_ms`` and return its output; raise EmulationError."""
         pieces = range(0, max(1, len(data)), MAX_RECEIVED)
         answers = [self._run(data[at : at + MAX_RECEIVED], now_ms) for at in pieces]
         while self.mailbox.more:
             answers.append(self._run(b"", now_ms))
             if len(answers) > len(pieces) + MOST_RUNS:
-                raise EmulationError("the emulated target sends without end")
+                raise EmulationError("the emulated target sends endlessly")
         return b"".join(answers)
 
     def _run(self, data: bytes, now_ms: int) -> bytes:
@@ -147,33 +147,32 @@ class Emulator:
             place = self._engine.reg_read(arm_const.UC_ARM_REG_PC)
             raise EmulationError(f"the emulated target stopped at {place:#010x}: {error}") from error
         if self._engine.reg_read(arm_const.UC_ARM_REG_PC) != self._stop & ~_THUMB:
-            raise EmulationError(f"the emulated target did not come back within {LONGEST_RUN} instructions")
+            raise EmulationError(f"the emulated target did not return within {LONGEST_RUN} instructions")
         return bytes(self._sent[: min(mailbox.sent_length, MAX_SENT)])
 
     def close(self) -> None:
-        """Take the counter out of the machine; it runs no more."""
-        uclib.uc_hook_del(self._engine._uch, self._hook)  # unicorn's own wrapper knows only its own hooks
+        """Remove the counter; the machine must not run afterwards."""
+        uclib.uc_hook_del(self._engine._uch, self._hook)  # unicorn's wrapper only removes its own hooks
 
     @property
     def stack_high_water(self) -> int:
-        """Octets of the stack that were ever used."""
+        """Maximum stack use [bytes]."""
         bottom, top = self._stack.start - RAM_AT, self._stack.stop - RAM_AT
         untouched = bytes(self._ram[bottom:top])
         return top - bottom - (len(untouched) - len(untouched.lstrip(bytes([PAINT]))))
 
 
 class EmulatedTarget:
-    """A ``ByteLink`` to the firmware's image; nothing of it takes time but the processor it runs on.
+    """A ``ByteLink`` to an emulated image.
 
-    The target's clock is simulated. It is ``now_s`` where that is given, the time of the flight for instance.
-    Without, the target knows only the time that its host spent waiting: a ``read`` that finds nothing returns at
-    once and lets the target be older by the time-out. Either way the same octets come in the same order.
+    The target's clock is simulated: ``now_s``, for example the flight's time, or else the time that its host spent
+    waiting. A ``read`` without data returns at once and advances that clock by its timeout.
     """
 
     name = "emulated Cortex-M4F"
 
     def __init__(self, image: Path, counter: Path, now_s: Callable[[], float] | None = None) -> None:
-        """Start the image; ``counter`` is the library that counts instructions. Raise EmulationError."""
+        """Load the image; ``counter`` is the instruction counter's library. Raise EmulationError."""
         self._emulator = Emulator(image, counter)
         self._now_s = now_s
         self._waited_s = 0.0
@@ -184,11 +183,11 @@ class EmulatedTarget:
         self._sent += self._emulator.exchange(data, round(now_s * 1000.0))
 
     def write(self, data: bytes) -> None:
-        """Let the target receive ``data`` and work on it until it waits for more. Raise EmulationError."""
+        """Send ``data`` and run the target until it waits for more; raise EmulationError."""
         self._exchange(data)
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what the target has sent; b"" when it is silent for ``timeout_s`` of its own time."""
+        """Return the target's output, b"" after ``timeout_s`` of its time without any."""
         if not self._sent:
             self._waited_s += timeout_s
             self._exchange(b"")
@@ -196,7 +195,7 @@ class EmulatedTarget:
         return sent
 
     def close(self) -> None:
-        """Switch the target off."""
+        """Stop the target."""
         self._emulator.close()
 
     @property
@@ -206,5 +205,5 @@ class EmulatedTarget:
 
     @property
     def stack_high_water(self) -> int:
-        """Octets of the target's stack that were ever used."""
+        """Maximum stack use [bytes]."""
         return self._emulator.stack_high_water

@@ -1,7 +1,7 @@
-"""The numbers of the loops on a target: one declaration, from which C's table and a flight's values are made.
+"""Numbers of the loops on a target: the declarations of C's table, and the values of a flight.
 
-A target knows the parameters of Python's loops by their names, and what is derived from the vehicle by names of its
-own (FS_MASS …), because a vehicle file does not reach it. Indices in names count from zero, as in the arrays.
+A target has the parameters of the Python loops under the same names, and quantities derived from the vehicle file as
+FS_MASS etc. Indices in names count from zero, as in the arrays.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import DEFAULT_VEHICLE, GRAVITY_M_S2, Vehicle, load_vehicle
 
 CONTROLLERS = (attitude_pid.CONTROLLER, attitude_backstepping.CONTROLLER)
-"""The laws that exist in C; FS_CTRL is the index."""
+"""Controllers available in C; FS_CTRL is the index."""
 WIDEST = 1e6
-"""Range of gains and thrusts on a target: a gains file in the paper's units, or a heavy vehicle, goes beyond the
-ranges that Python declares, and Python stretches them for it; C's table is the same for every vehicle."""
+"""Range of gains and thrusts on a target. C's table is the same for every vehicle, while Python extends the declared
+ranges for gains files in the paper's units and for heavy vehicles."""
 _STRETCHED = ("POS_Z_", "POS_THR_", "PID_ROLL_", "PID_PITCH_", "PID_YAW_")
 
 
 class TargetNumber(NamedTuple):
-    """One number of the loops on a target."""
+    """Declaration of a number of the loops on a target."""
 
     name: str
     place: str
-    """Where it stands in C's ``fs_loops``."""
+    """Member of C's ``fs_loops``."""
     low: float
     high: float
     is_whole: bool = False
     integral: str = ""
-    """The memory that this gain multiplies, which is scaled when the gain changes; see ``Tunable.integrates``."""
+    """Member that this gain multiplies, scaled when the gain changes; see ``Tunable.integrates``."""
 
 
 def _tunable(tunable: Tunable, law: str) -> TargetNumber:
@@ -92,7 +92,7 @@ TARGET_NUMBERS: tuple[TargetNumber, ...] = (
     TargetNumber("FS_JR", "backstepping.rotor_inertia_kg_m2", 0.0, 1.0),
     *_mixer_numbers(),
 )
-"""All numbers that a target has, in the order of its table."""
+"""All numbers of a target, in the order of its table."""
 
 
 def target_numbers(
@@ -103,15 +103,15 @@ def target_numbers(
     inner_hz: float,
     divisor: int,
 ) -> dict[str, float]:
-    """Return the numbers that make a target's loops those of ``PythonLoops`` with the same arguments.
+    """Return the numbers that make a target's loops equal to ``PythonLoops`` with the same arguments.
 
-    The gains of the controller that does not fly are not among them: the target keeps what it has. Raise
-    ConfigError if the controller does not exist in C, or a number is beyond what the target takes.
+    Gains of the inactive controller are not included. Raise ConfigError if the controller does not exist in C or a
+    number is out of the target's range.
     """
     names = [known.name for known in CONTROLLERS]
     if controller.name not in names:
         known = ", ".join(names)
-        raise ConfigError("--controller", controller.name, f"exists in Python alone; in C there are {known}")
+        raise ConfigError("--controller", controller.name, f"exists in Python only; available in C: {known}")
     values = _loop_values(loop_numbers(vehicle, controller, gains, max_tilt_rad), controller)
     ix, iy, iz = vehicle.inertia_kg_m2
     values |= {
@@ -128,14 +128,18 @@ def target_numbers(
         "FS_JR": vehicle.mean_rotor_inertia_kg_m2,
         **_mixer_values(vehicle),
     }
+    _check_ranges(values)
+    return values
+
+
+def _check_ranges(values: Mapping[str, float]) -> None:
     for number in TARGET_NUMBERS:
         value = values.get(number.name, number.low)
         if not number.low <= value <= number.high:
             limits = f"{number.low:g} to {number.high:g}"
             raise ConfigError(
-                "--loops", f"{number.name}={value:g}", f"is beyond what a target takes, {limits}"
+                "--loops", f"{number.name}={value:g}", f"is outside the target's range {limits}"
             )
-    return values
 
 
 def _loop_values(numbers: LoopNumbers, controller: AttitudeController) -> dict[str, float]:
@@ -165,11 +169,11 @@ def _mixer_values(vehicle: Vehicle) -> dict[str, float]:
 
 
 def default_numbers() -> dict[str, float]:
-    """Return the numbers that a target starts with: default vehicle, gains and rates, and the gains of every law."""
+    """Return a target's initial numbers: default vehicle, gains and rates, with the gains of all controllers."""
     vehicle, values = load_vehicle(DEFAULT_VEHICLE), dict[str, float]()
     divisor = round(DEFAULT_INNER_HZ / DEFAULT_OUTER_HZ)
     tilt_rad = math.radians(SPECS[TILT].default)
-    for controller in reversed(CONTROLLERS):  # the first one flies
+    for controller in reversed(CONTROLLERS):  # the first one is active
         gains = open_gains(DEFAULT_GAINS)
         values |= target_numbers(vehicle, controller, gains, tilt_rad, DEFAULT_INNER_HZ, divisor)
     return values

@@ -1,8 +1,8 @@
-"""The flight stack's side of the link to loops that run on a target, without I/O.
+"""Client of loops that run on a target, without I/O.
 
-``start_…`` begins an operation, ``poll`` returns the octets to send, ``receive`` takes those that came, and
-``result`` or ``failure`` says how it ended. One operation at a time. A step is sent again until its own report comes:
-the target computes it once and repeats the report, so that nothing is skipped and nothing runs twice.
+``start_…`` begins an operation, ``poll`` returns bytes to send, ``receive`` processes received bytes, and ``result`` or
+``failure`` is the outcome. One operation runs at a time. A step is resent until its report arrives; the target computes
+it once and repeats the report, so that no step is skipped or computed twice.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ MOST_TEXTS = 50
 
 
 class PilTiming(NamedTuple):
-    """Waits of the protocol [s of whatever clock drives it]."""
+    """Timeouts of the protocol [s of the driving clock]."""
 
     timeout_s: float = 0.25
-    """Before an operation is sent again."""
+    """Timeout before an operation is resent."""
     attempts: int = 20
-    """Times that it is sent before the target counts as lost."""
+    """Number of attempts before the target counts as lost."""
 
 
 DEFAULT_TIMING = PilTiming()
@@ -46,25 +46,25 @@ DEFAULT_TIMING = PilTiming()
 
 @dataclass
 class PilCounters:
-    """What happened on the link so far."""
+    """Counters of the link."""
 
     operations: int = 0
     answers: int = 0
     resent: int = 0
     late: int = 0
-    """Reports of another step than the one under way: doubled, or too late."""
+    """Duplicate or late reports, of another step than the current one."""
     repeated: int = 0
-    """Reports that the target sent again: it had computed the step, and its first report was lost or late."""
+    """Reports repeated by the target because the first one was lost or late."""
     out_of_order: int = 0
     frames: int = 0
     bad: int = 0
-    """Stretches of octets that made no frame."""
+    """Runs of bytes that are no frame."""
     octets_sent: int = 0
     octets_received: int = 0
 
 
 class PilClient:
-    """Runs steps, sets numbers and asks for messages, on one target."""
+    """Runs steps, sets numbers and requests messages on one target."""
 
     def __init__(self, timing: PilTiming = DEFAULT_TIMING) -> None:
         self.timing = timing
@@ -77,31 +77,31 @@ class PilClient:
         self._step = -1
         self.counters = PilCounters()
         self.texts: deque[tuple[int, str]] = deque(maxlen=MOST_TEXTS)
-        """Severity and text of the newest texts of the target."""
+        """Severity and text of the newest status texts of the target."""
         self.failure: str | None = None
-        """Why the operation failed, as a clause about the target; None while it has not."""
+        """Why the operation failed, as a clause about the target, or None."""
 
     def start_step(self, flags: int, numbers: Sequence[float]) -> None:
-        """Run the next step; ``numbers`` (24,) are the state and the setpoint, or the state and a given target."""
+        """Run the next step; ``numbers`` (24,) are the state with the setpoint or attitude target."""
         self._step = (self._step + 1) & 0xFFFF_FFFF
         self._start(Step(self._step, flags, numbers))
 
     def start_set(self, name: str, value: float) -> None:
-        """Set a number of the target's and see it confirmed, bit for bit as float32."""
+        """Set a number of the target; its float32 value must be confirmed bit by bit."""
         self._start(SetNumber(name, value))
 
     def start_request(self, name: str) -> None:
-        """Ask for the message of this name."""
+        """Request the message of this name."""
         self._start(Request(name))
 
     @property
     def result(self) -> PilReport | Message | float | None:
-        """What the operation brought: a report, a number as read back, a message; None while it is under way."""
+        """Result of the operation: a report, the confirmed number or a message; None until then."""
         return None if self._operation is None else self._operation.result
 
     @property
     def attempts(self) -> int:
-        """How often the operation was sent."""
+        """Number of times the operation was sent."""
         return self._attempts
 
     @property
@@ -110,7 +110,7 @@ class PilClient:
         return self._step
 
     def receive(self, data: bytes, now_s: float) -> None:
-        """Take octets from the target; what is not for the operation under way is counted."""
+        """Process received bytes; count messages that do not belong to the current operation."""
         counters, reader = self.counters, self._reader
         counters.octets_received += len(data)
         faults = reader.faults
@@ -127,18 +127,18 @@ class PilClient:
     def _take_message(self, message: Message) -> None:
         if message.get_type() == "STATUSTEXT":
             self.texts.append((message.severity, message.text))
-        if self._is_under_way and self._operation is not None:
+        if self._is_active and self._operation is not None:
             self._operation.take_message(message)
 
     def _take_report(self, report: PilReport) -> None:
         counters, operation = self.counters, self._operation
         counters.repeated += report.is_repeated
         counters.out_of_order += report.is_out_of_order
-        if not self._is_under_way or not isinstance(operation, Step):
+        if not self._is_active or not isinstance(operation, Step):
             counters.late += 1
         elif not operation.take_report(report):
             counters.late += not report.is_out_of_order
-            if operation.is_refused:  # to wait would change nothing
+            if operation.is_refused:  # resend at once
                 operation.is_refused = False
                 self._deadline_s = -math.inf
 
@@ -153,7 +153,7 @@ class PilClient:
             self._deadline_s = None
 
     def poll(self, now_s: float) -> bytes:
-        """Return the octets to send now."""
+        """Return the bytes to send now."""
         operation = self._operation
         if operation is None or self._deadline_s is None or now_s < self._deadline_s:
             return b""
@@ -162,7 +162,7 @@ class PilClient:
             return b""
         if self._attempts:
             self.counters.resent += 1
-            self._forget_partial()
+            self._drop_partial()
         self._attempts += 1
         self._deadline_s = now_s + self.timing.timeout_s
         data = operation.frame(self._codec, self._sequence)
@@ -170,18 +170,18 @@ class PilClient:
         self.counters.octets_sent += len(data)
         return data
 
-    def _forget_partial(self) -> None:
-        """After a silence, the rest of a frame does not come: it must not swallow the next one."""
+    def _drop_partial(self) -> None:
+        """Drop an incomplete frame after a timeout, or it would absorb the next one."""
         if self._reader.has_partial:
             self.counters.bad += 1
             self._reader = FrameReader()
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        """Return when to poll next without received data; -inf for immediately, None for never."""
         return self._deadline_s
 
     @property
-    def _is_under_way(self) -> bool:
+    def _is_active(self) -> bool:
         return self._deadline_s is not None and self._attempts > 0
 
     def _start(self, operation: Operation) -> None:

@@ -1,7 +1,7 @@
-"""What the link to a target can be busy with: a step, a number, a message. Pure.
+"""Operations on a target: run a step, set a number, request a message. Pure.
 
-Steps and reports go by the thousand: they are packed and read by ``struct``, not as pymavlink's objects. A test holds
-the octets equal.
+Steps and reports are packed and unpacked by ``struct`` instead of pymavlink for speed. A test checks that the bytes
+equal pymavlink's.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ class PilReport(NamedTuple):
     step: int
     status: int
     cost: tuple[int, ...]
-    """Outer loop, inner loop, mixer, whole step, in the unit that the target names."""
+    """Cost of outer loop, inner loop, mixer and whole step, in the target's unit."""
     outputs: tuple[float, ...]
     """Attitude target (5), reference (10), wrench (4), wrench achieved (4), rotor commands (8)."""
 
     @classmethod
     def of(cls, frame: bytes) -> PilReport:
-        """Read a whole frame whose checksum is right."""
+        """Read a complete, verified frame."""
         header = HEADER_V1 if frame[0] == MAGIC_V1 else HEADER_V2
         payload = frame[header : header + frame[1]][: _REPORT_PAYLOAD.size]
         values = _REPORT_PAYLOAD.unpack(payload.ljust(_REPORT_PAYLOAD.size, b"\0"))
@@ -46,32 +46,32 @@ class PilReport(NamedTuple):
 
     @property
     def is_repeated(self) -> bool:
-        """Whether the step was computed before and is only answered again."""
+        """True for a repeated report of a step computed before."""
         return bool(self.status & REPEATED)
 
     @property
     def is_out_of_order(self) -> bool:
-        """Whether nothing was computed, because ``step`` was expected."""
+        """True if nothing was computed because the target expects ``step``."""
         return bool(self.status & OUT_OF_ORDER)
 
 
 class Operation(Protocol):
-    """What an operation sends and takes; the client does the waiting."""
+    """Messages of an operation; the client handles timeouts."""
 
     failure: str | None
 
     @property
     def result(self) -> PilReport | Message | float | None:
-        """What the operation brought; None while it is under way."""
+        """Result, or None until then."""
 
     def frame(self, codec: Link, sequence: int) -> bytes:
-        """Return what to send; each call is an attempt."""
+        """Return the frame to send in an attempt."""
 
     def take_message(self, message: Message) -> None:
-        """Take a message of the target's other than a report."""
+        """Process a message of the target other than a report."""
 
     def silence(self, attempts: int) -> str:
-        """Return why the operation fails when the target has not answered ``attempts`` times."""
+        """Return why the operation fails after ``attempts`` unanswered attempts."""
 
 
 class Step:
@@ -85,7 +85,7 @@ class Step:
         self._expected: int | None = None
         try:
             payload = _STEP_PAYLOAD.pack(number, flags, *numbers)
-        except OverflowError:  # beyond float32, which is infinite for the target
+        except OverflowError:  # beyond float32
             payload = _STEP_PAYLOAD.pack(number, flags, *map(as_float32, numbers))
         self._payload = payload.rstrip(b"\0") or b"\0"
 
@@ -96,39 +96,39 @@ class Step:
         )
 
     def take_report(self, report: PilReport) -> bool:
-        """Take a report; return whether it is this step's. ``is_refused``: it shows that the target is elsewhere."""
+        """Process a report; return True if it is of this step. Set ``is_refused`` if another step is expected."""
         if report.is_out_of_order:
             ahead = (report.step - self._number) & 0xFFFF_FFFF
-            if ahead > 1:  # else the target is where we are: an old or doubled step came to it
+            if ahead > 1:  # else an old or duplicate step reached the target
                 self._expected, self.is_refused = report.step, True
             return False
         if report.step != self._number:
             return False
         if report.status & BAD_INPUT:
-            self.failure = f"stopped its rotors at step {self._number}: it was given bad input"
-            self.result = report  # what it says of the step is kept
+            self.failure = f"stopped its rotors at step {self._number} because of invalid input"
+            self.result = report  # kept for the record
             return True
         self.result = report
         return True
 
     def take_message(self, message: Message) -> None:
-        """Take a message of the target's; a step has no use for any."""
+        """Ignore the message."""
 
     def silence(self, attempts: int) -> str:
         """Return why the step fails."""
         if self._expected is not None:
-            return f"expects step {self._expected}, not {self._number}: it has lost its place (was it restarted?)"
+            return f"expects step {self._expected}, not {self._number}: it may have been restarted"
         return f"did not answer step {self._number}, sent {attempts} times"
 
 
 class SetNumber:
-    """Sets one number and waits until it is read back."""
+    """Sets a number and waits for its confirmation."""
 
     def __init__(self, name: str, value: float) -> None:
         self.result: float | None = None
         self.failure: str | None = None
         self._name, self._value = name, as_float32(value)
-        self._told: float | None = None
+        self._reported: float | None = None
 
     def frame(self, codec: Link, sequence: int) -> bytes:
         """Return a PARAM_SET."""
@@ -143,7 +143,7 @@ class SetNumber:
         )
 
     def take_message(self, message: Message) -> None:
-        """Take a PARAM_VALUE or PARAM_ERROR of the number; a value that is another may be an old message."""
+        """Process a PARAM_VALUE or PARAM_ERROR of the number; another value may be an old message."""
         kind = message.get_type()
         if kind not in ("PARAM_VALUE", "PARAM_ERROR") or message.param_id != self._name:
             return
@@ -153,17 +153,17 @@ class SetNumber:
         elif _bits(message.param_value) == _bits(self._value):
             self.result = float(message.param_value)
         else:
-            self._told = float(message.param_value)
+            self._reported = float(message.param_value)
 
     def silence(self, attempts: int) -> str:
         """Return why the number could not be set."""
-        if self._told is not None:
-            return f"keeps {self._name}={self._told:g} instead of {self._value:g}"
+        if self._reported is not None:
+            return f"keeps {self._name}={self._reported:g} instead of {self._value:g}"
         return f"did not confirm {self._name}, sent {attempts} times"
 
 
 class Request:
-    """Asks for a message."""
+    """Requests a message."""
 
     def __init__(self, name: str) -> None:
         self.result: Message | None = None
@@ -172,7 +172,7 @@ class Request:
         self._id: int = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
 
     def frame(self, codec: Link, sequence: int) -> bytes:
-        """Return the command that asks."""
+        """Return MAV_CMD_REQUEST_MESSAGE."""
         command = mavlink.MAV_CMD_REQUEST_MESSAGE
         return codec.encode(
             mavlink.MAVLink_command_long_message(
@@ -181,16 +181,15 @@ class Request:
         )
 
     def take_message(self, message: Message) -> None:
-        """Take the message, or the answer that there is none."""
+        """Process the message, or the refusal of the request."""
         if message.get_type() == self._name:
             self.result = message
         elif _is_refusal(message):
-            self.failure = f"does not know {self._name}: other firmware runs there"
+            self.failure = f"does not support {self._name}: it runs other firmware"
 
     def silence(self, attempts: int) -> str:
-        """Return why there is no message."""
-        asked = f"did not answer when asked for {self._name}, {attempts} times"
-        return f"{asked}: is the firmware on it, and the baud rate right?"
+        """Return why the request fails."""
+        return f"did not answer {attempts} requests for {self._name}: check its firmware and the baud rate"
 
 
 _NOT_REFUSED = (
@@ -201,14 +200,14 @@ _NOT_REFUSED = (
 
 
 def _is_refusal(message: Message) -> bool:
-    """Tell whether a message says that the one asked for does not exist; who has no room for it is asked again."""
+    """Return True for a refusal of the request other than a temporary one."""
     if message.get_type() != "COMMAND_ACK" or message.command != mavlink.MAV_CMD_REQUEST_MESSAGE:
         return False
     return message.result not in _NOT_REFUSED
 
 
 def message_of(codec: Link, frame: Frame) -> Message | None:
-    """Decode a frame whose checksum is right; None for what the dialect lacks."""
+    """Decode a verified frame; return None for an unknown message."""
     return next(codec.decode(frame.data), None) if frame.known else None
 
 

@@ -1,4 +1,4 @@
-"""What is kept of a flight on a target: what each step cost, and how the link did."""
+"""Record of a flight on a target: cost of each step and statistics of the link."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ STEP_ROW = np.dtype(
         ("round_trip_s", "f8"),
     ]
 )
-"""One step: number, ``LoopFlags``, FS_PIL_REPORT.status, cost of outer loop, inner loop, mixer and whole step, how
-often it was sent, and the wall time from the first sending to the report."""
+"""One step: number, ``LoopFlags``, FS_PIL_REPORT.status, cost of outer loop, inner loop, mixer and whole step, number
+of attempts, and wall time from the first attempt to the report."""
 
 
 class PilRecord:
-    """Rows of all steps, and what is known of target and link."""
+    """Rows of all steps, and information about target and link."""
 
     def __init__(self, target: str, identity: dict[str, Any], status_at_start: dict[str, Any]) -> None:
-        """``status_at_start``: FS_PIL_STATUS before the first step; its counters go on from one flight to the next."""
+        """``status_at_start`` is FS_PIL_STATUS before the first step: its counters continue from earlier flights."""
         self._target, self._identity, self._status_at_start = target, identity, status_at_start
         self._rows: np.ndarray[Any, np.dtype[np.void]] = np.zeros(1024, STEP_ROW)
         self._count = 0
         self.status: dict[str, Any] | None = None
-        """The target's FS_PIL_STATUS after the last step; None if it did not tell."""
+        """FS_PIL_STATUS after the last step, or None."""
 
     def add(self, flags: int, report: PilReport, attempts: int, round_trip_s: float) -> None:
-        """Note a step. One alone before a reset is no flight: the loops are tried once before the first."""
+        """Record a step; discard a single trial step before the first flight."""
         if flags & LoopFlags.RESET and self._count == 1:
             self._count = 0
         if self._count == len(self._rows):
@@ -53,11 +53,11 @@ class PilRecord:
 
     @property
     def steps(self) -> np.ndarray[Any, np.dtype[np.void]]:
-        """The rows so far; see ``STEP_ROW``."""
+        """Recorded rows; see ``STEP_ROW``."""
         return self._rows[: self._count]
 
     def summary(self, counters: PilCounters, ending: str | None) -> dict[str, Any]:
-        """Return what goes to ``pil-link.json``."""
+        """Return the content of ``pil-link.json``."""
         trips = self.steps["round_trip_s"]
         return {
             "target": self._target,
@@ -71,7 +71,7 @@ class PilRecord:
         }
 
     def write(self, log: Path, counters: PilCounters, texts: list[str], ending: str | None) -> None:
-        """Write both files beside the flight's log; ``ending``: why the target was given up. Raise OSError."""
+        """Write both files beside the flight's log; ``ending`` is why the target failed. Raise OSError."""
         folder, prefix = log.parent, log.stem.removesuffix("flight")
         folder.mkdir(parents=True, exist_ok=True)
         content = {**self.summary(counters, ending), "texts": texts}

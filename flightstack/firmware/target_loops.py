@@ -1,4 +1,4 @@
-"""The loops on a target, behind a line of octets: connected, checked, given their numbers, and stepped."""
+"""Loops on a target behind a ``ByteLink``: identification, numbers and steps."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from flightstack.transports.byte_link import ByteLink
 
 NOTHING = (0.0,) * (TARGET_AT - SETPOINT_AT - ATTITUDE_TARGET_SIZE)
 MOST_READS = 100_000
-"""Reads of one attempt: a line that never falls silent must not keep a step waiting."""
-FAREWELL_ATTEMPTS = 6
-"""Times that the target is asked for its counters at the end, each with the line's own time-out."""
+"""Maximum reads per attempt, which bounds a step on a link with endless data."""
+FINAL_ATTEMPTS = 6
+"""Attempts to read the target's counters at the end."""
 
 
 class TargetLoops:
     """Loops on a target; implements ``c_loops.LoopExecutor``.
 
-    A number that changes is set, and read back, before the next step. Nothing here may hang: every wait is bounded by
-    the client's timing, on the line's own clock, which runs on by what a read waited in vain.
+    A changed number is set and confirmed before the next step. All waits are bounded by the client's timing on the
+    link's clock, which advances by the timeout of a read without data.
     """
 
     def __init__(
@@ -41,19 +41,17 @@ class TargetLoops:
         clock_s: Callable[[], float] = time.monotonic,
         expected_hash: bytes | None = None,
     ) -> None:
-        """Check the target and give it ``numbers``; raise TargetError, WrongFirmwareError.
+        """Check the target and set ``numbers``; raise TargetError, WrongFirmwareError.
 
-        ``expected_hash``: that of the sources which the target must have; None: of these here.
+        ``expected_hash`` is the source hash required of the target, by default that of this installation.
         """
         self._link, self._client, self._clock_s = link, PilClient(timing), clock_s
-        self._waited_s = 0.0  # on top of the clock: an emulated target waits in no time
+        self._waited_s = 0.0  # added to the clock: an emulated target waits without real time
         self._numbers: dict[str, float] = {}
-        self._pending: list[
-            tuple[str, float]
-        ] = []  # each in turn, as loops here are set: integrals follow each
+        self._pending: list[tuple[str, float]] = []  # set one by one: integrals are scaled at each
         self._is_closed = False
         self.ending: str | None = None
-        """Why the target was given up; None: it was not."""
+        """Why the target failed, or None."""
         self.input: FloatArray = np.zeros(INPUT_SIZE)
         self.output: FloatArray = np.zeros(OUTPUT_SIZE)
         identity = self._identify()
@@ -62,8 +60,12 @@ class TargetLoops:
             raise WrongFirmwareError(f"{link.name}: {problem}")
         self.identity = described(identity)
         self.record = PilRecord(link.name, self.identity, self._counters())
-        words = (self.identity["board"], f"sources {self.identity['source_hash']}", self.identity["compiler"])
-        self.version = f"C, float, {', '.join(words)}"
+        details = (
+            self.identity["board"],
+            f"sources {self.identity['source_hash']}",
+            self.identity["compiler"],
+        )
+        self.version = f"C, float, {', '.join(details)}"
         for name, value in numbers.items():
             self.set(name, value)
         self._send_numbers()
@@ -71,23 +73,23 @@ class TargetLoops:
     # ------------------------------------------------------------------ LoopExecutor
 
     def set(self, name: str, value: float) -> None:
-        """Change a number before the next step."""
-        value = as_float32(value) + 0.0  # no -0: not every target's FPU has one
+        """Set a number before the next step."""
+        value = as_float32(value) + 0.0  # + 0.0 turns -0 into 0: not every target's FPU supports -0
         if self._numbers.get(name) != value:
             self._numbers[name] = value
             self._pending.append((name, value))
 
     def get(self, name: str) -> float:
-        """Return a number as the target has it, or will have it at the next step; KeyError if it was never set."""
+        """Return a number as of the next step; raise KeyError if it was never set."""
         return self._numbers[name]
 
     def step(self, flags: int) -> None:
-        """Let the target compute a tick from ``input`` into ``output``; raise TargetError."""
+        """Run a tick on the target from ``input`` to ``output``; raise TargetError."""
         self._send_numbers()
         numbers = self.input.tolist()
-        if flags & LoopFlags.SET_TARGET:  # the given target travels in the setpoint's place
+        if flags & LoopFlags.SET_TARGET:  # the attitude target is sent in place of the setpoint
             if flags & LoopFlags.OUTER_DUE:
-                raise ValueError("a step has either a setpoint or a target")
+                raise ValueError("a step has either a setpoint or an attitude target")
             numbers = [*numbers[:SETPOINT_AT], *numbers[TARGET_AT:], *NOTHING]
         else:
             numbers = numbers[:TARGET_AT]
@@ -96,7 +98,7 @@ class TargetLoops:
         began_s = self._clock_s()
         try:
             self._finish()
-        finally:  # of a step that ended in the safe state there is a report as well
+        finally:  # a step that ended in the safe state has a report too
             report = client.result
             if isinstance(report, PilReport):
                 self.record.add(flags, report, client.attempts, self._clock_s() - began_s)
@@ -105,26 +107,26 @@ class TargetLoops:
         self.output[-1] = report.status & 0xFFFF
 
     def close(self) -> None:
-        """Ask the target for its counters and close the line; a second call does nothing."""
+        """Read the target's counters and close the link; a second call does nothing."""
         if self._is_closed:
             return
         self._is_closed = True
         try:
-            if self.ending is None or isinstance(self._client.result, PilReport):  # it answers
-                self.record.status = self._farewell()
+            if self.ending is None or isinstance(self._client.result, PilReport):  # the target responds
+                self.record.status = self._final_counters()
         finally:
             self._link.close()
 
     def write_record(self, log: Path) -> None:
-        """Write what is known of steps and link beside the flight's log; raise OSError."""
+        """Write the record of steps and link beside the flight's log; raise OSError."""
         texts = [text for _, text in self._client.texts]
         self.record.write(log, self._client.counters, texts, self.ending)
 
-    # ------------------------------------------------------------------ the line
+    # ------------------------------------------------------------------ link
 
     @property
     def counters(self) -> PilCounters:
-        """What happened on the line so far: frames sent again, lost, damaged."""
+        """Counters of the link."""
         return self._client.counters
 
     @property
@@ -132,27 +134,27 @@ class TargetLoops:
         return self._clock_s() + self._waited_s
 
     def _finish(self) -> Any:
-        """Drive the line until the client's operation has ended; return its result or raise TargetError."""
+        """Run the link until the operation ends; return its result or raise TargetError."""
         client, link = self._client, self._link
         try:
             while client.failure is None and client.result is None:
                 data = client.poll(self._now_s)
                 if data:
                     link.write(data)
-                self._listen()
-        except (OSError, RuntimeError) as error:  # the line is gone, or the emulated processor
+                self._receive()
+        except (OSError, RuntimeError) as error:  # link or emulated processor failed
             self.ending = str(error)
             raise TargetError(str(error)) from error
         if client.failure is not None:
             sentence = f"the target on {link.name} {client.failure}"
             if client.texts:
-                sentence += f"; it said: {client.texts[-1][1]}"
+                sentence += f"; its last message: {client.texts[-1][1]}"
             self.ending = sentence
             raise TargetError(sentence)
         return client.result
 
-    def _listen(self) -> None:
-        """Read until the operation has ended or its deadline has come."""
+    def _receive(self) -> None:
+        """Read until the end or deadline of the operation."""
         client, link = self._client, self._link
         for _ in range(MOST_READS):
             deadline_s = client.next_deadline()
@@ -165,7 +167,7 @@ class TargetLoops:
             data = link.read(left_s)
             if data:
                 client.receive(data, self._now_s)
-            else:  # an emulated target has let the time pass that the clock has not
+            else:  # time passed on an emulated target but not on the clock
                 self._waited_s += max(0.0, left_s - (self._clock_s() - before_s))
         self._waited_s += max(0.0, (client.next_deadline() or 0.0) - self._now_s)
 
@@ -179,10 +181,10 @@ class TargetLoops:
             self._finish()
             del self._pending[0]
 
-    def _farewell(self) -> dict[str, Any] | None:
-        """Return the target's own counters; None when it does not tell them, which ends no flight: it is over."""
+    def _final_counters(self) -> dict[str, Any] | None:
+        """Return the target's counters, or None if it does not respond."""
         client, ending = self._client, self.ending
-        client.timing = client.timing._replace(attempts=min(client.timing.attempts, FAREWELL_ATTEMPTS))
+        client.timing = client.timing._replace(attempts=min(client.timing.attempts, FINAL_ATTEMPTS))
         try:
             return self._counters()
         except TargetError:
@@ -191,7 +193,7 @@ class TargetLoops:
             self.ending = ending
 
     def _counters(self) -> dict[str, Any]:
-        """Ask the target for FS_PIL_STATUS; raise TargetError."""
+        """Request FS_PIL_STATUS; raise TargetError."""
         self._client.start_request("FS_PIL_STATUS")
         status: dict[str, Any] = self._finish().to_dict()
         status.pop("mavpackettype", None)
@@ -199,7 +201,7 @@ class TargetLoops:
 
 
 def wrong_firmware(identity: Any, expected_hash: bytes) -> str | None:
-    """Tell why the loops behind an FS_PIL_IDENTITY cannot fly, or None."""
+    """Return why the firmware of an FS_PIL_IDENTITY is incompatible, or None."""
     if identity.real_octets != 4:
         return (
             f"its loops compute with {8 * identity.real_octets} bits, not with 32: flash the firmware again"
@@ -213,7 +215,7 @@ def wrong_firmware(identity: Any, expected_hash: bytes) -> str | None:
 
 
 def described(identity: Any) -> dict[str, Any]:
-    """Return an FS_PIL_IDENTITY in words and numbers, as JSON holds them."""
+    """Return an FS_PIL_IDENTITY as a JSON object."""
     unit = identity.cost_unit
     return {
         "board": _board(identity),

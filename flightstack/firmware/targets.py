@@ -1,4 +1,4 @@
-"""Make the loops that fly from the word behind ``--loops``."""
+"""Create the loops of ``--loops``, and connect to their target."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from flightstack.firmware.target_loops import TargetLoops
 from flightstack.transports.byte_link import ByteLink, LineError
 from flightstack.transports.serial_port import SerialPort
 
-_PATIENCE_S = 5.0
+_EXIT_TIMEOUT_S = 5.0
 
 
 class HostTarget:
-    """Runs the program of ``build.host_program`` and is the line to it; implements ``ByteLink``."""
+    """Firmware as a process on a pseudo-terminal (``build.host_program``); implements ``ByteLink``."""
 
     name = "the host program"
 
     def __init__(self, program: Path) -> None:
-        """Start it; raise LineError. It ends by itself when this process does: its input closes then."""
+        """Start the program; raise LineError. It exits when its stdin closes, at the latest with this process."""
         try:
             self._process = subprocess.Popen(
                 [str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
@@ -46,11 +46,11 @@ class HostTarget:
         return self._process.pid
 
     def write(self, data: bytes) -> None:
-        """Send octets; raise LineError when the program is gone."""
+        """Send bytes; raise LineError if the program has ended."""
         self._port.write(data)
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what has come, b"" when nothing does within ``timeout_s``; raise LineError."""
+        """Return received bytes, b"" after ``timeout_s`` without any; raise LineError."""
         return self._port.read(timeout_s)
 
     def close(self) -> None:
@@ -64,21 +64,21 @@ class HostTarget:
         self._process.stdin.close()
         self._process.stdout.close()
         try:
-            self._process.wait(_PATIENCE_S)
+            self._process.wait(_EXIT_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
 
 
 EXCHANGE_BITS = 8000.0
-"""Bits of a step and its report twice over, in start and stop bits: what a slow line needs on top."""
+"""Bits of two exchanges with start and stop bits, added to the timeout of a slow serial port."""
 
 
 def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlBackend:
-    """Make the loops that ``loops`` names, with all their numbers; raise ConfigError, TargetError."""
+    """Return the loops of ``loops`` with all their numbers; raise ConfigError, TargetError."""
     choice = parse_loops(loops)
     if choice.is_target and not lockstep:
-        problem = f"loops on a target ({loops}) fly in lockstep alone: their link keeps no real time"
+        problem = f"loops on a target ({loops}) require lockstep: their link is not real-time"
         raise ConfigError("--clock", "realtime", problem)
     if choice.kind == PYTHON:
         return PythonLoops(
@@ -99,7 +99,7 @@ def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlB
 
 
 def open_link(choice: LoopsChoice) -> ByteLink:
-    """Open the line to a target, which is started if it is a program; raise BuildError, LineError."""
+    """Open the link to a target, and start it if it is a program; raise BuildError, LineError."""
     if choice.kind == SERIAL:
         return SerialPort(choice.device, choice.baud)
     if choice.kind == EMULATED:
@@ -109,7 +109,7 @@ def open_link(choice: LoopsChoice) -> ByteLink:
 
 def _emulated() -> ByteLink:
     try:
-        from flightstack.firmware.cortex_m4 import emulated_target  # noqa: PLC0415  # unicorn is an extra
+        from flightstack.firmware.cortex_m4 import emulated_target  # noqa: PLC0415  # unicorn is optional
         from flightstack.firmware.emulator import EmulationError  # noqa: PLC0415
     except ImportError as error:
         raise BuildError(f"unicorn is not installed: {INSTALL_FIRMWARE}") from error
@@ -120,14 +120,14 @@ def _emulated() -> ByteLink:
 
 
 def timing_of(choice: LoopsChoice) -> PilTiming:
-    """Return how long to wait for answers on the line."""
+    """Return the timeouts of a link."""
     if choice.kind != SERIAL:
         return DEFAULT_TIMING
     return DEFAULT_TIMING._replace(timeout_s=DEFAULT_TIMING.timeout_s + EXCHANGE_BITS / choice.baud)
 
 
 def connect(link: ByteLink, numbers: dict[str, float], timing: PilTiming = DEFAULT_TIMING) -> TargetLoops:
-    """Return the loops at the other end, with their numbers; closes the line when they cannot fly."""
+    """Return the loops on the target with their numbers; close the link on an error."""
     try:
         return TargetLoops(link, numbers, timing)
     except BaseException:
@@ -136,7 +136,7 @@ def connect(link: ByteLink, numbers: dict[str, float], timing: PilTiming = DEFAU
 
 
 def finish_loops(loops: ControlBackend, log: Path | None) -> None:
-    """End the loops; those of a target leave the record of their link beside ``log``. Raise OSError."""
+    """Close the loops and write the record of a target's link beside ``log``; raise OSError."""
     loops.close()
     if log is not None and isinstance(loops, CLoops) and isinstance(loops.executor, TargetLoops):
         loops.executor.write_record(log)

@@ -1,8 +1,8 @@
-"""The flight's log: a streaming ULog writer that costs a loop only the writing of its row.
+"""Streaming ULog writer.
 
-The loops write float64 rows into ``Trace`` arrays. Rows become bytes in bulk, and bytes go to the file in
-whole blocks, so that the file of a killed process is readable up to its last block. Nothing of the wall clock
-goes in: the same flight gives the same bytes.
+The loops write float64 rows into ``Trace`` arrays, which are converted and written in blocks, so that the file of a
+killed process is readable up to the last block. The log contains no wall clock times: the same flight gives the same
+bytes.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ DEFAULT_CAPACITY = 256
 
 
 class LogFile(Protocol):
-    """What the log needs of a file: ``open(path, "wb", buffering=0)`` has it."""
+    """Unbuffered binary file, such as ``open(path, "wb", buffering=0)``."""
 
     def write(self, data: bytes | memoryview, /) -> int | None:
-        """Write bytes; return how many were written."""
+        """Write bytes; return the number written."""
 
     def truncate(self, size: int, /) -> int:
         """Shorten the file; raise OSError."""
@@ -39,24 +39,20 @@ class LogFile(Protocol):
 
 
 class Trace:
-    """Rows waiting to be written: ``rows[:n]``, shape (capacity, columns), and ``times_us[:n]``.
-
-    A loop may write ``rows[n]`` and ``times_us[n]`` itself, add one to ``n`` and call ``FlightLog.flush``
-    when ``n`` has reached ``capacity``; ``append`` does the same at the cost of a call and a view.
-    """
+    """Buffered rows: ``rows[:n]``, shape (capacity, columns), and ``times_us[:n]``."""
 
     __slots__ = ("_each", "_flush", "capacity", "n", "rows", "times_us")
 
     def __init__(self, capacity: int, columns: int, flush: Callable[[], None]) -> None:
         self.capacity = capacity
         self.rows: FloatArray = np.zeros((capacity, columns))
-        self._each: list[FloatArray] = list(self.rows)  # a view made anew takes longer than one found
+        self._each: list[FloatArray] = list(self.rows)  # reused views: creating one takes longer
         self.times_us: TimeArray = np.zeros(capacity, np.uint64)
         self.n = 0
         self._flush = flush
 
     def append(self, time_us: int) -> FloatArray:
-        """Return the next row for the caller to fill before its next call; writes the trace out when full."""
+        """Return the next row, to be filled before the next call; flush a full trace first."""
         if self.n == self.capacity:
             self._flush()
         index = self.n
@@ -66,16 +62,16 @@ class Trace:
 
 
 class _EventTopic:
-    """Packs one message of an event topic."""
+    """Encoder of an event topic."""
 
     def __init__(self, topic: Topic, message_id: int, known: Mapping[str, float]) -> None:
-        """``known`` fields have these values in every message that does not give another."""
+        """``known`` replaces the default values of fields."""
         self._header = ulog.DATA_HEADER.pack(content_size(topic), ulog.DATA_TYPE, message_id)
         self._codes = "Q" + "".join(STRUCT_CODES[field.type] for field in topic.fields)
         self._wraps = [
             True,
             *(f.type == "uint64_t" or f.name in COUNTERS for f in topic.fields),
-        ]  # uint64_t: times
+        ]  # uint64_t fields are times
         self._pack = struct.Struct("<" + self._codes).pack
         self._defaults: dict[str, float] = {
             field.name: field.default if field.type in ("float", "double") else int(field.default)
@@ -84,7 +80,7 @@ class _EventTopic:
         self._defaults |= known
 
     def encode(self, time_us: int, fields: Mapping[str, float]) -> bytes:
-        """Return the message. Times and counters wrap, other integers saturate."""
+        """Return the message; times and counters wrap, other integers saturate."""
         values = {**self._defaults, **fields}
         if len(values) != len(self._defaults):
             raise TypeError(f"not a field of the topic: {sorted(set(fields) - set(self._defaults))}")
@@ -96,10 +92,10 @@ class _EventTopic:
 
 
 class FlightLog:
-    """Writes one flight into ``file``, which it owns from then on.
+    """Writes one flight to ``file`` and owns it.
 
-    A file that cannot be written (disk full) must not end the flight: the first error is kept in ``error``, the file
-    ends with the last whole message, and nothing more is written.
+    A write error (disk full) does not end the flight: the first one is stored in ``error``, the file is truncated after
+    the last complete message, and writing stops.
     """
 
     def __init__(self, file: LogFile, rotors: int, capacity: int = DEFAULT_CAPACITY) -> None:
@@ -108,7 +104,7 @@ class FlightLog:
         self.inner = Trace(capacity, LoopRow.SIZE, self.flush)
         self.outer = Trace(capacity, OUTER.size, self.flush)
         self.error: OSError | None = None
-        self._size = 0  # of what was written whole
+        self._size = 0  # bytes of complete messages
         self._closed = False
         first_outer_id = len(self._inner_topics)
         first_event_id = first_outer_id + len(OUTER_TOPICS)
@@ -128,7 +124,7 @@ class FlightLog:
         parameters: Mapping[str, float],
         origin: GeoPoint,
     ) -> None:
-        """Write header and definitions; ``origin`` is that of the local frame. Call once, first."""
+        """Write header and definitions; ``origin`` is the origin of the local frame. Call first, once."""
         self._outer_block = RowBlock(
             OUTER_TOPICS,
             self._first_outer_id,
@@ -147,7 +143,7 @@ class FlightLog:
         self._write(b"".join(parts))
 
     def flush(self) -> None:
-        """Write all waiting rows. The rows of both traces are free again."""
+        """Write and clear all buffered rows."""
         inner, outer = self.inner, self.outer
         if inner.n:
             self._write(self._inner_block.encode(inner.times_us[: inner.n], inner.rows[: inner.n]))
@@ -158,22 +154,22 @@ class FlightLog:
             outer.n = 0
 
     def event(self, topic: str, time_us: int, **fields: float) -> None:
-        """Write one message of an event topic, after the rows before it; fields left out have defaults."""
+        """Write a message of an event topic after the buffered rows; omitted fields have defaults."""
         self.flush()
         self._write(self._events[topic].encode(time_us, fields))
 
     def message(self, time_us: int, level: int, text: str) -> None:
-        """Write a text; ``level`` is its MAV_SEVERITY, 0 (emergency) to 7 (debug)."""
+        """Write a text with MAV_SEVERITY ``level``."""
         self.flush()
         self._write(ulog.logged_string(time_us, level, text))
 
     def parameter(self, name: str, value: float) -> None:
-        """Write a parameter's new value; it is in force after the rows before it."""
+        """Write a changed parameter after the buffered rows."""
         self.flush()
         self._write(ulog.parameter(name, value))
 
     def close(self) -> None:
-        """Write what waits and close the file; a second call does nothing."""
+        """Flush and close the file; a second call does nothing."""
         if self._closed:
             return
         self.flush()
@@ -184,7 +180,7 @@ class FlightLog:
             self.error = self.error or error
 
     def _write(self, data: bytes | memoryview, header_size: int = 0) -> None:
-        """Write whole messages, after ``header_size`` bytes that are none."""
+        """Write complete messages, preceded by ``header_size`` bytes of file header."""
         written = 0
         try:
             while self.error is None and written < len(data):
@@ -194,13 +190,13 @@ class FlightLog:
                 written += now
         except OSError as error:
             self.error = error
-            with contextlib.suppress(OSError):  # a pipe cannot
+            with contextlib.suppress(OSError):  # not possible for a pipe
                 self._file.truncate(self._size + ulog.whole_messages(data, written, header_size))
         self._size += written
 
 
 def vehicle_fields(vehicle: Vehicle) -> dict[str, str | int | float]:
-    """Return the info entries of a vehicle that reports need; without limits, ideal rotors have none."""
+    """Return the info entries of a vehicle; ideal rotors have no speed limits."""
     info: dict[str, str | int | float] = {
         "vehicle": vehicle.name,
         "rotor_count": len(vehicle.rotors),

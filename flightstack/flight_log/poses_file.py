@@ -1,7 +1,6 @@
-"""POSES.npz: where a vehicle was over time, what a picture of a flight is drawn from.
+"""Pose files (.npz): the poses of a vehicle over time, rendered by ``sim-bridge render``.
 
-A NumPy archive whose arrays have the names of the fields of :class:`Poses`. Whoever has
-poses writes it with :func:`write_poses`; ``sim-bridge render`` draws it.
+A NumPy archive with one array per field of ``Poses``.
 """
 
 from __future__ import annotations
@@ -31,14 +30,13 @@ _BAD_FILE = (
 
 
 class Poses(NamedTuple):
-    """A flight as poses over n moments.
+    """Poses of a flight at n times.
 
-    ``time_s`` (n,) increases; ``position_ned_m`` (n, 3) from home; ``attitude`` (n, 4) are unit quaternions, scalar
-    first, body FRD to world NED; ``rotor_speed_rad_s`` is (n, rotors). ``target_ned_m`` (n, 3), the setpoint, may
-    be NaN where there is none. ``waypoints_ned_m`` (m, 3) are the places that were planned. ``vehicle`` is the
-    name of a built-in vehicle or the path of its file; ``title`` is written into the picture.
-    ``waypoint_numbers`` (m,) are the whole numbers that the places are called by; where there are none they count
-    from 1.
+    ``time_s`` (n,) is increasing; ``position_ned_m`` (n, 3) is relative to home; ``attitude`` (n, 4) holds unit
+    quaternions, scalar first, body FRD to world NED; ``rotor_speed_rad_s`` is (n, rotors). ``target_ned_m`` (n, 3) is
+    the position setpoint, NaN without one. ``waypoints_ned_m`` (m, 3) are the planned positions, labelled with the
+    integers ``waypoint_numbers`` (m,), by default from 1. ``vehicle`` is the name of a built-in vehicle or
+    the path of its file. ``title`` is drawn into the picture.
     """
 
     time_s: FloatArray
@@ -53,7 +51,7 @@ class Poses(NamedTuple):
 
 
 def write_poses(path: Path, poses: Poses) -> None:
-    """Write the file, whole or not at all; raise OSError."""
+    """Write the file atomically; raise OSError."""
     buffer = io.BytesIO()
     arrays: dict[str, Any] = {name: np.asarray(value) for name, value in poses._asdict().items()}
     np.savez_compressed(buffer, **arrays)
@@ -61,17 +59,17 @@ def write_poses(path: Path, poses: Poses) -> None:
 
 
 def read_poses(path: Path) -> Poses:
-    """Read the file; raise ConfigError with the reason when it cannot be read or holds no poses."""
+    """Read the file; raise ConfigError if it cannot be read or is invalid."""
     try:
         with (
             path.open("rb") as raw,
             np.load(raw, allow_pickle=False) as file,
-        ):  # NumPy leaves damaged ones open
+        ):  # NumPy does not close damaged files
             content = {name: file[name] for name in Poses._fields if name in file}
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror or error}") from error
     except _BAD_FILE as error:
-        raise ConfigError(path, "", f"is no file of poses: {error}") from error
+        raise ConfigError(path, "", f"is not a pose file: {error}") from error
     return _checked(path, content)
 
 
@@ -89,7 +87,7 @@ def _checked(path: Path, content: dict[str, np.ndarray[Any, Any]]) -> Poses:
     time_s = numbers("time_s")
     count = len(time_s)
     if not count or not np.isfinite(time_s).all() or (np.diff(time_s) <= 0.0).any():
-        raise ConfigError(path, "time_s", "is not a row of increasing times")
+        raise ConfigError(path, "time_s", "is not a series of increasing times")
     speeds = content.get("rotor_speed_rad_s", np.zeros((count, 4)))
     rotors = speeds.shape[1] if speeds.ndim == 2 else 0
     if rotors > MAX_ROTORS:
@@ -105,20 +103,26 @@ def _checked(path: Path, content: dict[str, np.ndarray[Any, Any]]) -> Poses:
         str(content.get("title", "")),
         numbers("waypoint_numbers", default=NO_NUMBERS),
     )
+    _check_rows(path, poses)
+    norm = np.linalg.norm(poses.attitude, axis=1, keepdims=True)
+    if (norm < 0.5).any():
+        raise ConfigError(path, "attitude", "contains an invalid quaternion")
+    return poses._replace(attitude=poses.attitude / norm)
+
+
+def _check_rows(path: Path, poses: Poses) -> None:
+    """Raise ConfigError unless rows match ``time_s``, poses are finite and waypoint numbers are whole."""
     labels = poses.waypoint_numbers
     if (
         not np.isfinite(labels).all()
         or len(labels) not in (0, len(poses.waypoints_ned_m))
         or not (np.trunc(labels) == labels).all()
     ):
-        raise ConfigError(path, "waypoint_numbers", "is not a whole number for each of waypoints_ned_m")
+        raise ConfigError(path, "waypoint_numbers", "must be one integer per row of waypoints_ned_m")
     for name in ("position_ned_m", "attitude", "rotor_speed_rad_s", "target_ned_m"):
-        if len(getattr(poses, name)) != count:
-            raise ConfigError(path, name, f"has {len(getattr(poses, name))} rows, time_s has {count}")
+        rows, expected = len(getattr(poses, name)), len(poses.time_s)
+        if rows != expected:
+            raise ConfigError(path, name, f"has {rows} rows, time_s has {expected}")
     for name in ("position_ned_m", "attitude"):
         if not np.isfinite(getattr(poses, name)).all():
-            raise ConfigError(path, name, "holds what is not a number")
-    norm = np.linalg.norm(poses.attitude, axis=1, keepdims=True)
-    if (norm < 0.5).any():
-        raise ConfigError(path, "attitude", "holds what is no quaternion")
-    return poses._replace(attitude=poses.attitude / norm)
+            raise ConfigError(path, name, "contains values that are not finite")

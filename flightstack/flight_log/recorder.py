@@ -1,4 +1,4 @@
-"""From the autopilot's events to flight logs: one log for each flight, from arming to disarming."""
+"""Record the autopilot's events and loops in flight logs, one per flight from arming to disarming."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OpenLog = Callable[[], FlightLog | None]
 
 
 class FlightRecorder:
-    """Implements the autopilot's ``Recorder``. While no log is open, rows go to a scratch row."""
+    """Implements the autopilot's ``Recorder``. Without an open log, rows go to a scratch row."""
 
     def __init__(
         self,
@@ -36,7 +36,7 @@ class FlightRecorder:
         parameters: Callable[[], Mapping[str, float]],
         home: GeoPoint,
     ) -> None:
-        """``parameters`` returns the present values, which begin a log; ``home`` is the local frame's origin too."""
+        """``parameters`` returns the values at the start of a log; ``home`` is the origin of the local frame."""
         self._open_log = open_log
         self._info = info
         self._parameters = parameters
@@ -46,10 +46,10 @@ class FlightRecorder:
         scratch = np.zeros(LoopRow.SIZE)
         self._no_row: Callable[[int], FloatArray] = lambda _: scratch
         self.inner_row: Callable[[int], FloatArray] = self._no_row
-        """Return the row that the inner loop fills in this tick, given its time; that of no log while none is open."""
+        """Return the row for the inner loop at a time [µs]; the scratch row without an open log."""
         sizes = (OUTER.size, STATE_SIZE, SETPOINT_SIZE, ATTITUDE_TARGET_SIZE)
         self._store_outer = direct(store_outer_row, *(np.zeros(size) for size in sizes), 0)
-        outer_heading(np.zeros((0, OUTER.size)))  # compiled here, not when the log is first written
+        outer_heading(np.zeros((0, OUTER.size)))  # compile now and not at the first write
         self._mission = (MissionProgress(0, -1, False, False), 0)
         self._missions = 0
         self._armed = False
@@ -57,11 +57,11 @@ class FlightRecorder:
 
     @property
     def is_logging(self) -> bool:
-        """Whether a log is being written."""
+        """True while a log is open."""
         return self._log is not None
 
     def discard_row(self) -> None:
-        """Forget the newest row of ``inner_row``: the loops failed before they filled it."""
+        """Discard the newest row of ``inner_row``, which failing loops did not fill."""
         if self._log is not None and self._log.inner.n:
             self._log.inner.n -= 1
 
@@ -73,15 +73,15 @@ class FlightRecorder:
         attitude_target: FloatArray,
         loop_flags: int,
     ) -> None:
-        """Record one outer tick; ``loop_flags`` say what the loops began it with, 0 while they rest."""
+        """Record one outer tick; ``loop_flags`` are ``LoopFlags``, 0 while the loops are idle."""
         if self._log is None:
             return
         row = self._log.outer.append(time_us)
         self._store_outer(row, state, setpoint, attitude_target, loop_flags)
 
     def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
-        """Record mode and arming, and whether a failsafe acts; arming begins a log, disarming ends it."""
-        if status.armed and not self._armed:  # not again in a flight whose log could not be written
+        """Record mode, arming state and active failsafe; arming starts a log and disarming ends it."""
+        if status.armed and not self._armed:  # not again in a flight whose log failed
             self._begin(time_us)
         self._armed = status.armed
         if self._log is None:
@@ -147,7 +147,7 @@ class FlightRecorder:
         )
 
     def timing(self, time_us: int, **figures: float) -> None:
-        """Record the timing of the loops; only what is the same in every run of the same flight, in lockstep."""
+        """Record the timing of the loops; in lockstep only deterministic values."""
         if self._log is not None:
             self._log.event("loop_timing", time_us, **figures)
 
@@ -162,14 +162,14 @@ class FlightRecorder:
             self._log.message(time_us, severity, text)
 
     def take_error(self) -> OSError | None:
-        """Return the error that ended a log early, once; None if there is none. The flight goes on without a log."""
+        """Return the error that ended a log early and clear it, or None. The flight continues without a log."""
         if self._log is not None and self._log.error is not None:
             self.close()
         error, self._error = self._error, None
         return error
 
     def close(self) -> None:
-        """End the log in good order; a later flight opens the next."""
+        """Close the log; the next flight opens another."""
         if self._log is not None:
             self._log.close()
             self._error = self._log.error

@@ -1,4 +1,4 @@
-"""Rows of a trace to ULog data messages, in bulk: one row becomes one message of every topic of the block."""
+"""Bulk conversion of trace rows to ULog data messages: one message of each topic per row."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TIMESTAMP = "Q"
 
 
 def content_size(topic: Topic) -> int:
-    """Size [bytes] of a data message's content: subscription id, timestamp and fields."""
+    """Return the size [bytes] of a data message: subscription id, timestamp and fields."""
     return 2 + 8 + sum(_field_dtype(field).itemsize for field in topic.fields)
 
 
@@ -29,7 +29,7 @@ def _field_dtype(field: Field) -> np.dtype[Any]:
 
 
 class RowBlock:
-    """Packs rows into a buffer of packed records, laid out once; what never changes is filled in once."""
+    """Converts rows in a preallocated buffer of packed records; constants are written once."""
 
     def __init__(
         self,
@@ -38,7 +38,7 @@ class RowBlock:
         capacity: int,
         constants: Mapping[str, float] | None = None,
     ) -> None:
-        """Lay out ``capacity`` rows. ``constants`` holds the values of fields without a source, by name."""
+        """Lay out ``capacity`` rows. ``constants`` are values of fields without a source, by name."""
         columns: list[tuple[str, Any]] = []
         for topic in topics:
             columns.append((f"{topic.name}.header", "V5"))
@@ -70,7 +70,7 @@ class RowBlock:
     def encode(self, times_us: TimeArray, rows: FloatArray) -> memoryview:
         """Return the messages of ``rows``, shape (n, columns), n ≤ capacity; valid until the next call.
 
-        Values that their type cannot hold become infinite (floats) or undefined (integers), never an error.
+        Out-of-range values become infinite (floats) or undefined (integers) and raise no error.
         """
         count = len(rows)
         with np.errstate(over="ignore", invalid="ignore"):

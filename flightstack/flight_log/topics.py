@@ -1,7 +1,7 @@
-"""What the log holds: the columns of the traces (the inner loop's: ``LoopRow``) and the topics made of them.
+"""Topics of the log: those sampled from the traces of the loops, and those written at events.
 
-Topics and fields have PX4's names where they mean the same. Fields come largest type first, as PX4
-lays them out, so that no padding is needed.
+Topics and fields have PX4's names where the meaning is the same. Fields are sorted by type size, as in PX4, so that no
+padding is needed. The columns of the inner loop's trace are ``LoopRow``.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ Derived: TypeAlias = Callable[[FloatArray], FloatArray]
 
 
 class OuterColumns(NamedTuple):
-    """First column of each group in a row of the outer loop's trace; ``size`` is the length of a row."""
+    """First column of each group in the outer loop's trace; ``size`` is the row length."""
 
     state: int = 0  # VehicleState, 13
     setpoint: int = 13  # PositionSetpoint, 11
     target_attitude: int = 24  # AttitudeTarget: quaternion, 4
     target_thrust: int = 28  # AttitudeTarget: thrust [N]
-    loop_flags: int = 29  # LoopFlags, 0 while the loops rest
+    loop_flags: int = 29  # LoopFlags, 0 while the loops are idle
     size: int = 30
 
 
@@ -37,9 +37,9 @@ ATTITUDE_AT = OUTER.state + 6
 
 
 class Field(NamedTuple):
-    """One field, an array if it has a ``length``.
+    """A field, an array if ``length`` is not 0.
 
-    ``source``: first column of the trace, a function of its rows, or None for a constant.
+    ``source`` is the first column of the trace, a function of its rows, or None for a constant.
     """
 
     type: str
@@ -50,7 +50,7 @@ class Field(NamedTuple):
 
 
 class Topic(NamedTuple):
-    """A topic; every topic starts with ``uint64_t timestamp`` [µs]."""
+    """A topic; its first field is ``uint64_t timestamp`` [µs]."""
 
     name: str
     fields: tuple[Field, ...]
@@ -58,7 +58,7 @@ class Topic(NamedTuple):
 
 @compiled
 def outer_heading(rows: FloatArray) -> FloatArray:
-    """Return the headings [rad] of rows of the outer loop's trace, shape (n, 30)."""
+    """Return the heading [rad] of each row of the outer loop's trace, shape (n, 30)."""
     headings = np.empty(len(rows))
     for i in range(len(rows)):
         w, x, y, z = (
@@ -72,7 +72,7 @@ def outer_heading(rows: FloatArray) -> FloatArray:
 
 
 def inner_topics(rotors: int) -> tuple[Topic, ...]:
-    """Topics written at the inner loop's rate, for a vehicle with ``rotors`` rotors."""
+    """Return the topics written at the inner loop's rate for a vehicle with ``rotors`` rotors."""
     return (
         Topic("vehicle_attitude", (Field("float", "q", 4, LoopRow.STATE.start + 6),)),
         Topic("vehicle_angular_velocity", (Field("float", "xyz", 3, LoopRow.STATE.start + 10),)),
@@ -139,7 +139,7 @@ OUTER_TOPICS = (
     ),
     Topic(
         "vehicle_attitude_setpoint",
-        # PX4's thrust_body is normalised; ours is in newtons, so it has a name of its own
+        # in newtons, unlike PX4's normalised thrust_body
         (
             Field("float", "q_d", 4, OUTER.target_attitude),
             Field("float", "thrust_n", 0, OUTER.target_thrust),
@@ -232,7 +232,7 @@ EVENT_TOPICS = (
             Field("bool", "from_external"),
         ),
     ),
-    # Figures taken from the wall clock stay NaN in lockstep, where the same flight must give the same bytes.
+    # wall clock figures are NaN in lockstep, where the log must be deterministic
     Topic(
         "loop_timing",
         (

@@ -1,7 +1,7 @@
-"""The messages of a ULog file as bytes, per PX4's ULog file format (version 1). Pure.
+"""Encoding of ULog messages, version 1 of PX4's ULog file format. Pure.
 
-A file is a header, the definitions (flag bits, formats, info, parameters), then the data section
-(subscriptions, data, logged strings). Every message is: uint16 size, uint8 type, content, little-endian.
+A file has a header, definitions (flag bits, formats, info, parameters) and a data section (subscriptions, data, logged
+strings). A message is uint16 size, uint8 type, content, little-endian.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ VERSION = 1
 _MESSAGE = struct.Struct("<HB")
 _SUBSCRIPTION = struct.Struct("<BH")
 _LOGGED_STRING = struct.Struct("<BQ")
-_FLAG_BITS = bytes(40)  # no compatible or incompatible flag, no appended data
+_FLAG_BITS = bytes(40)  # no flags, no appended data
 _MAX_CONTENT = 0xFFFF
 
 HEADER_SIZE = len(MAGIC) + 1 + 8
@@ -33,12 +33,12 @@ def _message(kind: str, content: bytes) -> bytes:
 
 
 def file_header(time_us: int) -> bytes:
-    """Return the file header and the flag bits, which must come first. ``time_us``: start of the log."""
+    """Return the file header and the flag bits; ``time_us`` is the start of the log."""
     return MAGIC + struct.pack("<BQ", VERSION, time_us) + _message("B", _FLAG_BITS)
 
 
 def whole_messages(data: bytes | memoryview, count: int, begin: int = 0) -> int:
-    """Return how many of the first ``count`` bytes are whole messages; they begin after ``begin`` other bytes."""
+    """Return how many of the first ``count`` bytes are complete messages after ``begin`` header bytes."""
     end = begin
     while end + _MESSAGE.size <= count:
         after = end + _MESSAGE.size + _MESSAGE.unpack_from(data, end)[0]
@@ -60,7 +60,7 @@ def _keyed(kind: str, key: str, value: bytes) -> bytes:
 
 
 def information(key: str, value: str | int | float) -> bytes:
-    """Return an information message; an int is stored as int32_t where it fits, a float as double."""
+    """Return an information message; an int is stored as int32_t if it fits, else int64_t, a float as double."""
     if isinstance(value, str):
         text = value.encode()
         return _keyed("I", f"char[{len(text)}] {key}", text)
@@ -72,7 +72,7 @@ def information(key: str, value: str | int | float) -> bytes:
 
 
 def parameter(name: str, value: float) -> bytes:
-    """Return a parameter: an int as int32_t, a float as float, the two types that ULog allows."""
+    """Return a parameter, as int32_t or float."""
     if isinstance(value, int):
         return _keyed("P", f"int32_t {name}", struct.pack("<i", int32(value)))
     return _keyed("P", f"float {name}", struct.pack("<f", fitted(value, "f", wraps=False)))

@@ -1,1 +1,1 @@
-"""MAVLink without I/O: dialect, frames, links, signing, and messages that both ends share."""
+"""MAVLink without I/O: dialect, frames, links, signing, and messages shared by vehicle and ground station."""

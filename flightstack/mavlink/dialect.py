@@ -1,9 +1,9 @@
-"""The dialect that both sides of every link speak: common.xml (pymavlink's) and the messages it has not got.
+"""The MAVLink dialect: pymavlink's common.xml and the messages of ``flightstack.xml``.
 
-``mavlink`` is pymavlink's module of common.xml with the messages of ``flightstack.xml`` registered under
-pymavlink's usual names (``MAVLink_available_modes_message``, ``MAVLINK_MSG_ID_AVAILABLE_MODES``), so that every
-codec made from it (``mavlink.MAVLink``) knows them. MISSION_COUNT, MISSION_ACK and MISSION_CURRENT take the place of
-pymavlink's, which lack their last fields: plan ids, zero when left out.
+``mavlink`` is pymavlink's module of common.xml. The messages of ``flightstack.xml`` are registered there under
+pymavlink's names (``MAVLink_available_modes_message``, ``MAVLINK_MSG_ID_AVAILABLE_MODES``), so that every codec
+(``mavlink.MAVLink``) supports them. MISSION_COUNT, MISSION_ACK and MISSION_CURRENT replace pymavlink's versions, which
+lack the plan ids at the end.
 """
 
 from __future__ import annotations

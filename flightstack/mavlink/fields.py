@@ -1,4 +1,12 @@
-"""Numbers as the fixed-size fields of messages and logs hold them. Pure."""
+"""Values of message and log fields: numbers fitted into their ranges, and text made safe to print. Pure.
+
+An out-of-range value never prevents sending: ``Link.encode`` packs each message as it is and fits it only on failure.
+
+* A time (unsigned with 32 bits or more and a unit of time; the signed nanoseconds of TIMESYNC) and a counter
+  (``COUNTERS``) wrap: ``time_boot_ms`` after 49.7 days, as specified.
+* Any other integer saturates; a value that is not finite becomes 0.
+* A floating-point number beyond single precision becomes infinite.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +20,7 @@ from flightstack.mavlink.dialect import mavlink
 _SINGLE = struct.Struct("<f")
 _SIZES = {"b": 8, "h": 16, "i": 32, "q": 64}
 RANGES: dict[str, tuple[int, int]] = {"?": (0, 1)}
-"""Smallest and largest value of each integer code of ``struct``."""
+"""Minimum and maximum of each integer code of ``struct``."""
 for _code, _bits in _SIZES.items():
     RANGES[_code] = -(1 << _bits - 1), (1 << _bits - 1) - 1
     RANGES[_code.upper()] = 0, (1 << _bits) - 1
@@ -24,34 +32,31 @@ COUNTERS = frozenset({
     "frames", "bad_frames", "skipped_octets", "uart_overruns", "dropped_frames", "uart_errors",
     "loop_overruns", "safe_states",
 })  # fmt: skip
-"""Fields of messages and topics that count, and wrap.
-
-Other unsigned fields saturate: a quantity need not have a unit, as ``eph`` and ``rssi``.
+"""Counters in messages and topics, which wrap. Other unsigned fields saturate, also without a unit (``eph``, ``rssi``).
 """
 
 
 def whole(value: float, low: int, high: int) -> int:
-    """Round a quantity into an integer field, saturated; a value that is not finite becomes 0."""
+    """Round to an integer in [low, high], saturated; 0 for a value that is not finite."""
     if not isinstance(value, int) and not math.isfinite(value):
         return 0
     return max(low, min(high, round(value)))
 
 
 def int16(value: float) -> int:
-    """Round a quantity into a signed 16-bit field."""
+    """Round to a signed 16-bit integer, saturated."""
     return whole(value, -32768, 32767)
 
 
 def int32(value: float) -> int:
-    """Round a quantity into a signed 32-bit field."""
+    """Round to a signed 32-bit integer, saturated."""
     return whole(value, -(2**31), 2**31 - 1)
 
 
 def fitted(value: float, code: str, wraps: bool) -> float:
-    """Return ``value`` as a field of the ``struct`` code ``code`` holds it.
+    """Return ``value`` fitted into a field of the ``struct`` code ``code``.
 
-    An integer that ``wraps`` is taken modulo the field's range, as clocks and counters are; any other saturates.
-    A floating-point number too large for its field becomes infinite.
+    Integers wrap or saturate; a floating-point number beyond the field's range becomes infinite.
     """
     if code in RANGES:
         low, high = RANGES[code]
@@ -69,7 +74,7 @@ def fitted(value: float, code: str, wraps: bool) -> float:
 
 
 PACKING_ERRORS = (struct.error, OverflowError)
-"""What ``pack`` raises for a value that its field cannot hold."""
+"""Raised by ``pack`` for a value out of range."""
 
 STRUCT_CODES = {
     "int8_t": "b", "uint8_t": "B", "int16_t": "h", "uint16_t": "H", "int32_t": "i", "uint32_t": "I",
@@ -88,7 +93,7 @@ class _Field(NamedTuple):
 
 @cache
 def _number_fields(kind: Any) -> tuple[_Field, ...]:
-    """Return the fields of a message class that hold numbers."""
+    """Return the numeric fields of a message class."""
     units = kind.fieldunits_by_name
     fields = []
     for name, field_type in zip(kind.fieldnames, kind.fieldtypes, strict=True):
@@ -101,7 +106,7 @@ def _number_fields(kind: Any) -> tuple[_Field, ...]:
 
 
 def fit(message: Any) -> None:
-    """Bring every number of ``message`` into the range of its field, in place."""
+    """Fit all numbers of ``message`` into their fields, in place."""
     for name, code, wraps in _number_fields(message.__class__):
         value = getattr(message, name)
         is_number = isinstance(value, (int, float))
@@ -113,10 +118,10 @@ REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 
 
 def clean(text: str) -> str:
-    """Return ``text`` on one line, with nothing in it that a terminal obeys or that hides other characters.
+    """Return ``text`` on one line without characters that control a terminal or hide others.
 
-    White space of any kind is a space. Other characters that are not printable (control characters of C0 and C1,
-    escape, marks of text direction, lone surrogates) are replaced by U+FFFD.
+    Whitespace becomes a space. Other non-printable characters (C0 and C1 controls, escape, text direction marks, lone
+    surrogates) become U+FFFD.
     """
     if text.isprintable():
         return text

@@ -1,4 +1,4 @@
-"""The files that a vehicle shows over MAVLink FTP: read only, made up or on a disk, behind one protocol."""
+"""Files in transfer: read-only files that a vehicle offers over MAVLink FTP, and files received in pieces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Entry(NamedTuple):
 
 
 class VirtualFile(Protocol):
-    """An open file. Its size is fixed when it is opened."""
+    """An open file; its size is fixed at opening."""
 
     @property
     def size(self) -> int:
@@ -27,7 +27,7 @@ class VirtualFile(Protocol):
         ...
 
     def close(self) -> None:
-        """Give the file back."""
+        """Close the file."""
         ...
 
 
@@ -35,16 +35,16 @@ class VirtualFiles(Protocol):
     """A tree of directories and files. Paths are relative to its root: ``"a/b"``; ``""`` is the root."""
 
     def list(self, path: str) -> list[Entry] | None:
-        """Return what is in the directory ``path``, always in the same order; None if there is none."""
+        """Return the entries of the directory ``path`` in a stable order; None if it does not exist."""
         ...
 
     def open(self, path: str) -> VirtualFile | None:
-        """Open the file at ``path``; None if there is none. Raise OSError when it cannot be read."""
+        """Open the file at ``path``; return None if it does not exist. Raise OSError."""
         ...
 
 
 Content: TypeAlias = Callable[[str], bytes | None]
-"""Makes a file's bytes when it is opened, from what follows "?" in its path; None: no such file."""
+"""Returns the bytes of a file at opening, given the arguments after "?" in its path; None for no such file."""
 
 
 class BytesFile:
@@ -63,24 +63,24 @@ class BytesFile:
         return self._content[offset : offset + count]
 
     def close(self) -> None:
-        """Do nothing: there is nothing to give back."""
+        """Do nothing."""
 
 
 def fixed(content: bytes) -> Content:
-    """Return the content of a file that never changes, and takes no arguments."""
+    """Return the ``Content`` of a constant file without arguments."""
     return lambda arguments: None if arguments else content
 
 
 def clean_path(path: str) -> str | None:
-    """Return ``path`` without empty parts and leading slash; None when it holds "." or ".." as a part."""
+    """Return ``path`` without empty parts and leading slash; None if a part is "." or ".."."""
     parts = [part for part in path.split("/") if part]
     return None if any(part in (".", "..") for part in parts) else "/".join(parts)
 
 
 class FileTree:
-    """Joins single files and whole trees to one tree, like a table of mounts.
+    """Combines single files and mounted trees into one tree.
 
-    ``files`` maps paths to contents, ``mounts`` directories to trees; all paths as ``clean_path`` gives them.
+    ``files`` maps paths to contents, ``mounts`` maps directories to trees; paths have the form of ``clean_path``.
     """
 
     def __init__(self, files: Mapping[str, Content], mounts: Mapping[str, VirtualFiles]) -> None:
@@ -88,7 +88,7 @@ class FileTree:
         self._mounts = dict(mounts)
 
     def list(self, path: str) -> list[Entry] | None:
-        """Return what is in the directory ``path``; None if there is none."""
+        """Return the entries of the directory ``path``; None if it does not exist."""
         cleaned = clean_path(path)
         if cleaned is None:
             return None
@@ -107,7 +107,7 @@ class FileTree:
         ]
 
     def open(self, path: str) -> VirtualFile | None:
-        """Open the file at ``path``, which may end in "?" and arguments; None if there is none."""
+        """Open the file at ``path``, which may end in "?" and arguments; return None if it does not exist."""
         name, _, arguments = path.partition("?")
         cleaned = clean_path(name)
         if cleaned is None:
@@ -132,15 +132,15 @@ class FileTree:
 
 
 MAX_SIZE = 2**30
-"""Bytes of the largest file that is fetched: whatever a vehicle says, memory is not without end."""
+"""Largest file that is downloaded; bounds memory whatever size the vehicle reports."""
 
 
 class PartialFile:
-    """A file of known size that arrives in pieces, in any order and any number of times."""
+    """A file of known size received in pieces, in any order and with repetitions."""
 
     def __init__(self, size: int) -> None:
         self.content = bytearray(size)
-        self._gaps: list[tuple[int, int]] = [(0, size)] if size else []  # begin, end; in order, apart
+        self._gaps: list[tuple[int, int]] = [(0, size)] if size else []  # [begin, end), sorted and disjoint
         self._left = size
 
     @property
@@ -150,16 +150,16 @@ class PartialFile:
 
     @property
     def left(self) -> int:
-        """Bytes that have not come."""
+        """Missing bytes."""
         return self._left
 
     @property
     def first(self) -> int:
-        """Where the first gap begins; the size of the file if there is none."""
+        """Offset of the first gap; the size of a complete file."""
         return self._gaps[0][0] if self._gaps else self.size
 
     def fill(self, offset: int, data: bytes) -> int:
-        """Take a piece; return how many of its bytes were missing. Bytes beyond the end are dropped."""
+        """Store a piece; return how many of its bytes were missing. Bytes beyond the end are dropped."""
         end = min(offset + len(data), self.size)
         if offset >= end:
             return 0
@@ -176,7 +176,7 @@ class PartialFile:
     def _split(
         self, begin: int, end: int
     ) -> tuple[list[tuple[int, int]], list[tuple[int, int]], list[tuple[int, int]]]:
-        """Return the gaps before, those that have bytes in [begin, end), and those after."""
+        """Return the gaps before, overlapping, and after [begin, end)."""
         first = next((i for i, gap in enumerate(self._gaps) if gap[1] > begin), len(self._gaps))
         last = next((i for i in range(first, len(self._gaps)) if self._gaps[i][0] >= end), len(self._gaps))
         return self._gaps[:first], self._gaps[first:last], self._gaps[last:]
@@ -191,7 +191,7 @@ class PartialFile:
         return total
 
     def pieces(self, size: int) -> Iterator[tuple[int, int]]:
-        """Yield (offset, count) of what is missing, in order and in pieces of ``size`` at most."""
+        """Yield (offset, count) of the missing bytes in order, in pieces of at most ``size``."""
         for start, stop in self._gaps:
             for offset in range(start, stop, size):
                 yield offset, min(size, stop - offset)

@@ -1,8 +1,7 @@
-"""Find MAVLink frames in bytes: bounded in memory and in work, whatever arrives. Pure.
+"""MAVLink frames: packing, and parsing of byte streams with bounded memory and work. Pure.
 
-pymavlink's own search keeps every octet it has seen as long as one frame is incomplete, and drops a whole
-would-be frame on a fault, with the good ones inside it. This one holds less than one frame, and looks again right
-behind the faulty start.
+pymavlink's parser keeps all received bytes while a frame is incomplete, and on an error drops a whole apparent frame
+with the good frames inside it. The parsers here hold less than one frame and resume right after a false start.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ the message id as 16 and 8 bits."""
 CHECKSUM_SIZE, SIGNATURE_SIZE = 2, 13
 LARGEST_FRAME = HEADER_V2 + 255 + CHECKSUM_SIZE + SIGNATURE_SIZE
 MAX_FAULTS = 32
-"""So many false starts in one piece of data, and the rest of it is not worth looking at."""
+"""False starts in one piece of data after which the rest of it is dropped."""
 
-# a frame begins here: of version 2 only with flags that the specification lets us understand (0x01: signed)
+# start of a frame; version 2 only with known incompatibility flags (0x01: signed)
 _BEGINNING = re.compile(rb"\xfd.[\x00\x01]|\xfe|\xfd.?\Z", re.DOTALL)
 
 
@@ -52,37 +51,37 @@ def message_id_of(frame: bytes) -> int:
 
 
 class Frame(NamedTuple):
-    """One frame as it was received."""
+    """A received frame."""
 
     data: bytes
     message_id: int
     known: bool
-    """Whether the dialect has the message. The checksum of an unknown one cannot be verified."""
+    """True if the dialect has the message. The checksum of an unknown one cannot be verified."""
 
 
 class FrameReader:
-    """Cuts a stream, or datagrams, into frames."""
+    """Splits a byte stream or datagrams into frames."""
 
     def __init__(self) -> None:
         self._rest = b""
         self.faults = 0
-        """Runs of octets that are no frame."""
+        """Runs of bytes that are no frame."""
 
     @property
     def partial_size(self) -> int:
-        """Bytes kept of a frame whose rest has not come; less than one frame."""
+        """Bytes held of an incomplete frame."""
         return len(self._rest)
 
     @property
     def has_partial(self) -> bool:
-        """Tell whether the beginning of a frame is held."""
+        """True if an incomplete frame is held."""
         return bool(self._rest)
 
     def feed(self, data: bytes | bytearray | memoryview) -> list[Frame]:
         """Return the frames that ``data`` completes."""
         new = bytes(data)
         if self._rest and _begins_with_frame(new):
-            self._rest = b""  # a frame does not go on after another one: what is held was none
+            self._rest = b""  # a frame does not continue after another one: the held bytes were none
             self.faults += 1
         buffer = self._rest + new
         frames: list[Frame] = []
@@ -108,7 +107,7 @@ class FrameReader:
 
 
 def frame_size(buffer: bytes, start: int) -> int | None:
-    """Return the size of the frame that begins at ``start``; None while its header is too short to tell."""
+    """Return the size of the frame at ``start``, or None if its header is incomplete."""
     if start + 3 > len(buffer):
         return None
     if buffer[start] == MAGIC_V1:
@@ -118,15 +117,15 @@ def frame_size(buffer: bytes, start: int) -> int | None:
 
 
 def checked(data: bytes) -> Frame | None:
-    """Return the frame that ``data`` is, or None when its checksum is wrong.
+    """Return the frame in ``data``, or None for a wrong checksum.
 
-    Unknown messages are frames in version 2 only, where two octets of the header have to fit.
+    Unknown messages are accepted in version 2 only, where two more header bytes must match.
     """
     message_id = message_id_of(data)
     end = (HEADER_V1 if data[0] == MAGIC_V1 else HEADER_V2) + data[1]
     kind = mavlink.mavlink_map.get(message_id)
     if data[0] == MAGIC_V1 and (kind is None or data[1] > kind.unpacker.size):
-        return None  # one in 256 octets of noise begins such a frame: only a checksum may speak for it
+        return None  # one in 256 noise bytes starts such a frame: only a checksum can confirm it
     if kind is None:
         return Frame(data, message_id, known=False)
     if checksum(data[1:end], kind.crc_extra) != data[end : end + CHECKSUM_SIZE]:
@@ -135,7 +134,7 @@ def checked(data: bytes) -> Frame | None:
 
 
 def _begins_with_frame(data: bytes) -> bool:
-    """Tell whether ``data`` begins with a whole frame whose checksum was verified."""
+    """Return True if ``data`` begins with a complete frame with a verified checksum."""
     if not _BEGINNING.match(data):
         return False
     size = frame_size(data, 0)
@@ -146,27 +145,29 @@ def _begins_with_frame(data: bytes) -> bool:
 
 
 class FrameFinder:
-    """Cuts a stream into known frames whose checksum is right; all other bytes are junk.
+    """Finds all intact frames of the simulator link among any other bytes.
 
-    It keeps at most the beginning of one frame.
+    ``FrameReader`` waits for the rest of an apparent frame and gives up after many false starts, which suits ground
+    links, where lost messages are resent. In lockstep a frame held back would stop both sides, so this parser also
+    searches behind an incomplete frame. It keeps at most one incomplete frame.
     """
 
     def __init__(self) -> None:
         self._held = b""
         self.junk = 0
-        """Stretches of bytes that were no frame."""
+        """Runs of bytes that are no frame."""
 
     @property
     def partial_size(self) -> int:
-        """Bytes kept of a frame whose rest has not come; less than one frame."""
+        """Bytes held of an incomplete frame."""
         return len(self._held)
 
     def find(self, data: bytes | memoryview) -> list[bytes]:
-        """Take ``data`` and return the frames that are complete now."""
+        """Return the frames that ``data`` completes."""
         stream = self._held + bytes(data)
         frames: list[bytes] = []
         decided, at = 0, 0
-        incomplete: int | None = None  # the first beginning whose rest has not come
+        incomplete: int | None = None  # start of the first incomplete frame
         while (match := _BEGINNING.search(stream, at)) is not None:
             start = match.start()
             size = frame_size(stream, start)

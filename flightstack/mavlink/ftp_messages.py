@@ -1,4 +1,4 @@
-"""MAVLink FTP's packet inside FILE_TRANSFER_PROTOCOL, per https://mavlink.io/en/services/ftp.html.
+"""Packets of MAVLink FTP in FILE_TRANSFER_PROTOCOL, per https://mavlink.io/en/services/ftp.html.
 
 Little-endian: uint16 sequence number, uint8 session, opcode, size, requested opcode, burst complete, padding,
 uint32 offset, then up to 239 bytes of data.
@@ -25,7 +25,7 @@ UINT32 = struct.Struct("<I")
 
 
 class Opcode(IntEnum):
-    """What a packet asks for or answers."""
+    """Request or response code of a packet."""
 
     NONE = 0
     TERMINATE_SESSION = 1
@@ -48,7 +48,7 @@ class Opcode(IntEnum):
 
 
 class FtpError(IntEnum):
-    """Why a request failed: the first byte of a NAK's data."""
+    """Error code: the first data byte of a NAK."""
 
     NONE = 0
     FAIL = 1
@@ -78,29 +78,29 @@ ERROR_TEXTS: dict[int, str] = {
 
 
 class Packet(NamedTuple):
-    """One request or answer. ``opcode`` and ``request`` are plain integers: the wire may hold any."""
+    """One request or response. ``opcode`` and ``request`` are plain integers: any value may be received."""
 
     sequence: int
     session: int
     opcode: int
     size: int
-    """Bytes in ``data``, or bytes asked for."""
+    """Bytes in ``data``, or bytes requested."""
     request: int = 0
-    """The opcode that an answer answers."""
+    """Opcode of the request that this packet answers."""
     burst_complete: bool = False
     offset: int = 0
     data: bytes = b""
 
     @property
     def path(self) -> str | None:
-        """The path in ``data``, up to its first NUL; None if it is not text."""
+        """The path in ``data``, up to its first NUL; None if it is not UTF-8."""
         try:
             return self.data.split(b"\x00", 1)[0].decode()
         except UnicodeDecodeError:
             return None
 
     def pack(self) -> bytes:
-        """Return the payload of FILE_TRANSFER_PROTOCOL, without the zeros at its end."""
+        """Return the payload of FILE_TRANSFER_PROTOCOL, without trailing zeros."""
         return (
             _HEADER.pack(
                 self.sequence,
@@ -121,9 +121,9 @@ def next_sequence(sequence: int, steps: int = 1) -> int:
 
 
 def read_packet(message: Message) -> Packet:
-    """Return the packet of a FILE_TRANSFER_PROTOCOL message; without data when its size cannot be.
+    """Return the packet of a FILE_TRANSFER_PROTOCOL message, without data if its size is invalid.
 
-    A request to read carries no data; its ``size`` says how much it wants.
+    ``size`` of a read request is the number of bytes requested.
     """
     payload = bytes(message.payload)
     sequence, session, opcode, size, request, burst_complete, offset = _HEADER.unpack_from(payload)
@@ -134,10 +134,10 @@ def read_packet(message: Message) -> Packet:
 
 
 class FtpMessage(mavlink.MAVLink_file_transfer_protocol_message):  # type: ignore[misc]
-    """FILE_TRANSFER_PROTOCOL whose payload stays bytes: pymavlink packs 251 integers one by one."""
+    """FILE_TRANSFER_PROTOCOL with a bytes payload: pymavlink packs 251 integers one by one."""
 
     def pack(self, mav: object, force_mavlink1: bool = False) -> bytes:
-        """Return the frame; MAVLink 2 leaves out zeros at the end of the payload, MAVLink 1 does not."""
+        """Return the frame; MAVLink 2 drops trailing zeros of the payload, MAVLink 1 does not."""
         content = _TARGETS.pack(self.target_network, self.target_system, self.target_component)
         content += bytes(self.payload)
         frame: bytes = self._pack(mav, self.crc_extra, content, force_mavlink1=force_mavlink1)
@@ -145,13 +145,13 @@ class FtpMessage(mavlink.MAVLink_file_transfer_protocol_message):  # type: ignor
 
 
 def ftp_message(target: Address, packet: Packet) -> Message:
-    """Return the message that carries ``packet`` to ``target``."""
+    """Return the message with ``packet`` for ``target``."""
     return FtpMessage(0, *target, packet.pack().ljust(_PAYLOAD, b"\x00"))
 
 
 def mavlink_crc32(data: bytes, crc: int = 0) -> int:
     """Return MAVLink's CRC-32 of ``data``, continued from ``crc``: polynomial 0xEDB88320, start and end 0.
 
-    It differs from zlib's, which starts from all ones and inverts the end.
+    zlib's starts with all ones and inverts the result.
     """
     return zlib.crc32(data, crc ^ _CRC_START) ^ _CRC_START

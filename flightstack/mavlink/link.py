@@ -1,4 +1,4 @@
-"""One MAVLink link without I/O: bytes in, messages out, and back, with sequence numbers of its own."""
+"""A MAVLink link without I/O: encoder and decoder with its own sequence numbers, and addressing of messages."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ Message: TypeAlias = Any
 """A pymavlink message object."""
 
 SILENT_AFTER_S = 5.0
-"""A peer that sent nothing valid for so long counts as gone: five heartbeats are missing."""
+"""Timeout of a peer without valid messages: five missed heartbeats."""
 
 
 class Link:
-    """Encodes and decodes one link. Bytes that make no message are counted, never raised."""
+    """Encoder and decoder of one link. Invalid bytes are counted and raise no error."""
 
     def __init__(
         self,
@@ -36,9 +36,9 @@ class Link:
         keeps_unknown: bool = False,
         signing: LinkSigning | None = None,
     ) -> None:
-        """``keeps_unknown``: let ``decode`` yield messages that the dialect lacks too, to be passed on.
+        """With ``keeps_unknown``, ``decode`` also yields messages unknown to the dialect, for forwarding.
 
-        ``signing``: sign what is sent, and count as bad what is not signed as it should be.
+        With ``signing``, sent messages are signed, and received ones without a required signature count as bad.
         """
         self._signing = signing
         self._codec = mavlink.MAVLink(None, system_id, component_id)
@@ -52,7 +52,7 @@ class Link:
     def encode(self, message: Message) -> bytes:
         """Return the frame of ``message`` with this link's next sequence number.
 
-        Values that their fields cannot hold are brought into range in ``message`` (``fields.fit``).
+        Out-of-range values are fitted in ``message`` (``fields.fit``).
         """
         try:
             frame: bytes = message.pack(self._codec)
@@ -67,15 +67,15 @@ class Link:
         return frame if self._signing is None else self._signing.outgoing(frame, message.crc_extra)
 
     def encode_shared(self, message: Message) -> bytes:
-        """Do as ``encode``, for a message that goes to several links and does not change between.
+        """Return the frame of an unchanged message that is sent on several links.
 
-        The payload is packed by the first of them. The others have to write header and checksum only.
+        The first link packs the payload; the others add header and checksum only.
         """
         codec = self._codec
         payload: bytes | None = message.get_payload()
         packed = (
             payload is not None and len(payload) == message.get_header().mlen
-        )  # of a received one it is not
+        )  # false for a received message
         if payload is None or not packed:
             return self.encode(message)
         number = message.get_msgId()  # ``id`` may be a field
@@ -90,15 +90,15 @@ class Link:
 
     @property
     def has_partial(self) -> bool:
-        """Tell whether the decoder holds the beginning of a frame."""
+        """True if the decoder holds an incomplete frame."""
         return self._reader.has_partial
 
     def decode(self, data: bytes) -> Iterator[Message]:
-        """Yield the messages that ``data`` completes; what is not a message is counted in ``bad``.
+        """Yield the messages that ``data`` completes; count other bytes in ``bad``.
 
-        Each has its frame as it was received in ``get_msgbuf()``. Its texts are clean: they may be shown.
+        ``get_msgbuf()`` returns the received frame. Text fields are safe to print.
         """
-        if self._is_one_frame(data):  # the usual datagram: no need to look for frames
+        if self._is_one_frame(data):  # typical datagram: no search for frames
             message = self._message(data)
             if message is not None:
                 yield message
@@ -117,7 +117,7 @@ class Link:
                     yield _unknown(frame)
 
     def _message(self, frame: bytes) -> Message | None:
-        """Decode one known frame; None when its checksum or signature is wrong."""
+        """Decode one known frame; return None for a wrong checksum or signature."""
         if self._signing is not None and not self._signing.accepts(frame):
             self.bad += 1
             return None
@@ -132,7 +132,7 @@ class Link:
         return message
 
     def _is_one_frame(self, data: bytes) -> bool:
-        """Tell whether ``data`` is one whole unsigned frame that we know and no beginning of another is held."""
+        """Return True if ``data`` is exactly one known, unsigned frame and no incomplete frame is held."""
         payload_size = len(data) - HEADER_V2 - CHECKSUM_SIZE
         if payload_size < 0 or data[0] != MAGIC_V2 or data[2] != 0:
             return False
@@ -142,12 +142,12 @@ class Link:
 
 
 def is_unknown(message: Message) -> bool:
-    """Tell whether the dialect lacks ``message``: its checksum could not be verified."""
+    """Return True for a message unknown to the dialect, with an unverified checksum."""
     return isinstance(message, mavlink.MAVLink_unknown)
 
 
 def _unknown(frame: Frame) -> Message:
-    """Return pymavlink's stand-in for a message that the dialect lacks, with its sender."""
+    """Return pymavlink's placeholder for an unknown message, with its sender."""
     message = mavlink.MAVLink_unknown(frame.message_id, frame.data)
     sequence, system, component = frame.data[2:5] if frame.data[0] == MAGIC_V1 else frame.data[4:7]
     header = mavlink.MAVLink_header(frame.message_id, 0, 0, frame.data[1], sequence, system, component)
@@ -163,15 +163,15 @@ class Address(NamedTuple):
 
 
 def sender(message: Message) -> Address:
-    """Return who sent ``message``."""
+    """Return the sender of ``message``."""
     return Address(message.get_srcSystem(), message.get_srcComponent())
 
 
 def is_for(message: Message, own: Address) -> bool:
-    """Tell whether a message with a target is for ``own``; 0 is for everyone."""
+    """Return True if a message is addressed to ``own`` or broadcast (0)."""
     return message.target_system in (0, own.system) and message.target_component in (0, own.component)
 
 
 def is_from(message: Message, peer: Address) -> bool:
-    """Tell whether ``message`` comes from ``peer``, whose component may be 0 for any."""
+    """Return True if ``message`` comes from ``peer``; component 0 matches any."""
     return message.get_srcSystem() == peer.system and peer.component in (0, message.get_srcComponent())

@@ -1,4 +1,4 @@
-"""LOG_DATA as bytes: what both sides of the log protocol share."""
+"""LOG_DATA messages with their data as bytes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _LAYOUT = struct.Struct("<IHB90s")
 
 
 class LogDataMessage(mavlink.MAVLink_log_data_message):  # type: ignore[misc]
-    """LOG_DATA whose data stays bytes: pymavlink packs 90 integers one by one."""
+    """LOG_DATA with bytes as data: pymavlink packs 90 integers one by one."""
 
     def pack(self, mav: object, force_mavlink1: bool = False) -> bytes:
         """Return the frame."""
@@ -22,5 +22,5 @@ class LogDataMessage(mavlink.MAVLink_log_data_message):  # type: ignore[misc]
 
 
 def log_data_message(log_id: int, offset: int, data: bytes) -> LogDataMessage:
-    """Return the message of up to 90 bytes of a log; none say that it ends at ``offset``."""
+    """Return LOG_DATA with up to 90 bytes; without data, ``offset`` is the end of the log."""
     return LogDataMessage(log_id, offset, len(data), data.ljust(BLOCK, b"\x00"))

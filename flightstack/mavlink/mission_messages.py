@@ -1,4 +1,4 @@
-"""What both sides of the mission protocol share: timing, and items to and from messages.
+"""Mission protocol elements shared by vehicle and ground station: timing, and items to and from messages.
 
 The protocol: https://mavlink.io/en/services/mission.html
 """
@@ -30,34 +30,32 @@ PROTOCOL = frozenset(
         "MISSION_SET_CURRENT",
     }
 )
-"""Messages of the protocol that go to a vehicle."""
+"""Messages of the protocol sent to a vehicle."""
 
 GOES_THERE, CHANGES_ALTITUDE = 2, 3
-"""Values of an item's ``current`` that make it no part of a plan: fly there now (``ground.guided_items``)."""
+"""Values of ``current`` for guided items, which are no part of a plan (``services.mission.guided_items``)."""
 
 _ITEM = struct.Struct("<ffffiifHB?")
 
 
 class Timing(NamedTuple):
-    """Waits of the protocol [s of whatever clock drives it]; the recommended values of the specification."""
+    """Timeouts of the protocol [s of the driving clock], with the specification's recommended values."""
 
     timeout_s: float = 1.5
-    """Before any message but a request for an item is sent again."""
+    """Timeout before a message other than an item request is resent."""
     item_timeout_s: float = 0.25
-    """Before a request for an item is sent again."""
+    """Timeout before an item request is resent."""
     retries: int = 5
-    """How often a message but a request for an item is sent again."""
+    """Number of retries of a message other than an item request."""
     silence_s: float = 5.0
-    """How long items are asked for without any answer.
+    """Timeout of item requests without any answer, as in PX4.
 
-    PX4's value. The five retries that the specification recommends would last 1.5 s: with 20 % loss each way,
-    one item in 460 would be lost by all six attempts, so that half of all missions of 320 items would fail.
+    The five retries recommended by the specification last 1.5 s: at 20 % loss each way, one item in 460 fails all six
+    attempts, and with it half of all missions of 320 items.
     """
 
     settle_s: float = 0.5
-    """Quiet time between two operations of one client that late messages could mix.
-
-    No message says which transfer it belongs to.
+    """Quiet time between two operations of one client, because messages do not identify their transfer.
     """
 
 
@@ -65,7 +63,7 @@ DEFAULT_TIMING = Timing()
 
 
 def item_from_message(message: Message) -> MissionItem:
-    """Return the item of a MISSION_ITEM_INT or a (deprecated, float) MISSION_ITEM."""
+    """Return the item of a MISSION_ITEM_INT or of the deprecated MISSION_ITEM."""
     x, y = message.x, message.y
     if message.get_type() == "MISSION_ITEM":
         is_global = message.frame in GLOBAL_FRAMES
@@ -86,7 +84,7 @@ def message_from_item(
     is_current: bool = False,
     is_int: bool = True,
 ) -> Message:
-    """Return the MISSION_ITEM_INT of an item, or the MISSION_ITEM, good to about a metre only."""
+    """Return the MISSION_ITEM_INT of an item, or the MISSION_ITEM, with a resolution of about a metre."""
     floats = [as_float32(value) for value in (*item.params, item.z)]
     x: float = item.x
     y: float = item.y
@@ -101,18 +99,15 @@ def message_from_item(
 
 
 def ack_message(to: Address, result: int, mission_type: int, opaque_id: int = 0) -> Message:
-    """Return a MISSION_ACK; the id is that of the plan that a vehicle has accepted."""
+    """Return a MISSION_ACK with the id of the accepted plan."""
     return mavlink.MAVLink_mission_ack_message(to.system, to.component, result, mission_type, opaque_id)
 
 
 def mission_id(items: Sequence[MissionItem]) -> int:
-    """Return a number that stands for the contents of a plan; 0 for an empty one.
-
-    It is MAVLink's opaque id: the same plan has it whenever and by whomever it was uploaded.
-    """
+    """Return MAVLink's opaque id of a plan, a checksum of its contents; 0 for an empty plan."""
     checksum = 0
     for item in items:
-        # one NaN for all: senders have many, which mean the same
+        # one NaN for all bit patterns of NaN
         floats = [math.nan if math.isnan(v) else as_float32(v) for v in (*item.params, item.z)]
         checksum = zlib.crc32(
             _ITEM.pack(*floats[:4], item.x, item.y, floats[4], item.command, item.frame, item.autocontinue),

@@ -1,13 +1,14 @@
-"""All parameters in one small file, ``@PARAM/param.pck``: the format of ArduPilot's AP_Filesystem_Param.
+"""All parameters in one file, ``@PARAM/param.pck``, in the format of ArduPilot's AP_Filesystem_Param.
 
-MAVProxy and QGroundControl fetch it over MAVFTP in place of a list. A header of three little-endian uint16 (magic,
-parameters in this file, parameters in all), and for each parameter, in the order of names:
+MAVProxy and QGroundControl download it over MAVFTP instead of the parameter list. It has a header of three
+little-endian uint16 (magic, parameters in this file, parameters in total) and for each parameter, in order of names:
 
 * type in the low four bits (3: int32, 4: float32), flags in the high ones (bit 0: a default follows the value);
-* letters shared with the name before in the low four bits, number of the other letters less one in the high ones;
-* the other letters; the value; the default, if it differs and was asked for.
+* number of letters shared with the previous name in the low four bits, number of further letters less one in the high
+  ones;
+* the further letters; the value; the default, if it differs and was requested.
 
-ArduPilot pads with zeros so that no value crosses a block while it changes; ours is a snapshot and needs none.
+ArduPilot pads with zeros so that no changing value crosses a block; this file is a snapshot without padding.
 """
 
 from __future__ import annotations
@@ -27,16 +28,16 @@ _MOST_SHARED = 15
 
 
 class PackRequest(NamedTuple):
-    """What is asked for behind the ``?`` of the file's name."""
+    """Arguments after the ``?`` of the file name."""
 
     start: int = 0
     limit: int = 0
-    """Most parameters; 0: all from ``start`` on."""
+    """Maximum number of parameters; 0 for all from ``start`` on."""
     with_defaults: bool = False
 
 
 class PackedParameter(NamedTuple):
-    """One parameter in the file; ``default`` is the value itself when the file says nothing else."""
+    """One parameter in the file; ``default`` equals the value if the file has none."""
 
     name: str
     value: float
@@ -45,7 +46,7 @@ class PackedParameter(NamedTuple):
 
 
 def parse_pack_request(arguments: str) -> PackRequest | None:
-    """Read ``start=N&count=N&withdefaults=1``; unknown arguments are ignored, bad ones make None."""
+    """Parse ``start=N&count=N&withdefaults=1``, ignoring unknown arguments; None for a bad one."""
     request = PackRequest()
     for part in arguments.split("&"):
         key, _, text = part.partition("=")
@@ -65,13 +66,13 @@ def parse_pack_request(arguments: str) -> PackRequest | None:
 
 
 def pack_file(store: ParamStore, arguments: str) -> bytes | None:
-    """Return the file for what follows the ``?`` of its name; None when it asks for what there is not."""
+    """Return the file for the arguments after the ``?`` of its name; None for bad arguments."""
     request = parse_pack_request(arguments)
     return None if request is None else pack_parameters(store, request)
 
 
 def pack_parameters(store: ParamStore, request: PackRequest = PackRequest()) -> bytes | None:  # noqa: B008  (immutable)
-    """Return the file; None when there is no parameter at ``request.start``."""
+    """Return the file; None without a parameter at ``request.start``."""
     names = sorted(store.specs)
     if request.start >= len(names):
         return None
@@ -103,7 +104,7 @@ def _entry(store: ParamStore, name: str, before: str, with_defaults: bool) -> by
 
 
 def unpack_parameters(data: bytes) -> Iterator[PackedParameter]:
-    """Yield the parameters of a file; raise ValueError when it is none, or is cut."""
+    """Yield the parameters of a file; raise ValueError for an invalid or truncated file."""
     if len(data) < _HEADER.size:
         raise ValueError("a parameter file has a header of 6 bytes")
     magic, count, _total = _HEADER.unpack_from(data)
@@ -114,7 +115,7 @@ def unpack_parameters(data: bytes) -> Iterator[PackedParameter]:
         while data[at : at + 1] == b"\0":  # padding
             at += 1
         if len(data) < at + 2:
-            raise ValueError("the parameter file is cut short")
+            raise ValueError("the parameter file is truncated")
         kind, lengths = data[at], data[at + 1]
         codec = {_TYPE_INT32: _INT, _TYPE_FLOAT: _FLOAT}.get(kind & 0xF)
         if codec is None:
@@ -122,7 +123,7 @@ def unpack_parameters(data: bytes) -> Iterator[PackedParameter]:
         value_at = at + 3 + (lengths >> 4)
         at = value_at + codec.size * (2 if kind & _HAS_DEFAULT else 1)
         if at > len(data):
-            raise ValueError("the parameter file is cut short")
+            raise ValueError("the parameter file is truncated")
         before = before[: lengths & 0xF] + data[value_at - 1 - (lengths >> 4) : value_at]
         value = float(codec.unpack_from(data, value_at)[0])
         default = float(codec.unpack_from(data, at - codec.size)[0])

@@ -1,6 +1,6 @@
-"""How parameter values travel: in the bits of a float, as PX4 and the MAVLink specification have it.
+"""Encoding of parameter values in the bits of a float, as in PX4 and MAVLink's specification.
 
-A REAL32 parameter is the float itself, an INT32 parameter its four bytes in the float's place (not its value).
+REAL32 is the float itself; INT32 is the bit pattern of the integer, not its value.
 https://mavlink.io/en/services/parameter.html#parameter-encoding
 """
 
@@ -20,28 +20,28 @@ REAL32: int = mavlink.MAV_PARAM_TYPE_REAL32
 UINT32: int = mavlink.MAV_PARAM_TYPE_UINT32
 
 LARGEST_INTEGER = 2**22
-"""Integers up to this size survive every codec: the bits of some beyond it are a signalling NaN, which
-a codec that passes through a 64-bit float (pymavlink's, on x86) changes."""
+"""Largest integer that every codec preserves: some beyond it have the bits of a signalling NaN, which codecs that
+convert to a 64-bit float (pymavlink on x86) change."""
 
 HASH_NAME = "_HASH_CHECK"
-"""Name under which PX4 sends the digest of all parameters; QGroundControl then uses those that it remembers."""
+"""Name of PX4's digest of all parameters, by which QGroundControl validates its parameter cache."""
 NO_INDEX = 65535
-"""Index of a PARAM_VALUE outside of the list."""
+"""Index of a PARAM_VALUE that is not in the list."""
 
 _FLOAT, _INT, _UNSIGNED = struct.Struct("<f"), struct.Struct("<i"), struct.Struct("<I")
 _ALL_ONES = 0xFFFFFFFF
 
 
 class Parameter(NamedTuple):
-    """One parameter as it was told by a vehicle."""
+    """A parameter received from a vehicle."""
 
     name: str
     value: float
     is_integer: bool
     place: int
-    """Its index in the vehicle's list."""
+    """Index in the vehicle's list."""
     total: int
-    """Number of parameters that the vehicle has."""
+    """Number of parameters of the vehicle."""
 
 
 def type_of(is_integer: bool) -> int:
@@ -50,19 +50,19 @@ def type_of(is_integer: bool) -> int:
 
 
 def wire_value(value: float, is_integer: bool) -> float:
-    """Return what goes into the field ``param_value``; ``value`` is finite and fits its type."""
+    """Return the field ``param_value``; ``value`` is finite and in the range of its type."""
     if is_integer:
         return float(_FLOAT.unpack(_INT.pack(int(value)))[0])
     return value
 
 
 def integer_of(param_value: float) -> int:
-    """Return the signed integer whose bits ``param_value`` holds."""
+    """Return the signed integer with the bits of ``param_value``."""
     return int(_INT.unpack(_FLOAT.pack(param_value))[0])
 
 
 def unsigned_of(param_value: float) -> int:
-    """Return the unsigned integer whose bits ``param_value`` holds."""
+    """Return the unsigned integer with the bits of ``param_value``."""
     return int(_UNSIGNED.unpack(_FLOAT.pack(param_value))[0])
 
 
@@ -74,9 +74,9 @@ def value_message(name: str, value: float, is_integer: bool, index: int, count: 
 
 
 def parse_value(message: Message) -> Parameter | None:
-    """Return the parameter of a PARAM_VALUE; None for a type that no vehicle of ours or PX4's has.
+    """Return the parameter of a PARAM_VALUE, or None for an unsupported type.
 
-    Smaller integers (ArduPilot's) are cast and not bytewise; 64-bit types do not fit at all.
+    Unsupported are smaller integers, which ArduPilot casts instead of copying bits, and 64-bit types.
     """
     if message.param_type == REAL32:
         value = shortest(message.param_value)
@@ -91,11 +91,11 @@ def parse_value(message: Message) -> Parameter | None:
 
 
 def digest(parameters: Iterable[tuple[str, float, bool]]) -> int:
-    """Return the digest of (name, value, is integer) in the order of names, as PX4 and QGroundControl count it.
+    """Return the digest of (name, value, is integer) in the order of names, as PX4 and QGroundControl compute it.
 
-    It is CRC-32 over names and 4-byte values, without the usual inversion at its beginning and end.
+    It is CRC-32 over names and 4-byte values without inversion at start and end.
     """
-    state = _ALL_ONES  # zlib inverts at both ends: undone by inverting again here and below
+    state = _ALL_ONES  # zlib inverts at start and end: undone here and below
     for name, value, is_integer in parameters:
         state = zlib.crc32(name.encode("ascii"), state)
         state = zlib.crc32(_INT.pack(int(value)) if is_integer else _FLOAT.pack(value), state)
@@ -103,10 +103,10 @@ def digest(parameters: Iterable[tuple[str, float, bool]]) -> int:
 
 
 def digest_message(value: int, count: int) -> Message:
-    """Return the PARAM_VALUE that carries the digest of ``count`` parameters.
+    """Return the PARAM_VALUE with the digest of ``count`` parameters.
 
-    One digest in 512 is a signalling NaN and arrives changed (see ``LARGEST_INTEGER``): the ground station
-    then asks for the list.
+    One digest in 512 is a signalling NaN and may arrive changed (see ``LARGEST_INTEGER``); the ground station then
+    requests the list.
     """
     bits = float(_FLOAT.unpack(_UNSIGNED.pack(value))[0])
     return mavlink.MAVLink_param_value_message(HASH_NAME.encode(), bits, UINT32, count, NO_INDEX)

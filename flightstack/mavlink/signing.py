@@ -1,8 +1,8 @@
-"""MAVLink 2 signing without I/O: who may speak, and proof that it is we who do.
+"""MAVLink 2 message signing without I/O.
 
-The specification: https://mavlink.io/en/guide/message_signing.html. One ``Signing`` serves all links of a process: a
-frame that was heard on one link is a replay on every other. pymavlink's own check notes the timestamp of a frame
-before it knows that the signature is right, so that a forged one silences a stream; this one does not.
+Specification: https://mavlink.io/en/guide/message_signing.html. One ``Signing`` serves all links of a process, so that
+a frame received on one link is a replay on the others. pymavlink stores the timestamp of a frame before it verifies the
+signature, so that a forged frame blocks a stream; this implementation verifies first.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from flightstack.mavlink.frames import (
 
 KEY_SIZE = 32
 NO_KEY = bytes(KEY_SIZE)
-"""The key that switches signing off."""
+"""Key that disables signing."""
 TICKS_PER_S = 100_000
 EPOCH_UNIX_S = 1_420_070_400
-"""Timestamps count 10 µs from here: 2015-01-01."""
+"""Epoch of timestamps, 2015-01-01; their unit is 10 µs."""
 LARGEST_TIMESTAMP = 2**48 - 1
 NEW_STREAM_TICKS = 60 * TICKS_PER_S
-"""A stream that was never heard may be so much behind our timestamp."""
+"""Maximum age of the first timestamp of a new stream."""
 KEEP_TICKS = 10 * TICKS_PER_S
-"""The latest timestamp is kept for the next start this often."""
+"""Interval at which the latest timestamp is saved for the next start."""
 MAX_STREAMS = 1024
-"""Only holders of the key open streams, but even they shall not fill the memory."""
+"""Bounds the memory that holders of the key can occupy."""
 _ALWAYS_TAKEN = frozenset({int(mavlink.MAVLINK_MSG_ID_RADIO_STATUS)})
-"""Telemetry radios put them on the link, and have no key."""
+"""Sent by telemetry radios, which have no key."""
 _SIGNED = int(mavlink.MAVLINK_IFLAG_SIGNED)
 
 
 class Counts(NamedTuple):
-    """What happened to the frames that were received while there was a key."""
+    """Counts of received frames by outcome, while signing is on."""
 
     good: int = 0
     unsigned_taken: int = 0
@@ -52,21 +52,21 @@ class Counts(NamedTuple):
 
     @property
     def refused(self) -> int:
-        """All frames that were not taken."""
+        """Frames that were not accepted."""
         return self.unsigned_refused + self.bad_signature + self.replayed + self.too_old
 
 
 def timestamp_of(unix_s: float) -> int:
-    """Return the timestamp of a time since the Unix epoch; before 2015, 0."""
+    """Return the timestamp of a time since the Unix epoch; 0 before 2015."""
     return min(LARGEST_TIMESTAMP, max(0, int((unix_s - EPOCH_UNIX_S) * TICKS_PER_S)))
 
 
 class Signing:
-    """The key, our timestamp, and the timestamps of all streams that were heard.
+    """Key, own timestamp, and latest timestamps of all received streams.
 
-    ``clock`` returns the time since the Unix epoch [s]. ``latest`` is what ``keep`` was last called with, before
-    this start: timestamps begin above both. A crash followed by a clock that was set back makes at most
-    KEEP_TICKS of them repeat. ``allow_unsigned``: take unsigned frames, but never wrongly signed ones.
+    ``clock`` returns the time since the Unix epoch [s]. ``latest`` is the last argument of ``keep`` before this start;
+    timestamps begin above both. After a crash with the clock set back, at most KEEP_TICKS of them repeat.
+    ``allow_unsigned`` accepts unsigned frames, but not wrongly signed ones.
     """
 
     def __init__(
@@ -89,32 +89,32 @@ class Signing:
 
     @property
     def is_on(self) -> bool:
-        """Whether there is a key: frames are signed and checked."""
+        """True if a key is set: frames are signed and checked."""
         return self._key != NO_KEY
 
     @property
     def stream_count(self) -> int:
-        """Streams whose timestamps are remembered, at most MAX_STREAMS."""
+        """Number of known streams, at most MAX_STREAMS."""
         return len(self._streams)
 
     @property
     def timestamp(self) -> int:
-        """The latest timestamp that was used or heard."""
+        """Latest timestamp sent or received."""
         return self._timestamp
 
     def set_key(self, key: bytes, initial_timestamp: int = 0) -> None:
-        """Use another key (32 octets; all zero: none) from now on; raise ValueError for another size."""
+        """Set the key (32 bytes; all zero for none); raise ValueError for another size."""
         if len(key) != KEY_SIZE:
-            raise ValueError(f"a signing key has {KEY_SIZE} octets, not {len(key)}")
+            raise ValueError(f"a signing key has {KEY_SIZE} bytes, not {len(key)}")
         if key != self._key:
-            self._streams.clear()  # frames of the old key are worth nothing now
+            self._streams.clear()  # timestamps of the old key do not count
         self._key = key
         self._timestamp = max(self._timestamp, min(initial_timestamp, LARGEST_TIMESTAMP))
 
     def next_timestamp(self) -> int:
-        """Return a timestamp that was never used before: the clock's, or one more than the last.
+        """Return a new timestamp: the clock's, or one more than the last.
 
-        At the end of all timestamps, to which only a holder of the key can take us, the last one stays.
+        At the largest timestamp, which only a holder of the key can cause, it stops increasing.
         """
         timestamp = min(max(self._timestamp + 1, timestamp_of(self._clock())), LARGEST_TIMESTAMP)
         self._timestamp = timestamp
@@ -123,27 +123,27 @@ class Signing:
         return timestamp
 
     def close(self) -> None:
-        """Keep the latest timestamp, at an orderly end."""
+        """Save the latest timestamp."""
         if self._timestamp > self._kept:
             self._kept = self._timestamp
             self._keep(self._kept)
 
     def sign(self, frame: bytes, crc_extra: int, link_id: int) -> bytes:
-        """Return an unsigned MAVLink 2 frame as a signed one."""
+        """Return the signed frame of an unsigned MAVLink 2 frame."""
         body = bytes((*frame[:2], frame[2] | _SIGNED)) + frame[3:-CHECKSUM_SIZE]
         tail = bytes((link_id,)) + self.next_timestamp().to_bytes(6, "little")
         signed = body + checksum(body[1:], crc_extra) + tail
         return signed + self._signature(signed)
 
     def accepts(self, frame: bytes, trusted: bool = False) -> bool:
-        """Tell whether a frame (whole, of either version) may be used, and count it.
+        """Return True if a complete frame of either version is accepted, and count it.
 
-        ``trusted``: it came on a link that needs no signature.
+        ``trusted``: the link requires no signature.
         """
         if not self.is_on:
             return True
         if is_signed(frame):
-            outcome = self._judge(frame)
+            outcome = self._classify(frame)
             if outcome == "good":
                 timestamp = _timestamp_in(frame)
                 self._streams[_stream_of(frame)] = timestamp
@@ -155,16 +155,16 @@ class Signing:
         return outcome in ("good", "unsigned_taken")
 
     def authenticates(self, frame: bytes, trusted: bool = False) -> bool:
-        """Return True if ``frame`` proves that its sender may use the link; nothing is counted or remembered.
+        """Return True if ``frame`` authenticates its sender; nothing is counted or stored.
 
-        An unsigned RADIO_STATUS is accepted, but proves nothing.
+        An unsigned RADIO_STATUS is accepted, but does not authenticate.
         """
         if self.is_on and is_signed(frame):
-            return self._judge(frame) == "good"
+            return self._classify(frame) == "good"
         return trusted or self.allow_unsigned or not self.is_on
 
-    def _judge(self, frame: bytes) -> str:
-        """Return what to count a signed frame as."""
+    def _classify(self, frame: bytes) -> str:
+        """Return the counter of a signed frame."""
         if not hmac.compare_digest(self._signature(frame[:-6]), frame[-6:]):
             return "bad_signature"
         timestamp, last = _timestamp_in(frame), self._streams.get(_stream_of(frame))
@@ -175,42 +175,42 @@ class Signing:
             return "too_old"
         return "good"
 
-    def _signature(self, octets: bytes) -> bytes:
-        return hashlib.sha256(self._key + octets).digest()[:6]
+    def _signature(self, signed: bytes) -> bytes:
+        return hashlib.sha256(self._key + signed).digest()[:6]
 
 
 class LinkSigning(NamedTuple):
-    """Signing on one link; ``link_id`` (0 to 255) tells it from our others."""
+    """Signing on one link; ``link_id`` (0 to 255) is unique among the links of the sender."""
 
     signing: Signing
     link_id: int
     trusted: bool = False
-    """Whether unsigned frames are taken on this link though they are not elsewhere."""
+    """True if this link accepts unsigned frames."""
 
     def outgoing(self, frame: bytes, crc_extra: int) -> bytes:
-        """Return what to send for an unsigned frame."""
+        """Return the frame to send, signed if signing is on."""
         return self.signing.sign(frame, crc_extra, self.link_id) if self.signing.is_on else frame
 
     def accepts(self, frame: bytes) -> bool:
-        """Tell whether a received frame may be used, and count it."""
+        """Return True if a received frame is accepted, and count it."""
         return self.signing.accepts(frame, self.trusted)
 
     def authenticates(self, frame: bytes) -> bool:
-        """Return True if a received frame, not accepted yet, proves that its sender may use the link."""
+        """Return True if a received frame authenticates its sender; call before ``accepts``."""
         return self.signing.authenticates(frame, self.trusted)
 
     @property
     def requires_signature(self) -> bool:
-        """Whether only signed frames are taken."""
+        """True if only signed frames are accepted."""
         return not (self.trusted or self.signing.allow_unsigned) and self.signing.is_on
 
     def is_authentic(self, frame: bytes) -> bool:
-        """Return True if a frame that was accepted had the signature that this link requires, if any."""
+        """Return True if an accepted frame carries the signature that this link requires, if any."""
         return is_signed(frame) or not self.requires_signature
 
 
 def without_signature(frame: bytes, crc_extra: int) -> bytes:
-    """Return a frame without its signature, as it belongs into a log; an unsigned one stays as it is."""
+    """Return a frame without its signature, for logging."""
     if not is_signed(frame):
         return frame
     body = bytes((*frame[:2], frame[2] & ~_SIGNED)) + frame[3 : HEADER_V2 + frame[1]]
@@ -218,7 +218,7 @@ def without_signature(frame: bytes, crc_extra: int) -> bytes:
 
 
 def is_signed(frame: bytes) -> bool:
-    """Return True if ``frame`` has a signature, right or wrong."""
+    """Return True if ``frame`` has a signature, valid or not."""
     return frame[0] == MAGIC_V2 and bool(frame[2] & _SIGNED)
 
 

@@ -1,1 +1,1 @@
-"""Numbers that decide a flight: vehicles, gains, behaviour."""
+"""Vehicles, gains and parameters."""

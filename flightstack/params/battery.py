@@ -1,4 +1,4 @@
-"""The battery of a vehicle: the optional table ``[battery]`` of a vehicle file."""
+"""Battery of a vehicle: the optional table ``[battery]`` of a vehicle file."""
 
 from __future__ import annotations
 
@@ -8,22 +8,21 @@ from itertools import pairwise
 from flightstack.params.toml_file import Table
 
 MAX_CELLS = 14
-"""Cells that BATTERY_STATUS has places for."""
+"""Number of cell voltages in BATTERY_STATUS."""
 
 MAX_CURVE_POINTS = 32
 
 LIPO_CELL_V = (3.27, 3.69, 3.73, 3.77, 3.80, 3.84, 3.87, 3.95, 4.02, 4.11, 4.20)
-"""Open-circuit voltage of a lithium-polymer cell at 0 %, 10 % … 100 % of its charge, as commonly published for
-these cells at rest."""
+"""Open-circuit voltage of a lithium-polymer cell at 0 %, 10 % … 100 % charge, as commonly published for
+cells at rest."""
 
 
 @dataclass(frozen=True)
 class Battery:
-    """A pack of equal cells in series: an open-circuit voltage that depends on the charge, behind a resistance.
+    """A pack of equal cells in series: a charge-dependent open-circuit voltage and an internal resistance.
 
-    ``cell_voltage_v`` holds voltages at equal steps of charge, from empty to full. ``efficiency`` is the
-    mechanical power of the rotors over the electric power that they take; ``avionics_w`` all else that the
-    battery feeds.
+    ``cell_voltage_v`` holds voltages at equal steps of charge, from empty to full. ``efficiency`` is the ratio of
+    mechanical rotor power to electric power; ``avionics_w`` is the power of all other consumers.
     """
 
     cells: int
@@ -35,7 +34,7 @@ class Battery:
 
 
 def read_battery(top: Table) -> Battery | None:
-    """Read the table ``[battery]``; None where there is none. Raises ConfigError."""
+    """Read the table ``[battery]``, or return None without one; raise ConfigError."""
     if not top.has("battery"):
         return None
     table = top.table("battery")
@@ -44,7 +43,7 @@ def read_battery(top: Table) -> Battery | None:
         raise table.error("cells", f"{cells:g} is not a whole number")
     points = table.number_list("cell_voltage_v", 2, MAX_CURVE_POINTS, 0.5, 5.0, LIPO_CELL_V)
     if any(after < before for before, after in pairwise(points)):
-        raise table.error("cell_voltage_v", "must not fall: it goes from empty to full")
+        raise table.error("cell_voltage_v", "must not decrease: it goes from empty to full")
     battery = Battery(
         cells=int(cells),
         capacity_mah=table.number("capacity_mah", 1.0, 1e6),

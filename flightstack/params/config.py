@@ -1,4 +1,4 @@
-"""Everything that a flight stack process is told at its start."""
+"""Configuration of the flight stack at startup."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ DEFAULT_OUTER_HZ = 100.0
 
 @dataclass(frozen=True)
 class StackConfig:
-    """What decides the flight; the same configuration gives the same log."""
+    """Configuration of a flight; the same configuration gives the same log."""
 
     vehicle: str = DEFAULT_VEHICLE
     controller: str = DEFAULT_CONTROLLER
     gains: str = DEFAULT_GAINS
     loops: str = "python"
-    """Which loops fly; ``flightstack.firmware.choice`` has what may stand here."""
+    """Control loops in use; syntax in ``flightstack.firmware.choice``."""
     inner_hz: float = DEFAULT_INNER_HZ
     outer_hz: float = DEFAULT_OUTER_HZ
     ideal_rotors: bool = False
@@ -35,9 +35,9 @@ class StackConfig:
     system_id: int = 1
     behaviour: Behaviour = field(default_factory=Behaviour)
     params_file: str | None = None
-    """Parameter file to start from."""
+    """Parameter file loaded at startup."""
     params: tuple[str, ...] = ()
-    """``NAME=VALUE`` of any parameter; stronger than file and ``behaviour``, in force for this run alone."""
+    """``NAME=VALUE`` of any parameter, for this run only; overrides the file and ``behaviour``."""
 
 
 def parse_home(text: str) -> GeoPoint:
@@ -61,14 +61,14 @@ PX4_COMPATIBLE, GENERIC = 0, 1
 
 
 def identity_specs(system_id: int) -> tuple[ParamSpec, ...]:
-    """Return their declarations; ``system_id`` is the one that the configuration gives by default."""
+    """Return the parameters of the vehicle's identity, read once at startup; ``system_id`` is the default."""
     return (
         ParamSpec(
             SYSTEM_ID, system_id, 1, 250, "", "MAVLink system id", True, group_of(SYSTEM_ID), 0, (), True
         ),
         ParamSpec(
-            AUTOPILOT, PX4_COMPATIBLE, 0, 1, "", "What the vehicle calls itself to ground stations", True,
+            AUTOPILOT, PX4_COMPATIBLE, 0, 1, "", "Autopilot type reported to ground stations", True,
             group_of(AUTOPILOT), 0,
-            ((PX4_COMPATIBLE, "PX4, whose modes and altitudes it has"), (GENERIC, "Generic autopilot")), True,
+            ((PX4_COMPATIBLE, "PX4 (compatible modes and altitudes)"), (GENERIC, "Generic autopilot")), True,
         ),
     )  # fmt: skip

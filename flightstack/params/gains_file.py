@@ -1,4 +1,4 @@
-"""Gains files: one TOML with a table for each loop, by name (``tuned``, ``paper``) or by path."""
+"""Gains files: TOML with a table per loop, by name (``tuned``, ``paper``) or path."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ DEFAULT_GAINS = "tuned"
 KIND = "built-in gains"
 LOOP_TABLES = ("position", "altitude", "attitude_reference")
 CONTROLLER_PREFIX = "attitude_"
-"""What the names of the controllers' tables begin with; those of other controllers are left alone."""
+"""Prefix of the controllers' tables; tables of other controllers are ignored."""
 
 
 def built_in_gains() -> list[str]:
@@ -20,7 +20,7 @@ def built_in_gains() -> list[str]:
 
 
 def hidden_gains(name_or_path: str) -> str | None:
-    """Return the sentence for a file in the working directory that a built-in name hides, or None."""
+    """Return a warning if a built-in name hides a file in the working directory, or None."""
     return hidden_file(name_or_path, KIND)
 
 

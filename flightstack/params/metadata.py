@@ -1,6 +1,6 @@
-"""What ground stations need to show parameters: the file of MAVLink's component metadata, type PARAMETER.
+"""Parameter metadata for ground stations: the file of MAVLink's component metadata of type PARAMETER.
 
-The form: https://mavlink.io/en/services/component_metadata.html, parameter.schema.json, version 3.
+Format: https://mavlink.io/en/services/component_metadata.html, parameter.schema.json, version 3.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def parameter_metadata(specs: Iterable[ParamSpec]) -> dict[str, Any]:
 
 
 def parameters_json(specs: Iterable[ParamSpec]) -> str:
-    """Return the text of the file; the same declarations give the same text."""
+    """Return the text of the file; it depends on the declarations alone."""
     return json.dumps(parameter_metadata(specs), separators=(",", ":"), allow_nan=False)
 
 
@@ -48,8 +48,10 @@ def _entry(spec: ParamSpec) -> dict[str, Any]:
 
 
 def long_description(spec: ParamSpec) -> str:
-    """Return the line of help as a sentence, and when a change takes effect."""
+    """Return the help text and when a change takes effect."""
     when = (
-        "Takes effect at the next start." if spec.reboot_required else "Takes effect at once, in flight too."
+        "Takes effect at the next start."
+        if spec.reboot_required
+        else "Takes effect immediately, also in flight."
     )
     return f"{spec.help}. {when}"

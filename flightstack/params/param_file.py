@@ -1,8 +1,7 @@
-"""Parameter files: QGroundControl's ``.params`` format, five columns between tabs, read strictly and written whole.
+"""Parameter files in QGroundControl's ``.params`` format: five tab-separated columns.
 
-A parameter is never lost in silence. A line that cannot be understood, a value that its declaration refuses, or a
-file of ours that is not all there is one sentence with file and line. Parameters that this vehicle does not have,
-because another controller flew when they were saved, are kept.
+Reading is strict: a malformed line, a rejected value or a truncated file raises an error with file and line. Parameters
+that the current vehicle and controller do not have are kept. Writing is atomic.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from flightstack.params.spec import LARGEST_NAME, ParamSpec
 from flightstack.params.store import ParamStore
 
 INT32, REAL32 = 6, 9
-"""MAV_PARAM_TYPE of our parameters."""
+"""MAV_PARAM_TYPE of the parameters."""
 _INTEGER_TYPES, _FLOAT_TYPES = range(1, 9), (9, 10)
 _AUTOPILOT = 1  # component id
 _OURS, _END = "# Stack: flightstack", "# End"
@@ -54,12 +53,12 @@ def format_params(lines: Iterable[ParamLine], system_id: int = 1) -> str:
 
 
 def is_parameter_name(name: str) -> bool:
-    """Return True if a parameter may have this name, and a file hold it."""
+    """Return True for a valid parameter name."""
     return re.fullmatch(rf"[A-Za-z0-9_]{{1,{LARGEST_NAME}}}", name) is not None
 
 
 def parse_params(text: str, file: object) -> list[ParamLine]:
-    """Read the text of a parameter file; raise ConfigError with ``file`` and line."""
+    """Parse a parameter file; raise ConfigError with ``file`` and line."""
     lines: dict[str, ParamLine] = {}
     rows = text.split("\n")
     for number, row in enumerate(rows, 1):
@@ -67,12 +66,12 @@ def parse_params(text: str, file: object) -> list[ParamLine]:
             continue
         item = _parse_row(row.rstrip("\r"), file, number)
         if item.name in lines:
-            problem = f"{item.name} stands in line {lines[item.name].line} already"
+            problem = f"{item.name} is already set in line {lines[item.name].line}"
             raise ConfigError(file, f"line {number}", problem)
         lines[item.name] = item
     comments = {row.strip() for row in rows if row.startswith("#")}
     if _OURS in comments and _END not in comments:
-        raise ConfigError(file, "", f"is not all there: its last line should be {_END!r}")
+        raise ConfigError(file, "", f"is truncated: its last line must be {_END!r}")
     return list(lines.values())
 
 
@@ -81,7 +80,7 @@ def _parse_row(row: str, file: object, number: int) -> ParamLine:
         return ConfigError(file, f"line {number}", problem)
 
     if not row.isascii():
-        raise error("holds characters that no parameter has")
+        raise error("contains characters that are not ASCII")
     columns = row.split("\t")
     if len(columns) != 5:
         raise error(
@@ -93,9 +92,9 @@ def _parse_row(row: str, file: object, number: int) -> ParamLine:
     if int(component) != _AUTOPILOT:
         raise error(f"{name} belongs to component {component}, not to the autopilot, {_AUTOPILOT}")
     if not is_parameter_name(name):
-        raise error(f"{name[:40]!r} is no name of a parameter")
+        raise error(f"{name[:40]!r} is not a parameter name")
     if not kind.isdecimal() or int(kind) not in (*_INTEGER_TYPES, *_FLOAT_TYPES):
-        raise error(f"{name}: {kind[:20]!r} is no MAV_PARAM_TYPE of a number")
+        raise error(f"{name}: {kind[:20]!r} is not a numeric MAV_PARAM_TYPE")
     number_read = float(value) if _NUMBER.fullmatch(value) else math.nan
     if not math.isfinite(number_read):
         raise error(f"{name}: {value[:40]!r} is not a number")
@@ -120,9 +119,9 @@ def read_param_file(path: Path) -> list[ParamLine]:
 
 
 def begin_param_file(path: Path, system_id: int) -> None:
-    """Write a parameter file that changes nothing; raise ConfigError where that cannot be.
+    """Write a parameter file without parameters; raise ConfigError.
 
-    A file that cannot be written is an error at the start, and not after a flight.
+    A path that is not writable is thus reported at startup and not after a flight.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -132,25 +131,25 @@ def begin_param_file(path: Path, system_id: int) -> None:
 
 
 class LoadedParams(NamedTuple):
-    """What a parameter file held."""
+    """Contents of a parameter file."""
 
     lines: Mapping[str, ParamLine]
     unknown: tuple[str, ...]
-    """Names that the vehicle does not have, kept for when it does."""
+    """Names that the vehicle does not have; they stay in the file."""
 
     def warning(self, path: Path) -> str | None:
-        """Return a sentence about unknown names, or None."""
+        """Return a warning about unknown names, or None."""
         if not self.unknown:
             return None
         shown = ", ".join(self.unknown[:5]) + (" …" if len(self.unknown) > 5 else "")
-        return f"{path}: kept, but of no use to this vehicle and controller: {shown}"
+        return f"{path}: not used by this vehicle and controller, but kept: {shown}"
 
 
 NOTHING_LOADED = LoadedParams({}, ())
 
 
 def load_into(store: ParamStore, path: Path) -> LoadedParams:
-    """Set the parameters of a file; raise ConfigError for one that is known and cannot be set."""
+    """Set the parameters of a file; raise ConfigError for a known parameter with a bad value."""
     lines = {item.name: item for item in read_param_file(path)}
     for item in lines.values():
         spec = store.specs.get(item.name)
@@ -169,9 +168,9 @@ def _kind_problem(spec: ParamSpec, item: ParamLine) -> str | None:
 
 
 def lines_to_save(store: ParamStore, loaded: LoadedParams) -> list[ParamLine]:
-    """Return what the file shall hold: all that differs from its default, and what is unknown here.
+    """Return the lines of the file: parameters that differ from their defaults, and unknown ones.
 
-    Of a parameter that is overridden for this run, the file keeps what it had.
+    A parameter that is overridden for this run keeps its line of the file.
     """
     kept = {name: loaded.lines[name] for name in loaded.unknown}
     for name, spec in store.specs.items():
@@ -184,6 +183,6 @@ def lines_to_save(store: ParamStore, loaded: LoadedParams) -> list[ParamLine]:
 
 
 def save(store: ParamStore, loaded: LoadedParams, path: Path, system_id: int) -> None:
-    """Write the parameter file whole; raise OSError."""
+    """Write the parameter file atomically; raise OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text_atomically(path, format_params(lines_to_save(store, loaded), system_id))

@@ -1,4 +1,4 @@
-"""What a parameter is: its declaration, and the values it takes."""
+"""Declaration of a parameter and validation of its values."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from flightstack.core.float32 import LARGEST_FLOAT32, shortest
 
 LARGEST_NAME = 16
-"""Characters in the name of a parameter: MAVLink's param_id."""
+"""Maximum length of a parameter name: MAVLink's param_id."""
 
 GROUPS = {
     "MIS": "Mission",
@@ -22,14 +22,13 @@ GROUPS = {
     "MAV": "MAVLink",
     "FS": "System",
 }
-"""Group of a parameter by the first part of its name, where the declaration names none. PX4's where it has one."""
+"""Default group of a parameter by the prefix of its name; PX4's group where it has one."""
 
 
 class ParamSpec(NamedTuple):
     """Declaration of one parameter.
 
-    Every declaration of the project is one of these, whichever table it stands in, so that one walk over them makes the
-    reference page, the metadata file, and a C table with the columns name, default, low, high, is_integer.
+    All parameters are declared this way: the reference page, the metadata file and the C table are generated from it.
     """
 
     name: str
@@ -42,22 +41,21 @@ class ParamSpec(NamedTuple):
     group: str = ""
     decimals: int = 3
     choices: tuple[tuple[int, str], ...] = ()
-    """The only values of an enumeration, each with its meaning; empty for any number of the range."""
+    """Values of an enumeration, each with its meaning; empty for a range."""
     reboot_required: bool = False
 
     def number(self, value: float) -> float:
-        """Return ``value`` with the type of the parameter: an ``int`` if it is an integer."""
+        """Return ``value`` as ``int`` for an integer parameter, else as ``float``."""
         return int(value) if self.is_integer else float(value)
 
     def accepted(self, value: float) -> float | str:
-        """Return what the parameter becomes when it is set to ``value``, or the sentence why it is refused.
+        """Return the value stored when the parameter is set to ``value``, or the reason for a refusal.
 
-        MAVLink carries float32, so that is a parameter's precision wherever the value comes from: it becomes the
-        shortest decimal number that float32 tells apart from its neighbours. 0.35 typed, 0.35 sent as
-        0.34999999403953552 and 0.35 read from a file are one value, and the flight is the same. The default keeps its
-        own precision, and an end of the range is not missed by the rounding.
+        Values have MAVLink's float32 precision whatever their source: the shortest decimal number with the same float32
+        is stored. 0.35 typed, 0.35 received as 0.34999999403953552 and 0.35 read from a file are the same value. The
+        default and the ends of the range keep their own precision.
         """
-        if abs(value) > LARGEST_FLOAT32:  # infinities as well, and integers that no float can hold
+        if abs(value) > LARGEST_FLOAT32:  # also infinities, and integers beyond the range of float
             value = math.copysign(math.inf, 1.0 if value > 0 else -1.0)
         refused = self._beyond(value)
         if refused is not None:
@@ -84,5 +82,5 @@ class ParamSpec(NamedTuple):
 
 
 def group_of(name: str) -> str:
-    """Return the group of a parameter by its name, for declarations that name none."""
+    """Return the default group of a parameter by its name."""
     return GROUPS.get(name.partition("_")[0], "Miscellaneous")

@@ -1,4 +1,4 @@
-"""The parameters of one vehicle: their declarations, their values, and who wants to hear of a change."""
+"""Parameter store of one vehicle: declarations, values and change listeners."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ Listener = Callable[[str, float], None]
 
 
 class ParamStore:
-    """Holds the value of every declared parameter. A value is always one that its declaration accepts."""
+    """Values of all declared parameters, each valid by its declaration."""
 
     def __init__(self, specs: Iterable[ParamSpec]) -> None:
-        """Take the declarations, each name once; every parameter has its default."""
+        """Set every parameter to its default; raise ValueError for a name declared twice."""
         ordered = sorted(specs, key=lambda spec: spec.name)
         self.specs: Mapping[str, ParamSpec] = MappingProxyType({spec.name: spec for spec in ordered})
-        """Declarations by name, sorted by name: a parameter's index in MAVLink is its place here."""
+        """Declarations by name, in the order of MAVLink's parameter indices."""
         if len(self.specs) != len(ordered):
             raise ValueError("a parameter is declared twice")
         self._values = {spec.name: spec.number(spec.default) for spec in ordered}
@@ -26,7 +26,7 @@ class ParamStore:
         self._listeners: list[Listener] = []
 
     def value(self, name: str) -> float:
-        """Return the value, an ``int`` if the parameter is an integer; raise KeyError for an unknown name."""
+        """Return the value, an ``int`` for an integer parameter; raise KeyError for an unknown name."""
         return self._values[name]
 
     def values(self) -> dict[str, float]:
@@ -34,11 +34,11 @@ class ParamStore:
         return dict(self._values)
 
     def set(self, name: str, value: float) -> str | None:
-        """Set a parameter; return the sentence why it is refused, or None. A refused one changes nothing."""
+        """Set a parameter; return the reason for a refusal, or None."""
         return self._set(name, value, override=False)
 
     def override(self, name: str, value: float) -> str | None:
-        """Set a parameter for this run only: ``is_overridden`` until somebody sets or resets it."""
+        """Set a parameter for this run only: it is not saved until it is set or reset."""
         return self._set(name, value, override=True)
 
     def _set(self, name: str, value: float, override: bool) -> str | None:
@@ -52,33 +52,33 @@ class ParamStore:
         return None
 
     def _adopt(self, name: str, value: float, override: bool) -> None:
-        news = value != self._values[name] or (name in self._overridden and not override)
+        has_changed = value != self._values[name] or (name in self._overridden and not override)
         self._values[name] = value
         if override:
             self._overridden.add(name)
         else:
             self._overridden.discard(name)
-        if news:
+        if has_changed:
             for listener in self._listeners:
                 listener(name, value)
 
     def reset(self, names: Iterable[str] | None = None) -> None:
-        """Give these parameters, or all, their defaults; unknown names are passed over."""
+        """Reset these parameters, or all, to their defaults; ignore unknown names."""
         for name in list(self.specs if names is None else names):
             spec = self.specs.get(name)
             if spec is not None:
                 self._adopt(name, spec.number(spec.default), override=False)
 
     def is_default(self, name: str) -> bool:
-        """Tell whether a parameter has its default."""
+        """Return True if a parameter has its default value."""
         return self._values[name] == self.specs[name].default
 
     def is_overridden(self, name: str) -> bool:
-        """Tell whether the value came from ``override``: it is not for the parameter file."""
+        """Return True if the value was set by ``override`` and is not saved."""
         return name in self._overridden
 
     def subscribe(self, listener: Listener) -> None:
-        """Call ``listener(name, value)`` at once for every change from now on."""
+        """Call ``listener(name, value)`` at every change."""
         self._listeners.append(listener)
 
 

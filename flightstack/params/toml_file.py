@@ -1,4 +1,4 @@
-"""Read TOML with checks: each value is asked for once, with its range, and unknown keys are errors."""
+"""TOML files: found by built-in name or path, read with range checks; unknown keys are errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flightstack.core.errors import ConfigError
 
 
 class Table:
-    """A table of a TOML file that remembers which keys were read."""
+    """A table of a TOML file that tracks which keys were read."""
 
     def __init__(self, file: object, values: dict[str, Any], path: str = "") -> None:
         self.file = file
@@ -41,7 +41,7 @@ class Table:
     def _in_range(self, key: str, value: Any, low: float, high: float) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, f"{value!r} is not a number")
-        if not low <= value <= high:  # nor is NaN
+        if not low <= value <= high:  # also rejects NaN
             shown = f"{value:g}" if isinstance(value, float) or abs(value) < 10**15 else "a number that large"
             raise self.error(key, f"{shown} is outside the allowed range {low:g} to {high:g}")
         return float(value)
@@ -93,7 +93,7 @@ class Table:
         return Table(self.file, value, self._name(key))
 
     def optional_table(self, key: str) -> Table:
-        """Return the table under ``key``, an empty one if there is none."""
+        """Return the table under ``key``, or an empty one."""
         return self.table(key) if key in self._values else Table(self.file, {}, self._name(key))
 
     def tables(self, key: str) -> list[Table]:
@@ -104,17 +104,17 @@ class Table:
         return [Table(self.file, item, f"{self._name(key)}[{index}]") for index, item in enumerate(value)]
 
     def has(self, key: str) -> bool:
-        """Tell whether ``key`` is given."""
+        """Return True if ``key`` is present."""
         return key in self._values
 
     def expect(self, *keys: str, prefix: str) -> None:
-        """Raise for a key that is neither one of ``keys`` nor begins with ``prefix``."""
+        """Raise ConfigError for a key that is not in ``keys`` and does not begin with ``prefix``."""
         for key in self._values:
             if key not in keys and not key.startswith(prefix):
                 raise self.error(key, "is not a known key")
 
     def finish(self) -> None:
-        """Raise for keys that nobody asked for: a misspelt key must not be ignored."""
+        """Raise ConfigError for a key that was not read, such as a misspelt one."""
         unknown = sorted(set(self._values) - self._read)
         if unknown:
             raise self.error(unknown[0], "is not a known key")
@@ -128,16 +128,16 @@ def read_toml(path: Path) -> Table:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(path, "", f"is not valid TOML: {error}") from error
-    except (RecursionError, ValueError) as error:  # nested without end, numbers of thousands of digits
-        problem = "is not sane TOML: it nests too deeply or holds an endless number"
+    except (RecursionError, ValueError) as error:  # deep nesting, numbers of thousands of digits
+        problem = "is not usable TOML: its nesting is too deep or a number too long"
         raise ConfigError(path, "", problem) from error
 
 
 def find_file(name_or_path: str, folder: Path, kind: str) -> Path:
-    """Return the TOML file of a name or a path; raise ConfigError for a name that ``folder`` does not have.
+    """Return the TOML file for a name or a path; raise ConfigError for an unknown name.
 
-    A path has a separator or a suffix. A plain name is that of a built-in file, whatever lies in the working
-    directory. ``kind`` says what is looked for, for example "a built-in vehicle".
+    A path has a separator or a suffix. A plain name always means a built-in file in ``folder``. ``kind`` describes the
+    file in messages, for example "a built-in vehicle".
     """
     if not _is_name(name_or_path):
         return Path(name_or_path)
@@ -146,7 +146,7 @@ def find_file(name_or_path: str, folder: Path, kind: str) -> Path:
         return folder / f"{name_or_path}.toml"
     names = ", ".join(known)
     if Path(name_or_path).is_file():
-        problem = f"is not {kind} ({names}); for the file of this name give ./{name_or_path}"
+        problem = f"is not {kind} ({names}); to use the file give ./{name_or_path}"
     else:
         problem = f"is neither a file nor {kind} ({names})"
     raise ConfigError(name_or_path, "", problem)
@@ -158,10 +158,10 @@ def built_in_names(folder: Path) -> list[str]:
 
 
 def hidden_file(name_or_path: str, kind: str) -> str | None:
-    """Return what to tell a user whose working directory has a file with the name of a built-in one, or None."""
+    """Return a warning if a built-in name hides a file in the working directory, or None."""
     if not _is_name(name_or_path) or not Path(name_or_path).is_file():
         return None
-    return f"{name_or_path} is taken as {kind}; for the file of this name give ./{name_or_path}"
+    return f"{name_or_path} is taken as {kind}; to use the file give ./{name_or_path}"
 
 
 def _is_name(name_or_path: str) -> bool:

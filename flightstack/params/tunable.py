@@ -1,4 +1,4 @@
-"""Declarations of the numbers of a control law that a user may tune, each beside the law that uses it."""
+"""Declarations of the tunable parameters of control laws, made beside each law."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from typing import NamedTuple
 from flightstack.params.spec import LARGEST_NAME, ParamSpec
 
 UNDECLARED_LIMIT = 1e6
-"""Range, both ways, of the parameters of a controller that declares none."""
+"""Range, of either sign, of parameters of a controller without declarations."""
 
 
 class Tunable(NamedTuple):
-    """One field of a law's NamedTuple of parameters, as a parameter of the vehicle.
+    """A field of a control law's parameter NamedTuple that is a parameter of the vehicle.
 
-    The default is no part of it: that is what the vehicle and its gains file give. What is derived from the vehicle
-    (mass, inertia) is no parameter and has no declaration. A C table of a law is its NamedTuple's fields in order, with
-    the name, range and scale of the declaration that names the field.
+    The default comes from the vehicle and its gains file. Quantities derived from the vehicle (mass, inertia) are no
+    parameters.
     """
 
     field: str
@@ -29,12 +28,12 @@ class Tunable(NamedTuple):
     help: str
     decimals: int = 3
     integrates: str = ""
-    """The field of the law's memory that this gain multiplies. It is scaled when the gain changes, so that the integral
-    term goes on from where it is."""
+    """Field of the law's memory that this gain multiplies; scaled when the gain changes so that the integral term is
+    continuous."""
 
 
 def spec_of(tunable: Tunable, default: float, group: str) -> ParamSpec:
-    """Return the declaration with its default, whose range a gains file in other units may have stretched."""
+    """Return the declaration with its default; the range is extended to include the default."""
     return ParamSpec(
         tunable.name,
         default,
@@ -48,10 +47,10 @@ def spec_of(tunable: Tunable, default: float, group: str) -> ParamSpec:
 
 
 def undeclared(controller: str, fields: Sequence[str]) -> tuple[Tunable, ...]:
-    """Declare every field of a controller that declares none: ``lqr``'s ``angle_roll`` is LQR_ANGLE_ROLL.
+    """Declare all fields of a controller without declarations: ``lqr``'s ``angle_roll`` becomes LQR_ANGLE_ROLL.
 
-    At most four characters of the controller's name, then the field, cut to what MAVLink carries. Where two names
-    become one, the later ones end in a number.
+    The name has up to four characters of the controller's name and the field, cut to MAVLink's length. Duplicates get a
+    number at the end.
     """
     prefix = _plain(controller)[:4].strip("_") or "CTRL"
     tunables: dict[str, Tunable] = {}
@@ -65,7 +64,7 @@ def undeclared(controller: str, fields: Sequence[str]) -> tuple[Tunable, ...]:
 def declaration_problem(
     tunables: Sequence[Tunable], params_fields: Sequence[str], memory_fields: Sequence[str]
 ) -> str | None:
-    """Tell what is wrong with the declarations of a law whose parameters and memory have these fields, or None."""
+    """Return the first problem with the declarations of a law with these fields, or None."""
     for tunable in tunables:
         problem = _problem(tunable, params_fields, memory_fields)
         if problem is not None:
@@ -81,7 +80,7 @@ def _problem(tunable: Tunable, params_fields: Sequence[str], memory_fields: Sequ
     if tunable.field not in params_fields:
         return f"has no field {tunable.field!r}"
     if tunable.integrates and tunable.integrates not in memory_fields:
-        return f"remembers no {tunable.integrates!r}"
+        return f"has no field {tunable.integrates!r} in its memory"
     if not (math.isfinite(tunable.low) and math.isfinite(tunable.high) and tunable.low < tunable.high):
         return "has no range"
     return None

@@ -1,4 +1,4 @@
-"""The vehicle: mass, inertia and rotor set, read from a TOML file, validated and immutable."""
+"""Vehicle definition: mass, inertia and rotors, read from a TOML file."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ GENERIC_MULTIROTOR = 43
 
 
 def system_type(rotors: int) -> int:
-    """Return the MAV_TYPE that a vehicle with so many rotors announces."""
+    """Return the MAV_TYPE of a vehicle with this number of rotors."""
     return SYSTEM_TYPES.get(rotors, GENERIC_MULTIROTOR)
 
 
 NO_DRAG_PLANT = "paper"
-"""The plant whose model has no drag, whatever the vehicle's."""
+"""Plant that ignores the vehicle's drag."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Rotor:
     min_speed_rad_s: float
     max_speed_rad_s: float
     max_drive_torque_n_m: float = math.inf
-    """Of the motor, for what speeds the rotor up and for the drag of the air; it acts on rotors with a lag."""
+    """Maximum motor torque, for acceleration and air drag; applies to rotors with a lag."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +62,13 @@ class Vehicle:
     leg_height_m: float
     rotors: tuple[Rotor, ...]
     optional_drag_n_s_m: tuple[float, float, float] | None = None
-    """The drag that ``with_drag`` flies, of a vehicle whose model has none."""
+    """Drag enabled by ``with_drag``, for a vehicle without drag by default."""
     ideal_rotors: bool = False
     battery: Battery | None = None
     parts: tuple[Part, ...] = ()
-    """What the file says of the parts that the multibody plant is made of."""
+    """Parts for the multibody plant."""
     default_parts: bool = True
-    """The parts of a usual multirotor are added where ``parts`` has none of their names."""
+    """Add the parts of a typical multirotor that are not in ``parts`` by name."""
 
     @property
     def weight_n(self) -> float:
@@ -77,14 +77,14 @@ class Vehicle:
 
     @property
     def max_thrust_n(self) -> float:
-        """Thrust of all rotors at their largest speed."""
+        """Thrust of all rotors at maximum speed."""
         return math.fsum(
             r.thrust_coefficient_n_s2 * r.max_speed_rad_s * r.max_speed_rad_s for r in self.rotors
         )
 
     @property
     def full_thrust_n(self) -> float:
-        """Thrust that the share 1 of a setpoint stands for; ideal rotors have no limit and get twice the weight."""
+        """Thrust of a normalised thrust setpoint of 1; twice the weight for ideal rotors, which have no limit."""
         return 2.0 * self.weight_n if self.ideal_rotors else self.max_thrust_n
 
     @property
@@ -98,23 +98,23 @@ class Vehicle:
         for column, rotor in enumerate(self.rotors):
             x, y, _ = rotor.position_frd_m
             b = rotor.thrust_coefficient_n_s2
-            # r × F with F = (0, 0, −bΩ²); the body feels the reaction of the rotor's drag
+            # r × F with F = (0, 0, −bΩ²), and the reaction torque of rotor drag
             matrix[:, column] = (b, -y * b, x * b, -rotor.spin * rotor.torque_coefficient_n_m_s2)
         return matrix
 
     def allocation(self) -> FloatArray:
         """Return the matrix from (thrust [N], torque FRD [N m]) to Ω² [rad²/s²], shape (rotors, 4).
 
-        The pseudo-inverse of ``effectiveness``: of all Ω² that make a wrench those of the least sum of squares.
+        The pseudo-inverse of ``effectiveness``: the least-squares Ω² for a wrench.
         """
         return pseudo_inverse(self.effectiveness())
 
     def hover_speeds_squared(self) -> list[float]:
-        """Return Ω² [rad²/s²] of each rotor in a hover."""
+        """Return Ω² [rad²/s²] of each rotor in hover."""
         return [share * self.weight_n for share in self.allocation()[:, 0].tolist()]
 
     def with_drag(self, plant: str) -> Vehicle:
-        """Return the vehicle with the optional drag of its file; raise ConfigError where it cannot act."""
+        """Return the vehicle with the optional drag of its file; raise ConfigError without one or without effect."""
         if plant == NO_DRAG_PLANT:
             raise ConfigError("--drag", "", "the paper's model has no drag; use --plant rigid or multibody")
         if self.optional_drag_n_s_m is None:
@@ -124,7 +124,7 @@ class Vehicle:
         return replace(self, linear_drag_n_s_m=self.optional_drag_n_s_m)
 
     def wind_refusal(self, plant: str) -> str | None:
-        """Return why wind cannot act on the vehicle in the plant of this name, and what to do; None if it can."""
+        """Return why wind has no effect in this plant and the remedy, or None if it has."""
         if plant == NO_DRAG_PLANT:
             return "wind cannot act: the paper's model has no drag; use --plant rigid or multibody"
         if any(self.linear_drag_n_s_m):
@@ -133,30 +133,30 @@ class Vehicle:
         return f"wind cannot act: the vehicle {self.name} has no drag; {remedy}"
 
     def with_ideal_rotors(self) -> Vehicle:
-        """Return the vehicle with rotors that follow at once and have no limits, as the paper assumes.
+        """Return the vehicle with rotors without lag and limits, as in the paper.
 
-        Their speeds are imposed: plants leave out the spin-up torque as well.
+        Their speeds are imposed, so that plants also omit the spin-up torque.
         """
-        lowest, most = -math.inf, math.inf
+        low, high = -math.inf, math.inf
         rotors = tuple(
-            replace(r, lag_s=0.0, min_speed_rad_s=lowest, max_speed_rad_s=most, max_drive_torque_n_m=most)
+            replace(r, lag_s=0.0, min_speed_rad_s=low, max_speed_rad_s=high, max_drive_torque_n_m=high)
             for r in self.rotors
         )
         return replace(self, rotors=rotors, ideal_rotors=True)
 
 
 def built_in_vehicles() -> list[str]:
-    """Names of the vehicles that come with the package."""
+    """Return the names of the built-in vehicles."""
     return built_in_names(BUILT_IN)
 
 
 def hidden_vehicle(name_or_path: str) -> str | None:
-    """Return the sentence for a file in the working directory that a built-in name hides, or None."""
+    """Return a warning if a built-in name hides a file in the working directory, or None."""
     return hidden_file(name_or_path, KIND)
 
 
 def load_vehicle(name_or_path: str) -> Vehicle:
-    """Read a vehicle by the name of a built-in one or by the path of a TOML file; raise ConfigError."""
+    """Read a built-in vehicle by name or a TOML file by path; raise ConfigError."""
     return _vehicle(read_toml(find_file(name_or_path, BUILT_IN, KIND)))
 
 
@@ -238,7 +238,7 @@ def _rotors(top: Table, rotor_type: Table, mass_kg: float) -> tuple[Rotor, ...]:
 
 
 def _drive_torque(rotor_type: Table, lag_s: float, inertia_kg_m2: float) -> float:
-    """Read the largest torque of a drive; infinite where the file has none."""
+    """Read the maximum motor torque; infinite if not given."""
     if not rotor_type.has("max_drive_torque_n_m"):
         return math.inf
     if lag_s == 0.0 or inertia_kg_m2 == 0.0:

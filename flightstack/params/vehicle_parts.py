@@ -1,7 +1,7 @@
-"""The parts of a vehicle: the optional tables ``[[part]]`` of a vehicle file, for the multibody plant.
+"""Parts of a vehicle for the multibody plant: the optional tables ``[[part]]`` of a vehicle file.
 
-A part is a solid of one material. It sits on the frame ("body"), once on every arm ("arm": the axes of a copy point
-outwards along the arm, to its right and down, its origin is the rotor's hub) or on every spinning rotor ("rotor").
+A part is a solid of one material. Its mount is the frame ("body"), every arm ("arm": the axes of each copy point
+outwards along the arm, to its right and down, with the origin at the rotor hub) or every spinning rotor ("rotor").
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from pathlib import Path
 from flightstack.params.toml_file import Table
 
 SHAPES = {"box": 3, "cylinder": 2, "capsule": 2, "sphere": 1, "mesh": 0}
-"""Names of the shapes and how many numbers ``size_m`` has.
+"""Shapes, each with the length of its ``size_m``.
 
-box: whole edges x, y, z. cylinder: radius, length along z. capsule: radius, distance between the centres of its round
-ends, along z. sphere: radius. mesh: a file in STL or OBJ instead.
+box: edge lengths x, y, z. cylinder: radius, length along z. capsule: radius, distance between the centres of its round
+ends along z. sphere: radius. mesh: an STL or OBJ file instead.
 """
 
 MATERIALS = {
     "carbon": 1600.0,  # laminate
-    "carbon_tube": 550.0,  # as if solid
+    "carbon_tube": 550.0,  # treated as solid
     "aluminium": 2700.0,
     "steel": 7850.0,
     "plastic": 1250.0,
@@ -44,7 +44,7 @@ _NOWHERE = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Part:
-    """One solid. Pose relative to its mount: position of its centre (of a mesh: of the file's origin) and attitude."""
+    """One solid. Pose relative to its mount: position of the centre (of the file's origin for a mesh) and attitude."""
 
     name: str
     shape: str
@@ -54,13 +54,13 @@ class Part:
     position_frd_m: tuple[float, float, float] = _NOWHERE
     euler_rad: tuple[float, float, float] = _NOWHERE  # roll, pitch, yaw
     mount: str = "body"
-    tune: bool = False  # its density may be changed so that the vehicle meets [body]
+    tune: bool = False  # its density is adjusted so that the total mass and inertia match [body]
     file: Path | None = None
     scale: float = 1.0  # metres per unit of the file
 
 
 def read_parts(top: Table) -> tuple[Part, ...]:
-    """Read the tables ``[[part]]``; none where there are none. Raises ConfigError."""
+    """Read the tables ``[[part]]``, if any; raise ConfigError."""
     if not top.has("part"):
         return ()
     entries = top.tables("part")
@@ -85,13 +85,13 @@ def _part(entry: Table) -> Part:
     tune = entry.flag("tune", False)
     mount = entry.choice("mount", MOUNTS) if entry.has("mount") else "body"
     if tune and mount == "rotor":
-        raise entry.error("tune", "a part of the rotors is always tuned, to their inertia: leave it out")
+        raise entry.error("tune", "rotor parts are always tuned to the rotor inertia: remove it")
     roll, pitch, yaw = entry.numbers("euler_deg", 3, -360.0, 360.0, _NOWHERE)
     x, y, z = entry.numbers("position_frd_m", 3, -10.0, 10.0, _NOWHERE)
     if mount == "rotor" and (shape in ("box", "mesh") or x or y or roll or pitch):
         raise entry.error(
-            "mount", "a part that is not round about the rotor's axis would shake the vehicle: "
-            "take a cylinder, capsule or sphere on the axis",
+            "mount", "a rotor part must be symmetric about the rotor axis: "
+            "use a cylinder, capsule or sphere on the axis",
         )  # fmt: skip
     part = Part(
         name,
@@ -113,7 +113,7 @@ def _part(entry: Table) -> Part:
 def _material(entry: Table) -> tuple[str, float]:
     material = entry.choice("material", tuple(MATERIALS)) if entry.has("material") else ""
     if not material and not entry.has("density_kg_m3"):
-        raise entry.error("density_kg_m3", f"is missing; or give a material: {', '.join(MATERIALS)}")
+        raise entry.error("density_kg_m3", f"is missing: give it or a material ({', '.join(MATERIALS)})")
     return material, entry.number("density_kg_m3", 1e-3, 3e4, MATERIALS.get(material))
 
 

@@ -1,4 +1,4 @@
-"""Plans: missions, geofences and rally points, their files (``.plan``, ``.waypoints``), and what the vehicle takes."""
+"""Plans: missions, geofences and rally points, their files (``.plan``, ``.waypoints``) and their validation."""
 
 from flightstack.plan.check import DEFAULT_LIMITS, Limits, check_mission
 from flightstack.plan.fence import check_fence, fence_shape

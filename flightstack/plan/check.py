@@ -1,6 +1,6 @@
-"""Which missions the vehicle takes: the vehicle refuses the others on upload, the ground station before it.
+"""Mission validation, by the vehicle on upload and by the ground station before it.
 
-Pure functions. Items are named by their number on the wire, which starts at 0.
+Pure. Items are numbered from 0, as in MAVLink.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from flightstack.plan.vocabulary import (
     MissionResult,
 )
 
-_ALTITUDE_TOLERANCE_M = 0.01  # a 32-bit float of an altitude above sea level is good to half a millimetre
+_ALTITUDE_TOLERANCE_M = 0.01  # a float32 altitude above sea level has a resolution of half a millimetre
 
 
 class Limits(NamedTuple):
-    """What a mission may ask for; PX4's parameter of the same meaning in brackets. Zero or less: no limit."""
+    """Limits of a mission, with PX4's parameters in brackets. Zero or less: no limit."""
 
     max_first_distance_m: float = 10_000.0
     """Horizontal distance from home to the first position [MIS_DIST_1WP]."""
@@ -44,7 +44,7 @@ class Limits(NamedTuple):
     max_home_distance_m: float = 0.0
     """Horizontal distance from home [GF_MAX_HOR_DIST]."""
     min_takeoff_altitude_m: float = 0.3
-    """Altitude above home that a takeoff must reach, or landing would be detected at once."""
+    """Minimum takeoff altitude above home: below it the land detector would detect a landing."""
     max_items: int = MAX_MISSION_ITEMS
 
 
@@ -57,9 +57,9 @@ def check_mission(
     limits: Limits = DEFAULT_LIMITS,
     fence: FenceShape | None = None,
 ) -> Rejection | None:
-    """Return why the vehicle refuses ``items``, or None if it takes them.
+    """Return the rejection of a mission, or None if it is valid.
 
-    With a ``fence`` in force, every position and the straight way to it must be inside.
+    All positions and the straight legs between them must be inside ``fence``.
     """
     if len(items) > limits.max_items:
         reason = f"the mission has {len(items)} items, and at most {limits.max_items} are allowed"
@@ -79,7 +79,7 @@ def check_mission(
 
 
 def _item_fault(item: MissionItem, seq: int, count: int) -> Fault | None:
-    """Return the fault of one item that can be seen without the others."""
+    """Return the fault of one item, regardless of the others."""
     if item.command not in Command.__members__.values():
         supported = ", ".join(f"{command.value} {command.name}" for command in Command)
         return Fault(MissionResult.UNSUPPORTED, f"is not supported; supported are {supported}")
@@ -102,7 +102,7 @@ def _position_fault(item: MissionItem) -> Fault | None:
 
 
 def _altitude_fault(item: MissionItem, home: GeoPoint, limits: Limits) -> Fault | None:
-    """Return the fault of an item's altitude; a landing's is free, since it ends on the ground."""
+    """Return the fault of an item's altitude. A landing ends on the ground: any altitude is valid."""
     if item.command not in POSITION_COMMANDS or item.command == Command.NAV_LAND:
         return None
     if math.isnan(item.z):
@@ -144,18 +144,18 @@ Place = tuple[float, float]
 
 
 class Leg(NamedTuple):
-    """A straight way from one place to another, north and east of the geofence's origin [m]."""
+    """A straight leg between two places, north and east of the geofence's origin [m]."""
 
     begin: Place
     end: Place
     seq: int
-    """Number of the item at its end."""
+    """Number of the item at the end."""
     start: str
-    """Where it begins, in words."""
+    """Description of the start position."""
 
 
 def mission_legs(items: Sequence[MissionItem], home: Place, shape: FenceShape) -> list[Leg]:
-    """Return the ways from home through all positions, by jumps too; a return goes to home."""
+    """Return the legs from home through all positions, with jumps; a return ends at home."""
     places: list[Place | None] = []
     for item in items:
         position = item.position_deg
@@ -177,7 +177,7 @@ def mission_legs(items: Sequence[MissionItem], home: Place, shape: FenceShape) -
 
 
 def leg_rejection(items: Sequence[MissionItem], home: GeoPoint, fence: FenceShape | None) -> Rejection | None:
-    """Return the rejection of the first item outside ``fence``, or the way to which leaves it."""
+    """Return the rejection of the first item that is outside ``fence`` or whose leg leaves it, or None."""
     if fence is None or not len(fence.areas):
         return None
     home_ne_m = fence.local(home.latitude_deg, home.longitude_deg)

@@ -1,8 +1,8 @@
-"""Geofences: the areas that fence items stand for, and which geofences the vehicle takes.
+"""Geofences: conversion of fence items to areas, and validation.
 
-Rules of MAVLink: each polygon is a run of as many vertices as each of them says; inclusion areas are in groups
-(parameter 2), and the vehicle must be inside all areas of at least one group. Ground stations send group 0 for all
-areas, so that the vehicle must be inside every inclusion area, as with PX4 and, by default, ArduPilot.
+MAVLink's rules: a polygon is a run of vertices, each with the vertex count; inclusion areas form groups (parameter 2),
+and the vehicle must be inside all areas of at least one group. Ground stations send group 0 for all areas, so that the
+vehicle must be inside every inclusion area, as with PX4 and, by default, ArduPilot.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ MAX_RADIUS_M = 1e6
 
 
 class FenceAreas(NamedTuple):
-    """What the items of a geofence stand for."""
+    """Areas and return point of a geofence."""
 
     areas: tuple[Area, ...]
     return_point: MissionItem | None
 
 
 def fence_areas(items: Sequence[MissionItem]) -> FenceAreas | Rejection:
-    """Group the items of a geofence into areas; return a rejection where they cannot be."""
+    """Convert fence items to areas, or return the rejection of the first bad item."""
     areas: list[Area] = []
     return_point: MissionItem | None = None
     seq = 0
@@ -73,7 +73,7 @@ def _area(items: Sequence[MissionItem], seq: int, count: int) -> Area:
 
 
 def _group(item: MissionItem) -> int:
-    """Return the inclusion group; ground stations that know none leave it NaN or 0."""
+    """Return the inclusion group; ground stations without groups send NaN or 0."""
     return 0 if math.isnan(item.param2) else int(item.param2)
 
 
@@ -103,7 +103,7 @@ def _item_fault(item: MissionItem) -> Fault | None:
 
 
 def _vertex_fault(items: Sequence[MissionItem], first: int, seq: int) -> Fault | None:
-    """Return the fault of item ``seq`` as a part of the polygon or circle that begins with ``first``."""
+    """Return the fault of item ``seq`` in the polygon or circle that starts at ``first``."""
     start = items[first]
     if seq >= len(items):
         have = len(items) - first
@@ -128,7 +128,7 @@ def _vertex_fault(items: Sequence[MissionItem], first: int, seq: int) -> Fault |
 
 
 def fence_shape(items: Sequence[MissionItem], home: GeoPoint) -> FenceShape:
-    """Return the shape, in metres from ``home``, of items that ``check_fence`` accepts; of others an empty one."""
+    """Return the shape, in metres from ``home``, of a valid geofence, or an empty shape."""
     parsed = fence_areas(items)
     return FenceShape((), home) if isinstance(parsed, Rejection) else FenceShape(parsed.areas, home)
 
@@ -136,10 +136,10 @@ def fence_shape(items: Sequence[MissionItem], home: GeoPoint) -> FenceShape:
 def check_fence(
     items: Sequence[MissionItem], home: GeoPoint, vehicle_ne_m: tuple[float, float] | None = None
 ) -> Rejection | None:
-    """Return why the vehicle refuses a geofence, or None if it takes it.
+    """Return the rejection of a geofence, or None if it is valid.
 
-    ``vehicle_ne_m`` is where a flying vehicle is, north and east of home: a geofence that it would break at
-    once is refused, as by PX4.
+    ``vehicle_ne_m`` is the position of a flying vehicle, north and east of home. As in PX4, a geofence that it would
+    breach is refused.
     """
     if len(items) > MAX_FENCE_ITEMS:
         reason = f"the geofence has {len(items)} items, and at most {MAX_FENCE_ITEMS} are allowed"
@@ -172,7 +172,7 @@ def _polygon_flaw(shape: FenceShape, index: int) -> str | None:
 def _place_rejection(
     shape: FenceShape, parsed: FenceAreas, vehicle_ne_m: tuple[float, float] | None
 ) -> Rejection | None:
-    """Refuse a geofence that leaves out a place the vehicle needs."""
+    """Return the rejection of a geofence without home, return point or the flying vehicle inside, or None."""
     places: list[tuple[str, tuple[float, float]]] = [("the home position", (0.0, 0.0))]
     if parsed.return_point is not None and parsed.return_point.position_deg is not None:
         places.append(("its return point", shape.local(*parsed.return_point.position_deg)))

@@ -1,7 +1,6 @@
-"""The plane geometry of a geofence: what is inside, and which ways lead out.
+"""Plane geometry of a geofence: containment of places and of segments.
 
-Coordinates are metres north and east of home. Exact for the straight lines and circles of the flat frame; a place
-on a boundary may count for either side.
+Coordinates are metres north and east of home. A place on a boundary may count for either side.
 """
 
 from __future__ import annotations
@@ -19,28 +18,28 @@ AREA = np.dtype(
     [
         ("inclusion", "i8"),  # 1, or 0 for an exclusion area
         ("group", "i8"),  # of an inclusion area, from 0
-        ("start", "i8"),  # index of the first vertex, and the one behind the last
+        ("start", "i8"),  # vertex range [start, end)
         ("end", "i8"),
         ("north", "f8"),  # centre and radius of a circle, m; the radius of a polygon is 0
         ("east", "f8"),
         ("radius", "f8"),
     ]
 )
-"""An area of a geofence as the kernels read it; the vertices are in an array of their own, shape (m, 2) [m]."""
+"""An area of a geofence in kernels; vertices are in a separate array, shape (m, 2): north and east [m]."""
 
 
 class Area(NamedTuple):
     """A polygon or circle of a geofence."""
 
     seq: int
-    """Number of its first item."""
+    """Number of the first item."""
     is_inclusion: bool
     group: int
     """Group of an inclusion area; 0 for exclusions."""
     points_deg: tuple[tuple[float, float], ...]
-    """Latitude and longitude of the vertices, or of the circle's centre alone."""
+    """Latitude and longitude of the vertices, or of the circle's centre."""
     radius_m: float = 0.0
-    """Of a circle; 0 for a polygon."""
+    """Radius of a circle; 0 for a polygon."""
 
 
 class FenceShape:
@@ -81,12 +80,12 @@ class FenceShape:
         return self.vertices[row["start"] : row["end"]]
 
     def _edges(self) -> tuple[FloatArray, FloatArray]:
-        """Return where the edges of all polygons begin and end, each of shape (n, 2)."""
+        """Return start and end points of all polygon edges, each of shape (n, 2)."""
         ends = [np.roll(self.polygon(index), -1, axis=0) for index in range(len(self.areas))]
         return self.vertices, np.concatenate(ends) if ends else self.vertices
 
     def allowed(self, places: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Tell for each of ``places``, shape (n, 2), whether the vehicle may be there."""
+        """Return for each of ``places``, shape (n, 2), whether the vehicle may be there."""
         in_group = np.ones((self.groups, len(places)), dtype=np.bool_)
         excluded = np.zeros(len(places), dtype=np.bool_)
         for index, row in enumerate(self.areas):
@@ -99,7 +98,7 @@ class FenceShape:
         return in_any & ~excluded
 
     def allows(self, north_m: float, east_m: float) -> bool:
-        """Tell whether the vehicle may be at this place."""
+        """Return True if the vehicle may be at this place."""
         return bool(self.allowed(np.array([[north_m, east_m]]))[0])
 
     def _inside(self, index: int, places: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
@@ -113,18 +112,18 @@ class FenceShape:
         inside = np.zeros(len(places), dtype=np.bool_)
         begins = self.polygon(index)
         for (n1, e1), (n2, e2) in zip(begins, np.roll(begins, -1, axis=0), strict=True):
-            spans = (e1 > east) != (e2 > east)  # even-odd rule with a ray to the north
+            spans = (e1 > east) != (e2 > east)  # even-odd rule, ray to the north
             if spans.any():
                 inside ^= spans & (north < n1 + (east - e1) * ((n2 - n1) / (e2 - e1)))
         return inside
 
     def segments_outside(self, begins: FloatArray, ends: FloatArray) -> list[tuple[int, tuple[float, float]]]:
-        """Return which straight ways from ``begins`` to ``ends``, each of shape (n, 2), are not wholly allowed.
+        """Return the segments from ``begins`` to ``ends``, each of shape (n, 2), that leave the allowed region.
 
-        Each is given by its row and a place on it that is not allowed.
+        Each is given by its row and one place on it that is not allowed.
         """
         suspects = ~(self.allowed(begins) & self.allowed(ends))
-        for start in range(0, len(begins), 256):  # in blocks: a bound on memory
+        for start in range(0, len(begins), 256):  # blocks bound the memory
             block = slice(start, start + 256)
             suspects[block] |= self._meets_boundary(begins[block], ends[block])
         found = []
@@ -137,7 +136,7 @@ class FenceShape:
     def _meets_boundary(
         self, begins: FloatArray, ends: FloatArray
     ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Tell which ways come so near to a boundary that they may cross it."""
+        """Return for each segment whether it may cross a boundary."""
         along = ends - begins
         meets = np.zeros(len(begins), dtype=np.bool_)
         if len(self._begins):
@@ -153,7 +152,7 @@ class FenceShape:
         return meets
 
     def _first_outside(self, begin: FloatArray, end: FloatArray) -> tuple[float, float] | None:
-        """Return a place of the way that is not allowed: between crossings of boundaries nothing changes."""
+        """Return the first place on a segment that is not allowed, or None; tested between boundary crossings."""
         along = end - begin
         shares = [0.0, 1.0]
         if len(self._begins):
@@ -178,7 +177,7 @@ def _centre(area: Record) -> FloatArray:
 def _meeting(
     begin: FloatArray, along: FloatArray, other_begin: FloatArray, other_along: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the shares of two lines' lengths at which they meet; NaN where they are parallel."""
+    """Return the fractions of two lines' lengths at their intersection; NaN or infinite for parallel lines."""
     apart = other_begin - begin
     with np.errstate(divide="ignore", invalid="ignore"):
         cross = along[..., 0] * other_along[..., 1] - along[..., 1] * other_along[..., 0]
@@ -188,7 +187,7 @@ def _meeting(
 
 
 def _circle_shares(from_centre: FloatArray, along: FloatArray, radius_m: float) -> list[float]:
-    """Return the shares of a way's length at which it crosses a circle."""
+    """Return the fractions of a segment's length at its intersections with a circle."""
     a = float(along @ along)
     b = float(from_centre @ along)
     discriminant = b * b - a * (float(from_centre @ from_centre) - radius_m * radius_m)
@@ -199,9 +198,9 @@ def _circle_shares(from_centre: FloatArray, along: FloatArray, radius_m: float) 
 
 
 def edges_that_cross(vertices: FloatArray) -> tuple[int, int] | None:
-    """Return the first two edges of a polygon, each by its first vertex, that meet where they should not.
+    """Return the first two edges of a polygon that intersect, each by its first vertex, or None.
 
-    Neighbours share a vertex; they cross themselves only when one folds back on the other, or is a point.
+    Adjacent edges share a vertex and intersect only if one folds back on the other or has zero length.
     """
     count = len(vertices)
     along = np.roll(vertices, -1, axis=0) - vertices

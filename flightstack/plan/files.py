@@ -1,4 +1,4 @@
-"""Plan files: read, and written so that an old file is never lost half-way."""
+"""Read plan files, and write them atomically."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ WAYPOINTS_SUFFIXES = (".waypoints", ".txt", ".mission")
 
 
 def load_plan(path: str | Path) -> Plan:
-    """Read a QGC ``.plan`` or a ``QGC WPL 110`` file, told apart by their content.
+    """Read a QGC ``.plan`` or a ``QGC WPL 110`` file, recognised by its content.
 
-    Raises ConfigError, one sentence with file, item, field, value and what is allowed.
+    Raise ConfigError with file, item, field, value and allowed range.
     """
     path = Path(path)
     try:
@@ -41,10 +41,9 @@ def load_plan(path: str | Path) -> Plan:
 
 
 def save_plan(path: str | Path, plan: Plan) -> None:
-    """Write ``plan`` in the format of the file's suffix; the file is replaced whole or not at all.
+    """Write ``plan`` atomically, in the format of the file's suffix.
 
-    Raises ConfigError for an unknown suffix, a file that cannot be written, or a plan that the format cannot
-    hold.
+    Raise ConfigError for an unknown suffix, a file that cannot be written, or a plan that the format cannot represent.
     """
     path = Path(path)
     if path.suffix in PLAN_SUFFIXES:

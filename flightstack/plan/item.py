@@ -1,4 +1,4 @@
-"""A mission item, as it is on the wire."""
+"""Mission items as in MAVLink, and plans made of them."""
 
 from __future__ import annotations
 
@@ -18,17 +18,16 @@ from flightstack.plan.vocabulary import (
     UNSET_E7,
 )
 
-_OUT_OF_RANGE = UNSET_E7 - 1  # no latitude, no longitude, and not the mark of an open one
+_OUT_OF_RANGE = UNSET_E7 - 1  # outside all latitudes and longitudes, and not UNSET_E7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MissionItem:
-    """One item; its number is its place in the mission. NaN in a parameter means "the vehicle's default".
+    """One item, numbered by its position in the plan. A NaN parameter means "the vehicle's default".
 
-    ``x`` and ``y`` are what MISSION_ITEM_INT carries: 1e-7 degrees of latitude and longitude in the global
-    frames (``UNSET_E7`` when left open), plain numbers in frame MISSION. ``z`` is the altitude in metres,
-    above home in the relative frames, else above sea level. Two items are equal if they mean the same: NaN
-    equals NaN.
+    ``x`` and ``y`` are the integers of MISSION_ITEM_INT: latitude and longitude in 1e-7 degrees in the global frames
+    (``UNSET_E7`` if not given), plain numbers in frame MISSION. ``z`` is the altitude in metres, above home in the
+    relative frames, else above sea level. NaN equals NaN in comparisons of items.
     """
 
     command: int
@@ -49,19 +48,19 @@ class MissionItem:
 
     @property
     def is_global(self) -> bool:
-        """Tell whether x and y are scaled as latitude and longitude."""
+        """True if x and y are a latitude and longitude."""
         return self.frame in GLOBAL_FRAMES
 
     @property
     def altitude_is_relative(self) -> bool:
-        """Tell whether the altitude counts from home."""
+        """True if the altitude is relative to home."""
         return self.frame in RELATIVE_FRAMES
 
     @property
     def position_deg(self) -> tuple[float, float] | None:
-        """Latitude and longitude in degrees; None when the item has none or leaves it open.
+        """Latitude and longitude in degrees, or None without a position.
 
-        A takeoff or landing at exactly 0, 0 leaves it open too: that is how clients without NaN say it.
+        A takeoff or landing at exactly 0, 0 has no position either: some clients send this instead of NaN.
         """
         if self.command not in PLACE_COMMANDS or not self.is_global:
             return None
@@ -72,7 +71,7 @@ class MissionItem:
         return self.x / 1e7, self.y / 1e7
 
     def on_wire(self) -> MissionItem:
-        """Return the item after its floats went through MAVLink's 32-bit ones."""
+        """Return the item with its floats rounded to float32."""
         return replace(
             self,
             param1=as_float32(self.param1),
@@ -97,14 +96,14 @@ class MissionItem:
 
 
 def is_unset(x_or_y: int) -> bool:
-    """Tell whether a latitude or longitude [1e-7 deg] is left open."""
+    """Return True if a latitude or longitude [1e-7 deg] is not given."""
     return x_or_y in (UNSET_E7, ALSO_UNSET_E7)
 
 
 def integer_coordinate(value: float, is_global: bool) -> int:
-    """Return the wire's integer for a latitude, longitude [deg] or plain number, whatever its value.
+    """Return MAVLink's integer for a latitude, longitude [deg] or plain number.
 
-    NaN gives ``UNSET_E7``; what no 32-bit integer holds gives a number out of every range.
+    NaN gives ``UNSET_E7``; values beyond 32 bits give a number outside every valid range.
     """
     if math.isnan(value):
         return UNSET_E7
@@ -115,7 +114,7 @@ def integer_coordinate(value: float, is_global: bool) -> int:
 
 
 def float_coordinate(value: int, is_global: bool) -> float:
-    """Return the latitude, longitude [deg] or plain number of the wire's integer; NaN when left open."""
+    """Return the latitude, longitude [deg] or plain number of MAVLink's integer; NaN for an unset one."""
     if is_unset(value):
         return math.nan
     return value / 1e7 if is_global else float(value)
@@ -125,9 +124,8 @@ def float_coordinate(value: int, is_global: bool) -> float:
 class Plan:
     """Mission items in flying order and the planned home.
 
-    ``document`` is the JSON document that the plan was read from (never changed). Every key that we do not
-    know lives there, and is written back. ``comments`` are those of a waypoint file,
-    each with the number of the line of values before which it stands.
+    ``document`` is the JSON document that the plan was read from, never changed; its unknown keys are written back.
+    ``comments`` are those of a waypoint file, each with the number of the row that follows it.
     """
 
     items: tuple[MissionItem, ...]
@@ -135,13 +133,13 @@ class Plan:
     document: Mapping[str, Any] = field(default_factory=dict, repr=False)
     comments: tuple[tuple[int, str], ...] = ()
     fence: tuple[MissionItem, ...] = ()
-    """The geofence, as items."""
+    """Items of the geofence."""
     rally: tuple[MissionItem, ...] = ()
-    """The rally points, as items."""
+    """Items of the rally points."""
 
     @property
     def has_fence_or_rally(self) -> bool:
-        """Tell whether there are geofence or rally points, be it of a version that we cannot read."""
+        """True if the plan has a geofence or rally points, even in an unsupported version."""
         if self.fence or self.rally:
             return True
         fence, rally = self.document.get("geoFence"), self.document.get("rallyPoints")

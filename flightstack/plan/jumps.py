@@ -1,4 +1,4 @@
-"""Where the DO_JUMPs of a mission lead: into loops without an item to fly, or into the air."""
+"""Analysis of DO_JUMP items: loops without a navigation item, and whether a mission takes off."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _UNSEEN, _ON_PATH, _DONE = 0, 1, 2
 
 
 def find_idle_loop(items: Sequence[MissionItem]) -> int | None:
-    """Return the number of a DO_JUMP in a loop without an item to fly, or None.
+    """Return the number of a DO_JUMP in a loop without a navigation item, or None.
 
-    Jump targets must be valid. A depth-first search with a stack of its own, linear in the items.
+    Jump targets must be valid. Iterative depth-first search, linear in the number of items.
     """
     state = [_UNSEEN] * len(items)
     for start in range(len(items)):
@@ -38,7 +38,7 @@ def find_idle_loop(items: Sequence[MissionItem]) -> int | None:
 
 
 def _next_at_once(items: Sequence[MissionItem], seq: int) -> Iterator[int]:
-    """Yield the items that may follow ``seq`` with no time passing; none when ``seq`` takes time."""
+    """Yield the items that may follow ``seq`` immediately; none if ``seq`` takes time."""
     if items[seq].command not in NAV_COMMANDS:
         yield from _next(items, seq)
 
@@ -48,17 +48,16 @@ def _next(items: Sequence[MissionItem], seq: int) -> Iterator[int]:
     item = items[seq]
     if item.command == Command.DO_JUMP and item.param2 != 0.0:
         yield int(item.param1)
-        if item.param2 < 0.0:  # for ever: what follows is never reached from here
+        if item.param2 < 0.0:  # endless: the next item is never reached from here
             return
     if seq + 1 < len(items):
         yield seq + 1
 
 
 def takes_off(items: Sequence[MissionItem], start: int = 0) -> bool:
-    """Tell whether a standing vehicle that goes on with item ``start`` leaves the ground.
+    """Return True if a landed vehicle that continues at item ``start`` takes off.
 
-    It does so by a takeoff or on the way to a position; a landing or a return before that keeps it there, as does an
-    endless loop of delays.
+    It does at a takeoff or position item, unless a landing, a return or an endless loop of delays comes first.
     """
     ahead, seen = [start], set()
     while ahead:
@@ -75,6 +74,6 @@ def takes_off(items: Sequence[MissionItem], start: int = 0) -> bool:
 
 
 def _jump_on_path(items: Sequence[MissionItem], path: list[int], loop_start: int) -> int:
-    """Return the last DO_JUMP on the part of ``path`` that is the loop; a loop always has one."""
+    """Return the last DO_JUMP of the loop at the end of ``path``."""
     loop = path[path.index(loop_start) :]
     return next(seq for seq in reversed(loop) if items[seq].command == Command.DO_JUMP)

@@ -1,7 +1,7 @@
-"""What a vehicle keeps of its plans over a restart, as text: mission, geofence, rally points and home.
+"""Text format for mission, geofence, rally points and home that the vehicle restores at the next start.
 
-A ``.plan`` file of QGroundControl cannot hold them: it knows no current item, sorts a geofence's areas, and makes
-altitudes of rally points relative, so that ids and meaning would change.
+QGroundControl's ``.plan`` format is not suitable: it has no current item, reorders the areas of a geofence and converts
+rally altitudes to relative ones, which would change plan ids and meaning.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ _KIND = "flightstack plans"
 
 
 class KeptPlans(NamedTuple):
-    """The plans in force."""
+    """The active plans."""
 
     mission: tuple[MissionItem, ...] = ()
     fence: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
     current: int = 0
-    """Number of the mission's current item."""
+    """Number of the current mission item."""
     home: GeoPoint | None = None
-    """Home, if a command named the place; None: it follows the next arming."""
+    """Home, if set by a command; None if it is set at the next arming."""
 
     def items(self, kind: MissionType) -> tuple[MissionItem, ...]:
         """Return the plan of one type."""
@@ -43,7 +43,7 @@ class KeptPlans(NamedTuple):
 
 
 def plans_to_text(plans: KeptPlans) -> str:
-    """Return the text of a file that ``plans_from_text`` reads; nothing is rounded."""
+    """Return the text of a plans file; values are not rounded."""
     content = {
         "current": plans.current,
         "fence": [_row(item) for item in plans.fence],
@@ -56,13 +56,13 @@ def plans_to_text(plans: KeptPlans) -> str:
 
 
 def plans_from_text(text: str, file: object) -> KeptPlans:
-    """Read what ``plans_to_text`` wrote; raise ConfigError for anything else, with ``file`` as its name."""
+    """Parse the text of ``plans_to_text``; raise ConfigError with ``file`` as its name."""
     try:
         document = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ConfigError(file, "", "is damaged or not all there") from error
+        raise ConfigError(file, "", "is damaged or truncated") from error
     if not isinstance(document, dict) or document.get("fileType") != _KIND:
-        raise ConfigError(file, "", "is no file of kept plans")
+        raise ConfigError(file, "", "is not a file of saved plans")
     if document.get("version") != VERSION:
         found = document.get("version")
         raise ConfigError(file, "", f"is of version {found!r:.20}, and this program reads version {VERSION}")

@@ -1,4 +1,4 @@
-"""What parameters 1 to 4 of each command may be."""
+"""Allowed values of parameters 1 to 4 of each command."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flightstack.plan.vocabulary import Command, MissionResult
 
 
 class Rule(NamedTuple):
-    """One parameter of a command: its number, its meaning, what is allowed, and the test of it."""
+    """Rule for one parameter: its number, meaning, allowed values as text, and predicate."""
 
     number: int
     meaning: str
@@ -58,7 +58,7 @@ _RULES: dict[int, tuple[Rule, ...]] = {
             lambda value: value == -1.0 or (value >= 0.0 and value == math.floor(value)),
         ),
     ),
-}  # every rule sees finite values or NaN only: infinities are refused before
+}  # values are finite or NaN: infinities are refused before
 
 
 def parameter_fault(item: MissionItem, seq: int, count: int) -> Fault | None:

@@ -1,7 +1,7 @@
-"""Geofence and rally points of a ``.plan``, version 2 of both, as mission items and back.
+"""Geofence and rally points of a ``.plan`` (version 2 of both), to and from mission items.
 
-QGroundControl sends them in this order: polygons, circles, return point. A key ``inclusionGroup`` of ours, beside
-``inclusion``, holds MAVLink's group where it is not 0; QGroundControl ignores it.
+The order is QGroundControl's: polygons, circles, return point. The additional key ``inclusionGroup`` holds MAVLink's
+group if it is not 0; QGroundControl ignores it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _GROUP = "inclusionGroup"
 
 
 def fence_items(document: Mapping[str, Any], file: object) -> tuple[MissionItem, ...]:
-    """Return the items of ``geoFence``; none for older versions of it. Raises ConfigError."""
+    """Return the items of ``geoFence``; none for older versions. Raise ConfigError."""
     fence = _part(document, "geoFence", file)
     items: list[MissionItem] = []
     for index, polygon in enumerate(_listed(fence, "geoFence.polygons", file)):
@@ -55,7 +55,7 @@ def fence_items(document: Mapping[str, Any], file: object) -> tuple[MissionItem,
 
 
 def rally_items(document: Mapping[str, Any], file: object) -> tuple[MissionItem, ...]:
-    """Return the items of ``rallyPoints``; none for older versions of it. Raises ConfigError."""
+    """Return the items of ``rallyPoints``; none for older versions. Raise ConfigError."""
     rally = _part(document, "rallyPoints", file)
     return tuple(
         _item(
@@ -66,7 +66,7 @@ def rally_items(document: Mapping[str, Any], file: object) -> tuple[MissionItem,
 
 
 def fence_document(items: Sequence[MissionItem], before: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ``geoFence`` for ``items``; keys of ``before`` that we do not know stay. Raises ConfigError."""
+    """Return ``geoFence`` for ``items``; unknown keys of ``before`` are kept. Raise ConfigError."""
     parsed = fence_areas(items)
     if isinstance(parsed, Rejection):
         raise ConfigError("plan", "geofence", parsed.reason)
@@ -91,13 +91,15 @@ def fence_document(items: Sequence[MissionItem], before: Mapping[str, Any]) -> d
 def rally_document(
     items: Sequence[MissionItem], home: GeoPoint | None, before: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return ``rallyPoints`` for ``items``: altitudes above home. Raises ConfigError when it is not known."""
+    """Return ``rallyPoints`` for ``items``, with altitudes above home; raise ConfigError if home is unknown."""
     points = []
     for seq, item in enumerate(items):
         if item.position_deg is None:
             raise ConfigError("plan", f"rally point {seq}", "has no latitude and longitude")
         if not item.altitude_is_relative and home is None:
-            raise ConfigError("plan", f"rally point {seq}", "is above sea level, and home is not known")
+            raise ConfigError(
+                "plan", f"rally point {seq}", "has an altitude above sea level, and home is not known"
+            )
         sea_level_m = 0.0 if item.altitude_is_relative or home is None else home.altitude_m
         points.append([*item.position_deg, item.z - sea_level_m])
     return {**before, "points": points, "version": VERSION}
@@ -145,5 +147,5 @@ def _item(
     code: int, frame: Frame, place: list[float], param1: float = 0.0, param2: float = 0.0
 ) -> MissionItem:
     x, y = (integer_coordinate(value, is_global=True) for value in place[:2])
-    z = place[2] if len(place) > 2 else 0.0  # the altitude, if there is one
+    z = place[2] if len(place) > 2 else 0.0  # altitude, if given
     return MissionItem(int(code), int(frame), param1, param2, 0.0, 0.0, x, y, z)

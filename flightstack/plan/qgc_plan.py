@@ -1,7 +1,7 @@
-"""QGroundControl's ``.plan``: JSON, version 1.
+"""QGroundControl's ``.plan``: JSON, version 1. Objects of unchanged items are written back as they were read.
 
-Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html. A DO_JUMP in the file
-names the ``doJumpId`` of its target; in memory, as on the wire, it names the target's number.
+Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html. A DO_JUMP in the file refers to
+the ``doJumpId`` of its target; in memory, as in MAVLink, to the number of the target.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ class _Entry(NamedTuple):
 
 
 def read_plan(text: str, file: object) -> Plan:
-    """Read the text of a ``.plan``; ``file`` is its name in errors (ConfigError)."""
+    """Parse a ``.plan``; raise ConfigError with ``file`` as its name."""
     return plan_of_document(_document(text, file), file)
 
 
 def plan_of_document(document: Mapping[str, Any], file: object) -> Plan:
-    """Return the plan of a JSON document whose type and version are right."""
+    """Return the plan of a JSON document of the right type and version."""
     mission = document.get("mission")
     if not isinstance(mission, dict):
         raise ConfigError(file, "mission", "must be an object with the mission's items")
@@ -53,7 +53,7 @@ def plan_of_document(document: Mapping[str, Any], file: object) -> Plan:
 def _document(text: str, file: object) -> dict[str, Any]:
     try:
         document = json.loads(text)
-    except (ValueError, RecursionError) as error:  # ValueError: also an integer of thousands of digits
+    except (ValueError, RecursionError) as error:  # ValueError also for an integer of thousands of digits
         raise ConfigError(file, "", f"is not valid JSON: {error}") from error
     if not isinstance(document, dict) or document.get("fileType") != "Plan":
         found = document.get("fileType") if isinstance(document, dict) else None
@@ -64,7 +64,7 @@ def _document(text: str, file: object) -> dict[str, Any]:
 
 
 def _append(entries: list[_Entry], listed: Any, file: object) -> None:
-    """Append the item, or the simple items that a complex item (a survey, say) stands for."""
+    """Append a simple item, or the simple items of a complex item such as a survey."""
     where = f"item {len(entries)}"
     if not isinstance(listed, dict):
         raise ConfigError(file, where, "must be an object")
@@ -135,7 +135,7 @@ def _home(value: Any, file: object) -> GeoPoint | None:
 
 
 def plan_to_json(plan: Plan) -> str:
-    """Return the text of a ``.plan`` that QGroundControl opens."""
+    """Return the text of a ``.plan``."""
     document = copy.deepcopy(dict(plan.document)) or _empty_document()
     source = plan_of_document(document, "")
     mission = document["mission"]
@@ -176,7 +176,7 @@ def _empty_document() -> dict[str, Any]:
 
 
 def _simple_items(listed: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return one object per item, those of complex items in their place."""
+    """Return one object per item, with complex items expanded."""
     flat: list[dict[str, Any]] = []
     for entry in listed:
         flat += entry["TransectStyleComplexItem"]["Items"] if entry["type"] == "ComplexItem" else [entry]
@@ -184,7 +184,7 @@ def _simple_items(listed: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _kept(listed: dict[str, Any], item: MissionItem, seq: int) -> dict[str, Any]:
-    """Return the object of an unchanged item, with the ids of its new surroundings."""
+    """Return the object of an unchanged item with updated ids."""
     params = list(listed["params"])
     if item.command == Command.DO_JUMP:
         params[0] = _number(item.param1 + 1.0)
@@ -214,7 +214,7 @@ def _number(value: float) -> float | int | None:
 
 
 def _derived_home(plan: Plan) -> GeoPoint:
-    """Return a home where none is known: QGroundControl opens no plan without one."""
+    """Return a home for a plan without one: QGroundControl requires it."""
     positions = (item.position_deg for item in plan.items)
     latitude_deg, longitude_deg = next((position for position in positions if position), (0.0, 0.0))
     return GeoPoint(latitude_deg, longitude_deg, 0.0)

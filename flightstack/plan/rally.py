@@ -1,4 +1,4 @@
-"""Rally points: which lists of them the vehicle takes."""
+"""Validation of rally points."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def check_rally(
     limits: Limits = DEFAULT_LIMITS,
     fence: FenceShape | None = None,
 ) -> Rejection | None:
-    """Return why the vehicle refuses a list of rally points, or None if it takes it."""
+    """Return the rejection of a list of rally points, or None if it is valid."""
     if len(items) > MAX_RALLY_POINTS:
         reason = f"there are {len(items)} rally points, and at most {MAX_RALLY_POINTS} are allowed"
         return Rejection(MissionResult.NO_SPACE, None, reason)
@@ -52,7 +52,7 @@ def _altitude_fault(item: MissionItem, home: GeoPoint, limits: Limits) -> Fault 
 
 
 def _distance_fault(item: MissionItem, home: GeoPoint, limits: Limits, shape: FenceShape) -> Fault | None:
-    assert item.position_deg is not None  # of a rally point whose place was checked
+    assert item.position_deg is not None  # checked by place_fault
     north_m, east_m = shape.local(*item.position_deg)
     home_north_m, home_east_m = shape.local(home.latitude_deg, home.longitude_deg)
     distance_m, far_m = distance(north_m - home_north_m, east_m - home_east_m), limits.max_home_distance_m

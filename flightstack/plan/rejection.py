@@ -1,4 +1,4 @@
-"""Why the vehicle refuses a mission, a geofence or rally points."""
+"""Rejections of missions, geofences and rally points."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from flightstack.plan.vocabulary import GLOBAL_FRAMES, MissionResult, command_na
 
 
 class Fault(NamedTuple):
-    """What is wrong with an item, without its number."""
+    """Fault of an item, without its number."""
 
     result: MissionResult
     reason: str
 
 
 class Rejection(NamedTuple):
-    """Why a plan is refused."""
+    """Rejection of a plan."""
 
     result: MissionResult
     seq: int | None
-    """Number of the item at fault; None when it is the plan as a whole."""
+    """Number of the faulty item; None for the plan as a whole."""
     reason: str
-    """One sentence, naming the item."""
+    """One sentence that names the item."""
 
 
 def item_rejection(seq: int, item: MissionItem, fault: Fault) -> Rejection:
@@ -31,7 +31,7 @@ def item_rejection(seq: int, item: MissionItem, fault: Fault) -> Rejection:
 
 
 def place_fault(item: MissionItem) -> Fault | None:
-    """Return the fault of an item that must have a latitude and a longitude, or None."""
+    """Return the fault of the position of an item that requires one, or None."""
     if item.frame not in GLOBAL_FRAMES:
         return Fault(
             MissionResult.UNSUPPORTED_FRAME, f"needs a global frame (0, 3, 5 or 6), not {item.frame}"
@@ -42,7 +42,7 @@ def place_fault(item: MissionItem) -> Fault | None:
 
 
 def range_fault(latitude_deg: float, longitude_deg: float) -> Fault | None:
-    """Return the fault of a latitude and longitude beyond their ranges, or None."""
+    """Return the fault of a latitude or longitude out of range, or None."""
     if not abs(latitude_deg) <= 90.0:
         reason = f"latitude {latitude_deg:.7f} is outside -90 to 90 degrees"
         return Fault(MissionResult.INVALID_PARAM5_X, reason)

@@ -1,4 +1,4 @@
-"""Checks of the values of plan files, shared by both formats. Errors name file, item and field."""
+"""Validation of values in plan files of both formats. Errors name file, item and field."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ _RANGE_DEG = {4: 90.0, 5: 180.0}
 
 
 def check_count(file: object, count: int) -> None:
-    """Raise ConfigError when there are more items than any vehicle of ours takes."""
+    """Raise ConfigError for too many items."""
     if count > MAX_MISSION_ITEMS:
         problem = f"has {count} items, and at most {MAX_MISSION_ITEMS} are allowed"
         raise ConfigError(file, "mission", problem)
 
 
 def number(file: object, key: str, value: Any) -> float:
-    """Return a JSON number as a float that MAVLink can carry; null is NaN."""
+    """Return a JSON number within float32 range; NaN for null."""
     if value is None:
         return math.nan
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ConfigError(file, key, f"{value!r:.40} must be a number or null")
     try:
         result = float(value)
-    except OverflowError:  # an integer beyond the floats
+    except OverflowError:  # an integer beyond the range of float
         result = math.inf
     if math.isinf(as_float32(result)):
         raise ConfigError(file, key, f"{result:g} must be a finite 32-bit number")
@@ -78,7 +78,7 @@ def frame(file: object, key: str, value: Any) -> Frame:
 def mission_item(
     file: object, where: str, code: Command, frame_code: Frame, values: list[float], *, autocontinue: bool
 ) -> MissionItem:
-    """Return the item of seven parameters, after a check of its position."""
+    """Return the item with these seven parameters; raise ConfigError for a bad position."""
     is_global = frame_code in GLOBAL_FRAMES
     for index, limit_deg in _RANGE_DEG.items() if is_global else ():
         value = values[index]

@@ -1,4 +1,4 @@
-"""The numbers of MAVLink's mission vocabulary that this project uses (a test holds them to pymavlink's)."""
+"""Numbers of MAVLink's mission protocol; a test compares them with pymavlink's."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from enum import IntEnum
 
 MAX_MISSION_ITEMS = 2000
 MAX_FENCE_ITEMS = 200
-"""Vertices and circles of a geofence. Its check compares every pair of edges."""
+"""Vertices and circles of a geofence, limited because validation compares all pairs of edges."""
 MAX_RALLY_POINTS = 100
 
 UNSET_E7 = 2**31 - 1
-"""x or y of an item that leaves its latitude or longitude open: NaN, which an integer cannot hold."""
+"""x or y of an item without latitude or longitude: INT32_MAX, MAVLink's integer for NaN."""
 
 ALSO_UNSET_E7 = -(2**31)
-"""What a NaN becomes in ground stations that cast it to an integer on x86."""
+"""Sent for NaN by ground stations that cast it to an integer on x86."""
 
 
 class Command(IntEnum):
-    """MAV_CMD of the mission items that the vehicle flies."""
+    """MAV_CMD of the supported mission items."""
 
     NAV_WAYPOINT = 16
     NAV_LOITER_TIME = 19
@@ -45,7 +45,7 @@ RALLY_POINT = 5100
 
 
 class Frame(IntEnum):
-    """MAV_FRAME of mission items. With an integer x and y, the INT and the plain form mean the same."""
+    """MAV_FRAME of mission items. The INT and the plain forms are equivalent for integer x and y."""
 
     GLOBAL = 0
     MISSION = 2
@@ -87,16 +87,16 @@ class MissionResult(IntEnum):
 POSITION_COMMANDS = frozenset(
     {Command.NAV_WAYPOINT, Command.NAV_LOITER_TIME, Command.NAV_LAND, Command.NAV_TAKEOFF}
 )
-"""Commands whose x, y and z are a position."""
+"""Commands with a position in x, y and z."""
 
 PLACE_COMMANDS: frozenset[int] = POSITION_COMMANDS | frozenset(FenceCommand) | {RALLY_POINT}
-"""Commands whose x and y are a latitude and longitude."""
+"""Commands with latitude and longitude in x and y."""
 
 OPEN_POSITION_COMMANDS = frozenset({Command.NAV_LAND, Command.NAV_TAKEOFF})
-"""Commands that may leave their position open: the vehicle's own is meant."""
+"""Commands whose position is optional: the default is the vehicle's position."""
 
 NAV_COMMANDS = POSITION_COMMANDS | {Command.NAV_RETURN_TO_LAUNCH, Command.NAV_DELAY}
-"""Commands that take time to fly; the others are done at once."""
+"""Commands that take time; the others complete immediately."""
 
 RELATIVE_FRAMES = frozenset({Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT})
 GLOBAL_FRAMES = RELATIVE_FRAMES | {Frame.GLOBAL, Frame.GLOBAL_INT}
@@ -107,11 +107,11 @@ PLAN_NAMES = {
     MissionType.FENCE: "geofence",
     MissionType.RALLY: "list of rally points",
 }
-"""What a user calls the plan of each type."""
+"""Name of each plan type in messages."""
 
 
 def result_name(result: int) -> str:
-    """Return the name of a MAV_MISSION_RESULT, whatever its value on the wire."""
+    """Return the name of a MAV_MISSION_RESULT; unknown values are valid."""
     try:
         return f"MAV_MISSION_{MissionResult(result).name}"
     except ValueError:
@@ -119,7 +119,7 @@ def result_name(result: int) -> str:
 
 
 def command_name(command: int) -> str:
-    """Return the name of a command, or its number when it is not one of ours."""
+    """Return the name of a command, or its number if unknown."""
     if command == RALLY_POINT:
         return "RALLY_POINT"
     if command in FenceCommand.__members__.values():

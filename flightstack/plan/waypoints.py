@@ -1,7 +1,7 @@
 """``QGC WPL 110``, the text format of Mission Planner, MAVProxy and older QGroundControl.
 
-Its first line of values is the planned home; the mission follows. So items are numbered from 1 in the file
-and from 0 on the wire, and the target of a DO_JUMP shifts by one. QGroundControl reads it the same way.
+The first row is the planned home, followed by the mission. Items are numbered from 1 in the file and from 0 in MAVLink,
+so that targets of DO_JUMP shift by one, as in QGroundControl.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from flightstack.plan.vocabulary import Command
 
 WAYPOINTS_HEADER = "QGC WPL 110"
 _COLUMNS = 12
-_UNSET_HOME = GeoPoint(0.0, 0.0, 0.0)  # what ground stations write that know no home
+_UNSET_HOME = GeoPoint(0.0, 0.0, 0.0)  # written by ground stations without a home
 
 
 def read_waypoints(text: str, file: object) -> Plan:
-    """Read the text of a waypoint file; ``file`` is its name in errors (ConfigError)."""
+    """Parse a waypoint file; raise ConfigError with ``file`` as its name."""
     lines = text.splitlines()
     if lines[0].strip() != WAYPOINTS_HEADER:
         problem = f"{lines[0].strip()!r:.40} must be {WAYPOINTS_HEADER!r}; other versions are not supported"
@@ -78,9 +78,9 @@ def _item(file: object, row: int, line_number: int, columns: list[str], rows: in
 
 
 def plan_to_waypoints(plan: Plan, file: object) -> str:
-    """Return the text of a waypoint file; ConfigError when the plan has more than the format can hold."""
+    """Return the text of a waypoint file; raise ConfigError for a plan with geofence or rally points."""
     if plan.has_fence_or_rally:
-        raise ConfigError(file, "", "this format cannot hold the geofence and rally points; save as .plan")
+        raise ConfigError(file, "", "this format has no geofence and rally points: save as .plan")
     home = plan.home or _UNSET_HOME
     rows = ["\t".join(("0", "1", "0", "16", "0", "0", "0", "0", *(_text(value) for value in home), "1"))]
     rows += [_row(index, item) for index, item in enumerate(plan.items, start=1)]

@@ -1,1 +1,1 @@
-"""The flight stack process: options, files, clock, and the parts joined and run."""
+"""The flight stack process: options, files, clock, assembly and main loop."""

@@ -1,4 +1,4 @@
-"""The flight stack process: the only place where clock, transports and autopilot meet."""
+"""Main loop of the flight stack process: connects clock, transports and autopilot."""
 
 from __future__ import annotations
 
@@ -15,8 +15,13 @@ from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.choice import PYTHON, SERIAL, parse_loops
 from flightstack.params.config import StackConfig
 from flightstack.process.assembly import Stack, reboot_config, transfer_state
-from flightstack.process.clock import DeadlineScheduler, ask_for_punctual_sleeps
-from flightstack.process.connections import GroundConnection, check_deadline, connect, wait_for_state
+from flightstack.process.clock import DeadlineScheduler, minimise_timer_slack
+from flightstack.process.connections import (
+    GroundConnection,
+    check_deadline,
+    connect_simulator,
+    wait_for_state,
+)
 from flightstack.process.process_config import (
     EXIT_LOST,
     EXIT_OK,
@@ -34,16 +39,16 @@ from flightstack.vehicle.lockstep import Lockstep
 
 GROUND_POLL_NS = 500_000
 GROUND_IDLE_NS = 2_000_000
-"""Time between two looks at the ground links, with traffic and without: a look takes 40 µs."""
+"""Intervals of polling the ground links with and without traffic; a poll takes 40 µs."""
 GROUND_SHARE = 0.4
-"""In real time, sending to ground stations takes so much of a tick at most; what is left waits for the next."""
+"""Maximum share of a real-time tick for sending to ground stations; the rest is sent in the next ticks."""
 REPORT_S = 0.2
 FIRST_CONTACT_S = 60.0
-"""How long a process that must not outlive its ground station waits for the first word from it."""
+"""Timeout of the first message from a required ground station."""
 
 
 class App:
-    """Runs one flight stack until it is stopped, or until the simulator or a required ground station is lost."""
+    """Runs the flight stack until it is stopped or loses the simulator or a required ground station."""
 
     def __init__(self, config: StackConfig, process: ProcessConfig) -> None:
         self._process = process
@@ -62,10 +67,10 @@ class App:
         self._next_ground_ns = 0
         self._follower: AffinityFollower | None = None
 
-    # ------------------------------------------------------------------ life
+    # ------------------------------------------------------------------ lifecycle
 
     def run(self) -> int:
-        """Run to the end; return the exit code."""
+        """Run the process; return the exit code."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._on_signal)
         simulator: TcpClient | None = None
@@ -85,27 +90,27 @@ class App:
             complain(error)
             code = EXIT_USAGE
         except LinkClosedError:
-            code = self._simulator_gone()
+            code = self._simulator_loss_code()
         finally:
             self._close(simulator, orderly=code == EXIT_OK)
         return code
 
     def _connect(self) -> TcpClient:
-        """Connect to the simulator; a reboot meanwhile begins anew."""
+        """Connect to the simulator, and reboot on request while waiting."""
         while True:
             try:
-                return connect(self._process, self._meanwhile)
+                return connect_simulator(self._process, self._serve_while_waiting)
             except RebootRequestedError:
                 self._reboot()
 
     def _fly(self, simulator: TcpClient) -> None:
-        """Wait for the first state and run the loops until the process ends; a reboot begins anew."""
+        """Wait for the first state and run the loops until the process ends, with reboots on request."""
         holds_time, waits = self._process.wait_for_start, True
         simulator.send(self.stack.simulator.initial_requests(self.stack.rates.interval_us))
         while True:
             try:
                 if waits:
-                    wait_for_state(simulator, self.stack, self._process, self._meanwhile)
+                    wait_for_state(simulator, self.stack, self._process, self._serve_while_waiting)
                 waits = False
                 if holds_time:
                     self._hold_time(simulator)
@@ -116,13 +121,15 @@ class App:
                     self._run_real_time(simulator)
             except RebootRequestedError:
                 self._reboot()
-                if not holds_time:  # the last state was answered: the next one comes by itself
+                if not holds_time:  # the last state was answered: the simulator sends the next one
                     waits = True
 
     def _prepare_reboot(self) -> str | None:
-        """Build the stack that a reboot begins with; return why it cannot be: then the present one goes on."""
+        """Build the stack for a reboot; return why it failed, in which case the current one continues."""
         config = reboot_config(self.stack, self._config)
-        is_exclusive = parse_loops(config.loops).kind == SERIAL  # a line is opened once: the rest must do
+        is_exclusive = (
+            parse_loops(config.loops).kind == SERIAL
+        )  # a serial port opens once: test with other loops
         try:
             stack = self._files.build(replace(config, loops=PYTHON) if is_exclusive else config)
         except (ConfigError, TargetError) as error:
@@ -135,11 +142,11 @@ class App:
         return None
 
     def _reboot(self) -> None:
-        """Put the stack that was prepared in place of the present one."""
+        """Replace the current stack by the prepared one."""
         old = self.stack
         old.recorder.close()
-        self._files.attend()
-        self._ground.leave(time.monotonic())  # with the command's answer
+        self._files.update()
+        self._ground.detach(time.monotonic())  # sends the acknowledgement of the command
         self._files.close_loops()
         config = reboot_config(old, self._config)
         new, config = self._next or (self._files.build(config), config)
@@ -147,7 +154,7 @@ class App:
         self._files.adopt(new, config)
         self.stack = new
         new.ground.vehicle.prepare_reboot = self._prepare_reboot
-        self._ground.join(new.ground)
+        self._ground.attach(new.ground)
         self._next_log_us = 0
         transfer_state(old, new)
         new.journal.say(Severity.NOTICE, "Rebooted")
@@ -156,7 +163,7 @@ class App:
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         self._stop_signal = number
 
-    def _simulator_gone(self) -> int:
+    def _simulator_loss_code(self) -> int:
         now = self.stack.now
         if self._stop_signal:
             return EXIT_OK
@@ -168,17 +175,17 @@ class App:
         return EXIT_LOST
 
     def _close(self, simulator: TcpClient | None, orderly: bool) -> None:
-        """End the log and, if all is in order, announce the end: peers would report a lost vehicle."""
+        """Close logs and files; after an orderly end announce the shutdown to peers, which else report a loss."""
         self.stack.recorder.close()
         self._files.close_loops()
         if self._next is not None:
             self._next[0].loops.close()
         self._files.close_parameters()
-        self._files.attend()
+        self._files.update()
         self._files.close_plans()
-        self._files.attend()
+        self._files.update()
         if orderly:
-            self._ground.farewell()
+            self._ground.announce_shutdown()
         self._files.close_signing()
         if simulator is not None:
             if orderly:
@@ -191,18 +198,18 @@ class App:
     # ------------------------------------------------------------------ start
 
     def _hold_time(self, simulator: TcpClient) -> None:
-        """Keep time at zero until the vehicle flies a mission; the ground links go on meanwhile."""
+        """Hold time at zero and serve the ground links until the vehicle flies a mission."""
         poller = select.poll()
         poller.register(simulator, select.POLLIN)
         self._ground.register(poller)
         now = self.stack.now
-        next_sign_s = 0.0
+        next_heartbeat_s = 0.0
         while not (now.status.armed and now.status.mode is Mode.MISSION):
-            self._meanwhile()
-            if time.monotonic() >= next_sign_s:  # the simulator waits for an answer: say that we are here
-                next_sign_s = time.monotonic() + 1.0
+            self._serve_while_waiting()
+            if time.monotonic() >= next_heartbeat_s:  # keeps the simulator from a timeout
+                next_heartbeat_s = time.monotonic() + 1.0
                 simulator.send(self.stack.simulator.heartbeat(now.status.armed))
-            self._pass_requests(simulator)
+            self._send_requests(simulator)
             poller.poll(20)
             data = simulator.receive_now()
             if data is not None:
@@ -211,13 +218,13 @@ class App:
     # ------------------------------------------------------------------ loops
 
     def _run_lockstep(self, simulator: TcpClient) -> None:
-        """Answer each state with actuators; the simulator owns time."""
+        """Answer each state with actuator commands; the simulator drives the time."""
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
         lockstep = Lockstep(link, autopilot, self.stack.rates.interval_us)
         receive, clock_ns = simulator.receive, time.monotonic_ns
         self._follower = AffinityFollower(simulator.socket)
         divisor, tick = self.stack.rates.divisor, 0
-        fresh = True  # the state that came before the start
+        fresh = True  # the state received before the start
         while True:
             if fresh:
                 began_ns = clock_ns()
@@ -228,22 +235,22 @@ class App:
                 if tick % divisor == 0:
                     self._between_ticks(simulator)
             data = receive()
-            fresh = self._wait_slowly(simulator) if data is None else link.receive(data)
+            fresh = self._wait_for_simulator(simulator) if data is None else link.receive(data)
 
-    def _wait_slowly(self, simulator: TcpClient) -> bool:
-        """Serve the ground links while the simulator takes its time; return whether a state came."""
+    def _wait_for_simulator(self, simulator: TcpClient) -> bool:
+        """Serve the ground links until the simulator sends data; return True for a new state."""
         deadline_s = time.monotonic() + self._process.simulator_timeout_s
         while True:
-            self._meanwhile()
+            self._serve_while_waiting()
             data = simulator.receive()
             if data is not None:
                 return self.stack.simulator.receive(data)
             check_deadline(deadline_s, self.stack, self._process)
 
     def _run_real_time(self, simulator: TcpClient) -> None:
-        """Tick at fixed deadlines on the newest state; the machine's clock owns time."""
+        """Tick at fixed deadlines on the newest state; the machine's clock drives the time."""
         link, autopilot, timing = self.stack.simulator, self.stack.autopilot, self.stack.timing
-        ask_for_punctual_sleeps()
+        minimise_timer_slack()
         scheduler = DeadlineScheduler(timing)
         self._ground.slice_ns = round(GROUND_SHARE * timing.period_ns)
         interval_us, tick, time_us = self.stack.rates.interval_us, 0, 0
@@ -265,7 +272,7 @@ class App:
                 self._ground.send()
 
     def _between_ticks(self, simulator: TcpClient) -> None:
-        """Do what is due between two ticks: ground links, timing report, reasons to stop."""
+        """Serve the ground links, log the timing and check for a stop."""
         time_us = self.stack.now.time_us
         if time_us >= self._next_log_us:
             self._next_log_us = time_us + 1_000_000
@@ -273,19 +280,19 @@ class App:
             self.stack.recorder.timing(time_us, **fields)
             if not self._lockstep:
                 self.stack.simulator.steps.compare(self.stack.simulator.time_us, time_us)
-        self._pass_notices()
+        self._report_notices()
         now_ns = time.monotonic_ns()
         if now_ns < self._next_ground_ns:
             return
         if self._follower is not None:
-            self._follower.follow()
+            self._follower.update()
         heard = self._serve_ground()
         self._next_ground_ns = now_ns + (GROUND_POLL_NS if heard else GROUND_IDLE_NS)
-        self._pass_requests(simulator)
+        self._send_requests(simulator)
         self._check_stop()
 
-    def _pass_notices(self) -> None:
-        """Tell the operator what is wrong with the simulator's steps; do not begin a mission that cannot be flown."""
+    def _report_notices(self) -> None:
+        """Report problems with the simulator's steps; raise Ended before a mission that cannot be flown."""
         link, now = self.stack.simulator, self.stack.now
         for severity, text in link.steps.take_notices():
             self.stack.journal.say(severity, text)
@@ -293,24 +300,24 @@ class App:
             if self._process.wait_for_start and now.landed and (refusal := link.step_refusal):
                 raise Ended(EXIT_USAGE, refusal)
 
-    def _pass_requests(self, simulator: TcpClient) -> None:
+    def _send_requests(self, simulator: TcpClient) -> None:
         if requests := self.stack.simulator.take_requests():
             simulator.send(requests)
 
     # ------------------------------------------------------------------ ground links
 
     def _serve_ground(self) -> bool:
-        """Carry what both sides have to say; return whether a ground peer has sent something."""
+        """Exchange data with ground peers; return True if any was received."""
         now_s = time.monotonic()
         if now_s >= self._next_report_s:
             self._next_report_s = now_s + REPORT_S
             self.stack.report.update(self.stack.now.time_us, now_s)
         heard = self._ground.serve(now_s)
-        self._files.attend()
+        self._files.update()
         return heard
 
-    def _meanwhile(self) -> None:
-        """Do what must go on while the simulator is waited for."""
+    def _serve_while_waiting(self) -> None:
+        """Check for a stop and serve the ground links."""
         self._check_stop()
         self._serve_ground()
 

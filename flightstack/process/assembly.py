@@ -1,6 +1,6 @@
-"""Put a flight stack together from its configuration: everything but clock and transports.
+"""Build a flight stack from its configuration, without clock and transports, and transfer state at a reboot.
 
-The process (``app``) and the tests that fly in one process build the same stack here.
+The process (``app``) and in-process tests use the same stack.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ LoopsMaker: TypeAlias = Callable[[str, LoopsSetup, bool], ControlBackend]
 
 
 class Stack(NamedTuple):
-    """The parts that a process or a test drives."""
+    """The parts of a flight stack that a process or a test uses."""
 
     vehicle: Vehicle
     rates: Rates
@@ -61,19 +61,19 @@ class Stack(NamedTuple):
     report: TimingReport
     params: ParamStore
     loaded_params: LoadedParams
-    """What the parameter file held at the start."""
+    """Contents of the parameter file at startup."""
     loops: ControlBackend
     status: Callable[[], VehicleStatus]
-    """Returns the status of now."""
+    """Returns the current status."""
 
     @property
     def autopilot(self) -> Autopilot:
-        """The part that runs the ticks."""
+        """The autopilot, which runs ticks."""
         return self.parts.autopilot
 
     @property
     def now(self) -> FlightState:
-        """The newest values of the flight."""
+        """The current flight state."""
         return self.parts.now
 
     @property
@@ -88,7 +88,7 @@ class Stack(NamedTuple):
 
     @property
     def area(self) -> FlightArea:
-        """Where the vehicle may fly."""
+        """The area in which the vehicle may fly."""
         return self.parts.area
 
 
@@ -99,7 +99,7 @@ def vehicle_of(config: StackConfig) -> Vehicle:
 
 
 def kernels_of(config: StackConfig) -> tuple[str, ...]:
-    """Names of the kernels that ``build`` compiles, or reads from the cache, in this order."""
+    """Return the names of the kernels that ``build`` compiles or loads, in order."""
     needs_loops = config.loops == PYTHON
     return tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
 
@@ -107,84 +107,83 @@ def kernels_of(config: StackConfig) -> tuple[str, ...]:
 def build(
     config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS, make: LoopsMaker = make_loops
 ) -> Stack:
-    """Build a stack that serves ``logs`` to ground stations and flies the loops that ``make`` returns.
+    """Build a stack with the loops of ``make`` that serves ``logs`` to ground stations.
 
-    Raise ConfigError for anything in the configuration that cannot fly.
+    Raise ConfigError for an invalid configuration.
     """
     vehicle = vehicle_of(config)
-    pace = rates(config.inner_hz, config.outer_hz)
+    loop_rates = rates(config.inner_hz, config.outer_hz)
     setup = LoopsSetup(
         vehicle,
         load_controller(config.controller),
         open_gains(config.gains),
         math.radians(config.behaviour.max_tilt_deg),
-        pace.inner_hz,
-        pace.outer_hz,
-        pace.divisor,
+        loop_rates.inner_hz,
+        loop_rates.outer_hz,
+        loop_rates.divisor,
     )
     backend = make(config.loops, setup, config.lockstep)
     try:
-        return _join(config, vehicle, pace, backend, open_log, logs)
+        return _join(config, vehicle, loop_rates, backend, open_log, logs)
     except BaseException:
-        backend.close()  # a target may be a process, or hold a line
+        backend.close()  # a target may hold a process or a serial port
         raise
 
 
 def _join(
     config: StackConfig,
     vehicle: Vehicle,
-    pace: Rates,
+    loop_rates: Rates,
     backend: ControlBackend,
     open_log: OpenLog,
     logs: LogStore,
 ) -> Stack:
-    log_info: dict[str, str | int | float] = {
+    params, loaded = load_parameters(config, backend)
+    behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
+    info = _log_info(config, vehicle, loop_rates, backend.version)
+    recorder = FlightRecorder(open_log, info, params.values, config.home)
+    simulator = SimulatorEndpoint(vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us)
+    parts = assemble(
+        vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
+        simulator.state, simulator.rotor_speed_rad_s, simulator,
+    )  # fmt: skip
+    parts.warm_up()
+    connect_parameters(params, parts, recorder)
+    timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
+    report = TimingReport(timing, loop_rates, config.lockstep)
+    generic = params.value(AUTOPILOT) == GENERIC
+    vehicle_id = vehicle_info(vehicle, system_id, generic, parts.places.frame)
+
+    def status() -> VehicleStatus:
+        return vehicle_status(vehicle_id, parts, simulator.battery)
+
+    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message)
+    context = VehicleContext.of(parts, params, simulator, generic, logs)
+    ground = GroundHub(context, parts, telemetry, vehicle_id)
+    return Stack(
+        vehicle, loop_rates, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status
+    )  # fmt: skip
+
+
+def _log_info(
+    config: StackConfig, vehicle: Vehicle, loop_rates: Rates, loops_version: str
+) -> dict[str, str | int | float]:
+    """Return the information messages of a log."""
+    return {
         "sys_name": "flightstack",
         "ver_sw": __version__,
         **vehicle_fields(vehicle),
         "controller": config.controller,
         "gains": config.gains,
         "loops": config.loops,
-        "ver_loops": backend.version,
-        "inner_hz": pace.inner_hz,
-        "outer_hz": pace.outer_hz,
+        "ver_loops": loops_version,
+        "inner_hz": loop_rates.inner_hz,
+        "outer_hz": loop_rates.outer_hz,
     }
-    params, loaded = load_parameters(config, backend)
-    behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
-    recorder = FlightRecorder(open_log, log_info, params.values, config.home)
-    simulator = SimulatorEndpoint(vehicle, config.home, config.lockstep, system_id, pace.interval_us)
-    parts = assemble(
-        vehicle,
-        backend,
-        behaviour,
-        config.home,
-        pace.divisor,
-        pace.outer_hz,
-        recorder,
-        simulator.state,
-        simulator.rotor_speed_rad_s,
-        simulator,
-    )
-    parts.warm_up()
-    connect_parameters(params, parts, recorder)
-    timing = LoopTiming(round(1e9 / pace.inner_hz))
-    report = TimingReport(timing, pace, config.lockstep)
-    generic = params.value(AUTOPILOT) == GENERIC
-    info = vehicle_info(vehicle, system_id, generic, parts.places.frame)
-
-    def status() -> VehicleStatus:
-        return vehicle_status(info, parts, simulator.battery)
-
-    telemetry = Telemetry(status, lambda: parts.now.time_us, report.message)
-    context = VehicleContext.of(parts, params, simulator, generic, logs)
-    ground = GroundHub(context, parts, telemetry, info)
-    return Stack(
-        vehicle, pace, simulator, parts, ground, recorder, timing, report, params, loaded, backend, status
-    )
 
 
 def reboot_config(stack: Stack, config: StackConfig) -> StackConfig:
-    """Return the configuration to boot with: without a parameter file, the values of now are handed on."""
+    """Return the configuration after a reboot; without a parameter file it contains the current values."""
     if config.params_file is not None:
         return config
     changed = [name for name in stack.params.specs if not stack.params.is_default(name)]
@@ -192,11 +191,10 @@ def reboot_config(stack: Stack, config: StackConfig) -> StackConfig:
 
 
 def transfer_state(old: Stack, new: Stack) -> None:
-    """Give the new stack what a reboot must not lose: peers, plans, home, and the newest state.
+    """Copy peers, plans, home and the newest state to the new stack at a reboot.
 
-    What begins anew: the vehicle's clock, modes and failsafes, sequence numbers, transfers of files and missions,
-    counters, timing. What the process keeps for all stacks: signing with the time stamps of its streams, the number
-    of the next log, the parameter file.
+    Vehicle clock, modes, failsafes, sequence numbers, transfers, counters and timing restart. The process keeps signing
+    timestamps, the number of the next log, and the parameter file for all stacks.
     """
     for address, permanent in old.ground.addresses():
         new.ground.add_peer(address, permanent)

@@ -1,7 +1,7 @@
-"""Fixed-rate scheduling: rate groups, the deadline scheduler of real time, and what the loops' timing was.
+"""Fixed-rate scheduling: rates of the loops, real-time deadline scheduler, and timing statistics.
 
-The only module that reads the machine's clock for the loops. In lockstep the simulator owns time and only the
-execution time of a tick is measured here.
+Only this module reads the machine's clock for the loops. In lockstep the simulator drives the time, and only execution
+times are measured.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ DEFAULT_OUTER_HZ = 100.0
 WINDOW = 4096
 
 
-def ask_for_punctual_sleeps() -> None:
-    """Set this process's timer slack to its minimum (Linux: 50 µs otherwise); elsewhere nothing happens."""
+def minimise_timer_slack() -> None:
+    """Set the timer slack of this process to its minimum on Linux, where the default is 50 µs."""
     with contextlib.suppress(OSError):
         Path("/proc/self/timerslack_ns").write_text("1", encoding="ascii")
 
 
 class Rates(NamedTuple):
-    """The rates of the loops. The outer one runs in every ``divisor``-th inner tick."""
+    """Rates of the loops; the outer loop runs in every ``divisor``-th inner tick."""
 
     inner_hz: float
     outer_hz: float
@@ -39,12 +39,12 @@ class Rates(NamedTuple):
 
 
 def nearest_outer_hz(inner_hz: float) -> float:
-    """Return the rate nearest to 100 Hz that divides ``inner_hz``: what an outer loop runs at unless told."""
+    """Return the default outer rate: the one nearest to 100 Hz that divides ``inner_hz``."""
     return inner_hz / max(1, round(inner_hz / DEFAULT_OUTER_HZ))
 
 
 def rates(inner_hz: float, outer_hz: float) -> Rates:
-    """Check and return the rates; raise ConfigError unless the outer one divides the inner one."""
+    """Return the validated rates; raise ConfigError."""
     if not MIN_INNER_HZ <= inner_hz <= MAX_INNER_HZ:
         raise ConfigError("--inner-hz", f"{inner_hz:g}", f"is outside {MIN_INNER_HZ:g} to {MAX_INNER_HZ:g}")
     interval_us = round(1e6 / inner_hz)
@@ -61,7 +61,7 @@ def rates(inner_hz: float, outer_hz: float) -> Rates:
 
 
 class Distribution(NamedTuple):
-    """Figures of a set of durations, µs."""
+    """Statistics of a set of durations [µs]."""
 
     mean_us: float
     p99_us: float
@@ -84,7 +84,7 @@ class Durations:
         self._count += 1
 
     def figures(self) -> Distribution:
-        """Return the figures of the durations held."""
+        """Return the statistics of the stored durations."""
         count = min(self._count, WINDOW)
         if count == 0:
             return NO_DURATIONS
@@ -93,7 +93,7 @@ class Durations:
 
 
 class LoopTiming:
-    """Accounts for ticks: execution time, lateness, overruns (longer than a period) and missed deadlines."""
+    """Statistics of ticks: execution time, lateness, overruns (longer than a period) and missed deadlines."""
 
     def __init__(self, period_ns: int) -> None:
         self.period_ns = period_ns
@@ -115,8 +115,7 @@ class LoopTiming:
 class DeadlineScheduler:
     """Releases ticks at fixed absolute deadlines of the monotonic clock, without drift.
 
-    A tick that comes late by whole periods skips the deadlines that have passed (they count as missed)
-    instead of hurrying after them, as a flight controller's loop does.
+    Deadlines that passed during a late tick are skipped and counted as missed.
     """
 
     def __init__(
@@ -150,7 +149,7 @@ class DeadlineScheduler:
 
 
 class TimingReport:
-    """Figures of the last few thousand ticks, refreshed by ``update``."""
+    """Timing statistics of recent ticks, for telemetry and log."""
 
     def __init__(self, timing: LoopTiming, rates: Rates, lockstep: bool) -> None:
         self._timing = timing
@@ -163,7 +162,7 @@ class TimingReport:
         self._last: tuple[int, float] | None = None
 
     def update(self, time_us: int, wall_s: float) -> None:
-        """Take the figures of now; the real-time factor is that since the last update."""
+        """Update the statistics; the real-time factor is that since the last update."""
         self._execution = self._timing.execution.figures()
         self._lateness = self._timing.lateness.figures()
         if self._last is not None and wall_s > self._last[1]:
@@ -180,7 +179,7 @@ class TimingReport:
         )  # fmt: skip
 
     def log_fields(self, ticks: int) -> dict[str, Any]:
-        """Return the fields of the log topic ``loop_timing``: in lockstep only what every run has in common."""
+        """Return the fields of the log topic ``loop_timing``: in lockstep only deterministic ones."""
         fields: dict[str, Any] = {
             "ticks": ticks,
             "inner_hz": self._rates.inner_hz,

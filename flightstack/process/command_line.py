@@ -1,27 +1,64 @@
-"""The look that the three commands share: plain help, ``-h``, ``--version`` and shell completion."""
+"""Command lines of the three programs: common look, shared options, and how one program starts another."""
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import inspect
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import typer
 
-# the base of all complaints about usage, in typer with its own copy of click and without
 UsageError: Any = typer.BadParameter.__mro__[1]
+"""Base class of usage errors: typer has its own copy of click in some versions."""
 
 HELP_FLAGS = ("-h", "--help")
+_ROOT = Path(__file__).resolve().parents[2]
 
 
 def make_app(**settings: Any) -> typer.Typer:
-    """Return a command line whose help is plain text: brackets in it are brackets, not markup."""
+    """Return a command line with plain-text help: brackets in it are no markup."""
     return typer.Typer(
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": list(HELP_FLAGS)},
         **settings,
     )
+
+
+def with_options(options: type[Any]) -> Callable[[Callable[[Any], None]], Callable[..., None]]:
+    """Give a command one flag per field of the dataclass ``options``, which is its only argument."""
+    hints = get_type_hints(options, include_extras=True)
+    parameters = [
+        inspect.Parameter(
+            field.name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name]
+        )
+        for field in dataclasses.fields(options)
+    ]
+
+    def decorate(command: Callable[[Any], None]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def run(**given: Any) -> None:
+            command(options(**given))
+
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        return run
+
+    return decorate
+
+
+def own_program(module: str, *arguments: str) -> list[str]:
+    """Return the command that runs a module of this installation.
+
+    ``-P`` keeps Python from importing a folder of the same name in the working directory, unless the working
+    directory is this installation.
+    """
+    safe = [] if Path.cwd() == _ROOT else ["-P"]
+    return [sys.executable, *safe, "-m", module, *arguments]
 
 
 def _print_version(context: typer.Context, wanted: bool) -> None:
@@ -36,7 +73,7 @@ Version = Annotated[
     bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
 ]
 
-
+# options of ``gcs replay`` and ``sim-bridge render``
 Png = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Write a picture of the middle of the flight, or of the time --at."),
@@ -45,7 +82,7 @@ Sheet = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Write nine times, or those of --at, in one picture.")
 ]
 Video = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Write a film, .mp4 (which needs even sizes) or .gif.")
+    Path | None, typer.Option(metavar="FILE", help="Write a film: .mp4 (needs an even size) or .gif.")
 ]
 View = Annotated[bool, typer.Option("--view", help="Play the flight in a window.")]
 At = Annotated[
@@ -67,7 +104,7 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing f
 
 
 class PictureOptions(NamedTuple):
-    """What was asked for, as it was given; None where it was not."""
+    """Options of a picture or film, as given; None where not given."""
 
     png: Path | None = None
     sheet: Path | None = None
@@ -84,7 +121,7 @@ class PictureOptions(NamedTuple):
     overwrite: bool = False
 
     def arguments(self) -> list[str]:
-        """Return the command line that asks for the same."""
+        """Return the same options as command line arguments."""
         given = {
             "--png": self.png, "--sheet": self.sheet, "--video": self.video, "--at": self.at,
             "--camera": self.camera, "--size": self.size, "--fps": self.fps, "--from": self.begin,
@@ -97,11 +134,12 @@ class PictureOptions(NamedTuple):
         ]
 
 
+# options of ``sim-bridge`` that ``gcs fly`` and ``gcs pil`` offer too
 VEHICLE = typer.Option(help="Built-in vehicle (paper_quad, x_quad) or a TOML file.")
 PLANT = typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")
 WIND = typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")
 GUST = typer.Option(help="Standard deviation of the gusts, m/s.")
-DRAG = typer.Option("--drag", help="Fly with the optional drag of the vehicle's file, so that wind acts.")
+DRAG = typer.Option("--drag", help="Use the optional drag of the vehicle file, so that wind acts.")
 FORCE = typer.Option(metavar="N,E,D", help="Constant external force, N.")
 TORQUE = typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")
 TORQUE_GUST = typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
@@ -119,16 +157,3 @@ FAULTS = typer.Option(
     "battery:level=SHARE, each with @BEGIN or @BEGIN-END in seconds; may be repeated.",
 )
 VIEW = typer.Option("--view", help="Show the vehicle in a window.")
-
-
-_ROOT = Path(__file__).resolve().parents[2]
-
-
-def own_program(module: str, *arguments: str) -> list[str]:
-    """Return the command that runs a module of this installation.
-
-    Python looks for modules in the working directory first, where a folder of the same name would be run instead; so
-    it must not, unless this installation is there.
-    """
-    safe = [] if Path.cwd() == _ROOT else ["-P"]
-    return [sys.executable, *safe, "-m", module, *arguments]

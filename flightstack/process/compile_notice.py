@@ -1,4 +1,4 @@
-"""Progress of compilation on stderr: one line for each kernel that is compiled, none for those read from the cache."""
+"""Progress of kernel compilation on stderr; kernels loaded from the cache are not reported."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ from collections.abc import Callable, Sequence
 from numba.core import event
 
 _COMPILATION = "numba:compile"
-"""Numba's event around the compilation of one function; a function read from the cache has none."""
+"""Numba's event of the compilation of one function."""
 
 
 class CompileNotice(event.Listener):  # type: ignore[misc]  # Numba has no types
-    """Reports each kernel before it is compiled; the functions that a kernel calls are part of it."""
+    """Reports each kernel before its compilation, which includes the functions that it calls."""
 
     def __init__(self, say: Callable[[str], None], kernels: Sequence[str]) -> None:
-        """``kernels``: names of all kernels that the program needs, in the order of compilation."""
+        """``kernels`` are the names of the program's kernels in order of compilation."""
         self._say, self._kernels = say, tuple(kernels)
         self._depth = 0
         self._began = False
 
     def on_start(self, event: event.Event) -> None:
-        """Report a kernel whose compilation begins."""
+        """Report a kernel at the start of its compilation."""
         self._depth += 1
         if self._depth == 1:
             self._report(base_name(event.data["dispatcher"].py_func.__name__))
 
     def on_end(self, event: event.Event) -> None:
-        """Count the way out of nested compilations."""
+        """Track nested compilations."""
         self._depth -= 1
 
     def _report(self, kernel: str) -> None:
@@ -41,12 +41,12 @@ class CompileNotice(event.Listener):  # type: ignore[misc]  # Numba has no types
 
 
 def base_name(kernel: str) -> str:
-    """Return the name of a kernel without the suffix that ``specialise`` gives it."""
+    """Return the name of a kernel without the suffix of ``specialise``."""
     return kernel.partition("__")[0]
 
 
 def announce_compilation(program: str, kernels: Sequence[str]) -> None:
-    """Report on stderr, from now on, each kernel that ``program`` compiles."""
+    """Report each kernel that ``program`` compiles on stderr."""
 
     def say(text: str) -> None:
         print(f"{program}: {text}", file=sys.stderr, flush=True)

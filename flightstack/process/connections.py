@@ -1,4 +1,4 @@
-"""The process's end of the ground links: the ports, joined to the hub of the present stack."""
+"""Connections of the process: to ground stations and to the simulator."""
 
 from __future__ import annotations
 
@@ -15,31 +15,36 @@ from flightstack.services.routing.peer import PeerAddress
 from flightstack.transports.tcp import TcpClient
 from flightstack.transports.vehicle_ports import Place, PortsConfig, VehiclePorts
 
+FALLBACK_REQUEST_S = 1.0
+"""Timeout before the standard message is requested from the simulator."""
+SIMULATOR_WARNING_S = 10.0
+"""Timeout before the user is warned; waiting continues, because the simulator may be compiling."""
+
 
 class GroundConnection:
-    """Carries bytes between ports and hub, on the machine's clock."""
+    """Connects the ports to the hub of the current stack."""
 
     def __init__(self, ports: PortsConfig, hub: GroundHub) -> None:
-        """Bind all ports, and address those who are to hear unasked; raise PortBusyError."""
+        """Bind all ports and add the configured peers; raise PortBusyError."""
         self._ports = VehiclePorts(ports)
         self._hub = hub
         self._sending: Iterator[tuple[PeerAddress, bytes]] | None = None
         self.slice_ns: int | None = None
-        """Sending takes so long at most, and what is left waits for the next call; None: as long as it takes."""
+        """Time limit of ``send``; the rest is sent in the next call. None for no limit."""
         for channel, peer in self._ports.first_peers:
             hub.add_peer(PeerAddress(channel, *peer), permanent=True)
 
     @property
     def is_sending(self) -> bool:
-        """Whether something was left for the next call."""
+        """True if data is left for the next call."""
         return self._sending is not None
 
     def register(self, poller: select.poll) -> None:
-        """Let ``poller`` wake when something arrives."""
+        """Register the ports with ``poller``."""
         self._ports.register(poller)
 
     def serve(self, now_s: float) -> bool:
-        """Take what has arrived, and send what is due; return whether anything has arrived."""
+        """Process received data and send due messages; return True if data was received."""
         hub, ports, heard = self._hub, self._ports, False
         for channel, peer, data in ports.receive(self._heard_s):
             heard = True
@@ -55,7 +60,7 @@ class GroundConnection:
         return heard
 
     def send(self) -> None:
-        """Send what is due, as far as the slice of time goes; ``serve`` was called before."""
+        """Send due messages within ``slice_ns``; call ``serve`` first."""
         assert self._sending is not None
         clock_ns, send = time.monotonic_ns, self._ports.send
         end_ns = math.inf if self.slice_ns is None else clock_ns() + self.slice_ns
@@ -67,18 +72,18 @@ class GroundConnection:
             self._sending = None
         self._ports.flush()
 
-    def leave(self, now_s: float) -> None:
-        """Send the last answers of a hub that another one will follow."""
+    def detach(self, now_s: float) -> None:
+        """Send the last messages of a hub before it is replaced."""
         for (channel, host, port), data in self._hub.poll(now_s):
             self._ports.send(channel, (host, port), data)
         self._sending = None
 
-    def join(self, hub: GroundHub) -> None:
-        """Serve another hub from now on."""
+    def attach(self, hub: GroundHub) -> None:
+        """Replace the hub."""
         self._hub = hub
 
-    def farewell(self) -> None:
-        """Send the last words of an orderly end."""
+    def announce_shutdown(self) -> None:
+        """Send the final messages of an orderly shutdown."""
         for (channel, host, port), data in self._hub.farewell():
             self._ports.send(channel, (host, port), data)
         self._ports.flush()
@@ -92,14 +97,8 @@ class GroundConnection:
         return self._hub.heard_s(PeerAddress(channel, *peer))
 
 
-SECOND_HELLO_S = 1.0
-"""Silence after which a simulator is asked for the standard message."""
-SIMULATOR_NOTICE_S = 10.0
-"""Silence of a connected simulator after which the user is told; it is waited for longer: it may be compiling."""
-
-
-def connect(process: ProcessConfig, between_tries: Callable[[], None]) -> TcpClient:
-    """Connect to the simulator, and call ``between_tries`` meanwhile; raise Ended if there is none in time."""
+def connect_simulator(process: ProcessConfig, between_tries: Callable[[], None]) -> TcpClient:
+    """Connect to the simulator, calling ``between_tries`` while waiting; raise Ended after the timeout."""
     p = process
     try:
         return TcpClient.connect(p.simulator_host, p.simulator_port, p.simulator_timeout_s, between_tries)
@@ -107,45 +106,45 @@ def connect(process: ProcessConfig, between_tries: Callable[[], None]) -> TcpCli
         raise Ended(
             EXIT_TIMEOUT,
             f"no simulator at {p.simulator_host}:{p.simulator_port} within {p.simulator_timeout_s:g} s: "
-            "start sim-bridge, or name its port with --sim-port",
+            "start sim-bridge, or give its port with --sim-port",
         ) from None
 
 
 def wait_for_state(
-    simulator: TcpClient, stack: Stack, process: ProcessConfig, meanwhile: Callable[[], None]
+    simulator: TcpClient, stack: Stack, process: ProcessConfig, while_waiting: Callable[[], None]
 ) -> None:
-    """Wait for the first state, and call ``meanwhile`` between looks; raise Ended when it takes too long."""
+    """Wait for the first state, calling ``while_waiting`` repeatedly; raise Ended after the timeout."""
     link, interval_us = stack.simulator, stack.rates.interval_us
     began_s = time.monotonic()
-    asked_again = told = False
+    is_fallback_requested = has_warned = False
     while True:
-        meanwhile()
+        while_waiting()
         data = simulator.receive()
         if data is not None and link.receive(data):
             break
-        silent = time.monotonic() - began_s > SECOND_HELLO_S
-        if not asked_again and (silent or link.request_refused):
-            asked_again = True
+        silent = time.monotonic() - began_s > FALLBACK_REQUEST_S
+        if not is_fallback_requested and (silent or link.request_refused):
+            is_fallback_requested = True
             simulator.send(link.fallback_request(interval_us))
-        if not told and time.monotonic() - began_s > SIMULATOR_NOTICE_S:
-            told = True
-            _tell_silent(stack, process)
+        if not has_warned and time.monotonic() - began_s > SIMULATOR_WARNING_S:
+            has_warned = True
+            _warn_of_silence(stack, process)
         check_deadline(began_s + process.simulator_timeout_s, stack, process)
     stack.now.has_state = True
 
 
-def _tell_silent(stack: Stack, process: ProcessConfig) -> None:
+def _warn_of_silence(stack: Stack, process: ProcessConfig) -> None:
     where = f"{process.simulator_host}:{process.simulator_port}"
     sentence = f"the simulator at {where} is connected but sends no state"
     stack.journal.say(Severity.WARNING, f"Waiting: {sentence}")
     complain(
-        f"warning: {sentence} for {SIMULATOR_NOTICE_S:g} s; it hangs, or compiles; waiting up to "
+        f"warning: {sentence} for {SIMULATOR_WARNING_S:g} s; it may be compiling; waiting up to "
         f"{process.simulator_timeout_s:g} s"
     )
 
 
 def check_deadline(deadline_s: float, stack: Stack, process: ProcessConfig) -> None:
-    """Raise Ended when the simulator has been silent past ``deadline_s`` of the machine's clock."""
+    """Raise Ended if the simulator was silent until ``deadline_s`` of the machine's clock."""
     if time.monotonic() > deadline_s:
         at = f"t={stack.now.time_us * 1e-6:.3f} s"
         timeout_s = process.simulator_timeout_s

@@ -1,4 +1,4 @@
-"""Prints lines on stdout and stderr: a closed pipe or a full disk behind the output never ends the process."""
+"""Print lines to stdout and stderr; a closed pipe or a full disk does not end the process."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import sys
 from typing import IO
 
 OUTPUT_ERRORS = frozenset({errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF})
-"""What writing to stdout may raise. Its errors name no file."""
+"""Errors of writing to stdout, which name no file."""
 
 
 def replace_unencodable() -> None:
-    """Print "?" for characters that the encoding of stdout or stderr does not have, such as × and °."""
+    """Print "?" for characters outside the encoding of stdout or stderr."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # None when it is closed
+        if isinstance(stream, io.TextIOWrapper):  # None if closed
             stream.reconfigure(errors="replace")
 
 
 def say(line: object) -> Exception | None:
-    """Print a line on stdout; return the error that prevents it, or None."""
+    """Print a line to stdout; return the error of a failure, or None."""
     return _print(line, sys.stdout)
 
 
 def complain(line: object) -> None:
-    """Print a line on stderr; an error is ignored."""
+    """Print a line to stderr; ignore errors."""
     _print(line, sys.stderr)
 
 
 def _print(line: object, stream: IO[str] | None) -> Exception | None:
-    if stream is None:  # it was closed when the process began
+    if stream is None:  # closed before the start
         return None
     try:
         print(line, file=stream, flush=True)
@@ -43,26 +43,26 @@ def _print(line: object, stream: IO[str] | None) -> Exception | None:
 
 
 def report_os_error(program: str, error: OSError) -> int:
-    """Report the error that ended ``program``, and return the exit code.
+    """Print an error of a named file or of stdout that ended ``program``, and return the exit code.
 
-    That is an error of the file that it names, or of stdout; any other is raised again.
+    Any other error is raised again.
     """
     if error.filename is None and error.errno not in OUTPUT_ERRORS:
         raise error
     drop(sys.stdout)
-    if not isinstance(error, BrokenPipeError):  # a reader that closed the pipe has read enough
+    if not isinstance(error, BrokenPipeError):  # the reader of a closed pipe needs no message
         where = "" if error.filename is None else f"{error.filename}: "
         complain(f"{program}: {where}{error.strerror}")
     return 1
 
 
 def drop(stream: IO[str] | None) -> None:
-    """Redirect a stream to /dev/null: an error while Python flushes it at exit would be printed."""
+    """Redirect a stream to /dev/null, so that flushing it at exit cannot fail."""
     if stream is None:
         return
     try:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
         os.close(nowhere)
-    except (OSError, ValueError):  # it has no descriptor, or is closed
+    except (OSError, ValueError):  # no descriptor, or closed
         return

@@ -1,4 +1,4 @@
-"""The files of one process's flight logs: named one after the other, and readable while they are written."""
+"""Log files of one process: naming, and reading while they are written."""
 
 from __future__ import annotations
 
@@ -13,19 +13,18 @@ RUNS = Path("runs")
 
 
 def default_log(instance: int, stamp: str) -> Path:
-    """Return where a vehicle that is told nothing begins its logs, at ``stamp``.
+    """Return the default log path at time ``stamp``.
 
-    A vehicle shows its ground stations, and erases for them, the logs of one folder; so each has a folder of its own.
+    Each instance has its own folder, because ground stations can list and erase all logs of a folder.
     """
     folder = RUNS if instance == 0 else RUNS / f"instance-{instance}"
     return folder / f"{stamp}-flight.ulg"
 
 
 class LogFiles:
-    """Opens ``first`` for the first flight, and for the next ones files with a number behind its name.
+    """Opens ``first`` for the first flight and numbered files for the next ones.
 
-    A file that exists is left alone, and the next free number taken; but ``first`` may be overwritten if the user
-    said so.
+    Numbers of existing files are skipped. Only ``first`` may be overwritten, with ``overwrite``.
     """
 
     def __init__(self, first: Path | None, overwrite: bool = False) -> None:
@@ -33,10 +32,10 @@ class LogFiles:
         self._overwrite = overwrite
         self._count = 0
         self.current: Path | None = None
-        """The newest log, finished or not."""
+        """The newest log, open or closed."""
 
     def open(self, rotors: int) -> FlightLog | None:
-        """Begin the next log; None if there are to be none. Raise OSError."""
+        """Open the next log, or return None if logging is off; raise OSError."""
         if self._first is None:
             return None
         while True:
@@ -56,7 +55,7 @@ class LogFiles:
         return first.with_name(f"{first.stem}-{self._count}{first.suffix}")
 
     def tail(self, is_logging: Callable[[], bool]) -> FileTail | None:
-        """Return the log that is being written, to be read along; None while there is none."""
+        """Open the current log for reading while it is written, or return None."""
         path = self.current
         if path is None or not is_logging():
             return None
@@ -67,16 +66,16 @@ class LogFiles:
 
 
 class FileTail:
-    """A growing file, read from its beginning; implements ``services.logs.log_stream.LogTail``."""
+    """A growing file, read from the start; implements ``services.logs.log_stream.LogTail``."""
 
     def __init__(self, path: Path, is_open: Callable[[], bool]) -> None:
-        """Open ``path``, raise OSError; ``is_open`` tells whether somebody still writes to it."""
+        """Open ``path``; ``is_open`` returns True while it is written. Raise OSError."""
         self._descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
         self._offset = 0
         self._is_open = is_open
 
     def read(self, count: int) -> bytes:
-        """Return the next bytes, at most ``count``; none if nothing new is there or the file cannot be read."""
+        """Return up to ``count`` new bytes; b"" without any or if reading fails."""
         try:
             data = os.pread(self._descriptor, count, self._offset) if self._descriptor >= 0 else b""
         except OSError:
@@ -86,7 +85,7 @@ class FileTail:
 
     @property
     def ended(self) -> bool:
-        """Whether nothing will be added."""
+        """True if the file does not grow any more."""
         return self._descriptor < 0 or not self._is_open()
 
     def close(self) -> None:

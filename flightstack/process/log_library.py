@@ -1,7 +1,7 @@
-"""The folder of flight logs: the only place that opens log files, and it opens nothing else.
+"""The folder of flight logs, with access restricted to its log files.
 
-A log is a regular file of this folder whose name ends in ``.ulg``. What leads out of the folder (a path, a symbolic
-link) is no log, whatever a ground station asks for.
+A log is a regular file in this folder whose name ends in ``.ulg``. Paths and symbolic links out of the folder are
+refused.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from flightstack.services.logs.log_store import LogInfo
 SUFFIX = ".ulg"
 _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | os.O_CLOEXEC
 MAX_LOGS = 65_535
-"""LOG_ENTRY counts in 16 bits; of more, the newest are shown."""
-LOOK_S = 1.0
-"""Time between two looks at the folder [s]."""
-LATELY_S = 60.0
-"""Files written in the last ``LATELY_S`` are examined at each look, all others once in this time [s]."""
+"""Limit of LOG_ENTRY's 16-bit count; the newest logs are listed."""
+SCAN_INTERVAL_S = 1.0
+"""Interval of folder scans [s]."""
+RECENT_S = 60.0
+"""Files written within this time [s] are examined at each scan, all others once per this time."""
 _LOCK_TRIES, _LOCK_WAIT_S = 100, 1e-3
 
 
 class LogFileReader:
-    """An open log. Its size is what it was when it was opened: the log of this flight goes on growing."""
+    """An open log with its size at opening; the log of the current flight still grows."""
 
     def __init__(self, descriptor: int, size: int) -> None:
         self._descriptor = descriptor
@@ -49,7 +49,7 @@ class LogFileReader:
         """Lock the log against ``create_log_file`` until it is closed; return False if it is being written."""
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:  # some file systems have no locks
+        except OSError as error:  # not all file systems support locks
             return error.errno != errno.EWOULDBLOCK
         return True
 
@@ -61,14 +61,14 @@ class LogFileReader:
 
 
 def create_log_file(path: Path, overwrite: bool = False) -> BinaryIO:
-    """Open a new log for writing, unbuffered; raise OSError, FileExistsError for a file unless ``overwrite``.
+    """Open a new log for unbuffered writing; raise OSError, FileExistsError for an existing file unless ``overwrite``.
 
-    A shared lock until the file is closed marks it as being written, for every process and this one too. A log that
-    was erased before it was locked is created again.
+    A shared lock marks the file as being written until it is closed. A log that was erased before it was locked is
+    created again.
     """
-    is_file = path.is_file() or not path.exists()  # a device or a pipe is written to
+    is_file = path.is_file() or not path.exists()  # a device or a pipe is opened as it is
     while True:
-        file = open(path, "xb" if is_file and not overwrite else "wb", buffering=0)  # noqa: SIM115  # its owner closes it
+        file = open(path, "xb" if is_file and not overwrite else "wb", buffering=0)  # noqa: SIM115  # closed by its owner
         _lock(file)
         if not is_file or _is_at(path, file):
             return file
@@ -76,20 +76,20 @@ def create_log_file(path: Path, overwrite: bool = False) -> BinaryIO:
 
 
 def _lock(file: BinaryIO) -> None:
-    """Lock a log that is written, after ``_LOCK_TRIES`` not at all: an erase holds its own lock for microseconds."""
+    """Lock a log, without a lock after ``_LOCK_TRIES``; an erase holds its lock for microseconds."""
     for _ in range(_LOCK_TRIES):
         try:
             fcntl.flock(file.fileno(), fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             time.sleep(_LOCK_WAIT_S)
-        except OSError:  # some file systems have no locks
+        except OSError:  # not all file systems support locks
             return
         else:
             return
 
 
 def _is_at(path: Path, file: BinaryIO) -> bool:
-    """Return whether ``path`` still names the open file."""
+    """Return True if ``path`` still names the open file."""
     try:
         return os.path.samestat(path.stat(), os.fstat(file.fileno()))
     except FileNotFoundError:
@@ -97,20 +97,20 @@ def _is_at(path: Path, file: BinaryIO) -> bool:
 
 
 class _Known(NamedTuple):
-    """A file of the folder as it was when it was last examined."""
+    """A file of the folder at its last examination."""
 
     inode: int
     written_ns: int
     info: LogInfo | None
-    """None for what is no log, or not examined yet."""
+    """None if it is no log or not examined yet."""
 
 
 class LogLibrary:
-    """The logs in ``folder``, by an index in memory.
+    """Index of the logs in ``folder``.
 
-    ``own_log`` returns the name of the log that this process is writing, or None. The folder is examined at most once
-    in ``LOOK_S``: new files, those written in the last ``LATELY_S``, and the own log. All files are examined once in
-    ``LATELY_S``, and at once when the own log begins or ends.
+    ``own_log`` returns the name of the log that this process writes, or None. At most once per ``SCAN_INTERVAL_S``, new
+    files, recently written ones and the own log are examined; all files once per ``RECENT_S`` and when the own log
+    starts or ends.
     """
 
     def __init__(self, folder: Path, own_log: Callable[[], str | None] = lambda: None) -> None:
@@ -120,35 +120,35 @@ class LogLibrary:
         self._known: dict[str, _Known] = {}
         self._logs: tuple[LogInfo, ...] = ()
         self._folder_written_ns = -1
-        self._looked_s = self._looked_at_all_s = -math.inf
+        self._scan_s = self._full_scan_s = -math.inf
 
     def logs(self) -> tuple[LogInfo, ...]:
-        """Return all logs, the oldest first; none if the folder cannot be read. The same object until they change."""
+        """Return all logs, oldest first; empty if the folder cannot be read. The same object until a change."""
         now_s, own = time.time(), self._own_log()
         if own != self._own:
-            self._own, self._looked_at_all_s = own, -math.inf
-        if self._looked_at_all_s == -math.inf or not 0.0 <= now_s - self._looked_s < LOOK_S:
-            self._look(now_s)
+            self._own, self._full_scan_s = own, -math.inf
+        if self._full_scan_s == -math.inf or not 0.0 <= now_s - self._scan_s < SCAN_INTERVAL_S:
+            self._scan(now_s)
         return self._logs
 
-    def _look(self, now_s: float) -> None:
-        """Bring the index up to date."""
-        self._looked_s = now_s
-        at_all = not 0.0 <= now_s - self._looked_at_all_s < LATELY_S
-        if at_all:
-            self._looked_at_all_s = now_s
-        lately_ns = int((now_s - LATELY_S) * 1e9)
+    def _scan(self, now_s: float) -> None:
+        """Update the index."""
+        self._scan_s = now_s
+        is_full = not 0.0 <= now_s - self._full_scan_s < RECENT_S
+        if is_full:
+            self._full_scan_s = now_s
+        recent_ns = int((now_s - RECENT_S) * 1e9)
         try:
             written_ns = self._folder.stat().st_mtime_ns
             listed = self._known if written_ns == self._folder_written_ns else self._listed()
-            is_settled = written_ns < int((now_s - LOOK_S) * 1e9)  # a change in this instant has its own time
+            is_settled = written_ns < int((now_s - SCAN_INTERVAL_S) * 1e9)  # later changes have another time
             self._folder_written_ns = written_ns if is_settled else -1
         except OSError:
             listed, self._folder_written_ns = {}, -1
         changed = {
             name: fresh
             for name, known in listed.items()
-            if (at_all or known.info is None or known.written_ns > lately_ns or name == self._own)
+            if (is_full or known.info is None or known.written_ns > recent_ns or name == self._own)
             and (fresh := self._examined(name, known.inode)) != known
         }
         if changed or listed.keys() != self._known.keys():
@@ -157,7 +157,7 @@ class LogLibrary:
             self._logs = tuple(info for _, _, info in logs[-MAX_LOGS:])
 
     def _listed(self) -> dict[str, _Known]:
-        """Return the files that are there, as far as they are known; raise OSError."""
+        """Return the files in the folder, with known information; raise OSError."""
         listed = {}
         with os.scandir(self._folder) as entries:
             for entry in entries:
@@ -169,16 +169,16 @@ class LogLibrary:
         return listed
 
     def _examined(self, name: str, inode: int) -> _Known:
-        """Return what a file is: a log if it is a regular file."""
+        """Examine a file, which is a log if it is regular."""
         try:
             status = os.stat(self._folder / name, follow_symlinks=False)
-        except OSError:  # it just vanished
+        except OSError:  # removed meanwhile
             return _Known(inode, 0, None)
         info = LogInfo(name, status.st_size, max(0, int(status.st_mtime)) & 0xFFFF_FFFF)
         return _Known(inode, status.st_mtime_ns, info if stat.S_ISREG(status.st_mode) else None)
 
     def open(self, name: str) -> LogFileReader | None:
-        """Open a log; None if there is none of this name. Raise OSError when it cannot be read."""
+        """Open a log; return None if it does not exist. Raise OSError."""
         if not is_log_name(name):
             return None
         try:
@@ -196,9 +196,9 @@ class LogLibrary:
         return LogFileReader(descriptor, status.st_size)
 
     def erase(self) -> int:
-        """Erase all logs but those being written; return how many. Raise OSError at the first that stays."""
+        """Erase all logs that are not being written; return the number. Raise OSError at the first failure."""
         count = 0
-        self._look(time.time())
+        self._scan(time.time())
         for log in self._logs:
             reader = self.open(log.name)
             if reader is not None and reader.claim():
@@ -206,12 +206,12 @@ class LogLibrary:
                 count += 1
             if reader is not None:
                 reader.close()
-        self._look(time.time())
+        self._scan(time.time())
         return count
 
 
 def is_log_name(name: str) -> bool:
-    """Tell whether ``name`` may be a log: one plain part of a path that can be shown and sent."""
+    """Return True for a valid log name: one path component of printable characters."""
     return (
         name.endswith(SUFFIX)
         and not name.startswith(".")

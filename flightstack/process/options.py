@@ -9,34 +9,36 @@ import typer
 
 from flightstack.core.port_numbers import INSTANCES
 
-Vehicle = Annotated[str, typer.Option(help="Built-in vehicle or TOML file.")]
-Controller = Annotated[str, typer.Option(help="Attitude controller: pid, backstepping or yours.")]
+Vehicle = Annotated[str, typer.Option(help="Built-in vehicle or a TOML file.")]
+Controller = Annotated[
+    str, typer.Option(help="Attitude controller: pid, backstepping, or the name of a plug-in.")
+]
 Gains = Annotated[
     str, typer.Option(help="Gains: tuned, paper, paper_rate_fed, backstepping_poles or a TOML file.")
 ]
 InnerHz = Annotated[float, typer.Option(help="Rate of the inner loop, Hz.")]
 OuterHz = Annotated[
     float | None,
-    typer.Option(help="Rate of the outer loop, Hz; divides the inner one.  [default: about 100]"),
+    typer.Option(help="Rate of the outer loop, Hz; must divide the inner rate.  [default: about 100]"),
 ]
-Clock = Annotated[str, typer.Option(help="lockstep (the simulator owns time) or realtime.")]
+Clock = Annotated[str, typer.Option(help="lockstep (the simulator drives the time) or realtime.")]
 Loops = Annotated[
     str,
     typer.Option(
-        help="Which loops fly: python, c (compiled here), or those of a target: host (a process), emulated "
-        "(a Cortex-M4F), serial:DEVICE[:BAUD] (a board).",
+        help="Control loops: python, c (compiled here), or on a target: host (a process), emulated (a Cortex-M4F) "
+        "or serial:DEVICE[:BAUD] (a board).",
         metavar="LOOPS",
     ),
 ]
-SimHost = Annotated[str, typer.Option(help="Host of the simulator.")]
-SimPort = Annotated[int | None, typer.Option(help="Port of the simulator.  [default: 4560 + instance]")]
-SimTimeout = Annotated[float, typer.Option(help="Longest wait for the simulator, s.")]
+SimHost = Annotated[str, typer.Option(help="Simulator host.")]
+SimPort = Annotated[int | None, typer.Option(help="Simulator port.  [default: 4560 + instance]")]
+SimTimeout = Annotated[float, typer.Option(help="Simulator timeout, s.")]
 Instance = Annotated[
-    int, typer.Option(min=0, max=INSTANCES - 1, help="Number of this vehicle; shifts ports and id.")
+    int, typer.Option(min=0, max=INSTANCES - 1, help="Vehicle number; offsets ports and system id.")
 ]
 GroundStations = Annotated[
     list[str] | None,
-    typer.Option(help="Ground station to address unasked: HOST:PORT; may be repeated."),
+    typer.Option(help="Ground station to send to without being contacted, HOST:PORT; may be repeated."),
 ]
 GcsPort = Annotated[
     int | None,
@@ -53,24 +55,24 @@ ApiPort = Annotated[
 TcpPort = Annotated[
     int | None, typer.Option(help="TCP port to listen on; 0 for none.  [default: 5760 + 10 x instance]")
 ]
-Listen = Annotated[
-    str, typer.Option(help="Address of this machine to listen on for MAVLink; 0.0.0.0 for all.")
-]
+Listen = Annotated[str, typer.Option(help="Local address to listen on for MAVLink; 0.0.0.0 for all.")]
 SigningKey = Annotated[
     Path | None,
-    typer.Option(help="Sign MAVLink with the key in this file (made if missing); refuse what is unsigned."),
+    typer.Option(
+        help="Sign MAVLink with the key in this file (created if missing) and refuse unsigned messages."
+    ),
 ]
 AllowUnsigned = Annotated[
-    bool, typer.Option("--allow-unsigned", help="With --signing-key: take unsigned messages as well.")
+    bool, typer.Option("--allow-unsigned", help="Accept unsigned messages too, with --signing-key.")
 ]
 LogFile = Annotated[
     str | None,
     typer.Option(
-        help="Log file; 'none' for no log. Ground stations see the logs of its folder.  "
+        help="Log file; 'none' for no log. Ground stations can download all logs of its folder.  "
         "[default: runs/<stamp>-flight.ulg, or runs/instance-<instance>/<stamp>-flight.ulg]"
     ),
 ]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Let --log replace a file that exists.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace an existing log file.")]
 Assignments = Annotated[
     list[str] | None, typer.Option(metavar="NAME=VALUE", help="Set a parameter; may be repeated.")
 ]
@@ -84,15 +86,15 @@ ParamFile = Annotated[
 State = Annotated[
     str | None,
     typer.Option(
-        help="Directory of what the vehicle keeps over a restart: parameters, mission, geofence, rally points, home; "
+        help="Directory for parameters, mission, geofence, rally points and home, restored at the next start; "
         "'none' for none.  [default: runs/state-<instance>; none with --params none]",
         metavar="DIR|none",
     ),
 ]
-Home = Annotated[str | None, typer.Option(help="LATITUDE,LONGITUDE,ALTITUDE of the local origin.")]
-IdealRotors = Annotated[bool, typer.Option(help="Rotors without lag and limits, as the paper assumes.")]
-WaitForStart = Annotated[bool, typer.Option(help="Keep time at zero until a mission is started.")]
-Check = Annotated[bool, typer.Option("--check", help="Check the configuration, compile the loops, end.")]
+Home = Annotated[str | None, typer.Option(help="Origin of the local frame: LATITUDE,LONGITUDE,ALTITUDE.")]
+IdealRotors = Annotated[bool, typer.Option(help="Rotors without lag and limits, as in the paper.")]
+WaitForStart = Annotated[bool, typer.Option(help="Hold simulated time at zero until a mission is started.")]
+Check = Annotated[bool, typer.Option("--check", help="Check the configuration, compile the loops and exit.")]
 ExitOnGcsLoss = Annotated[
-    float | None, typer.Option(help="End when no ground station is heard for so long, s.")
+    float | None, typer.Option(help="Exit if no ground station is heard for this time, s.")
 ]

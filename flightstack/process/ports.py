@@ -1,4 +1,4 @@
-"""The options about ports, made into a ``PortsConfig``, and said back in words."""
+"""Port options: validation and description."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def ports_config(
     listen: str,
     tcp: int | None,
 ) -> PortsConfig:
-    """Read the options; raise ConfigError. Without ``stations`` there is one, on this machine."""
+    """Return the configuration of the options; without ``stations`` there is one on this machine. Raise ConfigError."""
     bound = _host("--listen", listen, listen)
     ground = tuple(_address("--gcs", text) for text in stations)
     for text, (host, _) in zip(stations, ground, strict=True):
         if is_loopback(bound) and not is_loopback(host):
-            raise ConfigError("--gcs", text, f"cannot be reached from {bound}: give --listen 0.0.0.0 too")
+            raise ConfigError("--gcs", text, f"cannot be reached from {bound}: add --listen 0.0.0.0")
     if not ground:
         port = ground_station_port(instance) if station_port is None else station_port
         ground = ((LOOPBACK, _port("--gcs-port", port)),)
@@ -37,7 +37,7 @@ def ports_config(
 
 
 def described(config: PortsConfig) -> str:
-    """Return the ports in words, for the line that a process prints at its start."""
+    """Return a description of the ports for the line printed at startup."""
     stations = ", ".join(
         f"{'' if is_loopback(host) else host + ':'}{port}" for host, port in config.ground_stations
     )
@@ -66,7 +66,7 @@ def _host(option: str, text: str, host: str) -> str:
     try:
         return resolve(host)
     except OSError:
-        raise ConfigError(option, text, "names no host that has an IPv4 address") from None
+        raise ConfigError(option, text, "is not a host with an IPv4 address") from None
 
 
 def _port(option: str, port: int) -> int:

@@ -1,4 +1,4 @@
-"""What concerns the process and not the flight: its configuration, how it ends, and what it says."""
+"""Configuration, exit codes and messages of the process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ EXIT_OK, EXIT_LOST, EXIT_USAGE, EXIT_TIMEOUT = range(4)
 
 @dataclass(frozen=True)
 class ProcessConfig:
-    """What concerns the process and not the flight."""
+    """Configuration of the process; that of the flight is ``StackConfig``."""
 
     simulator_host: str
     simulator_port: int
@@ -23,15 +23,15 @@ class ProcessConfig:
     wait_for_start: bool
     exit_on_ground_loss_s: float | None
     signing_key: Path | None = None
-    """File of the key that signs MAVLink; None: nothing is signed."""
+    """Key file of MAVLink signing; None for no signing."""
     allow_unsigned: bool = False
     overwrite_log: bool = False
     state: Path | None = None
-    """Directory of what the vehicle keeps; None: it keeps nothing but, maybe, parameters."""
+    """State directory; None to save no plans."""
 
 
-class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops
-    """The process ends, with this exit code and sentence."""
+class Ended(Exception):  # noqa: N818  # not an error: leaves the main loop
+    """Ends the process with an exit code and a message."""
 
     def __init__(self, code: int, sentence: str) -> None:
         super().__init__(sentence)
@@ -39,9 +39,9 @@ class Ended(Exception):  # noqa: N818  # not an error: the way out of the loops
 
 
 class RebootRequestedError(Exception):
-    """A ground station wants the vehicle to start anew."""
+    """A ground station has requested a reboot."""
 
 
 def complain(sentence: object) -> None:
-    """Say a sentence on stderr, where it is seen at once; a closed stderr does not end the flight."""
+    """Print a message to stderr; a closed stderr does not end the flight."""
     console.complain(f"flightstack: {sentence}")

@@ -1,4 +1,4 @@
-"""The files of one process: the logs, the parameters and the signing key that its stacks use."""
+"""Files of the process: logs, parameters, plans and signing key."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from flightstack.services.logs.log_store import NO_LOGS
 
 
 class ProcessFiles:
-    """Joins a stack to its files; a reboot joins the next one."""
+    """Connects the current stack to its files, and the next stack after a reboot."""
 
     def __init__(self, process: ProcessConfig) -> None:
         self._process = process
@@ -32,7 +32,7 @@ class ProcessFiles:
         self._signing: Signing | None = None
 
     def build(self, config: StackConfig) -> Stack:
-        """Build a stack, which ``adopt`` puts in place of the present one; raise ConfigError, TargetError."""
+        """Build a stack for ``adopt``; raise ConfigError, TargetError."""
         if self._params is not None:
             self._params.flush()  # the new stack reads the file
         log = self._process.log
@@ -44,34 +44,34 @@ class ProcessFiles:
         return stack
 
     def adopt(self, stack: Stack, config: StackConfig) -> None:
-        """Join ``stack``, built for ``config``, to the files."""
+        """Connect ``stack``, built for ``config``, to the files."""
         self.close_parameters()
         is_first, self._stack = self._stack is None, stack
         if config.params_file is not None:
             self._params = _param_saver(stack, Path(config.params_file))
-        stack.ground.vehicle.logs.logs()  # every log is examined now, and not in flight
+        stack.ground.vehicle.logs.logs()  # examine all logs now and not in flight
         if self._plans is not None and is_first:
-            self._tell(self._plans.restore(stack))
+            self._report(self._plans.restore(stack))
 
     def unsaved_parameters(self) -> str | None:
-        """Return the sentence why the newest parameters are not in their file, or None if they are."""
+        """Return why the newest parameters are not saved, or None if they are."""
         return None if self._params is None else self._params.problem()
 
-    def attend(self) -> None:
-        """Save plans that have changed; tell ground stations and user once of a file that cannot be written."""
+    def update(self) -> None:
+        """Save changed plans; report each file that cannot be written once to ground stations and user."""
         assert self._stack is not None
         if self._plans is not None:
             self._plans.watch(self._stack)
-            self._tell(self._plans.take_error())
+            self._report(self._plans.take_error())
         if self._params is not None:
-            self._tell(self._params.take_error())
+            self._report(self._params.take_error())
         error = self._stack.recorder.take_error()
         if error is not None:
             reason = error.strerror or str(error)
-            self._tell(f"the log {self._logs.current} ends early: {reason}", f"Logging stopped: {reason}")
+            self._report(f"the log {self._logs.current} ends early: {reason}", f"Logging stopped: {reason}")
 
-    def _tell(self, sentence: str | None, text: str | None = None) -> None:
-        """Say a sentence, to ground stations perhaps as a shorter ``text``."""
+    def _report(self, sentence: str | None, text: str | None = None) -> None:
+        """Report a sentence to the user, and as ``text``, if given, to ground stations."""
         if sentence is None:
             return
         assert self._stack is not None
@@ -79,17 +79,17 @@ class ProcessFiles:
         complain(sentence)
 
     def close_parameters(self) -> None:
-        """Save what has changed; a second call does nothing."""
+        """Save changes; a second call does nothing."""
         if self._params is not None:
             self._params.close()
 
     def close_plans(self) -> None:
-        """Save what has changed; a second call does nothing."""
+        """Save changes; a second call does nothing."""
         if self._plans is not None:
             self._plans.close()
 
     def close_loops(self) -> None:
-        """End the loops; those of a target leave the record of their link beside the log."""
+        """Close the loops and write the record of a target's link beside the log."""
         if self._stack is None:
             return
         try:
@@ -98,7 +98,7 @@ class ProcessFiles:
             complain(f"warning: the record of the target's link cannot be written: {error}")
 
     def close_signing(self) -> None:
-        """Keep the time of the newest signature, and end; nothing is signed after it."""
+        """Save the latest signing timestamp; nothing may be signed afterwards."""
         if self._signing is not None:
             self._signing.close()
 
@@ -110,11 +110,11 @@ class ProcessFiles:
             return self._logs.open(len(self._stack.vehicle.rotors))
         except OSError as error:
             path = self._logs.current
-            self._tell(f"no log can be written to {path}: {error.strerror}")
+            self._report(f"no log can be written to {path}: {error.strerror}")
             return None
 
     def _own_log(self) -> str | None:
-        """Return the name of the log that is being written, or None."""
+        """Return the name of the current log, or None."""
         assert self._stack is not None
         path = self._logs.current
         return path.name if path is not None and self._stack.recorder.is_logging else None
@@ -127,9 +127,9 @@ class ProcessFiles:
     # ------------------------------------------------------------------ signing
 
     def _use_signing(self, stack: Stack) -> None:
-        """Sign the ground links if there is to be a key; raise ConfigError.
+        """Sign the ground links if a key is configured; raise ConfigError.
 
-        All stacks of the process share one ``Signing``: a frame heard before a reboot is a replay after it.
+        All stacks of the process share one ``Signing``, so that a frame received before a reboot is a replay after it.
         """
         path = self._process.signing_key
         if path is None:
@@ -137,14 +137,14 @@ class ProcessFiles:
         if self._signing is None:
             if not path.exists():
                 create_key(path)
-                say(f"flightstack: a new signing key is in {path}")
+                say(f"flightstack: new signing key written to {path}")
             role = f"vehicle-{self._process.ports.instance}"
             self._signing = open_signing(path, role, self._process.allow_unsigned)
         stack.ground.use_signing(self._signing, lambda key: replace_key(path, key))
 
 
 def _param_saver(stack: Stack, path: Path) -> FileSaver:
-    """Save the parameters of a stack to ``path`` at every change."""
+    """Return the saver of a stack's parameters to ``path``."""
     system_id = int(stack.params.value(SYSTEM_ID))
     saver = FileSaver(
         lambda: save(stack.params, stack.loaded_params, path, system_id),

@@ -1,4 +1,4 @@
-"""The signing key and the timestamp of its last use, in two files that only their owner may read."""
+"""Signing key and latest timestamp, in two files readable by their owner only."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from flightstack.process.console import complain
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _LONGEST_FILE = 200  # a key in hexadecimal takes 64 characters
 _LINK_IDS = range(16, 256)
-"""Drawn from at random. Other programs number their links from 0, often with the system and component id of ``gcs``."""
+"""Random link ids; other programs number links from 0, often with the system and component id of ``gcs``."""
 _TIMESTAMP_LOCK = 256
-"""The octet of the lock file that is held while the timestamp is written; the one at n is that of link id n."""
+"""Byte of the lock file that is locked while the timestamp is written; byte n is the lock of link id n."""
 
 
 def create_key(path: Path) -> bytes:
-    """Make a new key, write it to ``path``, which must not exist, and return it; raise ConfigError."""
+    """Create a key in the new file ``path`` and return it; raise ConfigError."""
     key = secrets.token_bytes(KEY_SIZE)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -33,7 +33,7 @@ def create_key(path: Path) -> bytes:
             with os.fdopen(descriptor, "w", encoding="ascii") as file:
                 file.write(key.hex() + "\n")
         except OSError:
-            path.unlink(missing_ok=True)  # half a key would end every later start
+            path.unlink(missing_ok=True)  # a partial key would fail every later start
             raise
     except OSError as error:
         raise _problem(path, error) from None
@@ -41,7 +41,7 @@ def create_key(path: Path) -> bytes:
 
 
 def load_key(path: Path) -> bytes:
-    """Read a key of 32 octets, raw or in hexadecimal; raise ConfigError, also when others may read it."""
+    """Read a key of 32 bytes, raw or hexadecimal; raise ConfigError, also if other users may read the file."""
     try:
         with path.open("rb") as file:
             mode = os.fstat(file.fileno()).st_mode
@@ -49,7 +49,7 @@ def load_key(path: Path) -> bytes:
     except OSError as error:
         raise _problem(path, error) from None
     if mode & _OTHERS:
-        raise ConfigError(path, "", f"others may read this key: make it yours with `chmod 600 {path}`")
+        raise ConfigError(path, "", f"is readable by other users: run `chmod 600 {path}`")
     if len(data) == KEY_SIZE:
         return data
     try:
@@ -57,9 +57,7 @@ def load_key(path: Path) -> bytes:
     except ValueError:
         key = b""
     if len(key) != KEY_SIZE:
-        raise ConfigError(
-            path, "", f"a signing key is {KEY_SIZE} octets, or {2 * KEY_SIZE} hexadecimal digits"
-        )
+        raise ConfigError(path, "", f"a signing key is {KEY_SIZE} bytes or {2 * KEY_SIZE} hexadecimal digits")
     return key
 
 
@@ -78,29 +76,26 @@ def open_signing(path: Path, role: str, allow_unsigned: bool = False) -> Signing
 
 
 def open_shared_signing(path: Path, role: str) -> LinkSigning:
-    """Return signing with the key at ``path``, for one of many processes of a ``role``; raise ConfigError.
+    """Return signing with the key at ``path``, for one of several processes of a ``role``; raise ConfigError.
 
-    Each has a link id of its own while it runs, as timestamps have to rise on each stream (system, component,
-    link id). The id is random, so that programs on other machines with the same key seldom have it too.
+    Each process has its own link id, because timestamps must increase on each stream (system, component, link id). The
+    id is random to avoid collisions with programs on other machines with the same key.
     """
     key, kept = load_key(path), _TimestampFile(path, role, is_shared=True)
     return LinkSigning(Signing(key, time.time, kept.open(), kept.keep), kept.claim_link_id())
 
 
 class _TimestampFile:
-    """The latest timestamp that any process of a role has used: it never goes back.
-
-    A full disk does not end a flight: it is reported once.
-    """
+    """Latest timestamp used by any process of a role; it never decreases. Write errors are reported once."""
 
     def __init__(self, key_path: Path, role: str, is_shared: bool = False) -> None:
         self._path = key_path.with_name(f"{key_path.name}.{role}.timestamp")
         self._lock_path = key_path.with_name(f"{key_path.name}.{role}.lock") if is_shared else None
-        self._lock: int | None = None  # it stays open: the end of the process frees what it has locked
+        self._lock: int | None = None  # stays open: locks end with the process
         self._has_failed = False
 
     def open(self) -> int:
-        """Return the timestamp kept last, and make sure that another one can be kept; raise ConfigError."""
+        """Return the saved timestamp and check that the file is writable; raise ConfigError."""
         latest = _load_timestamp(self._path)
         try:
             if self._lock_path is not None:
@@ -111,7 +106,7 @@ class _TimestampFile:
         return latest
 
     def keep(self, timestamp: int) -> None:
-        """Keep ``timestamp``, unless another process has kept a later one."""
+        """Save ``timestamp`` unless another process has saved a later one."""
         try:
             self._write(timestamp)
         except (OSError, ConfigError) as error:
@@ -121,12 +116,12 @@ class _TimestampFile:
                 complain(f"{reason}: after a crash, signed messages may be refused for a minute")
 
     def claim_link_id(self) -> int:
-        """Return a link id that no other process of the role has claimed; any one if there is none left."""
+        """Return a link id that no other process of the role uses, or any if all are used."""
         assert self._lock is not None
         first = secrets.randbelow(len(_LINK_IDS))
         link_ids: list[int] = [*_LINK_IDS[first:], *_LINK_IDS[:first]]
         for link_id in link_ids:
-            with contextlib.suppress(OSError):  # another process has locked this octet of the file
+            with contextlib.suppress(OSError):  # locked by another process
                 fcntl.lockf(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, link_id)
                 return link_id
         return link_ids[0]
@@ -142,7 +137,7 @@ class _TimestampFile:
             fcntl.lockf(self._lock, fcntl.LOCK_UN, 1, _TIMESTAMP_LOCK)
 
     def _replace(self, timestamp: int) -> None:
-        """Write the file anew. It is not forced to the disk: a power cut sets the clock forward anyway."""
+        """Replace the file without syncing: after a power loss the clock is later anyway."""
         write_bytes_atomically(self._path, f"{timestamp}\n".encode(), OWNER_ONLY, survives_power_loss=False)
 
 
@@ -155,7 +150,7 @@ def _load_timestamp(path: Path) -> int:
         raise ConfigError(path, "", f"cannot be read: {error}") from None
     if not (text.isdigit() and len(text) <= 15 and int(text) <= LARGEST_TIMESTAMP):
         raise ConfigError(
-            path, "", "is no timestamp: remove it if no frame of the last minute can have been heard"
+            path, "", "is not a timestamp: remove it if no frame was sent within the last minute"
         )
     return int(text)
 

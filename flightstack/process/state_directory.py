@@ -1,4 +1,4 @@
-"""The directory in which a vehicle keeps its parameters and plans over a restart: its path, lock and older files."""
+"""The state directory of a vehicle: its lock, and the parameters and plans saved there for the next start."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from flightstack.plan.kept_plans import KeptPlans, plans_from_text, plans_to_tex
 from flightstack.process.assembly import Stack
 from flightstack.process.log_files import RUNS
 
-LOCK_NAME = "lock"
+LOCK_NAME, PLANS_NAME, PARAMS_NAME = "lock", "plans.json", "vehicle.params"
+"""Files of a state directory."""
 
 
 class StateDirectory:
-    """The directory ``path`` of one vehicle; without a path, that of ``instance`` under ``runs``."""
+    """State directory of one vehicle: ``path``, or by default that of ``instance`` under ``runs``."""
 
     def __init__(self, path: Path | None, instance: int, has_params: bool = True) -> None:
-        """Without ``has_params`` the parameters are elsewhere, and no older file is adopted."""
+        """Without ``has_params``, parameters are saved elsewhere and an older file is not moved."""
         self.is_named = path is not None
         self.path = RUNS / f"state-{instance}" if path is None else path
         adopts = has_params and not self.is_named
@@ -32,24 +33,24 @@ class StateDirectory:
 
     @property
     def params(self) -> Path:
-        """The parameter file: that of an earlier version until it is adopted."""
+        """The parameter file, at its older path until ``open`` moves it."""
         old, new = self._old_params, self.path / PARAMS_NAME
         return old if old is not None and not new.exists() and old.is_file() else new
 
     def open(self) -> str | None:
-        """Create and lock the directory and adopt an older parameter file; return a sentence about that file, or None.
+        """Create and lock the directory and move an older parameter file there; return a notice of the move, or None.
 
-        Raise ConfigError if another process has the lock, or if nothing can be kept in a named directory. The lock
-        lasts until the process ends. Without a name the vehicle flies all the same, and saving reports the error.
+        Raise ConfigError if another process holds the lock or a named directory is not writable. The lock lasts until
+        the process ends. Errors of the default directory are reported when saving.
         """
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             if not self.is_named:
                 return None
-            raise ConfigError("--state", str(self.path), f"cannot be made: {error.strerror}") from None
+            raise ConfigError("--state", str(self.path), f"cannot be created: {error.strerror}") from None
         if self.is_named and not os.access(self.path, os.W_OK | os.X_OK):
-            raise ConfigError("--state", str(self.path), "nothing can be written there: permission denied")
+            raise ConfigError("--state", str(self.path), "is not writable: permission denied")
         self._take_lock()
         return self._adopt_params()
 
@@ -59,9 +60,9 @@ class StateDirectory:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             self.close()
-            reason = "another vehicle keeps its state there: give each its own --instance or --state DIR"
+            reason = "is in use by another vehicle: give each its own --instance or --state DIR"
             raise ConfigError("--state", str(self.path), reason) from None
-        except OSError:  # some file systems have no locks, and a directory that cannot be written needs none
+        except OSError:  # no support for locks, or not writable
             self.close()
 
     def _adopt_params(self) -> str | None:
@@ -72,7 +73,7 @@ class StateDirectory:
             old.rename(new)
         except OSError as error:
             raise ConfigError(old, "", f"cannot be moved to {new}: {error.strerror}") from None
-        return f"{old} was moved to {new}, where parameters are saved now"
+        return f"{old} was moved to {new}"
 
     def close(self) -> None:
         """Release the lock."""
@@ -82,23 +83,23 @@ class StateDirectory:
 
 
 class FileSaver:
-    """Writes a file after every change, in a thread of its own; many changes at once become one file.
+    """Writes a file after changes in its own thread, so that the loops do not wait for the disk.
 
-    ``write`` is called in that thread and writes the newest state. If it raises an error, the sentence for the user
-    begins with ``failure``, and the next change is written again.
+    ``write`` writes the newest state in that thread. Messages about its errors begin with ``failure``; the next change
+    is written again.
     """
 
     def __init__(self, write: Callable[[], None], failure: str) -> None:
         self._write = write
         self._failure = failure
         self._error: Exception | None = None
-        self._untold: Exception | None = None
+        self._unreported: Exception | None = None
         self._changed = threading.Event()
         self._closing = False
         self._thread: threading.Thread | None = None
 
     def change(self) -> None:
-        """Write the file soon."""
+        """Request a write."""
         self._changed.set()
         if self._thread is None and not self._closing:
             self._thread = threading.Thread(target=self._run, name="saver", daemon=True)
@@ -107,25 +108,25 @@ class FileSaver:
     def _run(self) -> None:
         while True:
             self._changed.wait()
-            closing = self._closing  # before the changes are taken: none comes after it
+            closing = self._closing  # read before clearing: no change follows it
             self._changed.clear()
             self.save()
             if closing:
                 return
 
     def save(self) -> None:
-        """Write the file now, in this thread; an error is kept for ``take_error`` and ``problem``."""
+        """Write the file in this thread; store an error for ``take_error`` and ``problem``."""
         try:
             self._write()
-        except Exception as error:  # a saver that ends loses every later change
+        except Exception as error:  # the thread must survive for later changes
             if self._error is None:
-                self._untold = error
+                self._unreported = error
             self._error = error
         else:
             self._error = None
 
     def problem(self) -> str | None:
-        """Return the sentence why the newest state is not in the file, or None if it is."""
+        """Return why the newest state is not saved, or None if it is."""
         return self._sentence(self._error)
 
     def _sentence(self, error: Exception | None) -> str | None:
@@ -135,17 +136,17 @@ class FileSaver:
         return f"{self._failure}: {reason or error}"
 
     def take_error(self) -> str | None:
-        """Return the sentence why the file was not written, or None: one for each row of failures."""
-        error, self._untold = self._untold, None
+        """Return a new error message and clear it, or None; one per series of failures."""
+        error, self._unreported = self._unreported, None
         return self._sentence(error)
 
     def flush(self) -> None:
-        """Write what has changed before returning; later changes are written too."""
+        """Write changes before returning; later changes are written too."""
         self.close()
         self._closing = False
 
     def close(self) -> None:
-        """Write what has changed, and end; a second call does nothing."""
+        """Write changes and stop the thread; a second call does nothing."""
         self._closing = True
         if self._thread is not None:
             self._changed.set()
@@ -153,26 +154,23 @@ class FileSaver:
             self._thread = None
 
 
-PLANS_NAME, PARAMS_NAME = "plans.json", "vehicle.params"
-"""Files of a state directory."""
-_NOTHING = ((0, 0, 0), 0, False, None)
+_NO_PLANS = ((0, 0, 0), 0, False, None)
 
 
 class PlanFile:
-    """Restores the plans of the process before this one, and saves every change."""
+    """Restores the plans of the previous run and saves changes."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._plans = KeptPlans()
-        self._saved_key: object = _NOTHING
+        self._saved_key: object = _NO_PLANS
         self._may_write = True
         self._saver = FileSaver(self._write, f"the plans are not saved to {path}")
 
     def restore(self, stack: Stack) -> str | None:
-        """Put the kept plans in force; return the sentence why not all of them are, or None.
+        """Activate the saved plans; return an error message, or None.
 
-        A file that cannot be read gives no plan at all. It is put aside, like one whose plans are refused: what a
-        user gave is not overwritten.
+        A file that is unreadable or whose plans are refused is renamed and not overwritten.
         """
         if not self._path.exists():
             return None
@@ -183,7 +181,7 @@ class PlanFile:
         if refusal is None:
             self._saved_key = _key(stack)
             return None
-        return f"plans not restored: {refusal}; {self._put_aside()}"
+        return f"plans not restored: {refusal}; {self._rename_refused()}"
 
     def watch(self, stack: Stack) -> None:
         """Save the plans if they have changed since the last call."""
@@ -193,19 +191,19 @@ class PlanFile:
             self._saver.change()
 
     def take_error(self) -> str | None:
-        """Return the sentence why the plans were not saved, or None."""
+        """Return a new message why plans were not saved, or None."""
         return self._saver.take_error()
 
     def close(self) -> None:
-        """Save what has changed, and end."""
+        """Save changes and stop."""
         self._saver.close()
 
     def _write(self) -> None:
         self._path.parent.mkdir(parents=True, exist_ok=True)
         write_text_atomically(self._path, plans_to_text(self._plans))
 
-    def _put_aside(self) -> str:
-        """Give the file another name; return what became of it."""
+    def _rename_refused(self) -> str:
+        """Rename the file; return a message about the outcome."""
         stem, suffix = self._path.stem, self._path.suffix
         names = (f"{stem}.refused{'' if n == 1 else f'-{n}'}{suffix}" for n in itertools.count(1))
         aside = next(path for name in names if not (path := self._path.with_name(name)).exists())
@@ -231,7 +229,7 @@ def _read(path: Path) -> str:
 
 
 def _key(stack: Stack) -> object:
-    """Return what differs whenever the plans do."""
+    """Return a key that changes with the plans."""
     places, progress = stack.places, stack.now.progress
     home = places.home_point if places.home_is_chosen else None
     return places.ids, progress.current, progress.finished, home

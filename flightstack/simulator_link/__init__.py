@@ -1,1 +1,1 @@
-"""The link to the simulator: frames, their layout, and the endpoint of the flight stack."""
+"""The link to the simulator: lockstep frames and the endpoint of the flight stack."""

@@ -1,7 +1,6 @@
-"""BATTERY_STATUS of the simulator link as bytes: it comes ten times a simulated second within the lockstep exchange.
+"""Fast codec of BATTERY_STATUS on the simulator link, sent ten times per simulated second in the lockstep exchange.
 
-pymavlink needs 15 µs for one of them, both ends together, which is a third of a microsecond in every step. The
-bytes equal pymavlink's (a test holds them to it).
+pymavlink takes 15 µs to encode and decode one, 0.3 µs per step. A test checks that the bytes equal pymavlink's.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER_V2, MAGIC_V2, check
 from flightstack.mavlink.link import Message
 
 UNUSED_CELL = 0xFFFF
-"""A place of ``voltages`` without a cell; in ``voltages_ext`` zero says the same."""
+"""Value of an unused entry of ``voltages``; in ``voltages_ext`` it is zero."""
 PLACES, EXTRA_PLACES = 10, 4
 UNKNOWN_TEMPERATURE = 0x7FFF
 
@@ -26,10 +25,10 @@ _MODE = (mavlink.MAV_BATTERY_MODE_UNKNOWN, 0)  # faults
 
 
 class BatteryReport(NamedTuple):
-    """What the simulator link uses of BATTERY_STATUS, in the units of the wire."""
+    """Fields of BATTERY_STATUS used on the simulator link, in MAVLink's units."""
 
-    number: int  # of the battery, 0 the first
-    cells_mv: tuple[int, ...]  # 10 places of voltages, then 4 of voltages_ext
+    number: int  # battery id, 0 for the first
+    cells_mv: tuple[int, ...]  # 10 entries of voltages, then 4 of voltages_ext
     current_ca: int  # 10 mA; -1 unknown
     consumed_mah: int
     energy_hj: int  # 100 J
@@ -37,7 +36,7 @@ class BatteryReport(NamedTuple):
 
 
 def encode_battery(report: BatteryReport, seq: int, system_id: int, component_id: int) -> bytes:
-    """Return the frame of a lithium polymer battery that feeds everything; its numbers must fit their fields."""
+    """Return the frame of a lithium polymer battery for all consumers; values must be in range."""
     cells = report.cells_mv
     payload = _WIRE.pack(
         report.consumed_mah, report.energy_hj, UNKNOWN_TEMPERATURE, *cells[:PLACES], report.current_ca,
@@ -50,7 +49,7 @@ def encode_battery(report: BatteryReport, seq: int, system_id: int, component_id
 
 
 def decode_battery(frame: bytes | memoryview) -> BatteryReport | None:
-    """Return the report that ``frame`` is: one intact, unsigned BATTERY_STATUS of MAVLink 2, or None."""
+    """Return the report in ``frame`` if it is exactly one intact, unsigned MAVLink 2 BATTERY_STATUS, else None."""
     data = bytes(frame)
     end = len(data) - CHECKSUM_SIZE
     if end <= HEADER_V2 or data[0] != MAGIC_V2 or data[1] != end - HEADER_V2 or data[2] or data[7:10] != _ID:
@@ -64,7 +63,7 @@ def decode_battery(frame: bytes | memoryview) -> BatteryReport | None:
 
 
 def report_of(message: Message) -> BatteryReport:
-    """Return the report of a message that the general decoder read."""
+    """Return the report in a message of the general decoder."""
     return BatteryReport(
         message.id,
         (*message.voltages, *message.voltages_ext),

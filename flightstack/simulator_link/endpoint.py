@@ -1,7 +1,7 @@
-"""The flight stack's end of the simulator link, without I/O.
+"""Endpoint of the simulator link in the flight stack, without I/O.
 
-A simulator is asked for FS_PLANT_STATE (exact, one frame each way per step) and, if it does not know that, for
-HIL_STATE_QUATERNION, as PX4 asks; whichever arrives is answered in kind.
+It requests FS_PLANT_STATE (full precision, one frame each way per step), or PX4's HIL_STATE_QUATERNION from simulators
+that do not support it, and answers with FS_ACTUATORS or HIL_ACTUATOR_CONTROLS accordingly.
 """
 
 from __future__ import annotations
@@ -24,46 +24,41 @@ from flightstack.simulator_link.state_steps import StateSteps
 HIL_ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED | mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 HIL_DISARMED = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 HIL_LOCKSTEP = 1
-
-
 LONGEST_STEP_US = 2_000_000
-"""Largest step between two states' times that the vehicle's clock follows: twice that of the slowest loops."""
+"""Longest step between states that the vehicle's clock follows: twice that of the slowest loops."""
 
 
 class Battery(NamedTuple):
-    """The battery as the simulator last reported it; what it does not know is NaN."""
+    """Last battery report of the simulator; unknown values are NaN."""
 
     voltage_v: float = math.nan
     current_a: float = math.nan
-    remaining: float = math.nan  # share of the charge, 0 to 1
-    time_us: int = 0  # vehicle time of the state that it came with
-    valid: bool = False  # a charge was ever reported
+    remaining: float = math.nan  # state of charge, 0 to 1
+    time_us: int = 0  # vehicle time of the state received with it
+    valid: bool = False  # a state of charge was reported
 
 
 NO_BATTERY = Battery()
 
 
 class Freshness(NamedTuple):
-    """How old the newest state is, in the vehicle's time."""
+    """Age of the newest state in vehicle time."""
 
     age_us: int  # since it arrived
-    frozen_us: (
-        int  # since any of its numbers changed in any bit; while the vehicle stands that is nothing odd
-    )
+    frozen_us: int  # since any of its values changed; normal while the vehicle stands
 
 
 NEW_STATE = Freshness(0, 0)
 
 
 class SimulatorEndpoint:
-    """Takes the simulator's bytes, keeps the newest state, and makes the answer to it.
+    """Decodes states from the simulator and encodes the answers.
 
-    ``state`` (13,) and ``rotor_speed_rad_s`` (8,) are the same arrays for the link's whole life.
+    ``state`` (13,) and ``rotor_speed_rad_s`` (8,) are updated in place.
 
-    ``time_us`` is the simulated time since the vehicle booted: the first state, whatever its time, is at 0, and
-    the steps between the states' times are followed. A step back, or one longer than ``LONGEST_STEP_US`` (a
-    simulator that started anew, or nonsense), is counted in ``time_jumps``; the state is taken, and the clock
-    stands still for that step. ``steps`` watches those that are not the loops' own, ``interval_us``.
+    ``time_us`` is the simulated time since boot: 0 at the first state, then advanced by the steps between states. A
+    step back, or one longer than ``LONGEST_STEP_US`` (such as after a simulator restart), is counted in ``time_jumps``:
+    the state is used, but the time does not advance. ``steps`` monitors steps that differ from ``interval_us``.
     """
 
     def __init__(
@@ -75,9 +70,9 @@ class SimulatorEndpoint:
         self._actuators.set_rotor_count(len(vehicle.rotors))
         self._system_type = system_type(len(vehicle.rotors))
         self._frame = LocalFrame(home)
-        self._top_speed = np.array([min(r.max_speed_rad_s, 1e6) for r in vehicle.rotors])
+        self._max_speed_rad_s = np.array([min(r.max_speed_rad_s, 1e6) for r in vehicle.rotors])
         self._lockstep = LOCKSTEP_FLAG if lockstep else 0
-        self._speaks_hil = False
+        self._uses_hil = False
         self.state: FloatArray = self._plant.state
         self.state[6] = 1.0
         self.rotor_speed_rad_s = self._plant.rotor_speed_rad_s
@@ -87,10 +82,10 @@ class SimulatorEndpoint:
         self._interval_us = interval_us
         self.battery = NO_BATTERY
         self.finder = FrameFinder()
-        """Cuts what is received into frames."""
-        self._state_us = 0  # the newest state's own time
+        """Frame parser of received bytes."""
+        self._state_us = 0  # time stamp of the newest state
         self.has_arrived = False
-        """Whether a state of a new time has come since ``freshness`` was last asked for."""
+        """True if a state with a new time arrived since the last call of ``freshness``."""
         self._arrived_us = 0
         self._changed_us = 0
         self._seen = b""
@@ -101,18 +96,18 @@ class SimulatorEndpoint:
         self.peer_is_shutting_down = False
 
     def resume(self, other: SimulatorEndpoint) -> None:
-        """Go on where another link of the same connection was, after a reboot."""
+        """Continue the connection of another endpoint after a reboot."""
         self.state[:] = other.state
         self.rotor_speed_rad_s[:] = other.rotor_speed_rad_s
-        self._state_us = other._state_us  # its clock begins anew
-        self.battery, self.has_state, self._speaks_hil = other.battery, other.has_state, other._speaks_hil
+        self._state_us = other._state_us  # the vehicle clock restarts
+        self.battery, self.has_state, self._uses_hil = other.battery, other.has_state, other._uses_hil
 
     def initial_requests(self, interval_us: int) -> bytes:
-        """Return the bytes to send after connecting: who we are, and our own state message every so often."""
+        """Return the messages to send after connecting: a heartbeat and a request for FS_PLANT_STATE."""
         return self.heartbeat(False) + self._request(FS_PLANT_STATE_ID, interval_us)
 
     def fallback_request(self, interval_us: int) -> bytes:
-        """Return the request to a simulator that does not know our message: PX4's."""
+        """Return the request for PX4's HIL_STATE_QUATERNION."""
         return self._request(mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION, interval_us)
 
     def _request(self, message_id: int, interval_us: int) -> bytes:
@@ -122,7 +117,7 @@ class SimulatorEndpoint:
         )
 
     def heartbeat(self, armed: bool, leaving: bool = False) -> bytes:
-        """Return a heartbeat; ``leaving`` announces an orderly end."""
+        """Return a heartbeat; ``leaving`` announces a shutdown."""
         return self._link.encode(
             mavlink.MAVLink_heartbeat_message(
                 self._system_type,
@@ -135,18 +130,18 @@ class SimulatorEndpoint:
         )
 
     def receive(self, data: memoryview) -> bool:
-        """Take bytes from the simulator; tell whether a new state arrived.
+        """Process received bytes; return True if they held a new state.
 
-        A whole state is taken at once, whatever came before it: that can only be junk.
+        A complete state frame is used at once: incomplete bytes before it are discarded.
         """
         if self._plant.open(data):
             self._take_time(self._plant.time_us)
-            self._speaks_hil = False
+            self._uses_hil = False
             return True
         return self._receive_with_battery(data) or self._receive_any(data)
 
     def _receive_with_battery(self, data: memoryview) -> bool:
-        """Take a battery's report and the state right behind it, as the simulator sends them; else nothing."""
+        """Process a battery report directly followed by a state; return False and do nothing for anything else."""
         split = len(data) - self._plant.size
         if (
             split <= 0
@@ -155,7 +150,7 @@ class SimulatorEndpoint:
         ):
             return False
         self._take_time(self._plant.time_us)
-        self._speaks_hil = False
+        self._uses_hil = False
         self._take_battery(report)
         return True
 
@@ -165,7 +160,7 @@ class SimulatorEndpoint:
         for frame in self.finder.find(data):
             if self._plant.open(frame):
                 self._take_time(self._plant.time_us)
-                self._speaks_hil = False
+                self._uses_hil = False
                 fresh = True
                 continue
             for message in self._link.decode(frame):
@@ -181,7 +176,7 @@ class SimulatorEndpoint:
                 else:
                     self._take_other(message)
         if battery is not None:
-            self._take_battery(battery)  # last: it has the time of the state that came with it
+            self._take_battery(battery)  # last: it gets the time of the state received with it
         return fresh
 
     def _take_other(self, message: Message) -> None:
@@ -197,10 +192,10 @@ class SimulatorEndpoint:
     def _take_time(self, state_us: int) -> None:
         step_us = state_us - self._state_us
         self._state_us = state_us
-        if step_us == self._interval_us and self.has_state:  # the usual
+        if step_us == self._interval_us and self.has_state:  # typical
             self.time_us += step_us
             self.has_arrived = True
-        elif not self.has_state:  # the vehicle boots
+        elif not self.has_state:  # boot
             self.has_state = self.has_arrived = True
         elif 0 < step_us <= LONGEST_STEP_US:
             self.time_us += step_us
@@ -212,13 +207,13 @@ class SimulatorEndpoint:
 
     @property
     def step_refusal(self) -> str:
-        """Why the vehicle must not arm with the simulator's steps; empty if it may."""
+        """Reason why the simulator's steps prevent arming; empty if they do not."""
         return self.steps.refusal(self.time_us)
 
     def freshness(self, now_us: int) -> Freshness:
-        """Tell how old the newest state is at ``now_us``, the time of this tick; to be asked for in regular ticks.
+        """Return the age of the newest state at ``now_us``; call in every tick.
 
-        In lockstep a state can be frozen but never old.
+        In lockstep a state can be frozen but not old.
         """
         if self.has_arrived:
             self.has_arrived = False
@@ -228,13 +223,11 @@ class SimulatorEndpoint:
                 self._seen = content
                 self._changed_us = now_us
                 return NEW_STATE
-        frozen_us = (
-            0 if self._speaks_hil else now_us - self._changed_us
-        )  # its coarse numbers may well stay the same
+        frozen_us = 0 if self._uses_hil else now_us - self._changed_us  # coarse HIL values may stay the same
         return Freshness(now_us - self._arrived_us, frozen_us)
 
     def _take_battery(self, report: BatteryReport) -> None:
-        """Take the report of the first battery; −1 and unused cells mean unknown."""
+        """Store the report of the first battery; −1 and unused cells mean unknown."""
         if report.number != 0:
             return
         cells_mv = [cell for cell in report.cells_mv if cell != UNUSED_CELL]
@@ -247,38 +240,38 @@ class SimulatorEndpoint:
         )
 
     def ask_for_failure(self, unit: int, failure: int, instance: int) -> None:
-        """Put a request for a failure among those that ``take_requests`` returns."""
+        """Queue a failure injection request for ``take_requests``."""
         self._failure_result = None
         self._requests.append(self.failure_request(unit, failure, instance))
 
     def take_failure_result(self) -> int | None:
-        """Return the simulator's MAV_RESULT of the newest request, once; None while there is none."""
+        """Return the simulator's MAV_RESULT of the newest request and clear it; None without one."""
         result, self._failure_result = self._failure_result, None
         return result
 
     def take_requests(self) -> bytes:
-        """Return the bytes that the simulator is to get besides its answers, once."""
+        """Return queued requests to the simulator and clear them."""
         if not self._requests:
             return b""
         requests, self._requests = b"".join(self._requests), []
         return requests
 
     def failure_request(self, unit: int, failure: int, instance: int) -> bytes:
-        """Return the bytes that ask the simulator for a failure: MAV_CMD_INJECT_FAILURE with its values."""
+        """Return the MAV_CMD_INJECT_FAILURE message for the simulator."""
         number = mavlink.MAV_CMD_INJECT_FAILURE
         return self._link.encode(
             mavlink.MAVLink_command_long_message(0, 0, number, 0, unit, failure, instance, 0, 0, 0, 0)
         )
 
     def _take_plant_state(self, m: Message) -> None:
-        """Take a frame that the general decoder read: it may be signed, or cut where its payload ends in zeros."""
-        self._speaks_hil = False
+        """Process a state of the general decoder: its frame may be signed or truncated."""
+        self._uses_hil = False
         self.state[:] = (*m.position_ned_m, *m.velocity_ned_m_s, *m.q, *m.rates_frd_rad_s)
         self.rotor_speed_rad_s[:] = m.rotor_speed_rad_s
         self._take_time(m.time_us)
 
     def _take_hil(self, m: Message) -> None:
-        self._speaks_hil = True
+        self._uses_hil = True
         position = self._frame.to_ned(GeoPoint(m.lat / 1e7, m.lon / 1e7, m.alt / 1e3))
         velocity = (m.vx / 100.0, m.vy / 100.0, m.vz / 100.0)
         rates = (m.rollspeed, m.pitchspeed, m.yawspeed)
@@ -286,15 +279,15 @@ class SimulatorEndpoint:
         self._take_time(m.time_usec)
 
     def answer(self, rotor_speed_rad_s: FloatArray, armed: bool) -> bytes | memoryview:
-        """Return the answer to the newest state: rotor speeds (8,), commanded."""
-        if self._speaks_hil:
+        """Return the answer to the newest state with commanded rotor speeds (8,)."""
+        if self._uses_hil:
             return self._hil_answer(rotor_speed_rad_s, armed)
         self._actuators.rotor_speed_rad_s[:] = rotor_speed_rad_s
         return self._actuators.seal(self._state_us, self._lockstep | (ARMED_FLAG if armed else 0))
 
     def _hil_answer(self, rotor_speed_rad_s: FloatArray, armed: bool) -> bytes:
-        count = self._top_speed.size
-        shares = np.clip(rotor_speed_rad_s[:count] / self._top_speed, 0.0, 1.0).tolist()
+        count = self._max_speed_rad_s.size
+        shares = np.clip(rotor_speed_rad_s[:count] / self._max_speed_rad_s, 0.0, 1.0).tolist()
         controls = [share * share if math.isfinite(share) else 0.0 for share in shares]
         controls += [0.0] * (16 - count)
         if not armed:

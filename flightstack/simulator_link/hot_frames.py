@@ -1,7 +1,7 @@
-"""The two messages of the lockstep exchange, encoded in place: no copy and no object per step.
+"""The two messages of the lockstep exchange, encoded in place without a copy or an object per step.
 
-Each keeps its frame in one buffer, laid out so that the doubles of the payload are aligned: the array handed
-to the kernels *is* the payload. The bytes equal pymavlink's (a test holds them to it).
+Each message keeps its frame in one buffer with aligned payload doubles, so that the array passed to the kernels is the
+payload itself. A test checks that the bytes equal pymavlink's.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from flightstack.mavlink.dialect import LAYOUT_BY_NAME
 from flightstack.mavlink.frames import CHECKSUM_SIZE, HEADER, HEADER_V2, MAGIC_V2
 
 if sys.byteorder != "little":  # the payload is used in place
-    raise ImportError("flightstack needs a little-endian machine")
+    raise ImportError("flightstack requires a little-endian machine")
 
-_ALIGNMENT = 6  # the payload starts at 16 in the buffer
+_ALIGNMENT = 6  # puts the payload at offset 16 of the buffer
 _TIME = struct.Struct("<Q")
 _CRC = struct.Struct("<H")
 _crc16 = crc16.mcrf4xx
@@ -31,7 +31,7 @@ LOCKSTEP_FLAG = 4  # FS_ACTUATORS
 
 
 class _HotFrame:
-    """One message of fixed length. Its last byte, the flags, is never zero, so that nothing is truncated."""
+    """A message of fixed length: its last byte, the flags, is never zero, so that it is not truncated."""
 
     name = ""
 
@@ -47,14 +47,14 @@ class _HotFrame:
             self.frame, 0, MAGIC_V2, self.payload_size, 0, 0, 0, system_id, component_id,
             layout.message_id & 0xFFFF, layout.message_id >> 16,
         )  # fmt: skip
-        # what is the same in all frames of one message (see HEADER), time, flags, checksum
+        # constant part of the header, time, flags, checksum
         self._unpack = struct.Struct(f"<3s4x3sQ{self.payload_size - 9}xBH").unpack_from
         self._magic, self._message = bytes(self.frame[:3]), bytes(self.frame[7:HEADER_V2])
         self._seq = 0
         self.time_us = 0
-        """Time of the message held."""
+        """Time of the current message."""
         self.flags = VALID_FLAG
-        """Flags of the message held."""
+        """Flags of the current message."""
         self._crc_at = HEADER_V2 + self.payload_size
         self._checked = self.frame[1 : self._crc_at + 1]
         self._flags_at = self._crc_at - 1
@@ -64,21 +64,21 @@ class _HotFrame:
         return np.frombuffer(self._buffer, "<f8", count, _ALIGNMENT + HEADER_V2 + offset)
 
     def seal(self, time_us: int, flags: int) -> memoryview:
-        """Complete the frame around the payload in place and return its bytes, valid until the next call."""
+        """Complete the frame around the payload in place; return its bytes, valid until the next call."""
         frame = self.frame
         self.time_us, self.flags = time_us, flags | VALID_FLAG
         frame[4] = self._seq
         self._seq = (self._seq + 1) & 255
         _TIME.pack_into(frame, HEADER_V2, time_us)
         frame[self._flags_at] = self.flags
-        frame[self._crc_at] = self._extra  # the checksum covers one byte more, which is not sent
+        frame[self._crc_at] = self._extra  # the checksum covers one more byte, which is not sent
         _CRC.pack_into(frame, self._crc_at, _crc16(self._checked))
         return frame
 
     def open(self, data: bytes | bytearray | memoryview) -> bool:
-        """Take over ``data`` if it is exactly one intact frame of this message; else leave all as it was.
+        """Copy ``data`` if it is exactly one intact frame of this message; return False and change nothing if not.
 
-        Signed or truncated frames are legal MAVLink too: those take the general codec's way.
+        Signed and truncated frames are valid MAVLink too, and are left to the general codec.
         """
         if len(data) != self.size:
             return False
@@ -93,7 +93,7 @@ class _HotFrame:
 
 
 class PlantStateFrame(_HotFrame):
-    """FS_PLANT_STATE: ``state`` is the array form of ``VehicleState``, in the payload itself."""
+    """FS_PLANT_STATE: ``state`` is the payload as array form of ``VehicleState``."""
 
     name = "FS_PLANT_STATE"
 
@@ -104,12 +104,12 @@ class PlantStateFrame(_HotFrame):
         self.rotor_speed_rad_s = np.frombuffer(self._buffer, "<f4", MAX_ROTORS, offset)
 
     def set_rotor_count(self, count: int) -> None:
-        """Say how many rotors are in use."""
+        """Set the number of rotors."""
         self.frame[self._flags_at - 1] = count
 
 
 class ActuatorsFrame(_HotFrame):
-    """FS_ACTUATORS: ``rotor_speed_rad_s`` are the commands, in the payload itself."""
+    """FS_ACTUATORS: ``rotor_speed_rad_s`` is the payload with the commands."""
 
     name = "FS_ACTUATORS"
 
@@ -119,9 +119,9 @@ class ActuatorsFrame(_HotFrame):
 
     @property
     def rotor_count(self) -> int:
-        """Rotors in use."""
+        """Number of rotors."""
         return self.frame[self._flags_at - 1]
 
     def set_rotor_count(self, count: int) -> None:
-        """Say how many rotors are in use."""
+        """Set the number of rotors."""
         self.frame[self._flags_at - 1] = count

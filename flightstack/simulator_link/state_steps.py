@@ -1,4 +1,4 @@
-"""What the times of states say about the simulator: how long its steps are, and whether they can be flown. Pure."""
+"""Monitor of the simulator's step lengths and speed. Pure."""
 
 from __future__ import annotations
 
@@ -7,37 +7,37 @@ from typing import NamedTuple
 from flightstack.core.enums import Severity
 
 LONGEST_FLYABLE_US = 10_000
-"""Longest step that loops of a shorter one fly by: both built-in vehicles fly the square at 16 ms, not at 20 ms."""
+"""Longest simulator step accepted for faster loops: both built-in vehicles fly the square at 16 ms, not at 20 ms."""
 GAP_US = 50_000
-"""A step longer than this is a gap: the loops rest in it, as without states."""
+"""A longer step is a gap, in which the loops pause as without states."""
 WINDOW = 10
-"""So many consecutive steps make a mean."""
+"""Number of consecutive steps per mean."""
 CHANGE = 0.05
-"""Share by which a mean must differ from the one that was told last."""
+"""Relative change of the mean that is reported."""
 PACE_SPAN_US = 5_000_000
 PACE_TOLERANCE = 0.2
-"""In real time, the share by which the simulator's speed may differ from the machine's, over so long."""
+"""In real time: maximum relative difference between the simulator's and the machine's clock over ``PACE_SPAN_US``."""
 
 
 class Notice(NamedTuple):
-    """What the operator should know, with its MAV_SEVERITY."""
+    """A text for the operator with its MAV_SEVERITY."""
 
     severity: int
     text: str
 
 
 def is_gap(step_us: int) -> bool:
-    """Return whether a step, or the ticks that it makes due, is a gap."""
+    """Return True if a step is a gap."""
     return step_us > GAP_US
 
 
 class StateSteps:
-    """Watches the steps between states. Steps of ``interval_us``, the loops' own, are not shown to it."""
+    """Monitors steps between states that differ from the loops' ``interval_us``."""
 
     def __init__(self, interval_us: int) -> None:
         self._interval_us = interval_us
         self._sum_us = self._count = self._longest_us = 0
-        self._mean_us = self._told_us = float(interval_us)
+        self._mean_us = self._reported_us = float(interval_us)
         self._latest_us = 0
         self._quiet_until_us = 0
         self._pace_from: tuple[int, int] | None = None
@@ -45,14 +45,14 @@ class StateSteps:
         self._notices: list[Notice] = []
 
     def take_notices(self) -> list[Notice]:
-        """Return what the operator should know, once."""
+        """Return new notices and clear them."""
         if not self._notices:
             return self._notices
         notices, self._notices = self._notices, []
         return notices
 
     def refusal(self, time_us: int) -> str:
-        """Return why the newest steps, at ``time_us``, cannot be flown; empty if they can."""
+        """Return why the loops cannot fly with the newest steps at ``time_us``; empty if they can."""
         is_over = time_us - self._latest_us > 2.0 * self._mean_us
         if is_over or self._mean_us <= max(LONGEST_FLYABLE_US, self._interval_us):
             return ""
@@ -62,9 +62,9 @@ class StateSteps:
         )
 
     def differs(self, step_us: int, time_us: int) -> None:
-        """Take a step that led to ``time_us`` and is not the loops' own.
+        """Record a step to ``time_us`` that differs from ``interval_us``.
 
-        Only consecutive steps make a mean: a hiccup now and then between steps of the loops' own is no rate.
+        The mean is of consecutive steps only: single irregular steps do not define a rate.
         """
         if time_us - step_us != self._latest_us:
             self._begin_window(time_us)
@@ -76,19 +76,19 @@ class StateSteps:
         if self._count == WINDOW:
             self._mean_us = self._sum_us / WINDOW
             self._sum_us = self._count = self._longest_us = 0
-            if abs(self._mean_us - self._told_us) > CHANGE * self._told_us:
-                self._told_us = self._mean_us
-                self._tell_mean(time_us)
+            if abs(self._mean_us - self._reported_us) > CHANGE * self._reported_us:
+                self._reported_us = self._mean_us
+                self._report_mean(time_us)
         elif gap:
             self.jumps(step_us, time_us)
 
     def _begin_window(self, time_us: int) -> None:
-        """Forget the steps of a window that steps of the loops' own ended; report one that was too long."""
+        """Discard an interrupted window; report a step that was too long."""
         if self._longest_us > max(LONGEST_FLYABLE_US, self._interval_us):
             self.jumps(self._longest_us, time_us)
         self._sum_us = self._count = self._longest_us = 0
 
-    def _tell_mean(self, time_us: int) -> None:
+    def _report_mean(self, time_us: int) -> None:
         refusal = self.refusal(time_us)
         text = (
             f"Simulator sends a state every {_ms(self._mean_us)}; "
@@ -100,7 +100,7 @@ class StateSteps:
             self.tell(Severity.NOTICE, text)
 
     def jumps(self, step_us: int, time_us: int) -> None:
-        """Take a step that the vehicle's clock, at ``time_us``, follows as a gap, or not at all."""
+        """Report a step at ``time_us`` that is a gap or that the vehicle's clock does not follow."""
         if time_us < self._quiet_until_us:
             return
         self._quiet_until_us = time_us + 10_000_000
@@ -108,7 +108,7 @@ class StateSteps:
         self.tell(Severity.WARNING, f"Simulator time {way} {abs(step_us) * 1e-6:.4g} s")
 
     def compare(self, time_us: int, machine_us: int) -> None:
-        """In real time: compare the simulator's clock with the machine's; call from time to time."""
+        """Compare the simulator's clock with the machine's in real time; call periodically."""
         if self._pace_from is None:
             self._pace_from = time_us, machine_us
             return

@@ -1,4 +1,4 @@
-"""A line that carries octets, whatever is at its other end."""
+"""Protocol of a bidirectional byte stream."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from typing import Protocol
 
 
 class ByteLink(Protocol):
-    """A stream of octets both ways, which may lose and change them."""
+    """A bidirectional byte stream that may lose and corrupt bytes."""
 
     name: str
-    """What it is, for messages to the user."""
+    """Name in messages to the user."""
 
     def write(self, data: bytes) -> None:
-        """Send octets; raise LineError when the line is gone."""
+        """Send bytes; raise LineError if the connection is lost."""
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what has come, b"" when nothing does within ``timeout_s``; raise LineError when it is gone."""
+        """Return received bytes, b"" after ``timeout_s`` without any; raise LineError if the connection is lost."""
 
     def close(self) -> None:
-        """Close the line; a second call does nothing."""
+        """Close the connection; a second call does nothing."""
 
 
 class LineError(OSError):
-    """A line cannot be opened, or is gone; the text is one sentence for the user."""
+    """A connection cannot be opened or is lost; the text is one sentence for the user."""

@@ -1,12 +1,11 @@
-"""Keep the two ends of a lockstep link on one processor.
+"""Run both processes of a lockstep link on the same CPU.
 
-In lockstep only one end runs at a time. On one processor the hand-over is a change of context, 3 µs each way.
-On two it is either the wake-up of a sleeping processor, tens of microseconds, or a wait that spins: that
-takes a second processor for nothing, and as soon as anything else wants it, the end that has work to do waits
-milliseconds.
+In lockstep only one process runs at a time. On one CPU the hand-over is a context switch, 3 µs each way. On two CPUs it
+is a wake-up of tens of microseconds, or a busy wait, which occupies the second CPU and delays the working process by
+milliseconds under load.
 
-One end roams: now and then it lets the scheduler choose its processor, and stays where it was put. The other
-follows. Where the system has no such calls (other than Linux), nothing happens; the link works all the same.
+The leader periodically lets the scheduler choose its CPU and then stays there; the follower moves to the same CPU. On
+systems other than Linux, affinity is not set.
 """
 
 from __future__ import annotations
@@ -16,58 +15,58 @@ import os
 import socket
 from pathlib import Path
 
-_SETTLED_FOR = 8192  # exchanges, a fraction of a second at full speed; the choice costs one at most
-_FREE_FOR = 16
-_PROCESSOR_FIELD = 36  # of /proc/…/stat, counted after the name in parentheses
+_PINNED_EXCHANGES = 8192  # exchanges: a fraction of a second at full speed
+_FREE_EXCHANGES = 16
+_CPU_FIELD = 36  # of /proc/…/stat, counted after the name in parentheses
 
 
 def _allowed() -> set[int]:
     return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
 
 
-def _move(processors: set[int]) -> None:
-    with contextlib.suppress(OSError):  # forbidden, or unplugged: then it stays as it is
-        os.sched_setaffinity(0, processors)
+def _set_affinity(cpus: set[int]) -> None:
+    with contextlib.suppress(OSError):  # not permitted, or CPU offline
+        os.sched_setaffinity(0, cpus)
 
 
-def _here() -> int:
+def _current_cpu() -> int:
     stat = Path("/proc/thread-self/stat").read_text(encoding="ascii", errors="replace")
-    return int(stat.rpartition(")")[2].split()[_PROCESSOR_FIELD])
+    return int(stat.rpartition(")")[2].split()[_CPU_FIELD])
 
 
 class AffinityLeader:
-    """The end that chooses the processor for both."""
+    """Process that chooses the CPU of both."""
 
     def __init__(self) -> None:
         self._allowed = _allowed()
-        self._settled = True
+        self._is_pinned = True
 
-    def step(self) -> int:
-        """Be free to move, or settle where we are, in turns; return for how many exchanges."""
-        self._settled = not self._settled
+    def update(self) -> int:
+        """Alternate between free and pinned to the current CPU; return the number of exchanges until the next call."""
+        self._is_pinned = not self._is_pinned
         if len(self._allowed) > 1:
-            _move({_here()} if self._settled else self._allowed)
-        return _SETTLED_FOR if self._settled else _FREE_FOR
+            _set_affinity({_current_cpu()} if self._is_pinned else self._allowed)
+        return _PINNED_EXCHANGES if self._is_pinned else _FREE_EXCHANGES
 
-    def leave(self) -> None:
-        """Be free to move for good."""
+    def release(self) -> None:
+        """Restore the original affinity."""
         if len(self._allowed) > 1:
-            _move(self._allowed)
+            _set_affinity(self._allowed)
 
 
 class AffinityFollower:
-    """The end that moves to the processor of the other."""
+    """Process that moves to the CPU of the leader."""
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
         self._allowed = _allowed()
-        self._processor = -1
+        self._cpu = -1
 
-    def follow(self) -> None:
-        """Move to where the peer's newest packet was handled: over loopback, the processor that sent it."""
+    def update(self) -> None:
+        """Move to the CPU that handled the peer's newest packet: over loopback the CPU of the sender."""
         if len(self._allowed) < 2:
             return
-        processor = self._connection.getsockopt(socket.SOL_SOCKET, socket.SO_INCOMING_CPU)
-        if processor != self._processor and processor in self._allowed:
-            self._processor = processor
-            _move({processor})
+        cpu = self._connection.getsockopt(socket.SOL_SOCKET, socket.SO_INCOMING_CPU)
+        if cpu != self._cpu and cpu in self._allowed:
+            self._cpu = cpu
+            _set_affinity({cpu})

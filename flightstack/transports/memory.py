@@ -1,6 +1,6 @@
-"""Links in memory for tests and in-process flights: datagrams, with no socket and no clock.
+"""In-memory datagram links for tests and in-process flights, without sockets and clocks.
 
-``memory_link`` is plain and fast; ``LossyLink`` loses, doubles, reorders and delays, from a seed.
+``memory_link`` is lossless; ``LossyLink`` loses, duplicates, reorders and delays datagrams by a seed.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 
 class MemoryEnd:
-    """One end of a plain link: what one end sends, the other receives, whole, once and in order."""
+    """One end of a lossless link."""
 
     def __init__(self, inbox: deque[bytes], outbox: deque[bytes]) -> None:
         self._inbox = inbox
@@ -30,22 +30,22 @@ class MemoryEnd:
 
 
 def memory_link() -> tuple[MemoryEnd, MemoryEnd]:
-    """Return the two ends of a plain link."""
+    """Return the two ends of a lossless link."""
     one: deque[bytes] = deque()
     other: deque[bytes] = deque()
     return MemoryEnd(one, other), MemoryEnd(other, one)
 
 
 class Conditions(NamedTuple):
-    """How bad a link is. Probabilities are per datagram and direction."""
+    """Impairments of a link. Probabilities are per datagram and direction."""
 
     loss: float = 0.0
     duplication: float = 0.0
     reordering: float = 0.0
-    """Probability that a datagram takes ``reordering_delay_s`` longer, and so is overtaken."""
+    """Probability that a datagram is delayed by ``reordering_delay_s`` and thus overtaken."""
     delay_s: float = 0.0
     jitter_s: float = 0.0
-    """Up to this much more delay, uniformly."""
+    """Maximum additional delay, uniformly distributed."""
     reordering_delay_s: float = 0.1
 
 
@@ -57,7 +57,7 @@ class LossyEnd:
 
     def __init__(self, conditions: Conditions, seed: str) -> None:
         self.conditions = conditions
-        """Of what is sent from now on."""
+        """Conditions of datagrams sent from now on."""
         self._random = random.Random(seed)
         self._in_flight: list[tuple[float, int, bytes]] = []
         self._sent = 0
@@ -72,7 +72,7 @@ class LossyEnd:
             arrival_s = now_s + conditions.delay_s + conditions.jitter_s * chance()
             if chance() < conditions.reordering:
                 arrival_s += conditions.reordering_delay_s
-            self._sent += 1  # datagrams that arrive together keep their order
+            self._sent += 1  # keeps the order of simultaneous datagrams
             heapq.heappush(self.other._in_flight, (arrival_s, self._sent, data))
 
     def receive(self, now_s: float) -> list[bytes]:
@@ -83,12 +83,12 @@ class LossyEnd:
         return arrived
 
     def next_arrival(self) -> float | None:
-        """Return when the next datagram arrives; None if none is under way."""
+        """Return the arrival time of the next datagram, or None."""
         return self._in_flight[0][0] if self._in_flight else None
 
 
 class LossyLink:
-    """A duplex link of datagrams under ``conditions``; the same seed and calls give the same link."""
+    """A bidirectional datagram link under ``conditions``, deterministic by seed and calls."""
 
     def __init__(self, conditions: Conditions = LOSSLESS, seed: int = 0) -> None:
         self.one = LossyEnd(conditions, f"{seed} one")
@@ -96,6 +96,6 @@ class LossyLink:
         self.one.other, self.two.other = self.two, self.one
 
     def next_arrival(self) -> float | None:
-        """Return when the next datagram arrives at either end; None if none is under way."""
+        """Return the arrival time of the next datagram at either end, or None."""
         arrivals = [end.next_arrival() for end in (self.one, self.two)]
         return min((arrival for arrival in arrivals if arrival is not None), default=None)

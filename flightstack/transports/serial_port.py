@@ -1,4 +1,4 @@
-"""A serial port, or a pseudo-terminal, as a line of octets."""
+"""A serial port or pseudo-terminal as ``ByteLink``."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import serial
 from flightstack.transports.byte_link import LineError
 
 _REASONS = {
-    errno.ENOENT: "there is no such device",
-    errno.EACCES: "permission denied: let your user into the group that owns it (dialout or uucp), and log in again",
-    errno.EPERM: "permission denied: let your user into the group that owns it (dialout or uucp), and log in again",
-    errno.EBUSY: "another program uses it",
-    errno.EAGAIN: "another program uses it",
-    errno.EWOULDBLOCK: "another program uses it",
-    errno.ENXIO: "there is no such device",
-    errno.ENOTTY: "is no serial port",
-    errno.EINVAL: "does not take these settings",
+    errno.ENOENT: "no such device",
+    errno.EACCES: "permission denied: add your user to its group (dialout or uucp) and log in again",
+    errno.EPERM: "permission denied: add your user to its group (dialout or uucp) and log in again",
+    errno.EBUSY: "in use by another program",
+    errno.EAGAIN: "in use by another program",
+    errno.EWOULDBLOCK: "in use by another program",
+    errno.ENXIO: "no such device",
+    errno.ENOTTY: "is not a serial port",
+    errno.EINVAL: "does not support these settings",
     errno.EISDIR: "is a directory",
 }
 _PIECE = 4096
 
 
 class SerialPort:
-    """An open serial port, 8N1 without flow control; implements ``ByteLink``. Nobody else can open it meanwhile."""
+    """An open serial port, 8N1 without flow control; opened exclusively; implements ``ByteLink``."""
 
     def __init__(self, device: str, baud: int) -> None:
         """Open ``device``; raise LineError."""
@@ -40,31 +40,31 @@ class SerialPort:
         self._poll.register(self._port.fileno(), select.POLLIN)
 
     def write(self, data: bytes) -> None:
-        """Send octets; raise LineError when the line is gone."""
+        """Send bytes; raise LineError if the connection is lost."""
         try:
             self._port.write(data)
         except (serial.SerialException, OSError) as error:
-            raise LineError(f"{self.name}: the line is gone: {_reason(error)}") from error
+            raise LineError(f"{self.name}: connection lost: {_reason(error)}") from error
 
     def read(self, timeout_s: float) -> bytes:
-        """Return what has come, b"" when nothing does within ``timeout_s``; raise LineError when it is gone."""
+        """Return received bytes, b"" after ``timeout_s`` without any; raise LineError if the connection is lost."""
         try:
             if not self._poll.poll(max(0.0, timeout_s) * 1000.0):
                 return b""
             data: bytes = self._port.read(_PIECE)
         except (serial.SerialException, OSError) as error:
-            raise LineError(f"{self.name}: the line is gone: {_reason(error)}") from error
+            raise LineError(f"{self.name}: connection lost: {_reason(error)}") from error
         if not data:
-            raise LineError(f"{self.name}: the line is gone: its other end closed it")
+            raise LineError(f"{self.name}: connection lost: closed by the other end")
         return data
 
     def close(self) -> None:
-        """Close the line; a second call does nothing."""
+        """Close the port; a second call does nothing."""
         self._port.close()
 
 
 def _reason(error: Exception) -> str:
-    """Return why, in words; pyserial keeps the system's number in the text alone when it sets a port up."""
+    """Return the reason as text; while opening a port, pyserial has the errno in its message only."""
     number = getattr(error, "errno", None)
     if number is None and (found := re.search(r"\((\d+), ", str(error))):
         number = int(found[1])

@@ -1,4 +1,4 @@
-"""A TCP client that waits in ``recv`` itself: one system call to receive, and none beside it to wait."""
+"""A TCP client that waits within ``recv``: one system call per reception."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import time
 from collections.abc import Callable
 
 BUFFER_SIZE = 65536
-PATIENCE_S = 0.02
-"""How long ``receive`` waits before it lets its caller look after other things."""
+RECEIVE_TIMEOUT_S = 0.02
+"""Timeout of ``receive``."""
 
 
 def wait_in_kernel(connection: socket.socket) -> None:
-    """Make ``recv`` block for ``PATIENCE_S`` and then raise BlockingIOError.
+    """Make ``recv`` block for ``RECEIVE_TIMEOUT_S`` and then raise BlockingIOError.
 
-    Python's own timeouts take a ``poll`` before each ``recv``.
+    Python's own timeouts call ``poll`` before each ``recv``.
     """
     connection.setblocking(True)
-    timeout = struct.pack("@ll", 0, round(PATIENCE_S * 1e6))
+    timeout = struct.pack("@ll", 0, round(RECEIVE_TIMEOUT_S * 1e6))
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeout)
 
 
@@ -28,7 +28,7 @@ class LinkClosedError(Exception):
 
 
 class TcpClient:
-    """One connection; ``receive`` returns a view of what has come, valid until the next call."""
+    """One connection; ``receive`` returns a view of the received bytes, valid until the next call."""
 
     def __init__(self, connection: socket.socket) -> None:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -48,7 +48,7 @@ class TcpClient:
         between_tries: Callable[[], None],
         now_s: Callable[[], float] = time.monotonic,
     ) -> TcpClient:
-        """Connect, trying again while nobody listens; raise TimeoutError after ``timeout_s``."""
+        """Connect, retrying while the port is closed; raise TimeoutError after ``timeout_s``."""
         deadline = now_s() + timeout_s
         while True:
             try:
@@ -60,15 +60,15 @@ class TcpClient:
                 time.sleep(0.02)
 
     def fileno(self) -> int:
-        """Descriptor, for ``poll``."""
+        """Return the file descriptor, for ``poll``."""
         return self.socket.fileno()
 
     def receive_now(self) -> memoryview | None:
-        """Return what is here, or None; raise LinkClosedError."""
+        """Return available bytes without waiting, or None; raise LinkClosedError."""
         return self.receive(socket.MSG_DONTWAIT)
 
     def receive(self, flags: int = 0) -> memoryview | None:
-        """Return what comes within ``PATIENCE_S``, or None; raise LinkClosedError."""
+        """Return bytes received within ``RECEIVE_TIMEOUT_S``, or None; raise LinkClosedError."""
         try:
             count = self._receive_into(self._buffer, 0, flags)
         except BlockingIOError:
@@ -80,10 +80,10 @@ class TcpClient:
         return self._view[:count]
 
     def send(self, data: bytes | memoryview) -> None:
-        """Send all of ``data``; raise LinkClosedError. Frames are small: they fit the socket's buffer."""
+        """Send all of ``data``; raise LinkClosedError. Frames usually fit into the socket buffer."""
         try:
             sent = self._send(data, socket.MSG_DONTWAIT)
-            while sent < len(data):  # a peer that stopped reading
+            while sent < len(data):  # the peer has stopped reading
                 select.select([], [self.socket], [], 5.0)
                 sent += self._send(data[sent:], socket.MSG_DONTWAIT)
         except OSError as error:

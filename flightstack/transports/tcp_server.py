@@ -1,10 +1,8 @@
-"""A TCP port for several MAVLink clients, without threads: nothing here ever waits.
+"""Non-blocking TCP server for several MAVLink clients.
 
-What a client does not read is kept up to ``MAX_UNSENT`` octets; beyond, whole frames are dropped, so that its
-stream never holds half of one. A client that takes nothing for ``STALLED_S`` is closed: it is gone, or as good
-as gone. When all places are taken, a client that sent no valid MAVLink for ``SILENT_AFTER_S``, or none at all,
-gives way to a new one; the others stay. The kernel's own buffer is kept small: telemetry that is older than a
-second is of no use.
+Up to ``MAX_UNSENT`` bytes are queued per client; beyond, complete frames are dropped. A client that reads nothing for
+``STALLED_S`` is disconnected. If ``MAX_CLIENTS`` are connected, a new client replaces one that sent no valid MAVLink
+for ``SILENT_AFTER_S``. The kernel buffer is small because old telemetry is useless.
 """
 
 from __future__ import annotations
@@ -25,16 +23,16 @@ MAX_CLIENTS = 64
 MAX_UNSENT = 65536
 STALLED_S = 10.0
 CONGESTED = 16384
-"""Unsent bytes above which a client gets no more of what can wait, such as file data."""
+"""Queued bytes above which a client gets no deferrable data, such as file contents."""
 _KERNEL_BUFFER = 65536
 _PIECE = 1024
 _BACKLOG = 16
 _ACCEPTED_AT_ONCE = 16
-_CLOSE_AT_ONCE = struct.pack("@ii", 1, 0)  # SO_LINGER: drop what is unsent, and tell the peer (RST)
+_CLOSE_AT_ONCE = struct.pack("@ii", 1, 0)  # SO_LINGER: drop unsent data and reset the connection
 
 
 class _Client:
-    """One connection and what could not be sent to it yet."""
+    """One connection with its unsent bytes."""
 
     def __init__(self, connection: socket.socket, now_s: float) -> None:
         connection.setblocking(False)
@@ -43,12 +41,12 @@ class _Client:
             (socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER),
             (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
         ):
-            with contextlib.suppress(OSError):  # it may be gone already
+            with contextlib.suppress(OSError):  # it may be closed already
                 connection.setsockopt(level, option, value)
         self.socket = connection
         self.unsent = bytearray()
         self.moved_s = now_s
-        """When the kernel last took something, or nothing waited."""
+        """Time at which the kernel last accepted data or nothing was queued."""
 
 
 class TcpServer:
@@ -57,7 +55,7 @@ class TcpServer:
     def __init__(
         self, host: str, port: int, poller: select.poll, now_s: Callable[[], float] = time.monotonic
     ) -> None:
-        """Listen; raise PortBusyError. ``poller`` is kept up to date with all descriptors to read from."""
+        """Listen; raise PortBusyError. All descriptors to read from are registered with ``poller``."""
         self._listener = _listening((host, port))
         self._now_s = now_s
         self._pollers = [poller]
@@ -66,39 +64,39 @@ class TcpServer:
         self._opened: list[Address] = []
         self._closed: list[Address] = []
         self.dropped = 0
-        """Frames that a client had no room for."""
+        """Frames dropped because a client's queue was full."""
         poller.register(self._listener, select.POLLIN)
 
     @property
     def address(self) -> Address:
-        """The local address, with the real port."""
+        """The local address with the actual port."""
         host, port = self._listener.getsockname()[:2]
         return str(host), int(port)
 
     def addresses(self) -> list[Address]:
-        """Return the addresses of the present clients."""
+        """Return the addresses of the connected clients."""
         return list(self._clients)
 
     def unsent(self, address: Address) -> int:
-        """Return how many bytes wait for a client, at most MAX_UNSENT."""
+        """Return the number of bytes queued for a client, at most MAX_UNSENT."""
         return len(self._clients[address].unsent)
 
     def __len__(self) -> int:
         return len(self._clients)
 
     def register(self, poller: select.poll) -> None:
-        """Keep one more poller up to date."""
+        """Register all descriptors with another poller too."""
         self._pollers.append(poller)
         for fileno in (self._listener.fileno(), *self._by_fileno):
             poller.register(fileno, select.POLLIN)
 
     def opened(self) -> list[Address]:
-        """Return who has connected since the last call, some of whom may have closed again."""
+        """Return clients connected since the last call; some may be closed again."""
         opened, self._opened = self._opened, []
         return opened
 
     def closed(self) -> list[Address]:
-        """Return whose connection has ended since the last call."""
+        """Return clients disconnected since the last call."""
         closed, self._closed = self._closed, []
         return closed
 
@@ -110,10 +108,10 @@ class TcpServer:
         heard_s: Callable[[Address], float] = lambda _: -math.inf,
         wants: Callable[[Address], bool] = lambda _: True,
     ) -> Iterator[tuple[Address, bytes]]:
-        """Accept clients, and yield a piece of each whose descriptor is among ``filenos`` and whom ``wants`` names.
+        """Accept clients, and yield a piece of data of each in ``filenos`` for which ``wants`` returns True.
 
-        ``heard_s`` tells when a client sent its last valid message, by our clock; −inf if it sent none. What is
-        not read stays in the kernel, and its sender has to wait.
+        ``heard_s`` returns the time of a client's last valid message, −inf without one. Unread data stays in the kernel
+        and blocks its sender.
         """
         for fileno in filenos:
             address = self._by_fileno.get(fileno)
@@ -141,7 +139,7 @@ class TcpServer:
         for _ in range(_ACCEPTED_AT_ONCE):
             try:
                 connection, peer = self._listener.accept()
-            except OSError:  # no connection waits, or it was reset, or no descriptor is left
+            except OSError:  # no connection, connection reset, or no descriptor left
                 return
             if len(self._clients) >= MAX_CLIENTS and not self._make_room(heard_s):
                 connection.close()
@@ -154,7 +152,7 @@ class TcpServer:
             self._opened.append(address)
 
     def _make_room(self, heard_s: Callable[[Address], float]) -> bool:
-        """Close the client that is silent for longest, the oldest of those never heard; False if none is silent."""
+        """Close the client that is silent for longest; return False if none is silent."""
         longest_silent = min(self._clients, key=heard_s)
         if self._now_s() - heard_s(longest_silent) <= SILENT_AFTER_S:
             return False
@@ -164,7 +162,7 @@ class TcpServer:
     # ------------------------------------------------------------------ sending
 
     def send(self, peer: Address, frame: bytes) -> bool:
-        """Take a whole frame for ``peer``; return False when it is dropped. ``flush`` sends it."""
+        """Queue a complete frame for ``peer``, sent by ``flush``; return False if it is dropped."""
         client = self._clients.get(peer)
         if client is None:
             return False
@@ -175,11 +173,11 @@ class TcpServer:
         return True
 
     def congested(self) -> list[Address]:
-        """Return the clients that read more slowly than they are sent to."""
+        """Return the clients with congested queues."""
         return [address for address, client in self._clients.items() if len(client.unsent) > CONGESTED]
 
     def flush(self) -> None:
-        """Send what the clients take now, and close those who have taken nothing for long."""
+        """Send as much as the clients accept, and close stalled ones."""
         now_s = self._now_s()
         for address, client in list(self._clients.items()):
             if not client.unsent:
@@ -212,7 +210,7 @@ class TcpServer:
         self._closed.append(address)
 
     def close(self) -> None:
-        """Close all connections and the port, after a last try to send what waits."""
+        """Flush, and close all connections and the port."""
         self.flush()
         for address in list(self._clients):
             self._drop(address)
@@ -223,7 +221,9 @@ def _listening(address: Address) -> socket.socket:
     made = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         made.setblocking(False)
-        made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # connections of an earlier process linger
+        made.setsockopt(
+            socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
+        )  # connections of an earlier process may linger
         made.bind(address)
         made.listen(_BACKLOG)
     except (OSError, OverflowError) as error:

@@ -1,4 +1,4 @@
-"""UDP datagrams, non-blocking: the same socket serves the ground station and the vehicle."""
+"""Non-blocking UDP sockets for ground station and vehicle."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from typing import TypeAlias
 Address: TypeAlias = tuple[str, int]
 
 _LARGEST_DATAGRAM = 65536
-_RECEIVE_BUFFER = 1 << 20  # telemetry of a vehicle at many times real time comes in bursts
+_RECEIVE_BUFFER = 1 << 20  # for bursts of telemetry at many times real time
 _DATAGRAMS_A_CALL = 1000
 
 
 class PortBusyError(Exception):
-    """A port is taken (or may not be used); its text is one sentence that names it."""
+    """A port cannot be used; the text is one sentence that names it."""
 
     def __init__(self, kind: str, address: Address, reason: str, is_in_use: bool = True) -> None:
         super().__init__(f"{kind} port {address[1]} on {address[0]} {reason}")
         self.address = address
         self.is_in_use = is_in_use
-        """Whether another program has it; else it may not be used at all."""
+        """True if another program uses the port."""
 
 
 def _bound(address: Address) -> socket.socket:
@@ -42,18 +42,18 @@ def _bound(address: Address) -> socket.socket:
 
 
 def resolve(host: str) -> str:
-    """Return the IPv4 address of a host name; raise OSError when there is none."""
+    """Return the IPv4 address of a host name; raise OSError."""
     try:
         return socket.gethostbyname(host)
-    except UnicodeError:  # names that cannot even be asked for
+    except UnicodeError:  # not encodable as a host name
         raise OSError(f"not a host name: {host}") from None
 
 
 class UdpSocket:
-    """Datagrams to and from any peer. What cannot be sent is counted: to lose one is normal in UDP."""
+    """Datagrams to and from any peer. Unsent ones are counted and raise no error."""
 
     def __init__(self, host: str = "127.0.0.1", port: int = 0, largest: int = _LARGEST_DATAGRAM) -> None:
-        """Bind to ``host``:``port`` (0: any free one); raise PortBusyError. Longer datagrams are cut."""
+        """Bind to ``host``:``port`` (0: any free one); raise PortBusyError. Longer datagrams are truncated."""
         self._largest = largest
         self._socket = _bound((host, port))
         self._poll = select.poll()
@@ -62,27 +62,27 @@ class UdpSocket:
 
     @property
     def address(self) -> Address:
-        """The local address, with the real port."""
+        """The local address with the actual port."""
         host, port = self._socket.getsockname()[:2]
         return str(host), int(port)
 
     def fileno(self) -> int:
-        """Descriptor, for ``select``."""
+        """Return the file descriptor, for ``select``."""
         return self._socket.fileno()
 
     def receive(self) -> Iterator[tuple[bytes, Address]]:
-        """Yield the datagrams that are here (bounded, so that a flood cannot hold the caller)."""
+        """Yield available datagrams, up to a bound per call."""
         for _ in range(_DATAGRAMS_A_CALL):
             try:
                 data, peer = self._socket.recvfrom(self._largest)
             except BlockingIOError:
                 return
-            except OSError:  # a report about an earlier datagram, not about this one
+            except OSError:  # an ICMP error for an earlier datagram
                 continue
             yield data, peer[:2]
 
     def send(self, data: bytes, peer: Address) -> bool:
-        """Send one datagram; return whether the system took it."""
+        """Send one datagram; return False if the system refuses it."""
         try:
             self._socket.sendto(data, peer)
         except (OSError, OverflowError):
@@ -91,11 +91,11 @@ class UdpSocket:
         return True
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until a datagram is here, at most ``timeout_s``; return whether one is."""
+        """Wait up to ``timeout_s`` for a datagram; return False after a timeout."""
         return bool(self._poll.poll(max(0.0, timeout_s) * 1e3))
 
     def close(self) -> None:
-        """Close the socket; twice does no harm."""
+        """Close the socket; a second call does nothing."""
         self._socket.close()
 
     def __enter__(self) -> UdpSocket:

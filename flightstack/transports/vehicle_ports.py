@@ -1,4 +1,4 @@
-"""The vehicle's ports, numbered as PX4's and ArduPilot's: UDP for ground stations and for companions, and TCP."""
+"""Ports of the vehicle: UDP for ground stations and companion computers, and TCP; fair reception among peers."""
 
 from __future__ import annotations
 
@@ -14,27 +14,25 @@ from flightstack.transports.tcp_server import TcpServer
 from flightstack.transports.udp import Address, PortBusyError, UdpSocket
 
 MAX_QUEUED_BYTES = 65536
-"""What one peer may have waiting; the largest datagram still fits."""
+"""Queue limit per peer; holds the largest datagram."""
 MIN_COST = 12
-"""What a piece counts at least, were it empty: the size of the smallest frame."""
+"""Minimum cost of a piece of data: the size of the smallest frame."""
 MAX_UNKNOWN_PEERS = 64
-"""How many peers that nobody has heard a valid message from may wait at once."""
+"""Maximum number of queued peers if they include peers without a valid message."""
 
 Key = TypeVar("Key", bound=Hashable)
 
 
 class FairQueue(Generic[Key]):
-    """Data of many peers: each peer's in order, the peers in turns, one piece a turn."""
+    """Round-robin queue of received data: one piece per peer and turn, so that a flood hardly delays other peers."""
 
-    def __init__(
-        self, max_octets: int = MAX_QUEUED_BYTES, max_unknown_peers: int = MAX_UNKNOWN_PEERS
-    ) -> None:
-        self._max_octets = max_octets
+    def __init__(self, max_bytes: int = MAX_QUEUED_BYTES, max_unknown_peers: int = MAX_UNKNOWN_PEERS) -> None:
+        self._max_bytes = max_bytes
         self._max_unknown_peers = max_unknown_peers
         self._waiting: dict[Key, deque[bytes]] = {}  # in the order of turns
-        self._octets: dict[Key, int] = {}
+        self._sizes: dict[Key, int] = {}
         self.dropped = 0
-        """Pieces refused because their peer, or all unknown peers together, had too much waiting."""
+        """Pieces dropped because the queue of the peer, or the number of unknown peers, was at its limit."""
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -43,52 +41,52 @@ class FairQueue(Generic[Key]):
         return key in self._waiting
 
     def push(self, key: Key, data: bytes, is_known: Callable[[Key], bool]) -> bool:
-        """Let ``data`` of ``key`` wait for its turn; return False when it is dropped.
+        """Queue ``data`` of ``key``; return False if it is dropped.
 
-        ``is_known`` tells who may always join: strangers share a limited number of places.
+        Peers for which ``is_known`` returns True are always queued; others share ``max_unknown_peers`` places.
         """
         cost = max(len(data), MIN_COST)
         pieces = self._waiting.get(key)
         if pieces is None:
-            # counting all as strangers is cheap; who is known is asked only when it matters
+            # is_known is costly: it is called only when the places are taken
             if len(self._waiting) >= self._max_unknown_peers and not is_known(key):
                 self.dropped += 1
                 return False
             pieces = self._waiting[key] = deque()
-            self._octets[key] = 0
-        elif self._octets[key] + cost > self._max_octets:
+            self._sizes[key] = 0
+        elif self._sizes[key] + cost > self._max_bytes:
             self.dropped += 1
             return False
         pieces.append(data)
-        self._octets[key] += cost
+        self._sizes[key] += cost
         return True
 
-    def take(self, octets: int) -> Iterator[tuple[Key, bytes]]:
-        """Yield pieces, with their peers, in turns: ``octets`` of them, and what the last piece has beyond."""
-        while self._waiting and octets > 0:
+    def take(self, budget: int) -> Iterator[tuple[Key, bytes]]:
+        """Yield (peer, piece) in turns until ``budget`` bytes are exceeded."""
+        while self._waiting and budget > 0:
             key = next(iter(self._waiting))
             pieces = self._waiting.pop(key)
             data = pieces.popleft()
             cost = max(len(data), MIN_COST)
-            octets -= cost
+            budget -= cost
             if pieces:
-                self._waiting[key] = pieces  # to the end of the line
-                self._octets[key] -= cost
+                self._waiting[key] = pieces  # to the end of the queue
+                self._sizes[key] -= cost
             else:
-                del self._octets[key]
+                del self._sizes[key]
             yield key, data
 
-    def forget(self, key: Key) -> None:
-        """Drop what ``key`` has waiting."""
+    def drop(self, key: Key) -> None:
+        """Drop the queued data of ``key``."""
         self._waiting.pop(key, None)
-        self._octets.pop(key, None)
+        self._sizes.pop(key, None)
 
 
 LOOPBACK = "127.0.0.1"
-OCTETS_A_POLL = 4096
-"""Handed out in one poll, all peers together: a millisecond of work at worst, 400 kB/s in real time."""
+BYTES_PER_POLL = 4096
+"""Limit per poll for all peers together: at most a millisecond of work, 400 kB/s in real time."""
 LARGEST_DATAGRAM = 2048
-"""Seven frames of the largest kind; nobody sends more at once."""
+"""Seven frames of maximum size."""
 
 Place = tuple[str, Address]
 """A channel, and an address on it."""
@@ -96,21 +94,21 @@ Place = tuple[str, Address]
 
 @dataclass(frozen=True)
 class PortsConfig:
-    """Where the vehicle listens and whom it addresses unasked. Hosts are IPv4 addresses."""
+    """Listening ports, and the peers that the vehicle sends to first. Hosts are IPv4 addresses."""
 
     instance: int
     ground_stations: tuple[Address, ...]
     api_client: Address
     listen: str = LOOPBACK
     tcp_port: int = 0
-    """0: no TCP."""
+    """0 for no TCP."""
 
 
 class VehiclePorts:
-    """Two UDP sockets, for ground stations and for companions, and a TCP server."""
+    """UDP sockets for ground stations and for companion computers, and a TCP server."""
 
     def __init__(self, config: PortsConfig) -> None:
-        """Bind all; raise PortBusyError."""
+        """Bind all ports; raise PortBusyError."""
         self._poller = select.poll()
         self._sockets: dict[str, UdpSocket] = {}
         self._tcp: TcpServer | None = None
@@ -126,24 +124,24 @@ class VehiclePorts:
             raise
         self.first_peers: list[Place] = [(GROUND, station) for station in config.ground_stations]
         self.first_peers.append((API, config.api_client))
-        """Those whom the vehicle addresses unasked."""
+        """Peers that the vehicle sends to first."""
 
     def receive(
-        self, heard_s: Callable[[Place], float] = lambda _: -math.inf, octets: int = OCTETS_A_POLL
+        self, heard_s: Callable[[Place], float] = lambda _: -math.inf, budget: int = BYTES_PER_POLL
     ) -> Iterator[tuple[str, Address, bytes]]:
-        """Yield pieces (channel, peer, data) of what is here, ``octets`` in all, peer by peer in turns.
+        """Yield received pieces (channel, peer, data) in turns of the peers, up to ``budget`` bytes.
 
-        ``heard_s`` tells when the last valid message came from a place (−inf: none did). Places that were never
-        heard share a limited number of turns, and a TCP client that is silent gives way to a new one.
+        ``heard_s`` returns the time of the last valid message from a place, −inf without one. Places without valid
+        messages share a limited number of turns, and a silent TCP client can be replaced by a new one.
         """
         filenos = [fileno for fileno, _ in self._poller.poll(0)]
         if filenos:
             self._collect(filenos, heard_s)
-        for (channel, peer), data in self._queue.take(octets):
+        for (channel, peer), data in self._queue.take(budget):
             yield channel, peer, data
 
     def _collect(self, filenos: list[int], heard_s: Callable[[Place], float]) -> None:
-        """Move what is here into the queue: a UDP socket is shared by peers, and so by those who flood it."""
+        """Move received data into the queue, because a flooding peer shares the UDP socket with others."""
 
         def is_known(place: Place) -> bool:
             return heard_s(place) > -math.inf
@@ -159,34 +157,34 @@ class VehiclePorts:
                 self._queue.push((TCP, peer), data, lambda _: True)
 
     def opened(self) -> list[Place]:
-        """Return who has connected since the last call: such a peer expects to be addressed at once."""
+        """Return TCP clients connected since the last call; they expect data at once."""
         return [(TCP, peer) for peer in self._tcp.opened()] if self._tcp else []
 
     def closed(self) -> list[Place]:
-        """Return whose connection has ended since the last call; ask after ``opened``."""
+        """Return TCP clients disconnected since the last call; call after ``opened``."""
         closed = [(TCP, peer) for peer in self._tcp.closed()] if self._tcp else []
         for place in closed:
-            self._queue.forget(place)
+            self._queue.drop(place)
         return closed
 
     def send(self, channel: str, peer: Address, data: bytes) -> None:
-        """Send a frame: one datagram over UDP; over TCP, with the next ``flush``."""
+        """Send a frame as a UDP datagram, or over TCP with the next ``flush``."""
         if channel in self._sockets:
             self._sockets[channel].send(data, peer)
         elif self._tcp is not None:
             self._tcp.send(peer, data)
 
     def congested(self) -> list[Place]:
-        """Return the peers whose connection takes less than they are sent; over UDP that is not known."""
+        """Return the TCP clients with congested queues."""
         return [(TCP, peer) for peer in self._tcp.congested()] if self._tcp else []
 
     def flush(self) -> None:
-        """Send what waits for TCP clients."""
+        """Send queued data to TCP clients."""
         if self._tcp is not None:
             self._tcp.flush()
 
     def register(self, poller: select.poll) -> None:
-        """Let ``poller`` wake up when something is here."""
+        """Register all descriptors with ``poller``."""
         for socket in self._sockets.values():
             poller.register(socket, select.POLLIN)
         if self._tcp is not None:

@@ -9,7 +9,7 @@ import socket
 import time
 from types import FrameType
 
-from flightstack.transports.tcp import PATIENCE_S, wait_in_kernel
+from flightstack.transports.tcp import RECEIVE_TIMEOUT_S, wait_in_kernel
 
 
 class StoppedError(Exception):
@@ -99,7 +99,7 @@ class Connection:
         """Wait for bytes; raise PeerClosedError, PeerSilentError at the timeout, or StoppedError."""
         waited_s = 0.0
         while (data := self.receive_now(0)) is None:
-            waited_s += PATIENCE_S
+            waited_s += RECEIVE_TIMEOUT_S
             if self._stop.stopped:
                 raise StoppedError
             if waited_s >= self._timeout_s:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
-from flightstack.process.clock import ask_for_punctual_sleeps
+from flightstack.process.clock import minimise_timer_slack
 from flightstack.process.compile_notice import announce_compilation
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.output import complain, say
@@ -76,7 +76,7 @@ def serve(options: ServerOptions) -> int:
             host, port = listener.getsockname()[:2]
             complain(f"waited {options.timeout_s:g} s for a flight stack to connect to {host}:{port}")
             return NO_PEER
-    ask_for_punctual_sleeps()
+    minimise_timer_slack()
     timeout_s = DEFAULT_TIMEOUT_S if options.timeout_s is None else options.timeout_s
     link = FlightStackEndpoint(simulator, options.vehicle, options.home, options.system_id)
     view = contextlib.nullcontext() if options.view is None else options.view.watching(simulator)

@@ -62,7 +62,7 @@ class Session:
         link.step()
         self.exchanges += 1
         if self.exchanges == self._move_at and self._leader is not None:
-            self._move_at += self._leader.step()
+            self._move_at += self._leader.update()
         if self.pacer is not None:
             self.pacer.wait_until(link.simulator.time_us)
 
@@ -71,7 +71,7 @@ class Session:
         if self.pacer is None:  # --speed max has no effect on a client with a clock of its own
             self.pacer = Pacer(1.0, self._stop.is_set)
         if self._leader is not None:
-            self._leader.leave()
+            self._leader.release()
             self._leader = None
         self.pacer.wait_until(link.simulator.time_us)
         received = False

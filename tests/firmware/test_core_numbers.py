@@ -42,7 +42,7 @@ def test_the_defaults_are_of_every_law() -> None:
 
 def test_a_law_without_c_is_refused_by_name() -> None:
     stranger = load_controller("pid")._replace(name="lqr")
-    with pytest.raises(ConfigError, match="exists in Python alone; in C there are pid, backstepping"):
+    with pytest.raises(ConfigError, match="exists in Python only; available in C: pid, backstepping"):
         target_numbers(ring(4), stranger, open_gains("tuned"), 0.6, 500.0, 5)
 
 

@@ -193,13 +193,13 @@ def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(board: Board, tm
     ("arguments", "words"),
     [
         (["hop.plan", "--target", "python"], "--target python: expected emulated, host"),
-        (["hop.plan", "--target", "serial:/dev/ttyNONE"], "/dev/ttyNONE: there is no such device"),
+        (["hop.plan", "--target", "serial:/dev/ttyNONE"], "/dev/ttyNONE: no such device"),
         (["none.plan", "--target", "host"], "none.plan"),
         (["hop.plan", "--target", "host", "--controller", "mine"], "--controller mine"),
         (["replay", "hop.plan", "--target", "c"], "not a readable flight log"),
         (["replay", "none.ulg"], "none.ulg"),
         (["doctor"], "give either --port DEVICE or --target"),
-        (["doctor", "--port", "/dev/ttyNONE"], "there is no such device"),
+        (["doctor", "--port", "/dev/ttyNONE"], "no such device"),
     ],
 )
 def test_mistakes_are_answered_with_a_sentence(arguments: list[str], words: str, tmp_path: Path) -> None:

@@ -166,8 +166,8 @@ def test_a_busy_tcp_port_is_named(start, instance: int) -> None:
         (["--gcs", "14550"], "must be HOST:PORT"),
         (["--gcs", "127.0.0.1:http"], "must be HOST:PORT"),
         (["--gcs", "127.0.0.1:70000"], "is outside 1 to 65535"),
-        (["--gcs", "192.0.2.1:14550"], "give --listen 0.0.0.0 too"),
-        (["--listen", "no.such.host.invalid"], "names no host"),
+        (["--gcs", "192.0.2.1:14550"], "add --listen 0.0.0.0"),
+        (["--listen", "no.such.host.invalid"], "is not a host"),
         (["--tcp-port", "70000"], "is outside 1 to 65535"),
     ],
 )

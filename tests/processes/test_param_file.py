@@ -18,5 +18,5 @@ def test_a_missing_parameter_file_is_begun_and_kept(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         there.stack.terminate()
         _, errors = there.stack.communicate(timeout=60)
-    assert errors.startswith(f"flightstack: warning: {path}: there is no such file")
+    assert errors.startswith(f"flightstack: warning: {path}: no such file")
     assert "MIS_TAKEOFF_ALT\t4.5" in path.read_text()

@@ -73,7 +73,7 @@ def test_a_state_directory_is_held_over_a_reboot(tmp_path: Path) -> None:
     with vehicle(tmp_path, *OPTIONS) as there:
         run(there, "reboot")
         run(there, "status")
-        with pytest.raises(ConfigError, match="another vehicle keeps its state there"):
+        with pytest.raises(ConfigError, match="is in use by another vehicle"):
             StateDirectory(tmp_path / "state", 0).open()
         assert kill(there) == "flightstack: rebooted\n"
     StateDirectory(tmp_path / "state", 0).open()
@@ -139,7 +139,7 @@ def test_a_damaged_file_is_told_and_kept_and_nothing_of_it_is_flown(tmp_path: Pa
         wait_for_file(kept, '"checksum"')
         errors = kill(there)
     assert errors == (
-        "flightstack: plans not restored: state/plans.json: is damaged or not all there; "
+        "flightstack: plans not restored: state/plans.json: is damaged or truncated; "
         "the file is now state/plans.refused.json\n"
     )
     assert (tmp_path / "state" / "plans.refused.json").read_text().endswith('"chec')

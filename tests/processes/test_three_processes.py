@@ -166,7 +166,7 @@ def test_a_busy_port_is_named(start: Start) -> None:
         (["--param", "MPC_XY_CRUISE=-3"], "is outside 0.1 to 20 m/s"),
         (["--param", "NO_SUCH=1"], "is not known"),
         (["--clock", "sundial"], "is not one of lockstep, realtime"),
-        (["--loops", "fortran"], "is none of python, c, host"),
+        (["--loops", "fortran"], "is not one of python, c, host"),
     ],
 )
 def test_bad_arguments_are_one_sentence_and_exit_2(arguments: list[str], sentence: str) -> None:

@@ -17,7 +17,7 @@ from flightstack.core.errors import TargetError, WrongFirmwareError
 from flightstack.firmware.build import host_library
 from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
-from flightstack.firmware.target_loops import FAREWELL_ATTEMPTS, TargetLoops
+from flightstack.firmware.target_loops import FINAL_ATTEMPTS, TargetLoops
 from flightstack.firmware.targets import finish_loops
 from flightstack.params.gains_file import open_gains
 from flightstack.params.vehicle import load_vehicle
@@ -189,7 +189,7 @@ def test_a_target_that_restarts_in_flight_ends_it_with_a_sentence(device) -> Non
     drive(loops, 10)
     other = Target()
     changing.now = other
-    with pytest.raises(TargetError, match=r"expects step 0, not 10: it has lost its place"):
+    with pytest.raises(TargetError, match=r"expects step 0, not 10: it may have been restarted"):
         drive(loops, 1)
     other.close()
 
@@ -198,7 +198,7 @@ def test_bad_input_ends_the_flight_and_the_target_has_stopped_its_rotors(device)
     loops = connected(LossyLine(device))
     drive(loops, 10)
     state = np.array([math.nan] + [0.0] * 5 + [1.0] + [0.0] * 6)
-    with pytest.raises(TargetError, match=r"stopped its rotors at step 10: it was given bad input"):
+    with pytest.raises(TargetError, match=r"stopped its rotors at step 10 because of invalid input"):
         loops.step(state, np.zeros(11), SPEEDS, True, np.zeros(LoopRow.SIZE))
     assert device.state == SAFE
 
@@ -213,13 +213,13 @@ def test_each_flight_is_judged_by_what_happened_in_it(device, tmp_path) -> None:
     loops = connected(LossyLine(device))
     drive(loops, 10)
     bad = np.array([math.nan] + [0.0] * 5 + [1.0] + [0.0] * 6)
-    with pytest.raises(TargetError, match="bad input"):
+    with pytest.raises(TargetError, match="invalid input"):
         loops.step(bad, np.zeros(11), SPEEDS, True, np.zeros(LoopRow.SIZE))
     assert checks_of(loops, tmp_path / "first", 10) == ["safe states of the target"]
     first = read_record(tmp_path / "first")
     assert (first.steps, first.bad_inputs, first.counted["safe_states"]) == (11, 1, 1)
     assert first.ending is not None
-    assert "bad input" in first.ending
+    assert "invalid input" in first.ending
     loops = connected(LossyLine(device))
     drive(loops, 20)
     assert checks_of(loops, tmp_path / "second", 20) == []
@@ -241,7 +241,7 @@ def test_a_target_that_is_lost_after_the_last_step_is_not_trusted(tmp_path) -> N
     failed = checks_of(loops, tmp_path, 10)
     assert failed == ["counters that the target did not tell", "steps that overran their period"]
     assert read_record(tmp_path).ending is None
-    assert line.now_s - began_s == pytest.approx(FAREWELL_ATTEMPTS * DEFAULT_TIMING.timeout_s)
+    assert line.now_s - began_s == pytest.approx(FINAL_ATTEMPTS * DEFAULT_TIMING.timeout_s)
     late.close()
 
 
@@ -289,7 +289,7 @@ def test_a_silent_line_is_no_target() -> None:
         def poll(self, passed_ms: int) -> None: ...
 
     line = LossyLine(Nobody())
-    with pytest.raises(TargetError, match="did not answer when asked for FS_PIL_IDENTITY, 20 times"):
+    with pytest.raises(TargetError, match="did not answer 20 requests for FS_PIL_IDENTITY"):
         TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
     assert line.now_s == pytest.approx(5.0)
 
@@ -307,7 +307,7 @@ def test_a_line_full_of_noise_is_no_target() -> None:
         def poll(self, passed_ms: int) -> None: ...
 
     line = LossyLine(Noise())
-    with pytest.raises(TargetError, match="did not answer when asked for FS_PIL_IDENTITY"):
+    with pytest.raises(TargetError, match="did not answer 20 requests for FS_PIL_IDENTITY"):
         TargetLoops(line, setup().numbers(), clock_s=line.clock, expected_hash=HASH)
     assert line.now_s < 6.0
 

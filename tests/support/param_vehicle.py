@@ -22,8 +22,8 @@ METADATA: list[dict[str, Any]] = [
     {"name": "MPC_XY_CRUISE", "type": "Float", "default": 4.0, "min": 0.1, "max": 20.0, "units": "m/s",
      "shortDesc": "Horizontal speed in auto modes"},
     {"name": "MPC_YAW_MODE", "type": "Int32", "default": 0, "min": 0, "max": 5,
-     "shortDesc": "Heading where none is given", "rebootRequired": True,
-     "values": [{"value": 0, "description": "Towards the waypoint"}, {"value": 5, "description": "As it is"}]},
+     "shortDesc": "Heading of waypoints without yaw", "rebootRequired": True,
+     "values": [{"value": 0, "description": "Towards the waypoint"}, {"value": 5, "description": "Unchanged"}]},
     {"name": "ROLL_P", "type": "Float", "default": 0.38729833462074170, "min": 0.0,
      "shortDesc": "Proportional gain of roll"},
 ]  # fmt: skip

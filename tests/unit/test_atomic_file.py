@@ -95,7 +95,7 @@ def test_a_file_behind_a_descriptor_is_written_to_not_replaced(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o664, 0o755])
-def test_a_replaced_file_keeps_its_permissions(tmp_path: Path, mode: int) -> None:
+def test_replaced_file_keeps_permissions(tmp_path: Path, mode: int) -> None:
     path = tmp_path / "a.txt"
     path.write_text("old")
     path.chmod(mode)
@@ -125,5 +125,5 @@ def test_an_existing_file_is_refused_unless_it_may_be_overwritten(tmp_path: Path
     check_new(path, overwrite=False)
     path.write_text("mine")
     check_new(path, overwrite=True)
-    with pytest.raises(ConfigError, match=r"a.txt: exists already: name another file, or give --overwrite$"):
+    with pytest.raises(ConfigError, match=r"a.txt: exists already: name another file or give --overwrite$"):
         check_new(path, overwrite=False)

@@ -38,7 +38,7 @@ def template(x: float) -> float:
     return FACTOR * inner(x)
 
 
-def test_a_template_is_bound_to_what_it_is_given() -> None:
+def test_specialise_binds_given_names() -> None:
     one = specialise(template, "one", inner=double, FACTOR=10.0)
     two = specialise(template, "two", inner=negative, FACTOR=0.5)
     assert (one(3.0), two(3.0)) == (60.0, -1.5)

@@ -205,7 +205,7 @@ BAD_DECLARATIONS = {
     "no such field": ((Tunable("q", "LQR_Q", 0, 1, "", "Q"),), "has no field 'q' for its parameter 'LQR_Q'"),
     "no such memory": (
         (Tunable("kp_roll", "LQR_Q", 0, 1, "", "Q", integrates="x"),),
-        "remembers no 'x' for its parameter 'LQR_Q'",
+        "has no field 'x' in its memory for its parameter 'LQR_Q'",
     ),
     "no range": ((Tunable("kp_roll", "LQR_Q", 1, 1, "", "Q"),), "has no range for its parameter 'LQR_Q'"),
     "twice": ((Tunable("kp_roll", "LQR_Q", 0, 1, "", "Q"),) * 2, "declares a parameter twice"),

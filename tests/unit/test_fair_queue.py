@@ -17,7 +17,7 @@ def test_a_peers_own_data_stays_in_order() -> None:
     assert len(queue) == 0
 
 
-def test_one_who_floods_delays_another_by_one_piece() -> None:
+def test_flooding_peer_delays_others_by_one_piece() -> None:
     queue: FairQueue[str] = FairQueue()
     for _ in range(1000):
         queue.push("flood", bytes(60), nobody)
@@ -42,7 +42,7 @@ def test_empty_pieces_do_not_come_for_free() -> None:
     assert len(list(queue.take(4096))) < 400
 
 
-def test_what_waits_is_bounded_for_each_and_for_all_unknown_peers() -> None:
+def test_queue_is_bounded_per_peer_and_for_unknown_peers() -> None:
     queue: FairQueue[str] = FairQueue()
     for _ in range(100):
         queue.push("flood", bytes(2048), nobody)
@@ -54,10 +54,10 @@ def test_what_waits_is_bounded_for_each_and_for_all_unknown_peers() -> None:
     assert queue.push("station", b"hello", lambda key: key == "station")
 
 
-def test_who_is_forgotten_has_nothing_waiting() -> None:
+def test_dropped_peer_has_no_queued_data() -> None:
     queue: FairQueue[str] = FairQueue()
     queue.push("a", b"hello", nobody)
     assert "a" in queue
-    queue.forget("a")
-    queue.forget("never")
+    queue.drop("a")
+    queue.drop("never")
     assert list(queue.take(1000)) == []

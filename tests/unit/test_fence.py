@@ -132,7 +132,7 @@ def test_polygons_that_cross_themselves_are_found(points: list[tuple[int, int]])
     begin=POINTS,
     end=POINTS,
 )
-def test_ways_out_are_those_that_a_dense_walk_finds(
+def test_segments_outside_match_dense_walk(
     outer: list[Point], holes: list[tuple[Point, int]], begin: Point, end: Point
 ) -> None:
     shape = shape_of([outer])

@@ -45,7 +45,7 @@ def test_a_stream_may_be_cut_anywhere(signed: bool, version: int, step: int) -> 
 
 @settings(max_examples=200)
 @given(st.lists(st.one_of(st.binary(max_size=60), st.integers(0, 4)), max_size=20), st.integers(1, 300))
-def test_good_frames_are_found_between_noise(parts: list, step: int) -> None:
+def test_frames_are_found_between_noise(parts: list, step: int) -> None:
     """What is reported is always a frame that was sent: noise may hide a frame, but never makes a known one."""
     sent = frames(5)
     stream = b"".join(sent[part] if isinstance(part, int) else part for part in parts)
@@ -65,7 +65,7 @@ def test_a_frame_behind_a_false_start_is_not_lost() -> None:
     assert [f.data for f in found] == sent
 
 
-def test_a_datagram_that_begins_with_a_frame_ends_what_the_last_one_left() -> None:
+def test_new_frame_discards_incomplete_one() -> None:
     (first, second) = frames(2)
     reader = FrameReader()
     assert reader.feed(first[:20]) == []
@@ -73,7 +73,7 @@ def test_a_datagram_that_begins_with_a_frame_ends_what_the_last_one_left() -> No
     assert reader.faults == 1
 
 
-def test_noise_for_hours_keeps_less_than_a_frame() -> None:
+def test_long_noise_holds_less_than_a_frame() -> None:
     """pymavlink's own search keeps all of it as long as some frame is incomplete."""
     reader, chance = FrameReader(), random.Random(3)
     for _ in range(2000):
@@ -90,7 +90,7 @@ def test_flags_that_we_do_not_understand_make_a_frame_unreadable() -> None:
     assert reader.faults > 0
 
 
-def test_noise_is_hardly_ever_taken_for_a_frame() -> None:
+def test_noise_rarely_parses_as_frame() -> None:
     """One in a hundred pieces of noise holds what could be an unknown message; none a known one, with this seed."""
     chance, reader = random.Random(1), FrameReader()
     found = [frame for _ in range(5000) for frame in reader.feed(chance.randbytes(280))]

@@ -87,7 +87,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_is_wrong_is_one_sentence_with_file_key_and_range(tmp_path: Path, name: str) -> None:
+def test_errors_name_file_key_and_range(tmp_path: Path, name: str) -> None:
     text, sentence = BAD[name]
     path = tmp_path / "my.toml"
     path.write_text(text)

@@ -104,7 +104,7 @@ def test_the_list_as_json(vehicle: ParamVehicle) -> None:
     assert facts == [
         {
             "name": "MPC_YAW_MODE", "value": 0, "default": 0.0, "min": 0.0, "max": 5.0, "unit": None,
-            "help": "Heading where none is given", "choices": {"0": "Towards the waypoint", "5": "As it is"},
+            "help": "Heading of waypoints without yaw", "choices": {"0": "Towards the waypoint", "5": "Unchanged"},
         }
     ]  # fmt: skip
 
@@ -119,8 +119,8 @@ def test_get_tells_all_about_one(vehicle: ParamVehicle) -> None:
         "MPC_XY_CRUISE = 4 m/s\n  Horizontal speed in auto modes\n  default 4, range 0.1 to 20\n"
     )
     assert told(vehicle, "get", "MPC_YAW_MODE").stdout == (
-        "MPC_YAW_MODE = 0\n  Heading where none is given\n  default 0, takes effect after a restart\n"
-        "  0: Towards the waypoint\n  5: As it is\n"
+        "MPC_YAW_MODE = 0\n  Heading of waypoints without yaw\n  default 0, takes effect after a restart\n"
+        "  0: Towards the waypoint\n  5: Unchanged\n"
     )
     assert json.loads(told(vehicle, "get", "ROLL_P", "--json").stdout)["value"] == 0.38729835
 
@@ -310,8 +310,11 @@ def test_a_file_brings_every_value_back(
         ("1 1 NAME 1 9", "line 1: has 1 columns between tabs"),
         ("# fine\n\n1\t1\tNAME\tx\t9", "line 3: NAME: 'x' is not a number"),
         ("1\t1\tNAME\tnan\t9", "line 1: NAME: 'nan' is not a number"),
-        ("1\t1\tNAME_OF_TOO_MANY_LETTERS\t1\t9", "line 1: 'NAME_OF_TOO_MANY_LETTERS' is no name"),
-        ("1\t1\tA\t1\t9\n1\t1\tA\t2\t9", "line 2: A stands in line 1 already"),
+        (
+            "1\t1\tNAME_OF_TOO_MANY_LETTERS\t1\t9",
+            "line 1: 'NAME_OF_TOO_MANY_LETTERS' is not a parameter name",
+        ),
+        ("1\t1\tA\t1\t9\n1\t1\tA\t2\t9", "line 2: A is already set in line 1"),
     ],
 )
 def test_a_bad_line_is_named(tmp_path: Path, text: str, problem: str) -> None:

@@ -46,7 +46,7 @@ ACCURACY = [(100.0, 0.012, 0.0012), (1_000.0, 0.18, 0.085), (10_000.0, 12.0, 8.5
 
 @pytest.mark.parametrize(("distance", "horizontal", "vertical"), ACCURACY)
 @pytest.mark.parametrize("latitude", [47.397742, -47.397742, 0.0])
-def test_accuracy_is_what_the_docstring_says(
+def test_accuracy_matches_docstring(
     distance: float, horizontal: float, vertical: float, latitude: float
 ) -> None:
     origin = GeoPoint(latitude, 8.545594, 488.0)

@@ -61,7 +61,7 @@ def test_actuators_have_pymavlinks_bytes(system, time_us, speeds, count, flag) -
 
 @properties
 @given(times, st.lists(st.floats(allow_nan=False), min_size=13, max_size=13))
-def test_what_one_seals_the_other_opens_and_pymavlink_reads(time_us: int, state: list[float]) -> None:
+def test_sealed_frame_opens_and_equals_pymavlink(time_us: int, state: list[float]) -> None:
     data = plant_frame(9, 0, time_us, state, [1.5] * 8, 4, 2)
     frame = PlantStateFrame()
     assert frame.open(data)

@@ -41,7 +41,7 @@ homes = st.none() | st.builds(GeoPoint, *3 * [st.floats(allow_nan=False, allow_i
 
 
 @given(st.builds(KeptPlans, plans, plans, plans, st.integers(0, 1000), homes))
-def test_what_is_kept_is_read_with_the_same_ids(kept: KeptPlans) -> None:
+def test_saved_plans_are_read_with_same_ids(kept: KeptPlans) -> None:
     read = plans_from_text(plans_to_text(kept), "file")
     assert read == kept
     assert [mission_id(part) for part in read[:3]] == [mission_id(part) for part in kept[:3]]
@@ -57,10 +57,10 @@ def changed(**values: object) -> str:
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("", "is damaged or not all there"),
-        (KEPT[:-20], "is damaged or not all there"),
-        ("[]", "is no file of kept plans"),
-        (changed(fileType="Plan"), "is no file of kept plans"),
+        ("", "is damaged or truncated"),
+        (KEPT[:-20], "is damaged or truncated"),
+        ("[]", "is not a file of saved plans"),
+        (changed(fileType="Plan"), "is not a file of saved plans"),
         (changed(version=2), "is of version 2, and this program reads version 1"),
         (changed(version=None), "is of version None, and"),
         (changed(plans=None), "its checksum is wrong"),
@@ -68,7 +68,7 @@ def changed(**values: object) -> str:
         (KEPT.replace('"current": 0', '"current": 1'), "its checksum is wrong"),
     ],
 )
-def test_a_file_that_is_not_whole_is_refused(text: str, problem: str) -> None:
+def test_truncated_file_is_refused(text: str, problem: str) -> None:
     with pytest.raises(ConfigError, match=f"^file: .*{problem}"):
         plans_from_text(text, "file")
 
@@ -146,9 +146,7 @@ def test_a_damaged_file_gives_no_plan_and_is_put_aside(tmp_path: Path) -> None:
         path.write_text(KEPT[:-20])
         stack, file, problem = stack_with(path)
         aside = tmp_path / f"plans.refused{number}.json"
-        assert problem == (
-            f"plans not restored: {path}: is damaged or not all there; the file is now {aside}"
-        )
+        assert problem == (f"plans not restored: {path}: is damaged or truncated; the file is now {aside}")
         assert stack.ground.plans() == KeptPlans()
         give(stack, "square.plan")
         save(stack, file)

@@ -31,7 +31,7 @@ def free_to_move() -> Iterator[None]:
     os.sched_setaffinity(0, PROCESSORS)
 
 
-def test_what_the_peer_sends_is_received_and_back(link: tuple[TcpClient, socket.socket]) -> None:
+def test_data_is_received_both_ways(link: tuple[TcpClient, socket.socket]) -> None:
     client, peer = link
     peer.sendall(b"state")
     data = client.receive()
@@ -73,15 +73,15 @@ def test_a_simulator_that_does_not_come_ends_the_wait() -> None:
 @needs_two
 def test_the_roamer_is_free_and_settled_in_turns(free_to_move: None) -> None:
     leader = AffinityLeader()
-    free_for = leader.step()
+    free_for = leader.update()
     assert os.sched_getaffinity(0) == PROCESSORS
-    settled_for = leader.step()
+    settled_for = leader.update()
     assert len(os.sched_getaffinity(0)) == 1
     assert settled_for > 100 * free_for
-    leader.step()
+    leader.update()
     assert os.sched_getaffinity(0) == PROCESSORS
-    leader.step()
-    leader.leave()
+    leader.update()
+    leader.release()
     assert os.sched_getaffinity(0) == PROCESSORS
 
 
@@ -96,7 +96,7 @@ def test_the_follower_goes_where_the_peer_sends_from(
         peer.sendall(b"x")
         assert client.receive() is not None
         os.sched_setaffinity(0, PROCESSORS)
-        follower.follow()
+        follower.update()
         assert os.sched_getaffinity(0) == {processor}
 
 
@@ -106,6 +106,6 @@ def test_a_system_without_such_calls_is_left_alone(
     monkeypatch.delattr(os, "sched_getaffinity", raising=False)
     monkeypatch.delattr(os, "sched_setaffinity", raising=False)
     leader = AffinityLeader()
-    assert leader.step() < leader.step()
-    leader.leave()
-    AffinityFollower(link[0].socket).follow()
+    assert leader.update() < leader.update()
+    leader.release()
+    AffinityFollower(link[0].socket).update()

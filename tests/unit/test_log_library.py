@@ -182,7 +182,7 @@ def test_a_list_of_logs_examines_the_folder_once_an_interval(
     assert (len(first), clock.take()) == (1000, (1, 1000))
     assert all(library.logs() is first for _ in range(118))
     assert clock.take() == (0, -1)
-    clock.now_s += log_library.LOOK_S
+    clock.now_s += log_library.SCAN_INTERVAL_S
     assert library.logs() is first
     assert clock.take() == (0, 0)
 
@@ -199,12 +199,12 @@ def test_changes_by_other_programs_show_in_the_next_interval(
     (thousand / "copy").rename(thousand / "0001.ulg")
     os.utime(thousand, (2_000, 2_000))
     clock.take()
-    clock.now_s += log_library.LOOK_S
+    clock.now_s += log_library.SCAN_INTERVAL_S
     logs = {log.name: log.size for log in library.logs()}
     assert (len(logs), logs["new.ulg"], logs["0001.ulg"]) == (1000, 3, 10)
     assert clock.take() == (1, 2)
     write(thousand / "new.ulg", b"it grows", int(clock.now_s))
-    clock.now_s += log_library.LOOK_S
+    clock.now_s += log_library.SCAN_INTERVAL_S
     assert library.logs()[-1] == LogInfo("new.ulg", 8, 1_000_001)
 
 
@@ -251,7 +251,7 @@ def test_the_open_log_shows_its_size_after_a_pause(
     if ends:
         own.clear()
     else:
-        clock.now_s += log_library.LOOK_S
+        clock.now_s += log_library.SCAN_INTERVAL_S
     assert library.logs()[-1] == LogInfo("own.ulg", 20, 1_000_070)
 
 
@@ -262,7 +262,7 @@ def test_an_old_log_that_another_process_grows_shows_its_size_in_a_minute(
     library = LogLibrary(thousand)
     library.logs()
     write(thousand / "0007.ulg", b"paused and grown", 1_000_030)
-    clock.now_s += log_library.LATELY_S
+    clock.now_s += log_library.RECENT_S
     assert library.logs()[-1] == LogInfo("0007.ulg", 16, 1_000_030)
 
 

@@ -39,7 +39,7 @@ def run(seed: int) -> list[bytes]:
     return link.two.receive(1e9)
 
 
-def test_a_bad_link_is_as_bad_as_asked_and_repeats_with_its_seed() -> None:
+def test_lossy_link_meets_conditions_and_repeats_by_seed() -> None:
     arrived = run(7)
     assert run(7) == arrived
     assert run(8) != arrived

@@ -150,7 +150,7 @@ def test_clocks_wrap_at_the_range_of_their_field(message_id, field, changes, exp
         (3.6, "B", False, 4), (7, "?", False, 1),
     ],
 )  # fmt: skip
-def test_a_number_becomes_what_its_field_holds(value, code, wraps, expected) -> None:
+def test_number_is_fitted_into_its_field(value, code, wraps, expected) -> None:
     assert fitted(value, code, wraps) == expected
 
 

@@ -265,7 +265,7 @@ def test_density_of_a_tuned_part_may_change(tmp_path: Path) -> None:
 BAD = [
     ('name = "a b"', "'a b' is not 1 to 40 letters"),
     ('name = "a"\nshape = "cone"', "'cone' is not one of box, cylinder, capsule, sphere, mesh"),
-    ('name = "a"\nshape = "box"', "part[0].density_kg_m3: is missing; or give a material: carbon"),
+    ('name = "a"\nshape = "box"', "part[0].density_kg_m3: is missing: give it or a material (carbon"),
     ('name = "a"\nshape = "box"\nmaterial = "gold"', "'gold' is not one of carbon"),
     ('name = "a"\nshape = "box"\nmaterial = "wood"', "part[0].size_m: is missing"),
     ('name = "a"\nshape = "box"\nmaterial = "wood"\nsize_m = [1, 1]', "must be a list of 3 numbers"),
@@ -276,7 +276,10 @@ BAD = [
         "colour: is not a known key",
     ),
     ('name = "a"\nshape = "sphere"\nmaterial = "wood"\nsize_m = [1]\ntune = 1', "is neither true nor false"),
-    ('name = "a"\nshape = "box"\nmaterial = "wood"\nsize_m = [1, 1, 1]\nmount = "rotor"', "would shake"),
+    (
+        'name = "a"\nshape = "box"\nmaterial = "wood"\nsize_m = [1, 1, 1]\nmount = "rotor"',
+        "must be symmetric",
+    ),
     ('name = "a"\nshape = "mesh"\nmaterial = "wood"\nfile = "a.step"', "neither STL nor OBJ"),
     ('name = "a"\nshape = "mesh"\nmaterial = "wood"\nfile = "none.stl"', "is not a file"),
 ]

@@ -45,7 +45,7 @@ def test_a_hidden_file_is_named(name: str, hidden: Callable[[str], str | None]) 
     Path(name).write_text("")
     sentence = hidden(name)
     assert sentence is not None
-    assert f"for the file of this name give ./{name}" in sentence
+    assert f"to use the file give ./{name}" in sentence
     assert hidden(f"./{name}") is None
 
 

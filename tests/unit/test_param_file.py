@@ -52,7 +52,7 @@ def test_what_is_written_is_read(parameters: dict[str, float], system_id: int) -
 
 
 @given(st.dictionaries(names, values, min_size=1), st.data())
-def test_a_file_of_ours_that_is_cut_short_is_never_taken_for_whole(parameters, data) -> None:
+def test_truncated_parameter_file_is_refused(parameters, data) -> None:
     lines = [ParamLine(name, value, isinstance(value, int)) for name, value in parameters.items()]
     text = format_params(lines)
     cut = data.draw(st.integers(text.index("# Stack: flightstack\n") + 21, len(text) - 2))
@@ -61,7 +61,7 @@ def test_a_file_of_ours_that_is_cut_short_is_never_taken_for_whole(parameters, d
 
 
 @given(st.text(max_size=300) | st.text("#\t19FS_GAIN.-e\n", max_size=100))
-def test_any_text_is_read_or_refused_in_one_sentence(text: str) -> None:
+def test_any_text_parses_or_raises_one_sentence(text: str) -> None:
     said = ""
     try:
         read = parse_params(text, "file")
@@ -76,18 +76,18 @@ BAD = {
     "a column too many": ("1\t1\tFS_SPEED\t5\t9\t", "has 6 columns between tabs, expected 5"),
     "half a line": ("1\t1\tFS_SPE", "has 3 columns between tabs, expected 5"),
     "vehicle": ("x\t1\tFS_SPEED\t5\t9", "vehicle 'x' and component '1' must be numbers"),
-    "digits of another script": ("١\t1\tFS_SPEED\t5\t9", "holds characters that no parameter has"),
+    "digits of another script": ("١\t1\tFS_SPEED\t5\t9", "contains characters that are not ASCII"),
     "other component": (
         "1\t25\tFS_SPEED\t5\t9",
         "FS_SPEED belongs to component 25, not to the autopilot, 1",
     ),
-    "name": ("1\t1\tFS SPEED\t5\t9", "'FS SPEED' is no name of a parameter"),
-    "long name": ("1\t1\tA2345678901234567\t5\t9", "'A2345678901234567' is no name of a parameter"),
+    "name": ("1\t1\tFS SPEED\t5\t9", "'FS SPEED' is not a parameter name"),
+    "long name": ("1\t1\tA2345678901234567\t5\t9", "'A2345678901234567' is not a parameter name"),
     "value": ("1\t1\tFS_SPEED\tfast\t9", "FS_SPEED: 'fast' is not a number"),
     "not finite": ("1\t1\tFS_SPEED\tnan\t9", "FS_SPEED: 'nan' is not a number"),
     "underscore": ("1\t1\tFS_SPEED\t1_0\t9", "FS_SPEED: '1_0' is not a number"),
     "huge": ("1\t1\tFS_MODE\t1e999\t6", "FS_MODE: '1e999' is not a number"),
-    "type": ("1\t1\tFS_SPEED\t5\t11", "FS_SPEED: '11' is no MAV_PARAM_TYPE of a number"),
+    "type": ("1\t1\tFS_SPEED\t5\t11", "FS_SPEED: '11' is not a numeric MAV_PARAM_TYPE"),
     "fraction": ("1\t1\tFS_MODE\t0.5\t6", "FS_MODE: '0.5' is not a whole number, as type 6 demands"),
     "real for an integer": ("1\t1\tFS_MODE\t3\t9", "FS_MODE: is an integer, type 6, in the vehicle"),
     "integer for a real": ("1\t1\tFS_SPEED\t3\t6", "FS_SPEED: is a real number, type 9, in the vehicle"),
@@ -109,7 +109,7 @@ def test_a_line_that_cannot_be_is_a_sentence_with_file_and_line(tmp_path: Path, 
 
 
 def test_a_parameter_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="line 2: FS_GAIN stands in line 1 already"):
+    with pytest.raises(ConfigError, match="line 2: FS_GAIN is already set in line 1"):
         parse_params("1\t1\tFS_GAIN\t2.5\t9\n1\t1\tFS_GAIN\t2.5\t9\n", "f")
 
 
@@ -132,12 +132,10 @@ def test_a_file_of_qgroundcontrol_is_read(tmp_path: Path) -> None:
     loaded = load_into(store, path)
     assert store.values() == {"FS_GAIN": 0.35, "FS_MODE": 3, "FS_SPEED": 4.0}
     assert loaded.unknown == ("SYS_AUTOSTART",)
-    assert (
-        loaded.warning(path) == f"{path}: kept, but of no use to this vehicle and controller: SYS_AUTOSTART"
-    )
+    assert loaded.warning(path) == f"{path}: not used by this vehicle and controller, but kept: SYS_AUTOSTART"
 
 
-def test_only_what_differs_is_saved_with_what_is_unknown_and_without_overrides(tmp_path: Path) -> None:
+def test_saves_changed_and_unknown_but_no_overridden_parameters(tmp_path: Path) -> None:
     path = tmp_path / "my.params"
     path.write_text("1\t1\tLQR_Q\t2.5\t9\n1\t1\tFS_SPEED\t5.5\t9\n1\t1\tFS_GAIN\t2.0\t9\n")
     store = ParamStore(SPECS)
@@ -229,7 +227,7 @@ def test_a_disk_that_fails_is_reported_once(tmp_path: Path) -> None:
     assert saver.take_error() is None
 
 
-def test_a_row_of_failed_saves_is_one_sentence() -> None:
+def test_series_of_failed_saves_is_reported_once() -> None:
     errors: list[OSError | None] = [OSError(28, "full"), OSError(28, "full"), None, OSError(5, "broken")]
 
     def write() -> None:
@@ -301,9 +299,7 @@ def test_a_file_that_is_named_and_missing_is_mentioned_and_begun(tmp_path: Path)
     path = tmp_path / "new" / "my.params"
     done = flightstack_command("--check", "--params", path)
     assert done.returncode == 0
-    assert (
-        done.stderr == f"flightstack: warning: {path}: there is no such file: it begins with the defaults\n"
-    )
+    assert done.stderr == f"flightstack: warning: {path}: no such file, starting with the defaults\n"
     assert not path.exists()  # a check changes nothing
     begin_param_file(path, 3)
     assert read_param_file(path) == []

@@ -37,7 +37,7 @@ def test_the_file_keeps_the_schema() -> None:
             assert set(choice) == {"value", "description"}
 
 
-def test_it_says_what_is_declared() -> None:
+def test_metadata_matches_declarations() -> None:
     spec = ParamSpec("FS_MODE", 0, 0, 5, "", "What to do", True, "System", 0, ((0, "None"), (5, "End")), True)
     assert parameter_metadata([spec])["parameters"] == [
         {

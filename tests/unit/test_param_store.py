@@ -32,7 +32,7 @@ def float32(value: float) -> float:
 
 
 @given(st.lists(st.tuples(st.sampled_from([spec.name for spec in ALL] + ["NONE"]), numbers)))
-def test_whatever_is_set_values_are_in_range_and_refused_changes_change_nothing(changes) -> None:
+def test_values_stay_in_range_and_refusals_change_nothing(changes) -> None:
     store, heard = ParamStore(ALL), []
     store.subscribe(lambda name, value: heard.append((name, value)))
     for name, value in changes:
@@ -116,7 +116,7 @@ def test_listeners_hear_changes_alone_and_reset_is_one() -> None:
     assert all(store.is_default(name) for name in store.specs)
 
 
-def test_an_override_lasts_until_somebody_sets_the_parameter() -> None:
+def test_override_lasts_until_parameter_is_set() -> None:
     store, heard = ParamStore(ALL), []
     apply_assignments(store, ["any=2", "ANY = 3", "COUNT=3"])
     store.subscribe(lambda name, value: heard.append((name, value)))

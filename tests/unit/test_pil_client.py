@@ -124,14 +124,14 @@ def test_a_target_that_is_where_we_are_may_refuse_an_old_step(expected: int) -> 
     assert client.counters.out_of_order == 1
 
 
-def test_a_target_that_is_elsewhere_is_asked_again_at_once_and_then_given_up() -> None:
+def test_target_at_another_step_is_retried_then_fails() -> None:
     client = stepping(7)
     for _ in range(2):
         client.receive(report(0, OUT_OF_ORDER), 0.1)
         assert client.poll(0.1)
     client.receive(report(0, OUT_OF_ORDER), 0.1)
     assert client.poll(0.1) == b""
-    assert client.failure == "expects step 0, not 7: it has lost its place (was it restarted?)"
+    assert client.failure == "expects step 0, not 7: it may have been restarted"
 
 
 def test_one_old_refusal_does_not_end_a_step() -> None:
@@ -145,7 +145,7 @@ def test_one_old_refusal_does_not_end_a_step() -> None:
 def test_bad_input_fails_at_once() -> None:
     client = stepping(2)
     client.receive(report(2, BAD_INPUT | 1), 0.1)
-    assert client.failure == "stopped its rotors at step 2: it was given bad input"
+    assert client.failure == "stopped its rotors at step 2 because of invalid input"
     assert client.next_deadline() is None
 
 
@@ -186,7 +186,7 @@ def test_a_number_that_the_target_refuses_fails_at_once(error: int, words: str) 
     assert client.failure == f"{words} FS_MASS=2"
 
 
-def test_a_message_is_asked_for_and_refused() -> None:
+def test_message_request_is_refused() -> None:
     client = PilClient()
     client.start_request("FS_PIL_STATUS")
     (message,) = mavlink.MAVLink(None, 1, 1).parse_buffer(client.poll(0.0))
@@ -195,10 +195,10 @@ def test_a_message_is_asked_for_and_refused() -> None:
     client.receive(packed(mavlink.MAVLink_command_ack_message(512, 0)), 0.1)
     assert client.failure is None
     client.receive(packed(mavlink.MAVLink_command_ack_message(512, 3)), 0.1)
-    assert client.failure == "does not know FS_PIL_STATUS: other firmware runs there"
+    assert client.failure == "does not support FS_PIL_STATUS: it runs other firmware"
 
 
-def test_a_message_that_has_no_room_yet_is_asked_for_again() -> None:
+def test_temporarily_rejected_request_is_resent() -> None:
     """The target acknowledges, but its line is full: TEMPORARILY_REJECTED."""
     client = PilClient()
     client.start_request("FS_PIL_STATUS")

@@ -89,7 +89,7 @@ def test_pymavlinks_loader_reads_the_same_waypoints(plan: Plan, tmp_path_factory
             assert got == expected or (math.isnan(got) and math.isnan(expected))
 
 
-def test_we_read_what_pymavlinks_loader_writes(tmp_path: Path) -> None:
+def test_reads_waypoints_of_pymavlink(tmp_path: Path) -> None:
     ours = load_plan("missions/triangle.waypoints")
     loader = MAVWPLoader()
     loader.load("missions/triangle.waypoints")
@@ -112,7 +112,7 @@ def test_the_projects_missions_are_sound_and_kept_to_the_letter(path: Path, tmp_
     assert (tmp_path / path.name).read_bytes() == path.read_bytes()
 
 
-def test_every_supported_command_is_in_the_mission_that_says_so() -> None:
+def test_every_item_mission_has_all_supported_commands() -> None:
     used = {item.command for item in load_plan("missions/every_item.plan").items}
     assert used == set(Command)
 
@@ -176,7 +176,7 @@ def write(path: Path, content: Any) -> Path:
     return path
 
 
-def test_what_we_do_not_know_survives(tmp_path: Path) -> None:
+def test_unknown_keys_are_kept(tmp_path: Path) -> None:
     source = document(
         simple(),
         survey(simple(jump_id=2), simple(jump_id=3)),
@@ -209,7 +209,7 @@ def test_changed_items_are_written_new_and_the_others_kept(tmp_path: Path) -> No
 
 def test_a_format_that_cannot_hold_the_fence_is_refused(tmp_path: Path) -> None:
     plan = load_plan(write(tmp_path / "a.plan", document(simple())))
-    with pytest.raises(ConfigError, match=r"cannot hold the geofence.*save as \.plan"):
+    with pytest.raises(ConfigError, match=r"has no geofence.*save as \.plan"):
         save_plan(tmp_path / "a.waypoints", plan)
     assert not (tmp_path / "a.waypoints").exists()
 
@@ -305,7 +305,7 @@ BAD_PLANS: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.parametrize(("content", "problem"), BAD_PLANS.values(), ids=BAD_PLANS)
-def test_a_bad_file_is_one_clear_sentence(tmp_path: Path, content: Any, problem: str) -> None:
+def test_bad_file_raises_one_sentence(tmp_path: Path, content: Any, problem: str) -> None:
     path = write(tmp_path / "bad.plan", content)
     with pytest.raises(ConfigError) as caught:
         load_plan(path)

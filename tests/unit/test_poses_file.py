@@ -43,22 +43,22 @@ def test_targets_waypoints_and_speeds_may_be_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"time_s": np.array([0.0, 1.0, 1.0])}, "time_s: is not a row of increasing times"),
-        ({"time_s": np.zeros(0)}, "time_s: is not a row of increasing times"),
-        ({"time_s": np.array([0.0, np.nan, 1.0])}, "time_s: is not a row of increasing times"),
+        ({"time_s": np.array([0.0, 1.0, 1.0])}, "time_s: is not a series of increasing times"),
+        ({"time_s": np.zeros(0)}, "time_s: is not a series of increasing times"),
+        ({"time_s": np.array([0.0, np.nan, 1.0])}, "time_s: is not a series of increasing times"),
         ({"position_ned_m": np.zeros((3, 2))}, "position_ned_m: is not an array of numbers of shape (n, 3)"),
-        ({"position_ned_m": np.full((3, 3), np.inf)}, "position_ned_m: holds what is not a number"),
-        ({"attitude": np.zeros((3, 4))}, "attitude: holds what is no quaternion"),
+        ({"position_ned_m": np.full((3, 3), np.inf)}, "position_ned_m: contains values that are not finite"),
+        ({"attitude": np.zeros((3, 4))}, "attitude: contains an invalid quaternion"),
         ({"attitude": np.array(["a"] * 3)}, "attitude: is not an array of numbers"),
         ({"position_ned_m": np.zeros((2, 3))}, "position_ned_m: has 2 rows, time_s has 3"),
         ({"rotor_speed_rad_s": np.zeros((3, 9))}, "rotor_speed_rad_s: has 9 rotors, at most 8 are allowed"),
         (
             {"waypoint_numbers": np.ones(2)},
-            "waypoint_numbers: is not a whole number for each of waypoints_ned_m",
+            "waypoint_numbers: must be one integer per row of waypoints_ned_m",
         ),
         (
             {"waypoints_ned_m": np.zeros((1, 3)), "waypoint_numbers": np.array([np.inf])},
-            "waypoint_numbers: is not a whole number",
+            "waypoint_numbers: must be one integer",
         ),
         ({"waypoints_ned_m": np.zeros(())}, "waypoints_ned_m: is not an array of numbers of shape (n, 3)"),
     ],
@@ -83,7 +83,7 @@ def test_missing_arrays_are_named(tmp_path: Path) -> None:
 
 def test_a_pickle_is_not_opened(tmp_path: Path) -> None:
     np.savez(tmp_path / "p.npz", time_s=np.array([object()]))
-    with pytest.raises(ConfigError, match="is no file of poses"):
+    with pytest.raises(ConfigError, match="is not a pose file"):
         read_poses(tmp_path / "p.npz")
 
 

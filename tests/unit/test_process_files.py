@@ -73,7 +73,7 @@ def test_a_parameter_changed_just_before_a_reboot_is_kept(tmp_path: Path) -> Non
     assert "5.5" in (tmp_path / "vehicle.params").read_text()
 
 
-def test_a_stack_that_cannot_be_built_leaves_the_present_one_joined(tmp_path: Path) -> None:
+def test_failed_build_keeps_current_stack(tmp_path: Path) -> None:
     file = tmp_path / "vehicle.params"
     files, config = process_files(tmp_path), StackConfig(params_file=str(file))
     stack = files.build(config)

@@ -42,7 +42,7 @@ def test_nothing_within_the_time_is_nothing(line: tuple[int, SerialPort]) -> Non
     assert line[1].read(0.01) == b""
 
 
-def test_what_came_before_it_was_opened_is_dropped() -> None:
+def test_data_before_opening_is_dropped() -> None:
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
     os.write(ours, b"old")
@@ -54,17 +54,17 @@ def test_what_came_before_it_was_opened_is_dropped() -> None:
 
 
 @pytest.mark.parametrize("path", ["/dev/null", "/dev/zero", __file__])
-def test_what_is_no_serial_port_says_so(path: str) -> None:
-    with pytest.raises(LineError, match=f"^{path}: is no serial port$"):
+def test_non_serial_device_raises_line_error(path: str) -> None:
+    with pytest.raises(LineError, match=f"^{path}: is not a serial port$"):
         SerialPort(path, 115_200)
 
 
-def test_a_line_whose_other_end_is_gone_says_so(line: tuple[int, SerialPort]) -> None:
+def test_lost_connection_raises_line_error(line: tuple[int, SerialPort]) -> None:
     ours, port = line
     os.close(ours)
-    with pytest.raises(LineError, match="at 921600 baud: the line is gone"):
+    with pytest.raises(LineError, match="at 921600 baud: connection lost"):
         port.read(1.0)
-    with pytest.raises(LineError, match="at 921600 baud: the line is gone"):
+    with pytest.raises(LineError, match="at 921600 baud: connection lost"):
         port.write(b"x")
 
 
@@ -73,9 +73,9 @@ def test_a_line_whose_other_end_is_gone_says_so(line: tuple[int, SerialPort]) ->
     [
         (
             serial.SerialException(errno.EACCES, "could not open"),
-            "permission denied: let your user into the group",
+            "permission denied: add your user to its group",
         ),
-        (serial.SerialException(errno.EBUSY, "could not open"), "another program uses it"),
+        (serial.SerialException(errno.EBUSY, "could not open"), "in use by another program"),
         (serial.SerialException("Could not configure port: (5, 'Input/output error')"), "Input/output error"),
         (ValueError("Not a valid baudrate: 7"), "Not a valid baudrate: 7"),
         (serial.SerialException(), "SerialException"),

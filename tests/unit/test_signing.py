@@ -81,7 +81,7 @@ def taken(receiver: Link, *frames: bytes) -> int:
 # ---------------------------------------------------------------------- with pymavlink
 
 
-def test_pymavlink_takes_what_we_sign() -> None:
+def test_pymavlink_accepts_signed_frames() -> None:
     own, receiver = signing(), peer()
     sender = link(own)
     for index in range(300):
@@ -99,7 +99,7 @@ def test_pymavlink_takes_shared_payloads_that_we_sign() -> None:
     assert (received.text, received.get_signed()) == ("to all", True)
 
 
-def test_we_take_what_pymavlink_signs() -> None:
+def test_accepts_frames_signed_by_pymavlink() -> None:
     own = signing()
     receiver, sender = link(own), peer()
     assert taken(receiver, *(packed(sender, text(f"number {index}")) for index in range(300))) == 300

@@ -61,7 +61,7 @@ def test_a_key_is_raw_or_hexadecimal(key_file: Path, content: bytes) -> None:
 )
 def test_any_other_content_is_refused(key_file: Path, content: bytes) -> None:
     key_file.write_bytes(content)
-    with pytest.raises(ConfigError, match="32 octets, or 64 hexadecimal digits"):
+    with pytest.raises(ConfigError, match="32 bytes or 64 hexadecimal digits"):
         load_key(key_file)
 
 
@@ -156,7 +156,7 @@ def test_a_damaged_timestamp_file_is_not_passed_over(key_file: Path, content: by
         open_signing(key_file, "vehicle")
 
 
-def test_a_disk_that_fails_in_flight_is_told_once(key_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_disk_error_in_flight_is_reported_once(key_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     signing = open_signing(key_file, "vehicle")
     (key_file.parent / "vehicle.key.vehicle.timestamp").unlink()
     (key_file.parent / "vehicle.key.vehicle.timestamp").mkdir()  # no file can take its place
@@ -237,7 +237,7 @@ def test_a_key_from_a_network_is_refused(key_file: Path) -> None:
     assert load_key(key_file) == KEY
 
 
-def test_a_key_is_changed_by_who_has_it_alone(key_file: Path) -> None:
+def test_only_key_holder_changes_key(key_file: Path) -> None:
     setup = Setup(key_file)
     refusal = "Signing key refused: the message is not signed with the present key"
     assert setup.send(OTHER_KEY, signed=False) == [refusal]

@@ -202,7 +202,7 @@ def test_built_in_batteries_hover_for_a_usual_time() -> None:
         ("cells = 3", "capacity_mah"),
         ("cells = 2.5\ncapacity_mah = 1000.0", "not a whole number"),
         ("cells = 15\ncapacity_mah = 1000.0", "1 to 14"),
-        ("cells = 3\ncapacity_mah = 1000.0\ncell_voltage_v = [4.2, 3.3]", "must not fall"),
+        ("cells = 3\ncapacity_mah = 1000.0\ncell_voltage_v = [4.2, 3.3]", "must not decrease"),
         ("cells = 3\ncapacity_mah = 1000.0\ncell_voltage_v = [4.2]", "2 to 32 numbers"),
         ("cells = 3\ncapacity_mah = 1000.0\nefficiency = 0.0", "0.05 to 1"),
         ("cells = 3\ncapacity_mah = 1000.0\nvolts = 12.0", "not a known key"),

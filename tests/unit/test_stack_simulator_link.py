@@ -163,7 +163,7 @@ def test_a_state_that_takes_the_general_way_is_taken_too() -> None:
 # ---------------------------------------------------------------------- third parties
 
 
-def test_hello_says_who_we_are_and_asks_for_states() -> None:
+def test_initial_requests_are_heartbeat_and_state_interval() -> None:
     messages = list(Link(1, 51).decode(link().initial_requests(2000)))
     assert messages[0].get_type() == "HEARTBEAT"
     assert messages[0].get_srcSystem() == 3
@@ -171,7 +171,7 @@ def test_hello_says_who_we_are_and_asks_for_states() -> None:
     assert (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, FS_PLANT_STATE_ID, 2000.0) in asked
 
 
-def test_a_simulator_that_refuses_our_message_is_asked_for_the_standard_one() -> None:
+def test_refused_state_request_falls_back_to_hil_message() -> None:
     stack = link()
     request = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
     receive(stack, Link(1, 1).encode(mavlink.MAVLink_command_ack_message(request, 0)))
@@ -232,7 +232,7 @@ def test_each_state_is_answered_in_its_own_kind() -> None:
     controls(stack, [0.0] * 8)
 
 
-def test_goodbye_is_heard_and_said() -> None:
+def test_shutdown_is_received_and_announced() -> None:
     stack = link()
     receive(stack, heartbeat())
     assert not stack.peer_is_shutting_down
@@ -279,7 +279,7 @@ def test_a_battery_and_state_are_the_same_whichever_way_they_come() -> None:
     assert seen[0][0].time_us == seen[0][2] == 4000
 
 
-def test_what_a_battery_does_not_know_is_not_a_number() -> None:
+def test_unknown_battery_values_are_nan() -> None:
     stack = link()
     receive(stack, battery(voltages=[0xFFFF] * 10, current_battery=-1, battery_remaining=-1))
     assert all(math.isnan(value) for value in stack.battery[:3])
@@ -341,7 +341,7 @@ def test_the_clock_counts_from_the_first_state(first_us: int) -> None:
         assert (stack.time_us, stack.time_jumps) == (after_us, 0)
 
 
-def test_a_first_time_that_was_nonsense_costs_one_step() -> None:
+def test_invalid_first_time_costs_one_step() -> None:
     stack = link()
     receive(stack, plant_state(2**64 - 1))
     receive(stack, plant_state(2000))
@@ -363,7 +363,7 @@ def texts(stack: SimulatorEndpoint) -> list[str]:
 
 
 @pytest.mark.parametrize("step_us", [500, 4000, 4167, 10_000])
-def test_another_step_is_told_once(step_us: int) -> None:
+def test_changed_step_is_reported_once(step_us: int) -> None:
     stack = booted()
     for number in range(1, 100):
         receive(stack, plant_state(number * step_us))
@@ -373,7 +373,7 @@ def test_another_step_is_told_once(step_us: int) -> None:
     assert not stack.step_refusal
 
 
-def test_steps_that_jitter_about_the_loops_own_are_not_told() -> None:
+def test_jittering_steps_are_not_reported() -> None:
     stack = booted()
     for number in range(1, 200):
         receive(stack, plant_state(number * 2000 + (number % 3 - 1) * 20))
@@ -410,7 +410,7 @@ def test_a_gap_is_longer_than_50_ms_for_steps_and_ticks() -> None:
     assert [is_gap(step_us) for step_us in (49_999, 50_000, 50_001)] == [False, False, True]
 
 
-def test_steps_that_cannot_be_followed_are_told_now_and_then() -> None:
+def test_time_jumps_are_reported_at_intervals() -> None:
     stack = booted()
     for time_us in (2000, 12_002_000, 2000, 4000):
         receive(stack, plant_state(time_us))
@@ -421,7 +421,7 @@ def test_steps_that_cannot_be_followed_are_told_now_and_then() -> None:
     assert texts(stack) == ["Simulator time went back by 12 s"]
 
 
-def test_a_simulator_out_of_step_with_the_machine_is_told_once() -> None:
+def test_simulator_speed_difference_is_reported_once() -> None:
     stack = booted()
     for second in range(30):
         stack.steps.compare(1_000_000 * second, 1_000_000 * second)
@@ -431,7 +431,7 @@ def test_a_simulator_out_of_step_with_the_machine_is_told_once() -> None:
     assert texts(stack) == ["Simulator runs at 0.50 times real time"]
 
 
-def test_a_failure_is_asked_for_by_the_standard_command() -> None:
+def test_failure_request_uses_inject_failure() -> None:
     (m,) = Link(1, 51).decode(link().failure_request(101, 1, 2))
     assert (m.command, m.param1, m.param2, m.param3) == (mavlink.MAV_CMD_INJECT_FAILURE, 101.0, 1.0, 2.0)
 

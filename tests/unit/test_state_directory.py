@@ -15,7 +15,7 @@ from tests.support.commands import flightstack_command
 
 SAVED = "1\t1\tMPC_XY_CRUISE\t50\t9\n"
 REFUSED = "line 1: MPC_XY_CRUISE: 50 is outside 0.1 to 20 m/s"
-IN_USE = "another vehicle keeps its state there: give each its own --instance or --state DIR"
+IN_USE = "is in use by another vehicle: give each its own --instance or --state DIR"
 
 
 @pytest.fixture(autouse=True)
@@ -37,7 +37,7 @@ def test_parameters_of_an_earlier_version_are_adopted(runs: Path) -> None:
     assert flightstack_command(*check).stderr == f"flightstack: runs/params-3.params: {REFUSED}\n"
     assert os.listdir(runs) == ["params-3.params"]  # a check changes nothing
     new = "runs/state-3/vehicle.params"
-    moved = f"flightstack: runs/params-3.params was moved to {new}, where parameters are saved now\n"
+    moved = f"flightstack: runs/params-3.params was moved to {new}\n"
     assert start("--instance", "3").stderr == f"{moved}flightstack: {new}: {REFUSED}\n"
     assert flightstack_command(*check).stderr == f"flightstack: {new}: {REFUSED}\n"
     directory = StateDirectory(None, 3)
@@ -75,5 +75,5 @@ def test_a_second_vehicle_is_refused_a_state_directory(tmp_path: Path) -> None:
 def test_a_directory_that_cannot_be_made_is_refused_if_named(runs: Path) -> None:
     (runs / "state-0").write_text("")
     assert StateDirectory(None, 0).open() is None
-    with pytest.raises(ConfigError, match="cannot be made: File exists"):
+    with pytest.raises(ConfigError, match="cannot be created: File exists"):
         StateDirectory(runs / "state-0", 0).open()

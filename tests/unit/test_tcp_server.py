@@ -68,7 +68,7 @@ def server() -> Iterator[Server]:
         client.close()
 
 
-def test_clients_are_told_apart_and_answered(server: Server) -> None:
+def test_clients_are_distinguished_and_answered(server: Server) -> None:
     (one, first), (two, second) = server.joined(), server.joined()
     assert server.tcp.opened() == [first, second]
     one.sendall(b"of one")
@@ -157,7 +157,7 @@ def test_an_end_is_reported_once_also_with_a_reset(server: Server, abruptly: boo
     assert not server.tcp.send(address, FRAME)
 
 
-def test_who_closes_its_writing_half_only_is_gone(server: Server) -> None:
+def test_half_closed_client_is_disconnected(server: Server) -> None:
     client, address = server.joined()
     client.sendall(b"last words")
     client.shutdown(socket.SHUT_WR)
@@ -241,7 +241,7 @@ def test_a_hundred_idle_connections_do_not_lock_out_a_client(server: Server) -> 
     assert len(server.tcp) == MAX_CLIENTS
 
 
-def test_what_is_not_wanted_now_stays_with_its_sender(server: Server) -> None:
+def test_unwanted_data_stays_in_the_kernel(server: Server) -> None:
     client, address = server.joined()
     client.sendall(FRAME)
     ready = [fileno for fileno, _ in server.poller.poll(WAIT_MS)]

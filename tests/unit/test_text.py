@@ -67,7 +67,7 @@ def test_every_text_field_of_a_message_is_clean(octets: bytes) -> None:
         assert all(text.isprintable() for text in texts)
 
 
-def test_a_message_that_is_passed_on_keeps_its_octets() -> None:
+def test_forwarded_message_keeps_its_bytes() -> None:
     frame = Link(1, 1).encode(mavlink.MAVLink_param_value_message(b"\x1b[2J", 1.0, 9, 1, 0))
     (received,) = Link(255, 190).decode(frame)
     assert bytes(received.get_msgbuf()) == frame

@@ -162,7 +162,7 @@ def test_info_parameters_texts_and_home_read_back() -> None:
     assert texts == [(200, "WARNING", "wind is 3 m/s — careful"), (300, "EMERGENCY", "emergency")]
 
 
-def test_the_same_flight_gives_the_same_bytes_whatever_the_block_size(
+def test_log_bytes_are_independent_of_block_size(
     traces: tuple[np.ndarray, np.ndarray],
 ) -> None:
     assert synthetic_flight_bytes(20, 100, 8.0) == synthetic_flight_bytes(20, 100, 8.0)
@@ -261,9 +261,7 @@ def test_a_full_disk_ends_the_log_but_not_the_flight(traces: tuple[np.ndarray, n
 
 
 @pytest.mark.parametrize("room", [0, 1, 15, 16, 17, 60, 5000, 20_000])
-def test_a_log_that_ends_early_ends_with_a_whole_message(
-    traces: tuple[np.ndarray, np.ndarray], room: int
-) -> None:
+def test_truncated_log_ends_with_complete_message(traces: tuple[np.ndarray, np.ndarray], room: int) -> None:
     file = FullDisk(room)
     log = FlightLog(file, ROTORS, 16)
     log.start(0, INFO, PARAMETERS, HOME)

@@ -63,7 +63,7 @@ def test_a_limit_of_the_drives_is_optional(tmp_path: Path) -> None:
         ("lag_s = 0.005\nmax_drive_torque_n_m = -1", "outside the allowed range"),
     ],
 )
-def test_says_what_is_wrong_with_a_limit_of_the_drives(tmp_path: Path, lines: str, problem: str) -> None:
+def test_bad_drive_torque_limit_raises_config_error(tmp_path: Path, lines: str, problem: str) -> None:
     with pytest.raises(ConfigError, match=re.escape(problem)) as caught:
         load_text(tmp_path, changed(r"^lag_s = .*$", lines))
     assert "max_drive_torque_n_m" in str(caught.value)
@@ -83,7 +83,7 @@ def test_the_papers_vehicle_is_table_i() -> None:
     assert np.allclose(v.effectiveness(), expected, rtol=1e-15, atol=0.0)
 
 
-def test_the_optional_drag_acts_only_when_asked_for() -> None:
+def test_optional_drag_acts_only_on_request() -> None:
     v = load_vehicle("paper_quad")
     assert v.linear_drag_n_s_m == (0.0, 0.0, 0.0)
     assert v.with_drag("rigid") == replace(v, linear_drag_n_s_m=(0.153, 0.153, 0.153))
@@ -132,7 +132,7 @@ BAD = {
         value("mass_kg", "1" + "0" * 400),
         "body.mass_kg: a number that large is outside the allowed",
     ),
-    "5000 digits": (value("mass_kg", "1" + "0" * 5000), "is not sane TOML"),
+    "5000 digits": (value("mass_kg", "1" + "0" * 5000), "is not usable TOML"),
     "two inertias": (value("inertia_kg_m2", "[1, 2]"), "body.inertia_kg_m2: must be a list of 3 numbers"),
     "zero inertia": (
         value("inertia_kg_m2", "[0, 1, 1]"),
@@ -205,12 +205,12 @@ BAD = {
     "name that is no text": (value("name", "5"), "name: 5 is not a string"),
     "not TOML": ("mass = = 3", "is not valid TOML: "),
     "not UTF-8": (b"name = '\xff'", "is not valid TOML: "),
-    "endless nesting": ("a = " + "[" * 20_000, "is not sane TOML"),
+    "endless nesting": ("a = " + "[" * 20_000, "is not usable TOML"),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_is_wrong_is_one_sentence_with_file_key_and_range(tmp_path: Path, name: str) -> None:
+def test_errors_name_file_key_and_range(tmp_path: Path, name: str) -> None:
     text, sentence = BAD[name]
     with pytest.raises(ConfigError) as error:
         load_text(tmp_path, text)
