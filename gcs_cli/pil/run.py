@@ -17,6 +17,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.flight import Flight
 from gcs_cli.fly.fly_display import BarDisplay, Display, draws_bars
 from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_options import outer_rate_hz
 from gcs_cli.fly.fly_run import fly, write_results
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.report import render_report
@@ -156,7 +157,7 @@ def _conditions(options: FlyOptions, target: str) -> dict[str, Any]:
         "gains": options.gains,
         "plant": options.plant,
         "inner loop": f"{options.inner_hz:g} Hz",
-        "outer loop": f"{options.outer_rate_hz:g} Hz",
+        "outer loop": f"{outer_rate_hz(options):g} Hz",
         "seed": options.seed,
         "wind": options.wind,
         "gusts": options.gust,
