@@ -88,6 +88,7 @@ class FlyOptions:
     param: stack.Assignments = None
     view: Annotated[bool, world.VIEW] = False
     drag: Annotated[bool, world.DRAG] = False
+    signing_key: Path | None = None
 
     @property
     def speed_factor(self) -> float:
@@ -120,7 +121,7 @@ NOT_PASSED = {
     "params": "--params of gcs fly, which creates no file", "outer_hz": "--outer-hz of gcs fly",
     "home": "--home of gcs fly, or the plan's home", "overwrite": "--overwrite of gcs fly",
     "state": "none: a flight depends on its command line alone",
-    "api_port": _LOCAL, "tcp_port": _LOCAL, "listen": _LOCAL, "signing_key": _LOCAL,
+    "api_port": _LOCAL, "tcp_port": _LOCAL, "listen": _LOCAL, "signing_key": "--signing-key of gcs",
     "allow_unsigned": _LOCAL, "check": "gcs fly checks before it starts anything", "version": "gcs --version",
 }  # fmt: skip
 """Options of simulator and flight stack that are not passed on unchanged, each with the reason."""
@@ -173,4 +174,6 @@ def complete_options(
         )
     link = link_options(context, LinkOptions(timeout=run.timeout, instance=run.instance))
     timeout_s = FlyOptions.timeout_s if link.timeout is None else link.timeout
-    return replace(options, instance=link.instance or 0, timeout_s=timeout_s)
+    return replace(
+        options, instance=link.instance or 0, timeout_s=timeout_s, signing_key=settings.signing_key
+    )

@@ -20,6 +20,7 @@ from flightstack.params.vehicle import Vehicle, hidden_vehicle, load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
 from flightstack.process.clock import nearest_outer_hz, rates
 from flightstack.process.console import complain
+from flightstack.process.signing_file import load_key
 from flightstack.transports.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.flight_limit import flight_limit_s
@@ -47,6 +48,8 @@ def checked_plan(options: FlyOptions) -> Plan:
             complain(f"gcs: {sentence}")
     if options.params is not None and not options.params.is_file():
         raise CliError(f"--params {options.params}: no such file", USAGE)
+    if options.signing_key is not None:
+        load_key(options.signing_key)
     rates(options.inner_hz, outer_rate_hz(options))
     if not plan.items:
         raise CliError(f"{options.plan_path}: has no mission items", USAGE)
@@ -162,6 +165,7 @@ def simulator_arguments(options: FlyOptions, home: GeoPoint) -> list[str]:
 
 def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_port: int) -> list[str]:
     """Return the command line of ``flightstack``, which sends to ``ground_port`` and the default ground station."""
+    signing = [] if options.signing_key is None else [f"--signing-key={options.signing_key}"]
     return [
         *passed(options, TO_STACK),
         f"--outer-hz={outer_rate_hz(options)!r}",
@@ -175,6 +179,7 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_po
         f"--params={options.params or 'none'}",
         "--state=none",  # a flight depends on its command line alone
         "--wait-for-start",
+        *signing,
     ]
 
 

@@ -31,6 +31,7 @@ from gcs_cli.fly.processes import Child, Children, Interruption
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import LOOPBACK, VehicleEndpoint
 from gcs_cli.link.tlog import TlogFile
+from gcs_cli.link.vehicle_link import open_signing
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.flight_data import Flight as FlightData
 from gcs_cli.report.flight_outcome import Code, Outcome, with_log
@@ -69,7 +70,8 @@ def fly(
     """
     vehicle = (LOOPBACK, vehicle_ground_port(options.instance))
     own_port = VehicleEndpoint(LOOPBACK, 0, listens=True)
-    with Interruption() as interruption, Connection(own_port, vehicle=vehicle) as connection:
+    signing = open_signing(options.signing_key)
+    with Interruption() as interruption, Connection(own_port, signing=signing, vehicle=vehicle) as connection:
         check_ports(options)
         folder = make_run_directory(options.plan_path, out, overwrite=overwrite)
         flight = Flight(
