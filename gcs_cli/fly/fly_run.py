@@ -48,7 +48,7 @@ from gcs_cli.report.run_directory import (
 from gcs_cli.report.summary import RunInfo, summarise, write_summary
 
 _STEP_S = 0.1
-_END_PATIENCE_S = 10.0
+_END_TIMEOUT_S = 10.0
 
 
 class Flown(NamedTuple):
@@ -90,7 +90,7 @@ def fly(
             )
             _run(flight, connection, children, interruption, display)
             if flight.shut_down_accepted:
-                children.wait(_END_PATIENCE_S)
+                children.wait(_END_TIMEOUT_S)
             _show_notices(children, display)
     assert flight.outcome is not None
     wall_time_s = None
@@ -118,7 +118,7 @@ def _recording(connection: Connection, folder: Path) -> Iterator[None]:
 def _run(
     flight: Flight, connection: Connection, children: Children, interruption: Interruption, display: Display
 ) -> None:
-    while not flight.over:
+    while not flight.is_over:
         if flight.outcome is not None and children.wait(0.0):
             return  # no process is left to shut down
         now_s = connection.now_s
@@ -132,7 +132,7 @@ def _run(
         _show_notices(children, display)
         flight.step(now_s)
         display.update(flight)
-        if not flight.over:
+        if not flight.is_over:
             connection.step(now_s + _STEP_S)
 
 
@@ -148,7 +148,7 @@ def _failed_child(flight: Flight, children: Children) -> Child | None:
     """
     if flight.outcome is not None or not (children.ended() or flight.view.powered_off):
         return None
-    return children.culprit(_END_PATIENCE_S)
+    return children.culprit(_END_TIMEOUT_S)
 
 
 def _drag_of(options: FlyOptions) -> tuple[float, float, float]:

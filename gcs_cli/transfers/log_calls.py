@@ -1,4 +1,4 @@
-"""Requests about the vehicle's logs, each run to its end on a connection."""
+"""Transfers of the vehicle's logs over a connection."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from gcs_cli.link.connection import Connection
 
 LOG_FOLDER = "@MAV_LOG"
-"""Where a vehicle shows its logs over MAVLink FTP, if it does."""
+"""Directory of the logs on MAVLink FTP."""
 FTP_WAIT_S = 1.5
-"""How long a vehicle may take to show them; many never answer."""
+"""Timeout of the directory; many vehicles never answer."""
 _STEP_S = 0.1
 
 Progress: TypeAlias = Callable[[int, int], None]
-"""Called with the bytes that have come, and bytes in all."""
+"""Called with the received bytes and their total."""
 
 
 def fetch_list(connection: Connection) -> tuple[LogEntry, ...]:
@@ -37,17 +37,17 @@ def fetch_list(connection: Connection) -> tuple[LogEntry, ...]:
 
 
 def fetch_files(connection: Connection) -> tuple[Entry, ...]:
-    """Return the logs that the vehicle shows over MAVLink FTP; none when it does not know how."""
+    """Return the logs on the vehicle's MAVLink FTP; none if it does not support that."""
     client = _ftp_client(connection)
     client.start_list(LOG_FOLDER)
-    _run(connection, client, "log list", patience_s=FTP_WAIT_S)
+    _run(connection, client, "log list", timeout_s=FTP_WAIT_S)
     if not isinstance(client.result, FtpDone):
         return ()
     return tuple(entry for entry in client.result.entries if is_plain_name(entry.name))
 
 
 def file_of(log: LogEntry, logs: tuple[LogEntry, ...], files: tuple[Entry, ...]) -> Entry | None:
-    """Return the file that holds ``log``: numbers and names are only joined by a size that is there once."""
+    """Return the file of ``log``, or None: numbers and names are matched by a size that is unique."""
     if [entry.size for entry in logs].count(log.size) != 1:
         return None
     found = [file for file in files if file.size == log.size]
@@ -55,7 +55,7 @@ def file_of(log: LogEntry, logs: tuple[LogEntry, ...], files: tuple[Entry, ...])
 
 
 def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: Progress) -> bytes:
-    """Return the bytes of ``log``, as the file over MAVLink FTP if it is known, which is faster; raise CliError."""
+    """Return the content of ``log``, over MAVLink FTP if ``file`` is known, which is faster; raise CliError."""
     name = f"log {log.log_id}"
     if file is not None:
         over_ftp = _ftp_client(connection)
@@ -72,7 +72,7 @@ def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: P
 
 
 def is_plain_name(name: str) -> bool:
-    """Tell whether a name from the vehicle may name a file here: no path, nothing hidden, nothing replaced."""
+    """Return True if a name from the vehicle is safe as a file name: no path, not hidden, no replaced characters."""
     return (
         bool(name)
         and name.isprintable()
@@ -86,12 +86,12 @@ def _run(
     client: LogClient | FtpClient,
     name: str,
     show: Progress | None = None,
-    patience_s: float | None = None,
+    timeout_s: float | None = None,
 ) -> None:
-    """Let ``client`` talk until it has a result; raise CliError when the vehicle goes away meanwhile."""
+    """Run ``client`` until it has a result; raise CliError if the vehicle is lost."""
     session = connection.session
     session.use(client)
-    end_s = None if patience_s is None else connection.now_s + patience_s
+    end_s = None if timeout_s is None else connection.now_s + timeout_s
     while client.result is None and (end_s is None or connection.now_s < end_s):
         if session.view.powered_off or session.view.lost(connection.now_s):
             raise CliError(f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}")

@@ -1,4 +1,4 @@
-"""Requests about parameters, each run to its end on a connection."""
+"""Transfers of parameters over a connection."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gcs_cli.link.connection import Connection
 
 METADATA_WAIT_S = 3.0
-"""How long a vehicle may take to send what it knows of its parameters; many know nothing."""
+"""Timeout of the parameter metadata; many vehicles have none."""
 TIMING = ParamTiming()
 _STEP_S = 0.25
 _WARNING = 4  # MAV_SEVERITY_WARNING; lower is worse
@@ -61,18 +61,18 @@ def change(connection: Connection, name: str, value: float) -> Parameter:
 
 
 def fetch_metadata(connection: Connection) -> dict[str, ParamInfo]:
-    """Return what the vehicle knows of its parameters, by name; nothing when it does not say."""
+    """Return the metadata of the vehicle's parameters, by name; empty if it sends none."""
     client = FtpClient(_vehicle(connection), Address(SYSTEM_ID, COMPONENT_ID))
     client.start_download(METADATA_PATH)
     _run(connection, client, "parameter metadata", METADATA_WAIT_S)
     return parse_metadata(client.result.content) if isinstance(client.result, FtpDone) else {}
 
 
-def _run(connection: Connection, client: _Client, name: str, patience_s: float | None = None) -> None:
-    """Let ``client`` talk until it has a result; raise CliError when the vehicle goes away meanwhile."""
+def _run(connection: Connection, client: _Client, name: str, timeout_s: float | None = None) -> None:
+    """Run ``client`` until it has a result; raise CliError if the vehicle is lost."""
     session = connection.session
     session.use(client)
-    end_s = None if patience_s is None else connection.now_s + patience_s
+    end_s = None if timeout_s is None else connection.now_s + timeout_s
     while client.result is None and (end_s is None or connection.now_s < end_s):
         if session.view.powered_off or session.view.lost(connection.now_s):
             raise CliError(f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}")
@@ -81,7 +81,7 @@ def _run(connection: Connection, client: _Client, name: str, patience_s: float |
 
 
 def _explanation(connection: Connection, name: str, texts_before: int) -> str | None:
-    """Return the vehicle's own words for refusing ``name``, which come right after the answer."""
+    """Return the vehicle's STATUSTEXT about refusing ``name``, which follows the answer."""
     prefix = f"Parameter {name} refused: "
 
     def said() -> str | None:

@@ -286,6 +286,6 @@ def test_a_child_that_does_not_listen_is_killed(tmp_path: Path) -> None:
     wait_until(lambda: child.last_line == "deaf", "it never started")
     with Children(tmp_path) as children:
         children.add(child)
-        children.stop(patience_s=0.1)
+        children.stop(timeout_s=0.1)
     assert child.exit_code == -signal.SIGKILL
     assert child.obituary == "deaf was killed by signal 9"
