@@ -13,6 +13,7 @@ from gcs_cli.clients.command_client import CommandClient, CommandResult
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID, Session
 
+OWN_ADDRESS = Address(SYSTEM_ID, COMPONENT_ID)
 TEXT_WAIT_S = 0.3
 """How long to wait for the STATUSTEXT that explains a refusal; it follows the answer."""
 
@@ -99,7 +100,7 @@ class Call:
 
 def command(session: Session, number: int, params: Sequence[float], now_s: float) -> Call:
     """Begin a command; omitted parameters are zero."""
-    client = CommandClient(_vehicle(session), Address(SYSTEM_ID, COMPONENT_ID))
+    client = CommandClient(vehicle_address(session), OWN_ADDRESS)
     client.send(number, params, now_s)
     return Call(session, client)
 
@@ -127,10 +128,11 @@ def clear(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
 
 def mission_client(session: Session, kind: MissionType) -> MissionClient:
     """Return a client that transfers one type of plan."""
-    return MissionClient(_vehicle(session), Address(SYSTEM_ID, COMPONENT_ID), kind)
+    return MissionClient(vehicle_address(session), OWN_ADDRESS, kind)
 
 
-def _vehicle(session: Session) -> Address:
+def vehicle_address(session: Session) -> Address:
+    """Return system and component of the vehicle."""
     return Address(*session.target)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from typing import Protocol
 
 from flightstack.mavlink.signing import LinkSigning
 from flightstack.plan import MissionResult
@@ -12,10 +13,25 @@ from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError, PortInUseError, V
 from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Command, Request
 from gcs_cli.link.endpoint import VEHICLE_CONNECTION, VehicleEndpoint
-from gcs_cli.link.session import Session
+from gcs_cli.link.session import Service, Session
 
 _LONGEST_WAIT_S = 0.25
 """Longest time until Ctrl-C, the end of a child or a resized terminal is noticed."""
+
+_PROGRESS_S = 0.1
+"""Longest time between two updates of a progress bar."""
+
+
+class TransferClient(Service, Protocol):
+    """A service that transfers data until it has a result."""
+
+    @property
+    def result(self) -> object | None:
+        """Result of the transfer; None before its end."""
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """Transferred units and their total (0 before it is known)."""
 
 
 class Connection:
@@ -117,11 +133,8 @@ class Connection:
 
         With ``may_lack``, a type of plan that the vehicle does not support counts as empty.
         """
-        session = self.session
         while (answer := call.answer(self.now_s)) is None:
-            if session.view.powered_off or session.view.lost(self.now_s):
-                how = "shut down" if session.view.powered_off else "was lost"
-                raise VehicleLostError(f"{name() if callable(name) else name}: the vehicle {how}")
+            self._check_vehicle(name)
             self.step(self.now_s + _LONGEST_WAIT_S)
         if may_lack and answer.result == MissionResult.UNSUPPORTED:
             return Answer(True)
@@ -130,6 +143,32 @@ class Connection:
             said = what if answer.silent or answer.cancelled else f"{what} refused"
             raise CliError(f"{said}: {answer.reason}", NO_ANSWER if answer.silent else FAILED)
         return answer
+
+    def run(
+        self,
+        client: TransferClient,
+        name: str,
+        timeout_s: float | None = None,
+        show: Callable[[int, int], None] | None = None,
+    ) -> None:
+        """Run ``client`` until it has a result, or for ``timeout_s``; raise CliError if the vehicle is lost.
+
+        ``show`` is called with the transferred units and their total.
+        """
+        self.session.use(client)
+        end_s = None if timeout_s is None else self.now_s + timeout_s
+        while client.result is None and (end_s is None or self.now_s < end_s):
+            self._check_vehicle(name)
+            self.step(self.now_s + _PROGRESS_S)
+            if show is not None:
+                show(*client.progress)
+        self.session.use(None)
+
+    def _check_vehicle(self, name: str | Callable[[], str]) -> None:
+        view = self.session.view
+        if view.powered_off or view.lost(self.now_s):
+            how = "shut down" if view.powered_off else "was lost"
+            raise VehicleLostError(f"{name() if callable(name) else name}: the vehicle {how}")
 
     def _send(self, frames: list[bytes]) -> None:
         peer = self.session.peer

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from flightstack.mavlink.fields import REPLACEMENT
 from flightstack.mavlink.files import Entry
-from flightstack.mavlink.link import Address
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
-from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID
-
-if TYPE_CHECKING:
-    from gcs_cli.link.connection import Connection
+from gcs_cli.link.calls import OWN_ADDRESS, vehicle_address
+from gcs_cli.link.connection import Connection
 
 LOG_FOLDER = "@MAV_LOG"
 """Directory of the logs on MAVLink FTP."""
 FTP_WAIT_S = 1.5
 """Timeout of the directory; many vehicles never answer."""
-_STEP_S = 0.1
 
 Progress: TypeAlias = Callable[[int, int], None]
 """Called with the received bytes and their total."""
@@ -28,9 +24,9 @@ Progress: TypeAlias = Callable[[int, int], None]
 
 def fetch_list(connection: Connection) -> tuple[LogEntry, ...]:
     """Return all logs of the vehicle; raise CliError."""
-    client = LogClient(_vehicle(connection))
+    client = LogClient(vehicle_address(connection.session))
     client.start_list()
-    _run(connection, client, "log list")
+    connection.run(client, "log list")
     if isinstance(client.result, LogDone):
         return client.result.entries
     raise _error(client.result, "log list")
@@ -40,7 +36,7 @@ def fetch_files(connection: Connection) -> tuple[Entry, ...]:
     """Return the logs on the vehicle's MAVLink FTP; none if it does not support that."""
     client = _ftp_client(connection)
     client.start_list(LOG_FOLDER)
-    _run(connection, client, "log list", timeout_s=FTP_WAIT_S)
+    connection.run(client, "log list", timeout_s=FTP_WAIT_S)
     if not isinstance(client.result, FtpDone):
         return ()
     return tuple(entry for entry in client.result.entries if is_plain_name(entry.name))
@@ -60,12 +56,12 @@ def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: P
     if file is not None:
         over_ftp = _ftp_client(connection)
         over_ftp.start_download(f"{LOG_FOLDER}/{file.name}")
-        _run(connection, over_ftp, name, show)
+        connection.run(over_ftp, name, show=show)
         if isinstance(over_ftp.result, FtpDone):
             return over_ftp.result.content
-    client = LogClient(_vehicle(connection))
+    client = LogClient(vehicle_address(connection.session))
     client.start_download(log)
-    _run(connection, client, name, show)
+    connection.run(client, name, show=show)
     if isinstance(client.result, LogDone):
         return client.result.content
     raise _error(client.result, name)
@@ -81,26 +77,6 @@ def is_plain_name(name: str) -> bool:
     )
 
 
-def _run(
-    connection: Connection,
-    client: LogClient | FtpClient,
-    name: str,
-    show: Progress | None = None,
-    timeout_s: float | None = None,
-) -> None:
-    """Run ``client`` until it has a result; raise CliError if the vehicle is lost."""
-    session = connection.session
-    session.use(client)
-    end_s = None if timeout_s is None else connection.now_s + timeout_s
-    while client.result is None and (end_s is None or connection.now_s < end_s):
-        if session.view.powered_off or session.view.lost(connection.now_s):
-            raise CliError(f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}")
-        connection.step(connection.now_s + _STEP_S)
-        if show is not None:
-            show(*client.progress)
-    session.use(None)
-
-
 def _error(result: object, name: str) -> CliError:
     if isinstance(result, LogFailed):
         return CliError(f"{name}: {result.reason}", NO_ANSWER if result.silent else FAILED)
@@ -108,8 +84,4 @@ def _error(result: object, name: str) -> CliError:
 
 
 def _ftp_client(connection: Connection) -> FtpClient:
-    return FtpClient(_vehicle(connection), Address(SYSTEM_ID, COMPONENT_ID))
-
-
-def _vehicle(connection: Connection) -> Address:
-    return Address(*connection.session.target)
+    return FtpClient(vehicle_address(connection.session), OWN_ADDRESS)
