@@ -274,7 +274,7 @@ def test_a_child_that_cannot_start_says_why(tmp_path: Path) -> None:
         child = children.start("sim-bridge", "sim_bridge", ["--plant=flat"])
         assert children.wait(LONG_S)
         assert child.exit_code == 2
-        assert child.obituary.startswith("sim-bridge ended with code 2: --plant: 'flat' is not one of")
+        assert child.end_reason.startswith("sim-bridge ended with code 2: --plant: 'flat' is not one of")
 
 
 def test_a_child_that_does_not_listen_is_killed(tmp_path: Path) -> None:
@@ -288,4 +288,4 @@ def test_a_child_that_does_not_listen_is_killed(tmp_path: Path) -> None:
         children.add(child)
         children.stop(timeout_s=0.1)
     assert child.exit_code == -signal.SIGKILL
-    assert child.obituary == "deaf was killed by signal 9"
+    assert child.end_reason == "deaf was killed by signal 9"
