@@ -166,7 +166,17 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
             outcome = Outcome(Code.NO_LOG, f"the mission was flown, but its log cannot be read: {error}")
     else:
         outcome = with_log(outcome, data, plan.items)
-    run = RunInfo(
+    summary = summarise(data, plan, _run_info(options, flown, outcome))
+    try:
+        write_summary(flown.folder / SUMMARY_NAME, summary)
+        write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
+    except OSError as error:
+        raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
+    return summary, outcome
+
+
+def _run_info(options: FlyOptions, flown: Flown, outcome: Outcome) -> RunInfo:
+    return RunInfo(
         outcome=outcome.code.value,
         outcome_text=outcome.reason,
         plan=str(options.plan_path),
@@ -193,12 +203,5 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
         inner_hz=options.inner_hz,
         outer_hz=outer_rate_hz(options),
         overruns=flown.overruns,
-        log_path=log,
+        log_path=flown.folder / LOG_NAME,
     )
-    summary = summarise(data, plan, run)
-    try:
-        write_summary(flown.folder / SUMMARY_NAME, summary)
-        write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
-    except OSError as error:
-        raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
-    return summary, outcome
