@@ -7,66 +7,36 @@ import sys
 
 import typer
 
+from flightstack.core.errors import ConfigError
 from flightstack.process.command_line import UsageError, Version, make_app
 from flightstack.process.console import complain, drop, replace_unencodable
+from gcs_cli.commands import GcsGroup, add_groups
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
-from gcs_cli.settings import ConnectOption, InstanceOption, Settings, SigningKeyOption, TimeoutOption
+from gcs_cli.option_groups import expand_options
+from gcs_cli.settings import LinkOptions, Settings, SigningKeyOption
 
 app = make_app(
     name="gcs",
+    cls=GcsGroup,
     help="Ground station on the command line: fly missions, command and watch a vehicle over MAVLink.",
     no_args_is_help=True,
 )
+add_groups(app)
 
 _TYPER_INTERRUPTED = 130
-"""What typer makes of a KeyboardInterrupt; none of our exit codes."""
+"""Exit code of typer for a KeyboardInterrupt; not one of ours."""
 
 
 @app.callback()
+@expand_options
 def options(
     context: typer.Context,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
+    link: LinkOptions,
     signing_key: SigningKeyOption = None,
     version: Version = False,  # its callback does all
 ) -> None:
-    """Hold the flags that are given before the command."""
-    context.obj = Settings(connect, timeout, signing_key, instance)
-
-
-def _register() -> None:
-    from gcs_cli.commands import (  # noqa: PLC0415
-        actions,
-        compare,
-        fly,
-        log,
-        mission,
-        paper,
-        param,
-        perf,
-        pil,
-        replay,
-        status,
-        watch,
-    )
-
-    app.command()(fly.fly)
-    app.add_typer(mission.app, name="mission")
-    app.add_typer(param.app, name="param")
-    app.add_typer(log.app, name="log")
-    app.add_typer(pil.app, name="pil")
-    app.command()(paper.paper)
-    for action in actions.ACTIONS:
-        app.command()(action)
-    app.command()(status.status)
-    app.command()(watch.watch)
-    app.command()(perf.perf)
-    app.command()(replay.replay)
-    app.command()(compare.compare)
-
-
-_register()
+    """Keep the options that are given before the command."""
+    context.obj = Settings(link, signing_key)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -96,19 +66,10 @@ def main(argv: list[str] | None = None) -> int:
         sentence, code = error.format_message(), USAGE
     except CliError as error:
         sentence, code = str(error), error.exit_code
-    except Exception as error:
-        sentence, code = _config_problem(error), USAGE
+    except ConfigError as error:
+        sentence, code = str(error), USAGE
     complain(f"gcs: {sentence}")
     return code
-
-
-def _config_problem(error: Exception) -> str:
-    """Return the sentence of a bad file; raise all else again."""
-    from flightstack.core.errors import ConfigError  # noqa: PLC0415
-
-    if isinstance(error, ConfigError):
-        return str(error)
-    raise error
 
 
 if __name__ == "__main__":

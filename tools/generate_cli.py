@@ -5,11 +5,12 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, get_args, get_type_hints
 
 import typer
-from typer.models import ArgumentInfo, OptionInfo
+from typer.models import ArgumentInfo, CommandInfo, OptionInfo
 
 import flightstack.__main__
 import gcs_cli.__main__
@@ -120,14 +121,21 @@ def section(
     return "".join(parts)
 
 
+def commands_of(app: typer.Typer) -> Iterator[tuple[str, CommandInfo]]:
+    """Yield the commands of a group by name; import those that are loaded on use."""
+    lazy = getattr(app.info.cls, "lazy", {})
+    for module in dict.fromkeys(command.module for command in lazy.values()):
+        loaded = dict(commands_of(import_module(module).app))
+        yield from ((name, loaded[name]) for name in lazy if lazy[name].module == module)
+    for command in app.registered_commands:
+        if command.callback is not None and not command.hidden:
+            yield command.name or command.callback.__name__.replace("_", "-"), command
+
+
 def sections(app: typer.Typer, path: str, heading: str, shared: Sequence[Parameter]) -> Iterator[str]:
     """Yield the sections of a group's commands, depth first."""
-    for command in app.registered_commands:
-        function = command.callback
-        if function is None or command.hidden:
-            continue
-        name = command.name or function.__name__.replace("_", "-")
-        yield section(heading, f"{path} {name}", function, command.help, shared)
+    for name, command in commands_of(app):
+        yield section(heading, f"{path} {name}", command.callback, command.help, shared)
     for group in app.registered_groups:
         inner = group.typer_instance
         if inner is None:

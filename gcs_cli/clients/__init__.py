@@ -1,1 +1,1 @@
-"""The client halves of the MAVLink services, without I/O."""
+"""Clients of the MAVLink services, sans-IO."""

@@ -1,6 +1,6 @@
-"""Send a command and see it answered: the sender's side of the command protocol, without I/O.
+"""Client of the command protocol, sans-IO.
 
-The protocol: https://mavlink.io/en/services/command.html
+Protocol: https://mavlink.io/en/services/command.html
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ _IN_PROGRESS: int = mavlink.MAV_RESULT_IN_PROGRESS
 
 
 class CommandTiming(NamedTuple):
-    """Waits of the protocol [s of whatever clock drives it]."""
+    """Timeouts of the protocol [s of the clock that drives it]."""
 
     timeout_s: float = 1.0
-    """Before a command is sent again."""
+    """Time after which a command is sent again."""
     retries: int = 5
     progress_timeout_s: float = 10.0
-    """Before a command that the vehicle works on counts as lost."""
+    """Time after which a command in progress counts as lost."""
 
 
 class CommandResult(NamedTuple):
-    """How a command ended."""
+    """Result of a command."""
 
     result: int | None
-    """The vehicle's MAV_RESULT; None when it did not answer."""
+    """The vehicle's MAV_RESULT; None if it did not answer."""
     reason: str
-    """One sentence; empty when accepted."""
+    """One sentence for the user; empty if accepted."""
 
     @property
     def accepted(self) -> bool:
-        """Tell whether the vehicle did it."""
+        """True if the vehicle accepted the command."""
         return self.result == _ACCEPTED
 
 
 class CommandClient:
-    """Sends one command at a time to one vehicle; a new ``send`` replaces the one under way."""
+    """Sends one command at a time to one vehicle; a new ``send`` replaces the current one."""
 
     def __init__(
         self,
@@ -54,7 +54,7 @@ class CommandClient:
         self.own = own
         self.result: CommandResult | None = None
         self.progress_percent: int | None = None
-        """What the vehicle last said of a command that it works on."""
+        """Progress of a command that the vehicle executes; None if unknown."""
         self._timing = timing
         self._command = -1
         self._request: Message | None = None
@@ -63,7 +63,7 @@ class CommandClient:
         self._in_progress = False
 
     def send(self, command: int, params: Sequence[float], now_s: float) -> None:
-        """Begin a COMMAND_LONG of up to seven parameters; those left out are zero."""
+        """Begin a COMMAND_LONG of up to seven parameters; omitted ones are zero."""
         values = [as_float32(value) for value in (*params, *[0.0] * (7 - len(params)))]
         self._begin(command, mavlink.MAVLink_command_long_message(*self.vehicle, command, 0, *values), now_s)
 
@@ -86,7 +86,7 @@ class CommandClient:
         self._in_progress = False
 
     def receive(self, message: Message, now_s: float) -> None:
-        """Take a message from the vehicle's link; what does not answer the command is ignored."""
+        """Process a message; messages that do not answer the command are ignored."""
         if self._deadline_s is None or message.get_type() != "COMMAND_ACK":
             return
         if not is_from(message, self.vehicle) or not is_for(message, self.own):
@@ -114,7 +114,7 @@ class CommandClient:
         request = self._request
         if request is None:
             return []
-        if request.get_type() == "COMMAND_LONG":  # tells the vehicle a repetition from a new command
+        if request.get_type() == "COMMAND_LONG":  # distinguishes a repetition from a new command
             request = copy.copy(request)
             request.confirmation = self._timing.retries + 1 - self._sends_left
         self._sends_left -= 1
@@ -122,7 +122,7 @@ class CommandClient:
         return [request]
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; None for never."""
+        """Return the time of the next ``poll`` without an earlier message; None: never."""
         return self._deadline_s
 
     def cancel(self) -> None:

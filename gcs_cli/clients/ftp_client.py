@@ -1,7 +1,7 @@
-"""The ground station's side of MAVLink FTP, without I/O: fetches files and lists directories.
+"""Client of MAVLink FTP, sans-IO: downloads files and lists directories.
 
-``start_…`` begins an operation, ``poll`` returns what to send, ``receive`` takes what came, and ``result`` says how it
-ended. A file comes in bursts; single requests fetch what got lost.
+``start_…`` begins an operation, ``poll`` returns the messages to send, ``receive`` processes received ones, and
+``result`` is the result at the end. Files are read in bursts; single requests read lost parts.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from flightstack.mavlink.ftp_messages import (
 from flightstack.mavlink.link import Address, Message, is_for, is_from
 
 RETRY_S = 0.3
-"""Silence after which a request is sent again, until answers have shown how long they take."""
+"""Time after which a request is sent again, before a round trip was measured."""
 SOONEST_RETRY_S = 0.1
 SILENCE_S = 6.0
-"""How long an operation goes on without any progress."""
+"""Longest time without progress before an operation fails."""
 BURST_BYTES = 500 * MAX_DATA
-"""What a burst may bring; more than a tenth of it missing is worth another burst."""
+"""Largest burst. If more than a tenth of it is missing, another burst is requested."""
 FEW = 50
 MAX_READS = 16
-"""Single requests under way at once."""
+"""Largest number of pending single requests."""
 MAX_ENTRIES = 100_000
 _HALF = 0x8000
 
@@ -43,22 +43,22 @@ class FtpDone(NamedTuple):
     """The operation succeeded."""
 
     content: bytes = b""
-    """The file, of a download."""
+    """Content of the file, of a download."""
     entries: tuple[Entry, ...] = ()
-    """What is in the directory, of a list."""
+    """Content of the directory, of a list."""
 
 
 class FtpFailed(NamedTuple):
     """The operation failed."""
 
     reason: str
-    """One sentence."""
+    """One sentence for the user."""
     error: int | None = None
-    """The FtpError of the vehicle; None when it did not answer."""
+    """The vehicle's FtpError; None if it did not answer."""
 
 
 class FtpClient:
-    """One operation at a time with one vehicle; a new one takes the place of the one under way."""
+    """One operation at a time with one vehicle; a new one replaces the current one."""
 
     def __init__(self, vehicle: Address, own: Address) -> None:
         self.vehicle = vehicle
@@ -67,23 +67,23 @@ class FtpClient:
         self._sequence = 0
         self._outbox: list[Packet] = []
         self._request: Packet | None = None
-        """An open or list request that waits for its answer."""
+        """The pending open or list request."""
         self._session: int | None = None
         self._file: PartialFile | None = None
         self._entries: list[Entry] = []
         self._offset = 0
         self._burst: Packet | None = None
         self._reads: dict[int, tuple[int, int, float]] = {}
-        """Sequence number of the answer → offset, count and when it was asked for."""
+        """Sequence number of the answer → offset, count and time of the request."""
         self._path = b""
         self._retry_s: float | None = None
         self._progress_s = math.inf
         self._sent_s: float | None = None
-        """When the request that waits was sent, if once only: then its answer shows how long answers take."""
-        self._patience_s = RETRY_S
+        """Time of the pending request if it was sent once, so that its answer measures the round trip."""
+        self._timeout_s = RETRY_S
 
     def start_download(self, path: str) -> None:
-        """Fetch the file at ``path``."""
+        """Download the file at ``path``."""
         self._start(path)
         self._ask(Opcode.OPEN_FILE_RO)
 
@@ -94,13 +94,13 @@ class FtpClient:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Bytes that have come, and bytes in all (0 before the size is known)."""
+        """Received bytes and their total (0 before the size is known)."""
         return (self._file.size - self._file.left, self._file.size) if self._file else (0, 0)
 
-    # -- what drives it
+    # -- messages
 
     def receive(self, message: Message, now_s: float) -> None:
-        """Take a message from the vehicle's link; what is not for this operation is ignored."""
+        """Process a message; messages that do not belong to this operation are ignored."""
         if (
             message.get_type() != "FILE_TRANSFER_PROTOCOL"
             or not is_from(message, self.vehicle)
@@ -125,7 +125,7 @@ class FtpClient:
             elif self._request is not None:
                 self._outbox.append(self._request)
                 self._sent_s = now_s if self._retry_s == -math.inf else None
-                self._retry_s = now_s + self._patience_s
+                self._retry_s = now_s + self._timeout_s
             elif self._file is not None:
                 self._burst = None
                 self._fetch(self._file, now_s)
@@ -133,7 +133,7 @@ class FtpClient:
         return [ftp_message(self.vehicle, packet) for packet in outbox]
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        """Return the time of the next ``poll`` without an earlier message; -inf: immediately, None: never."""
         if self._outbox:
             return -math.inf
         return None if self.result is not None else self._retry_s
@@ -170,7 +170,7 @@ class FtpClient:
         self._request, self._session = None, packet.session
         size = UINT32.unpack_from(packet.data)[0] if packet.size >= UINT32.size else None
         if size is None:
-            self._end(FtpFailed("the vehicle does not tell the size of the file"))
+            self._end(FtpFailed("the vehicle did not send the size of the file"))
         elif size > MAX_SIZE:
             self._end(FtpFailed(f"a file of {size} bytes is too large"))
         else:
@@ -182,7 +182,7 @@ class FtpClient:
         error = packet.data[0] if packet.data else FtpError.FAIL
         if error == FtpError.END_OF_FILE and request.opcode == Opcode.LIST_DIRECTORY:
             self._end(FtpDone(entries=tuple(self._entries)))
-        elif error != FtpError.NO_SESSIONS_AVAILABLE:  # which passes: ask again
+        elif error != FtpError.NO_SESSIONS_AVAILABLE:  # temporary: try again
             self._end(_refused(error))
 
     def _on_entries(self, packet: Packet) -> None:
@@ -219,10 +219,10 @@ class FtpClient:
         if is_over or not file.left:
             self._fetch(file, now_s)
         else:
-            self._retry_s = now_s + self._patience_s
+            self._retry_s = now_s + self._timeout_s
 
     def _on_burst(self, packet: Packet) -> bool | None:
-        """Return whether the burst is over; None when the packet is of an older one, maybe of another file."""
+        """Return True if the burst is complete; None if the packet belongs to an older one."""
         burst = self._burst
         if burst is None or packet.offset < burst.offset:
             return None
@@ -237,7 +237,7 @@ class FtpClient:
 
     def _on_nak(self, file: PartialFile, packet: Packet) -> None:
         error = packet.data[0] if packet.data else FtpError.FAIL
-        if error == FtpError.INVALID_SESSION:  # the vehicle has closed it: open it again, keep what came
+        if error == FtpError.INVALID_SESSION:  # closed by the vehicle: open it again, keep the received data
             self._reads.clear()
             self._ask(Opcode.OPEN_FILE_RO)
         elif error != FtpError.END_OF_FILE:
@@ -246,8 +246,8 @@ class FtpClient:
             self._end(FtpFailed("the file became shorter while it was read", error))
 
     def _fetch(self, file: PartialFile, now_s: float) -> None:
-        """Ask for what is missing: in a burst if it is much, else piece by piece."""
-        self._retry_s = now_s + self._patience_s
+        """Request missing data: many blocks in a burst, few one by one."""
+        self._retry_s = now_s + self._timeout_s
         if not file.left:
             self._end(FtpDone(bytes(file.content)))
         elif self._burst is None:
@@ -260,14 +260,14 @@ class FtpClient:
                 self._read_pieces(file, now_s)
 
     def _read_pieces(self, file: PartialFile, now_s: float) -> None:
-        self._reads = {key: read for key, read in self._reads.items() if now_s < read[2] + self._patience_s}
+        self._reads = {key: read for key, read in self._reads.items() if now_s < read[2] + self._timeout_s}
         asked = {(offset, count) for offset, count, _ in self._reads.values()}
         for offset, count in self._wanted(file, asked):
             read = self._packet(Opcode.READ_FILE, size=count, offset=offset)
             self._reads[next_sequence(read.sequence)] = (offset, count, now_s)
             self._outbox.append(read)
         self._retry_s = (
-            min((asked_s for _, _, asked_s in self._reads.values()), default=now_s) + self._patience_s
+            min((asked_s for _, _, asked_s in self._reads.values()), default=now_s) + self._timeout_s
         )
 
     def _wanted(self, file: PartialFile, asked: set[tuple[int, int]]) -> Iterator[tuple[int, int]]:
@@ -279,12 +279,12 @@ class FtpClient:
                 room -= 1
                 yield piece
 
-    # -- the rest
+    # -- helpers
 
     def _learn(self, answer_s: float) -> None:
-        """Wait three times as long as an answer took; what is slower now and then soon counts less."""
+        """Set the timeout to three round trips; the influence of a slow one decays."""
         wanted_s = min(RETRY_S, max(SOONEST_RETRY_S, 3.0 * answer_s))
-        self._patience_s = max(wanted_s, 0.5 * self._patience_s + 0.5 * wanted_s)
+        self._timeout_s = max(wanted_s, 0.5 * self._timeout_s + 0.5 * wanted_s)
 
     def _packet(self, opcode: Opcode, *, size: int = 0, offset: int = 0, data: bytes = b"") -> Packet:
         packet = Packet(self._sequence, self._session or 0, opcode, size, offset=offset, data=data)
@@ -303,7 +303,7 @@ def _refused(error: int) -> FtpFailed:
 
 
 def _entries(lines: list[bytes]) -> Iterator[Entry]:
-    """Yield the files and directories among the lines of a list; others count, but are not shown."""
+    """Yield the files and directories among the lines of a list; other lines are skipped."""
     for line in lines:
         kind, text = line[:1], line[1:].decode(errors="replace")
         if kind == b"D":

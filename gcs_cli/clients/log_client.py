@@ -1,7 +1,7 @@
-"""The ground station's side of the log protocol, without I/O: lists a vehicle's logs and fetches one.
+"""Client of the log protocol, sans-IO: lists a vehicle's logs and downloads one.
 
-``start_…`` begins an operation, ``poll`` returns what to send, ``receive`` takes what came, and ``result`` says how it
-ended. Works with PX4, which numbers logs from 0, and ArduPilot, which numbers from 1.
+``start_…`` begins an operation, ``poll`` returns the messages to send, ``receive`` processes received ones, and
+``result`` is the result at the end. Works with PX4, which numbers logs from 0, and ArduPilot, which numbers from 1.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from flightstack.mavlink.link import Address, Message, is_from
 from flightstack.mavlink.log_messages import BLOCK
 
 RETRY_S = 0.4
-"""Silence after which what is missing is asked for again."""
+"""Time without messages after which missing data is requested again."""
 SILENCE_S = 6.0
-"""How long an operation goes on without any progress."""
+"""Longest time without progress before an operation fails."""
 WINDOW = 4000 * BLOCK
-"""What is asked for at once."""
+"""Size of a request."""
 FEW = 40
-"""Blocks; more than this missing are asked for in one request, with those between them."""
+"""Number of missing blocks above which one request covers them and the blocks between them."""
 MAX_REQUESTS = 20
 ALL_LOGS = 0xFFFF
 
@@ -33,7 +33,7 @@ class LogEntry(NamedTuple):
     log_id: int
     size: int
     time_utc_s: int
-    """Seconds since 1970; 0 if the vehicle does not know."""
+    """Seconds since 1970; 0 if unknown."""
 
 
 class LogDone(NamedTuple):
@@ -47,9 +47,9 @@ class LogFailed(NamedTuple):
     """The operation failed."""
 
     reason: str
-    """One sentence."""
+    """One sentence for the user."""
     silent: bool = False
-    """Whether the vehicle did not answer."""
+    """True if the vehicle did not answer."""
 
 
 class LogClient:
@@ -64,7 +64,7 @@ class LogClient:
         self._log_id: int | None = None
         self._file: PartialFile | None = None
         self._asked_end = 0
-        """Where the newest request ends: its last block asks for the next."""
+        """End of the latest request: its last block triggers the next."""
         self._retry_s: float | None = None
         self._progress_s = math.inf
 
@@ -74,7 +74,7 @@ class LogClient:
         self._entries, self._ids = {}, None
 
     def start_download(self, entry: LogEntry) -> None:
-        """Fetch a log of the list."""
+        """Download a log of the list."""
         self._start()
         self._log_id, self._file, self._asked_end = entry.log_id, PartialFile(min(entry.size, MAX_SIZE)), 0
         if not entry.size:
@@ -83,19 +83,19 @@ class LogClient:
             self._end(LogFailed(f"a log of {entry.size} bytes is too large"))
 
     def cancel(self) -> None:
-        """Give up the operation under way, and say so to the vehicle."""
+        """Cancel the operation, and tell the vehicle."""
         if self.result is None and self._retry_s is not None:
             self._end(LogFailed("the operation was cancelled"))
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Bytes that have come and bytes in all, of a download."""
+        """Received bytes and their total, of a download."""
         return (self._file.size - self._file.left, self._file.size) if self._file else (0, 0)
 
-    # -- what drives it
+    # -- messages
 
     def receive(self, message: Message, now_s: float) -> None:
-        """Take a message from the vehicle's link; what is not for this operation is ignored."""
+        """Process a message; messages that do not belong to this operation are ignored."""
         if self.result is not None or self._retry_s is None or not is_from(message, self.vehicle):
             return
         kind = message.get_type()
@@ -120,7 +120,7 @@ class LogClient:
         return outbox
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        """Return the time of the next ``poll`` without an earlier message; -inf: immediately, None: never."""
         if self._outbox:
             return -math.inf
         return None if self.result is not None else self._retry_s
@@ -131,7 +131,7 @@ class LogClient:
         if message.num_logs == 0:
             self._end(LogDone())
             return
-        # the newest numbers hold: a log may have begun meanwhile; none is below 0, whatever the count says
+        # the latest numbers count: a new log may have begun; an id is never below 0, whatever the count is
         last = message.last_log_num
         self._ids = range(max(0, last - message.num_logs + 1), last + 1)
         if message.id not in self._entries:
@@ -175,7 +175,7 @@ class LogClient:
             self._outbox.append(request)
         self._retry_s = now_s + RETRY_S
 
-    # -- the rest
+    # -- helpers
 
     def _start(self) -> None:
         self.cancel()

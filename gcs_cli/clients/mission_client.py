@@ -1,7 +1,7 @@
-"""The ground station's side of the mission protocol, without I/O.
+"""Client of the mission protocol, sans-IO.
 
-``start_…`` begins an operation, ``poll`` returns what to send, ``receive`` takes what came, and ``result``
-says how it ended. One operation at a time; a new ``start_…`` cancels the one under way.
+``start_…`` begins an operation, ``poll`` returns the messages to send, ``receive`` processes received ones, and
+``result`` is the result at the end. One operation at a time; a new ``start_…`` cancels the current one.
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ class MissionClient:
         self._give_up_s = math.inf
         self._sends_left = 0
         self._is_settling = False
-        self._busy_s = -math.inf  # when a message of the protocol was last sent or taken
+        self._busy_s = -math.inf  # time of the last message of the protocol
 
     def start_upload(self, items: Sequence[MissionItem]) -> None:
-        """Replace the vehicle's mission by ``items``; no items clear it."""
+        """Replace the vehicle's mission by ``items``; without items, clear it."""
         self._start(Upload(self.vehicle, self.mission_type, items))
 
     def start_download(self) -> None:
-        """Fetch the vehicle's mission."""
+        """Download the vehicle's mission."""
         self._start(Download(self.vehicle, self.mission_type))
 
     def start_clear(self) -> None:
@@ -65,32 +65,32 @@ class MissionClient:
         self._start(Clear(self.vehicle, self.mission_type))
 
     def start_set_current(self, seq: int) -> None:
-        """Make ``seq`` (0 to 65535) the item that the vehicle flies next."""
+        """Set the current item to ``seq`` (0 to 65535)."""
         self._start(SetCurrent(self.vehicle, self.mission_type, seq))
 
     def cancel(self) -> None:
-        """Give up the operation under way, and say so to the vehicle."""
+        """Cancel the operation, and tell the vehicle."""
         if self._operation is not None and self._operation.result is None:
             self._outbox.clear()
             self._give_up(self._operation, "the operation was cancelled")
 
     @property
     def result(self) -> Done | Failed | None:
-        """How the operation ended; None while it is under way."""
+        """Result of the operation; None before its end."""
         return self._operation.result if self._operation else None
 
     @property
     def plan_id(self) -> int:
-        """MAVLink's opaque id of the plan that was uploaded or downloaded; 0 if the vehicle gives none."""
+        """MAVLink's opaque id of the uploaded or downloaded plan; 0 if the vehicle sends none."""
         return self._operation.plan_id if self._operation else 0
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Items transferred, and items in all (0 before the count is known)."""
+        """Transferred items and their total (0 before the count is known)."""
         return self._operation.progress if self._operation else (0, 0)
 
     def receive(self, message: Message, now_s: float) -> None:
-        """Take a message from the vehicle's link; what is not for this operation is ignored."""
+        """Process a message; messages that do not belong to this operation are ignored."""
         operation = self._operation
         kind = message.get_type()
         if operation is None or not is_from(message, self.vehicle):
@@ -119,7 +119,9 @@ class MissionClient:
         if operation is not None and self._deadline_s is not None and now_s >= self._deadline_s:
             is_over = now_s >= self._give_up_s if operation.waits_for_item else self._sends_left == 0
             if is_over:
-                self._give_up(operation, f"the vehicle (system {self.vehicle.system}) {operation.silence()}")
+                self._give_up(
+                    operation, f"the vehicle (system {self.vehicle.system}) {operation.missing_answer()}"
+                )
             else:
                 self._is_settling = False
                 self._sends_left -= 1
@@ -131,7 +133,7 @@ class MissionClient:
         return outbox
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        """Return the time of the next ``poll`` without an earlier message; -inf: immediately, None: never."""
         return -math.inf if self._outbox else self._deadline_s
 
     def _start(self, operation: Operation) -> None:
@@ -145,7 +147,7 @@ class MissionClient:
         self._sends_left = self._timing.retries + 1
 
     def _receive_early(self, kind: str, now_s: float) -> None:
-        """Take a message of the operation before: a vehicle that still asks for items is told to stop."""
+        """Process a message of the previous operation: cancel it if the vehicle still requests items."""
         if self._operation is not None and kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
             self._outbox.append(self._operation.ack(MissionResult.OPERATION_CANCELLED))
             if self._deadline_s is not None:

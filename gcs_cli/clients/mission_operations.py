@@ -1,8 +1,8 @@
-"""The operations of a mission client, each as the messages it sends and the answers it takes.
+"""The operations of a mission client: the messages that each one sends and processes.
 
-Here what they share, and the short ones; upload and download are in ``mission_transfers``.
-``MissionClient`` adds time: it sends ``request`` again while no answer comes. An operation sets ``moved``
-when an answer brought it on, which starts the wait anew, and ``result`` when it is over.
+This file has their interface and the short ones; upload and download are in ``mission_transfers``.
+``MissionClient`` adds time: it repeats ``request`` until an answer comes. An operation sets ``moved`` after
+progress, which restarts the timeout, and ``result`` at its end.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ class Done(NamedTuple):
 
 
 class Failed(NamedTuple):
-    """The operation failed, and the vehicle keeps the mission that it had."""
+    """The operation failed, and the vehicle keeps its former mission."""
 
     reason: str
-    """One sentence."""
+    """One sentence for the user."""
     result: int
-    """The MAV_MISSION_RESULT: the vehicle's, or OPERATION_CANCELLED when we gave up."""
+    """The MAV_MISSION_RESULT: the vehicle's, or OPERATION_CANCELLED after a timeout."""
     seq: int | None = None
-    """The item under way. None once all are across: then only the vehicle's STATUSTEXT names the item."""
+    """The current item. None after the last one: then only the vehicle's STATUSTEXT names the item."""
 
 
 class Operation:
@@ -40,7 +40,7 @@ class Operation:
     is_transfer = True
     only_reads = False
     may_be_open = False
-    """Whether the vehicle may still wait for the first item of an upload that is over for us."""
+    """True if the vehicle may still wait for the first item of an upload that has ended here."""
 
     def __init__(self, vehicle: Address, mission_type: int, request: Message) -> None:
         self.vehicle = vehicle
@@ -52,22 +52,22 @@ class Operation:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Items transferred, and items in all (0 before the count is known)."""
+        """Transferred items and their total (0 before the count is known)."""
         return 0, 0
 
-    def silence(self) -> str:
-        """Return what the vehicle failed to do."""
+    def missing_answer(self) -> str:
+        """Return a description of the missing answer."""
         raise NotImplementedError
 
     def receive(self, message: Message) -> list[Message]:
-        """Take a message of this mission type from the vehicle, and return the answers to it."""
+        """Process a message of this mission type from the vehicle, and return the answers."""
         raise NotImplementedError
 
     def quiet_after(self, before: Operation, timing: Timing) -> float:
         """Return how long [s] the link must be quiet between the operation ``before`` and this one.
 
-        No message says which transfer it belongs to, so late ones must be gone. Downloads share no message
-        with the others that would matter.
+        Messages do not identify their transfer, so that late ones must not arrive in the next one. Downloads share
+        no such message with the others.
         """
         if SetCurrent in (type(self), type(before)) or self.only_reads != before.only_reads:
             return 0.0
@@ -92,12 +92,12 @@ class Clear(Operation):
         request = mavlink.MAVLink_mission_clear_all_message(*vehicle, mission_type)
         super().__init__(vehicle, mission_type, request)
 
-    def silence(self) -> str:
-        """Return what the vehicle failed to do."""
+    def missing_answer(self) -> str:
+        """Return a description of the missing answer."""
         return "did not confirm that its mission is cleared"
 
     def receive(self, message: Message) -> list[Message]:
-        """Take the vehicle's message, and return the answers to it."""
+        """Process a message from the vehicle, and return the answers."""
         if message.get_type() == "MISSION_ACK" and self.result is None:
             if message.type == MissionResult.ACCEPTED:
                 self.result = Done()
@@ -107,7 +107,7 @@ class Clear(Operation):
 
 
 class SetCurrent(Operation):
-    """Makes an item the one that the vehicle flies next; its MISSION_CURRENT is the answer."""
+    """Sets the current item; MISSION_CURRENT is the answer."""
 
     is_transfer = False
 
@@ -115,12 +115,12 @@ class SetCurrent(Operation):
         super().__init__(vehicle, mission_type, mavlink.MAVLink_mission_set_current_message(*vehicle, seq))
         self._seq = seq
 
-    def silence(self) -> str:
-        """Return what the vehicle failed to do."""
+    def missing_answer(self) -> str:
+        """Return a description of the missing answer."""
         return f"did not make item {self._seq} its current one"
 
     def receive(self, message: Message) -> list[Message]:
-        """Take the vehicle's message, and return the answers to it."""
+        """Process a message from the vehicle, and return the answers."""
         if message.get_type() == "MISSION_CURRENT" and message.seq == self._seq:
             self.result = self.result or Done()
         return []

@@ -1,4 +1,4 @@
-"""Upload and download, as a mission client does them."""
+"""Upload and download of a mission client."""
 
 from __future__ import annotations
 
@@ -13,12 +13,10 @@ from gcs_cli.clients.mission_operations import Done, Failed, Operation
 
 
 class Upload(Operation):
-    """Announces the items, then serves them as the vehicle asks, in any order and as often as it asks."""
+    """Sends the count, then each item that the vehicle requests, in any order and any number of times."""
 
     def __init__(self, vehicle: Address, mission_type: int, items: Sequence[MissionItem]) -> None:
-        announced = min(
-            len(items), 0xFFFF
-        )  # of more than the field holds, so many: a vehicle refuses them all
+        announced = min(len(items), 0xFFFF)  # the largest count of the field; a vehicle refuses so many
         count = mavlink.MAVLink_mission_count_message(*vehicle, announced, mission_type)
         super().__init__(vehicle, mission_type, count)
         self._items = tuple(items)
@@ -29,18 +27,18 @@ class Upload(Operation):
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Items transferred, and items in all."""
+        """Transferred items and their total."""
         return self._last_sent_seq + 1, len(self._items)
 
-    def silence(self) -> str:
-        """Return what the vehicle failed to do."""
+    def missing_answer(self) -> str:
+        """Return a description of the missing answer."""
         done, count = self.progress
         if not self._is_serving:
             return "did not answer the announcement of the upload"
         return f"did not ask for item {done} of {count}" if done < count else "did not confirm the upload"
 
     def receive(self, message: Message) -> list[Message]:
-        """Take the vehicle's message, and return the answers to it."""
+        """Process a message from the vehicle, and return the answers."""
         kind = message.get_type()
         if kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
             return self._on_request(message.seq)
@@ -49,11 +47,11 @@ class Upload(Operation):
         return []
 
     def _on_request(self, seq: int) -> list[Message]:
-        # After success, too: should the acceptance have been a late copy of one before, this still completes.
+        # After success too: if the acceptance was a late copy, the upload still completes.
         if isinstance(self.result, Failed):
             return [self.ack(MissionResult.OPERATION_CANCELLED)]
         if not self._is_serving and (seq != 0 or not self._items):
-            # A request left over from an upload before this one: an item now would mix two missions.
+            # A request of a previous upload: an item now would mix two missions.
             return [self._count_message]
         if seq >= len(self._items):
             if self.result is None:
@@ -63,8 +61,8 @@ class Upload(Operation):
         self._is_serving = True
         self._last_sent_seq = max(self._last_sent_seq, seq)
         self.may_be_open = self._last_sent_seq < 1
-        # Integers even to the deprecated MISSION_REQUEST, as the specification says. The item is also what is
-        # sent again in silence: a vehicle answers a repeated last item with the MISSION_ACK that got lost.
+        # MISSION_ITEM_INT also for the deprecated MISSION_REQUEST, as specified. The item is also
+        # repeated without an answer: a vehicle answers a repeated last item with the lost MISSION_ACK.
         self.request = message_from_item(
             self._items[seq], seq, self.vehicle, self.mission_type, is_current=seq == 0
         )
@@ -79,13 +77,13 @@ class Upload(Operation):
             self.plan_id = plan_id
             self.result = Done(self._items)
         elif self._is_serving:
-            # The end of an upload before this one: begin again, so that this one ends whole.
+            # The end of a previous upload: begin again.
             self._is_serving, self._last_sent_seq = False, -1
             self.request = self._count_message
 
 
 class Download(Operation):
-    """Asks for the count, then for each item in turn."""
+    """Requests the count, then each item in turn."""
 
     only_reads = True
 
@@ -98,21 +96,21 @@ class Download(Operation):
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Items transferred, and items in all."""
+        """Transferred items and their total."""
         return len(self._items), self._count
 
-    def silence(self) -> str:
-        """Return what the vehicle failed to do."""
+    def missing_answer(self) -> str:
+        """Return a description of the missing answer."""
         if not self.waits_for_item:
             return "did not answer the request for its mission"
         return f"did not send item {len(self._items)} of {self._count}"
 
     def receive(self, message: Message) -> list[Message]:
-        """Take the vehicle's message, and return the answers to it."""
+        """Process a message from the vehicle, and return the answers."""
         kind = message.get_type()
         if self.result is not None:
             return []
-        if kind == "MISSION_COUNT" and self._is_news(message):
+        if kind == "MISSION_COUNT" and self._is_new_count(message):
             self._items, self._count = [], message.count
             self.plan_id = message.opaque_id
             self.waits_for_item = True
@@ -123,8 +121,8 @@ class Download(Operation):
             self.refused(message.type, len(self._items) if self.waits_for_item else None)
         return []
 
-    def _is_news(self, message: Message) -> bool:
-        """Tell a count from a late copy: another plan than the one half across begins again."""
+    def _is_new_count(self, message: Message) -> bool:
+        """Return False for a late copy of the count; the count of another plan restarts the download."""
         known = (self._count, self.plan_id)
         return not self.waits_for_item or (message.count, message.opaque_id) != known
 
@@ -133,9 +131,9 @@ class Download(Operation):
             self._items.append(item_from_message(message))
             return self._ask_next_item()
         if message.seq > len(self._items) and not self._asked_early:
-            self._asked_early = True  # once only, or duplicates would multiply
+            self._asked_early = True  # only once, else duplicates would multiply
             return [self.request]
-        return []  # a copy of what we have
+        return []  # a copy of a received item
 
     def _ask_next_item(self) -> list[Message]:
         seq = len(self._items)

@@ -1,7 +1,7 @@
-"""The ground station's side of the parameter protocol, without I/O.
+"""Client of the parameter protocol, sans-IO.
 
-``start_…`` begins an operation, ``poll`` returns what to send, ``receive`` takes what came, and ``result`` says how
-it ended. One operation at a time; a new ``start_…`` replaces the one under way.
+``start_…`` begins an operation, ``poll`` returns the messages to send, ``receive`` processes received ones, and
+``result`` is the result at the end. One operation at a time; a new ``start_…`` replaces the current one.
 """
 
 from __future__ import annotations
@@ -33,29 +33,29 @@ class ParamClient:
         self._sends_left = 0
 
     def start_list(self) -> None:
-        """Fetch all parameters."""
+        """Read all parameters."""
         self._start(ListAll(self.vehicle, self._timing))
 
     def start_get(self, name: str) -> None:
-        """Fetch one parameter."""
+        """Read one parameter."""
         self._start(ReadOrSet(self.vehicle, self._timing, name, None))
 
     def start_set(self, name: str, value: float) -> None:
-        """Ask for the parameter's type, set it to the finite ``value``, and see it confirmed."""
+        """Read the parameter's type, set it to the finite ``value``, and wait for the confirmation."""
         self._start(ReadOrSet(self.vehicle, self._timing, name, float(value)))
 
     @property
     def result(self) -> ParamResult | None:
-        """How the operation ended; None while it is under way."""
+        """Result of the operation; None before its end."""
         return None if self._operation is None else self._operation.result
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Parameters received, and those in all (0 before that is known)."""
+        """Received parameters and their total (0 before the count is known)."""
         return (0, 0) if self._operation is None else self._operation.progress
 
     def receive(self, message: Message, now_s: float) -> None:
-        """Take a message from the vehicle's link; what is not for this operation is ignored."""
+        """Process a message; messages that do not belong to this operation are ignored."""
         operation = self._operation
         if operation is None or self._deadline_s is None or not is_from(message, self.vehicle):
             return
@@ -74,7 +74,7 @@ class ParamClient:
         if operation is None or self._deadline_s is None or now_s < self._deadline_s:
             return []
         if self._sends_left == 0:
-            operation.result = operation.silence()
+            operation.result = operation.missing_answer()
             self._deadline_s = None
             return []
         self._sends_left -= 1
@@ -83,7 +83,7 @@ class ParamClient:
         return requests
 
     def next_deadline(self) -> float | None:
-        """Return when to poll next if nothing arrives before; -inf for at once, None for never."""
+        """Return the time of the next ``poll`` without an earlier message; -inf: immediately, None: never."""
         return self._deadline_s
 
     def _start(self, operation: Operation) -> None:

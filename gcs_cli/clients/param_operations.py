@@ -1,4 +1,4 @@
-"""What the client of the parameter protocol can be busy with: one parameter, or all of them."""
+"""The operations of the parameter client: read or set one parameter, read all."""
 
 from __future__ import annotations
 
@@ -26,36 +26,36 @@ _REASONS = {
     7: "the type of the value is not the parameter's",
     8: "the vehicle could not read the parameter",
 }
-"""MAV_PARAM_ERROR in words."""
+"""Description of each MAV_PARAM_ERROR."""
 
 
 class ParamTiming(NamedTuple):
-    """Waits of the protocol [s of whatever clock drives it]."""
+    """Timeouts of the protocol [s of the clock that drives it]."""
 
     timeout_s: float = 0.5
-    """Before a request is sent again."""
+    """Time after which a request is sent again."""
     quiet_s: float = 0.2
-    """Silence in a list after which the missing parameters are asked for."""
+    """Time without messages after which missing parameters of a list are requested."""
     retries: int = 20
-    """Repetitions without any progress."""
+    """Repetitions without progress."""
     window: int = 20
-    """Missing parameters asked for at once."""
+    """Missing parameters per request."""
 
 
 class ParamDone(NamedTuple):
-    """What the vehicle told: the one parameter, or all in the order of their index."""
+    """The read parameter, or all in the order of their index."""
 
     parameters: tuple[Parameter, ...]
 
 
 class ParamFailed(NamedTuple):
-    """Why an operation failed, in one sentence."""
+    """The reason of a failure, in one sentence."""
 
     reason: str
     error: int | None
-    """The vehicle's MAV_PARAM_ERROR; None when it gave none."""
+    """The vehicle's MAV_PARAM_ERROR; None without one."""
     silent: bool
-    """Whether the vehicle did not answer."""
+    """True if the vehicle did not answer."""
 
 
 ParamResult: TypeAlias = ParamDone | ParamFailed
@@ -63,35 +63,35 @@ DEFAULT_TIMING = ParamTiming()
 
 
 class Operation(Protocol):
-    """What an operation does with messages; the client does the waiting."""
+    """The messages of an operation; the client handles timeouts."""
 
     result: ParamResult | None
 
     @property
     def wait_s(self) -> float:
-        """How long to wait now for the next message."""
+        """Timeout of the next message [s]."""
         ...
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Parameters received, and those in all (0 before that is known)."""
+        """Received parameters and their total (0 before the count is known)."""
         ...
 
     def requests(self) -> list[Message]:
-        """Return what to ask now; each call is an attempt."""
+        """Return the requests to send now; each call is one attempt."""
         ...
 
     def receive(self, message: Message) -> bool:
-        """Take a PARAM_VALUE or PARAM_ERROR; return whether it brought the operation on."""
+        """Process a PARAM_VALUE or PARAM_ERROR; return True if the operation made progress."""
         ...
 
-    def silence(self) -> ParamFailed:
-        """Return how the operation ends when nothing comes any more."""
+    def missing_answer(self) -> ParamFailed:
+        """Return the failure of an operation without an answer."""
         ...
 
 
 class ReadOrSet:
-    """Reads one parameter, and then sets it if there is a value to set."""
+    """Reads one parameter, and sets it if a value is given."""
 
     def __init__(self, vehicle: Address, timing: ParamTiming, name: str, wanted: float | None) -> None:
         self.result: ParamResult | None = None
@@ -103,54 +103,54 @@ class ReadOrSet:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Parameters received, and those in all (0 before that is known)."""
+        """Received parameters and their total (0 before the count is known)."""
         return int(self.result is not None), 1
 
     def requests(self) -> list[Message]:
-        """Return what to ask now."""
+        """Return the requests to send now."""
         self._is_asked = True
         self.wait_s = self._timeout_s
         name = self._name.encode("ascii", errors="replace")[:16]
         if self._found is None:
             return [mavlink.MAVLink_param_request_read_message(*self._vehicle, name, -1)]
         is_integer = self._found.is_integer
-        assert self._wanted is not None  # without a value to set, what was found is the result
+        assert self._wanted is not None  # without a value, the read parameter is the result
         value = wire_value(as_float32(self._wanted) if not is_integer else self._wanted, is_integer)
         return [mavlink.MAVLink_param_set_message(*self._vehicle, name, value, type_of(is_integer))]
 
     def receive(self, message: Message) -> bool:
-        """Take a PARAM_VALUE or PARAM_ERROR; return whether it brought the operation on."""
+        """Process a PARAM_VALUE or PARAM_ERROR; return True if the operation made progress."""
         if message.param_id != self._name or not self._is_asked:
             return False
         if message.get_type() == "PARAM_ERROR":
             reason = _REASONS.get(message.error, f"the vehicle answered error {message.error}")
             self.result = ParamFailed(reason, message.error, False)
             return True
-        told = parse_value(message)
-        if told is None:
+        parameter = parse_value(message)
+        if parameter is None:
             self.result = ParamFailed(f"its type {message.param_type} is not supported", None, False)
-        elif self._wanted is None or self._is_confirmed(told):
-            self.result = ParamDone((told,))
+        elif self._wanted is None or self._is_confirmed(parameter):
+            self.result = ParamDone((parameter,))
         else:
-            return self._find(told, self._wanted)
+            return self._find(parameter, self._wanted)
         return True
 
-    def _is_confirmed(self, told: Parameter) -> bool:
-        """Tell whether the parameter has the wanted value. (If it had so before, there is nothing to do.)"""
-        return self._wanted is not None and as_float32(told.value) == as_float32(self._wanted)
+    def _is_confirmed(self, parameter: Parameter) -> bool:
+        """Return True if the parameter has the wanted value, also if it had it before."""
+        return self._wanted is not None and as_float32(parameter.value) == as_float32(self._wanted)
 
-    def _find(self, told: Parameter, wanted: float) -> bool:
-        """Note the type. A value that is still another may be an old message: the vehicle is asked again."""
-        is_first, self._found = self._found is None, told
-        if told.is_integer and not (wanted.is_integer() and abs(wanted) <= LARGEST_INTEGER):
+    def _find(self, parameter: Parameter, wanted: float) -> bool:
+        """Store the type. Another value may be an old message: the request is repeated."""
+        is_first, self._found = self._found is None, parameter
+        if parameter.is_integer and not (wanted.is_integer() and abs(wanted) <= LARGEST_INTEGER):
             self.result = ParamFailed("the parameter is an integer", None, False)
             return True
         if is_first:
             self.wait_s = 0.0  # set it at once
         return is_first
 
-    def silence(self) -> ParamFailed:
-        """Return how the operation ends when nothing comes any more."""
+    def missing_answer(self) -> ParamFailed:
+        """Return the failure of an operation without an answer."""
         if self._found is not None:
             return ParamFailed(f"the vehicle keeps {self._found.value:g}", None, False)
         return ParamFailed(
@@ -159,7 +159,7 @@ class ReadOrSet:
 
 
 class ListAll:
-    """Reads all parameters; those that got lost are asked for by index."""
+    """Reads all parameters; lost ones are requested by index."""
 
     def __init__(self, vehicle: Address, timing: ParamTiming) -> None:
         self.result: ParamResult | None = None
@@ -170,16 +170,16 @@ class ListAll:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Parameters received, and those in all (0 before that is known)."""
+        """Received parameters and their total (0 before the count is known)."""
         return len(self._got), self._count
 
     @property
     def wait_s(self) -> float:
-        """How long to wait now for the next message."""
+        """Timeout of the next message [s]."""
         return self._timing.quiet_s if self._count else self._timing.timeout_s
 
     def requests(self) -> list[Message]:
-        """Return what to ask now."""
+        """Return the requests to send now."""
         self._is_asked = True
         if not self._count:
             return [mavlink.MAVLink_param_request_list_message(*self._vehicle)]
@@ -190,23 +190,23 @@ class ListAll:
         ]
 
     def receive(self, message: Message) -> bool:
-        """Take a PARAM_VALUE or PARAM_ERROR; return whether it brought the operation on."""
+        """Process a PARAM_VALUE or PARAM_ERROR; return True if the operation made progress."""
         if message.get_type() != "PARAM_VALUE" or not self._is_asked:
             return False
-        if message.param_count != self._count:  # the first message, or the vehicle is another one now
+        if message.param_count != self._count:  # the first message, or another vehicle
             self._count = message.param_count
             self._got.clear()
-        told = parse_value(message)
-        if told is None or message.param_id == HASH_NAME or told.place >= self._count:
+        parameter = parse_value(message)
+        if parameter is None or message.param_id == HASH_NAME or parameter.place >= self._count:
             return False
-        is_new = told.place not in self._got
-        self._got[told.place] = told
+        is_new = parameter.place not in self._got
+        self._got[parameter.place] = parameter
         if len(self._got) == self._count:
             self.result = ParamDone(tuple(self._got[index] for index in range(self._count)))
         return is_new
 
-    def silence(self) -> ParamFailed:
-        """Return how the operation ends when nothing comes any more."""
+    def missing_answer(self) -> ParamFailed:
+        """Return the failure of an operation without an answer."""
         system = f"the vehicle (system {self._vehicle.system})"
         if not self._count:
             return ParamFailed(f"{system} did not send its parameters", None, True)

@@ -1,224 +1,191 @@
-"""``gcs arm``, ``takeoff``, ``goto``, ``mode`` and their like: one command, one line."""
+"""``gcs arm``, ``takeoff``, ``goto``, ``mode`` and similar: one command to the vehicle, one line of output."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from flightstack.process.command_line import make_app
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.settings import ConnectOption, InstanceOption, TimeoutOption, meet_vehicle
+from gcs_cli.link import calls
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.vehicle_link import connect_vehicle
+from gcs_cli.option_groups import expand_options
+from gcs_cli.settings import LinkOptions
 from gcs_cli.vehicle.px4_modes import mode_numbers, settable_modes
 
-if TYPE_CHECKING:
-    from gcs_cli.link.connection import Connection
+app = make_app(add_completion=False)
+
+_HOME_WAIT_S = 3.0
 
 
-def order(connection: Connection, command: tuple[int, Sequence[float]], name: str) -> None:
-    """Send a command and wait for its answer; raise CliError with the vehicle's reason."""
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    number, params = command
-    connection.complete(calls.command(connection.session, number, params, connection.now_s), name)
-
-
-def arm(
-    context: typer.Context,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
+@app.command()
+@expand_options
+def arm(context: typer.Context, link: LinkOptions) -> None:
     """Arm the vehicle."""
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        order(connection, calls.ARM, "arming")
+    with connect_vehicle(context, link) as connection:
+        connection.command(calls.ARM, "arming")
     typer.echo("armed")
 
 
+@app.command()
+@expand_options
 def disarm(
     context: typer.Context,
-    force: Annotated[bool, typer.Option("--force", help="Also in the air: the rotors stop.")] = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
+    link: LinkOptions,
+    force: Annotated[bool, typer.Option("--force", help="Disarm in the air too: the rotors stop.")] = False,
 ) -> None:
     """Disarm the vehicle."""
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        order(connection, calls.FORCE_DISARM if force else calls.DISARM, "disarming")
+    with connect_vehicle(context, link) as connection:
+        connection.command(calls.FORCE_DISARM if force else calls.DISARM, "disarming")
     typer.echo("disarmed")
 
 
+@app.command()
+@expand_options
 def takeoff(
     context: typer.Context,
-    alt: Annotated[float | None, typer.Option("--alt", metavar="METRES", help="Altitude above home.")] = None,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
+    link: LinkOptions,
+    alt: Annotated[
+        float | None,
+        typer.Option("--alt", metavar="METRES", min=0.1, max=10_000.0, help="Altitude above home."),
+    ] = None,
 ) -> None:
-    """Take off; a disarmed vehicle is armed for it."""
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    if alt is not None and not 0.0 < alt < 1e4:
-        raise CliError(f"--alt {alt:g}: expected metres above zero", USAGE)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+    """Take off; arm first if disarmed."""
+    with connect_vehicle(context, link) as connection:
         altitude_amsl_m = calls.NAN if alt is None else alt + _home_altitude_m(connection)
-        order(connection, calls.takeoff_command(altitude_amsl_m), "takeoff")
+        connection.command(calls.takeoff_command(altitude_amsl_m), "takeoff")
         if not connection.session.view.armed:
-            order(connection, calls.ARM, "arming for takeoff")
+            connection.command(calls.ARM, "arming for takeoff")
     typer.echo("taking off" if alt is None else f"taking off to {alt:g} m")
 
 
 def _home_altitude_m(connection: Connection) -> float:
-    """Return home's altitude above sea level, in which the takeoff command counts."""
+    """Return the altitude of home above mean sea level, the reference of MAV_CMD_NAV_TAKEOFF."""
     session = connection.session
-    if not connection.wait_for(lambda: session.view.home is not None or session.view.geo is not None, 3.0):
-        raise CliError("takeoff: the vehicle does not tell its position, and --alt needs it; leave it out")
+    if not connection.wait_for(
+        lambda: session.view.home is not None or session.view.geo is not None, _HOME_WAIT_S
+    ):
+        raise CliError("takeoff: the vehicle does not send its position, which --alt needs: leave --alt out")
     if session.view.home is not None:
         return session.view.home.altitude_m
     assert session.view.geo is not None
     return session.view.geo.altitude_m - session.view.geo.relative_altitude_m
 
 
-def land(
-    context: typer.Context,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
-    """Land where the vehicle is."""
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        order(connection, calls.LAND, "landing")
+@app.command()
+@expand_options
+def land(context: typer.Context, link: LinkOptions) -> None:
+    """Land at the current position."""
+    with connect_vehicle(context, link) as connection:
+        connection.command(calls.LAND, "landing")
     typer.echo("landing")
 
 
-def rtl(
-    context: typer.Context,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
+@app.command()
+@expand_options
+def rtl(context: typer.Context, link: LinkOptions) -> None:
     """Return to launch and land."""
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        order(connection, calls.RETURN, "return")
+    with connect_vehicle(context, link) as connection:
+        connection.command(calls.RETURN, "return")
     typer.echo("returning to launch")
 
 
-def hold(
-    context: typer.Context,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
+@app.command()
+@expand_options
+def hold(context: typer.Context, link: LinkOptions) -> None:
     """Hold the position."""
-    mode(context, "hold", connect, timeout, instance)
+    _select_mode(context, link, "hold")
 
 
+@app.command()
+@expand_options
 def mode(
     context: typer.Context,
+    link: LinkOptions,
     name: Annotated[str, typer.Argument(help="hold, mission, takeoff, land, rtl …")],
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
     """Select a flight mode."""
+    _select_mode(context, link, name)
+
+
+def _select_mode(context: typer.Context, link: LinkOptions, name: str) -> None:
     numbers = mode_numbers(name)
     if numbers is None:
         known = ", ".join(settable_modes()).lower()
-        raise CliError(f"mode {name}: there is none; known are {known}", USAGE)
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        order(connection, calls.mode_command(*numbers), f"mode {name.lower()}")
+        raise CliError(f"mode {name}: unknown mode; known are {known}", USAGE)
+    with connect_vehicle(context, link) as connection:
+        connection.command(calls.mode_command(*numbers), f"mode {name.lower()}")
     typer.echo(f"mode {name.lower()}")
 
 
+@app.command()
+@expand_options
 def goto(
     context: typer.Context,
-    latitude: Annotated[float, typer.Argument(help="Degrees.")],
-    longitude: Annotated[float, typer.Argument(help="Degrees.")],
+    link: LinkOptions,
+    latitude: Annotated[float, typer.Argument(min=-90.0, max=90.0, help="Degrees.")],
+    longitude: Annotated[float, typer.Argument(min=-180.0, max=180.0, help="Degrees.")],
     alt: Annotated[float | None, typer.Option("--alt", metavar="METRES", help="Altitude above home.")] = None,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
-    """Fly to a place and hold there.
+    """Fly to a position and hold there.
 
     Put -- before negative degrees.
     """
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
-        raise CliError(f"goto {latitude:g} {longitude:g}: not a place on earth", USAGE)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+    with connect_vehicle(context, link) as connection:
         altitude_amsl_m = calls.NAN if alt is None else alt + _home_altitude_m(connection)
-        order(connection, calls.goto_command(latitude, longitude, altitude_amsl_m), "goto")
+        connection.command(calls.goto_command(latitude, longitude, altitude_amsl_m), "goto")
     typer.echo(f"flying to {latitude:.7f} {longitude:.7f}" + ("" if alt is None else f" at {alt:g} m"))
 
 
+@app.command()
+@expand_options
 def speed(
     context: typer.Context,
-    metres_per_second: Annotated[float, typer.Argument(help="Ground speed [m/s]; -2 for the usual one.")],
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
+    link: LinkOptions,
+    metres_per_second: Annotated[float, typer.Argument(help="Ground speed [m/s]; -2 for the default.")],
 ) -> None:
-    """Fly at another speed until disarmed."""
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        order(connection, calls.speed_command(metres_per_second), "speed")
+    """Set the ground speed until disarmed."""
+    with connect_vehicle(context, link) as connection:
+        connection.command(calls.speed_command(metres_per_second), "speed")
     typer.echo(
-        "flying at the usual speed" if metres_per_second < 0.0 else f"flying at {metres_per_second:g} m/s"
+        "flying at the default speed" if metres_per_second < 0.0 else f"flying at {metres_per_second:g} m/s"
     )
 
 
+@app.command()
+@expand_options
 def sethome(
     context: typer.Context,
+    link: LinkOptions,
     place: Annotated[
-        list[float] | None, typer.Argument(help="Latitude, longitude, altitude above the sea [here].")
+        list[float] | None,
+        typer.Argument(help="Latitude, longitude, altitude above mean sea level [current position]."),
     ] = None,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
-    """Move home, where a return goes.
+    """Set the home position.
 
-    Altitudes count from there. Put -- before negative degrees.
+    A return goes there, and relative altitudes are measured from it. Put -- before negative degrees.
     """
-    from gcs_cli.link import calls  # noqa: PLC0415
-
     if place and len(place) != 3:
-        raise CliError("sethome: give latitude, longitude and altitude, or nothing for here", USAGE)
-    target = (place[0], place[1], place[2]) if place else None
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        order(connection, calls.home_command(target), "sethome")
+        raise CliError(
+            "sethome: give latitude, longitude and altitude, or nothing for the current position", USAGE
+        )
+    home = (place[0], place[1], place[2]) if place else None
+    with connect_vehicle(context, link) as connection:
+        connection.command(calls.home_command(home), "sethome")
     typer.echo(
-        "home is here" if target is None else f"home is {target[0]:.7f} {target[1]:.7f} {target[2]:g} m"
+        "home is the current position"
+        if home is None
+        else f"home is {home[0]:.7f} {home[1]:.7f} {home[2]:g} m"
     )
 
 
-def reboot(
-    context: typer.Context,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
-    """Reboot the vehicle, which must stand on the ground."""
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        order(connection, calls.REBOOT, "reboot")
+@app.command()
+@expand_options
+def reboot(context: typer.Context, link: LinkOptions) -> None:
+    """Reboot the vehicle, which must be on the ground."""
+    with connect_vehicle(context, link) as connection:
+        connection.command(calls.REBOOT, "reboot")
     typer.echo("rebooting")
-
-
-ACTIONS: tuple[Callable[..., None], ...] = (
-    arm, disarm, takeoff, land, rtl, hold, goto, speed, sethome, mode, reboot,
-)  # fmt: skip

@@ -3,22 +3,36 @@
 from __future__ import annotations
 
 import json
+import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
+from rich import box
+from rich.table import Table
+from rich.text import Text
 
+from flightstack.core.atomic_file import check_new, write_text_atomically
+from flightstack.process.command_line import make_app
 from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.fly.fly_display import FlyConsole
+from gcs_cli.report.compare import (
+    ComparedRun,
+    Row,
+    comparison,
+    condition_rows,
+    figure_rows,
+    read_runs,
+    render_comparison,
+)
 from gcs_cli.settings import JsonOption, OverwriteOption
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from gcs_cli.report.compare import ComparedRun, Row
+app = make_app(add_completion=False)
 
 
+@app.command()
 def compare(
     runs: Annotated[
         list[Path],
@@ -33,10 +47,6 @@ def compare(
 
     Writes a page with their charts overlaid, and prints their figures side by side.
     """
-    from flightstack.core.atomic_file import check_new, write_text_atomically  # noqa: PLC0415
-    from gcs_cli.fly.fly_display import FlyConsole  # noqa: PLC0415
-    from gcs_cli.report.compare import comparison, read_runs, render_comparison  # noqa: PLC0415
-
     if len(runs) < 2:
         raise CliError("give two flights or more to compare", USAGE)
     check_new(out, overwrite)
@@ -52,18 +62,11 @@ def compare(
         console.print(comparison_table(read))
         console.print(f"page written to {out}", markup=False, soft_wrap=True)
     if open_page:
-        import webbrowser  # noqa: PLC0415
-
         webbrowser.open(out.resolve().as_uri())
 
 
 def comparison_table(runs: Sequence[ComparedRun]) -> Table:
     """Return conditions and figures, a column for each flight."""
-    from rich import box  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
-
-    from gcs_cli.report.compare import condition_rows, figure_rows  # noqa: PLC0415
-
     summaries = [run.summary for run in runs]
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("")
@@ -78,8 +81,6 @@ def comparison_table(runs: Sequence[ComparedRun]) -> Table:
 
 
 def _cells(row: Row, mark: str) -> list[Any]:
-    from rich.text import Text  # noqa: PLC0415
-
     cells = [
         Text.assemble(text, (f"  {change}" if change else "", "bright_black"))
         for text, change in zip(row.texts, row.changes, strict=True)
@@ -88,6 +89,4 @@ def _cells(row: Row, mark: str) -> list[Any]:
 
 
 def _plain(name: str) -> Any:
-    from rich.text import Text  # noqa: PLC0415
-
     return Text(name)

@@ -5,43 +5,36 @@ from __future__ import annotations
 import json
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from flightstack.core.atomic_file import check_new, write_bytes_atomically
+from flightstack.mavlink.files import Entry
 from flightstack.process.command_line import make_app
+from gcs_cli.clients.log_client import LogEntry
 from gcs_cli.errors import FAILED, USAGE, CliError
-from gcs_cli.settings import (
-    ConnectOption,
-    InstanceOption,
-    JsonOption,
-    OverwriteOption,
-    TimeoutOption,
-    meet_vehicle,
-)
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.vehicle_link import connect_vehicle
+from gcs_cli.option_groups import expand_options
+from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
+from gcs_cli.transfers import log_calls
+from gcs_cli.tui.transfer_bar import TransferBar
 
-if TYPE_CHECKING:
-    from flightstack.mavlink.files import Entry
-    from gcs_cli.clients.log_client import LogEntry
-    from gcs_cli.link.connection import Connection
-
-app = make_app(help="The vehicle's flight logs.", no_args_is_help=True)
+app = make_app(add_completion=False)
 
 _KILO = 1000.0
 
 
 @app.command("list")
+@expand_options
 def list_logs(
     context: typer.Context,
+    link: LinkOptions,
     as_json: JsonOption = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
     """List the logs, the oldest first."""
-    from gcs_cli.transfers import log_calls  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+    with connect_vehicle(context, link) as connection:
         logs = log_calls.fetch_list(connection)
         files = log_calls.fetch_files(connection) if logs else ()
     named = [(log, log_calls.file_of(log, logs, files)) for log in logs]
@@ -56,44 +49,57 @@ def list_logs(
 
 
 @app.command()
+@expand_options
 def download(
     context: typer.Context,
+    link: LinkOptions,
     log_id: Annotated[
         str, typer.Argument(metavar="[ID|latest]", help="Which log.", show_default=False)
     ] = "latest",
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The file to write; with --all, the folder.", show_default=False),
+        typer.Option("--output", "-o", help="File to write; with --all, the folder.", show_default=False),
     ] = None,
     everything: Annotated[
-        bool, typer.Option("--all", help="All logs; those that are here already are left out.")
+        bool, typer.Option("--all", help="All logs, except those that are already in the folder.")
     ] = False,
     overwrite: OverwriteOption = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
-    """Fetch a log, or all of them."""
-    from gcs_cli.transfers import log_calls  # noqa: PLC0415
-
+    """Download a log, or all of them."""
     number = _number(log_id)
     if everything and log_id != "latest":
         raise CliError("give either a log or --all", USAGE)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+    with connect_vehicle(context, link) as connection:
         logs = log_calls.fetch_list(connection)
         if not logs:
             raise CliError("the vehicle has no logs")
         files = log_calls.fetch_files(connection)
-        refused: list[str] = []
-        for log in logs if everything else [_chosen(logs, number)]:
+        if everything:
+            _download_all(connection, logs, files, output, overwrite)
+        else:
+            log = _chosen(logs, number)
             file = log_calls.file_of(log, logs, files)
-            path = _path(log, file, output, everything)
-            if everything and path.exists() and path.stat().st_size == log.size:
-                typer.echo(f"{path} is here already")
-            elif everything and path.is_file() and not overwrite:
-                refused.append(str(path))  # a log that has grown since, or another file
-            else:
-                _fetch(connection, log, file, path, overwrite)
+            _download(connection, log, file, _path(log, file, output, False), overwrite)
+
+
+def _download_all(
+    connection: Connection,
+    logs: tuple[LogEntry, ...],
+    files: tuple[Entry, ...],
+    output: Path | None,
+    overwrite: bool,
+) -> None:
+    """Download the logs that are not in the folder yet; raise CliError if files of other sizes are in the way."""
+    refused: list[str] = []
+    for log in logs:
+        file = log_calls.file_of(log, logs, files)
+        path = _path(log, file, output, True)
+        if path.exists() and path.stat().st_size == log.size:
+            typer.echo(f"{path} exists already")
+        elif path.is_file() and not overwrite:
+            refused.append(str(path))  # a log that has grown since, or another file
+        else:
+            _download(connection, log, file, path, overwrite)
     if refused:
         verb = "exists" if len(refused) == 1 else "exist"
         raise CliError(
@@ -102,11 +108,7 @@ def download(
         )
 
 
-def _fetch(connection: Connection, log: LogEntry, file: Entry | None, path: Path, overwrite: bool) -> None:
-    from flightstack.core.atomic_file import check_new, write_bytes_atomically  # noqa: PLC0415
-    from gcs_cli.transfers import log_calls  # noqa: PLC0415
-    from gcs_cli.tui.transfer_bar import TransferBar  # noqa: PLC0415
-
+def _download(connection: Connection, log: LogEntry, file: Entry | None, path: Path, overwrite: bool) -> None:
     check_new(path, overwrite)
     began_s = connection.now_s
     with TransferBar(f"log {log.log_id}") as bar:
@@ -119,7 +121,7 @@ def _fetch(connection: Connection, log: LogEntry, file: Entry | None, path: Path
 
 
 def _number(text: str) -> int | None:
-    """Return the number of a log; None for the latest. Raise CliError (usage)."""
+    """Return the number of a log, or None for the latest; raise CliError (usage)."""
     if text == "latest":
         return None
     if not (text.isascii() and text.isdecimal() and len(text) <= 5):
@@ -134,7 +136,7 @@ def _chosen(logs: tuple[LogEntry, ...], number: int | None) -> LogEntry:
         if log.log_id == number:
             return log
     first, last = logs[0].log_id, logs[-1].log_id
-    raise CliError(f"there is no log {number}: the vehicle has {first} to {last}", FAILED)
+    raise CliError(f"no log {number}: the vehicle has {first} to {last}", FAILED)
 
 
 def _path(log: LogEntry, file: Entry | None, output: Path | None, everything: bool) -> Path:
@@ -163,7 +165,7 @@ def _time_text(log: LogEntry) -> str:
 
 
 def size_text(size: float) -> str:
-    """Show a number of bytes with three digits."""
+    """Format a number of bytes with three digits."""
     for unit in ("B", "kB", "MB"):
         if size < _KILO:
             return f"{size:.0f} {unit}" if unit == "B" else f"{size:.3g} {unit}"

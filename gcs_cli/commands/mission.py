@@ -4,24 +4,31 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from flightstack.core.atomic_file import check_new
+from flightstack.core.geodesy import GeoPoint
+from flightstack.plan import MissionItem, MissionType, Plan, command_name, load_plan, save_plan
 from flightstack.process.command_line import make_app
-from gcs_cli.settings import ConnectOption, InstanceOption, OverwriteOption, TimeoutOption, meet_vehicle
+from gcs_cli.errors import FAILED, CliError, VehicleLostError
+from gcs_cli.fly.processes import Interruption
+from gcs_cli.link import calls
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.vehicle_link import connect_vehicle
+from gcs_cli.option_groups import expand_options
+from gcs_cli.settings import LinkOptions, OverwriteOption
 from gcs_cli.transfers.plan_files import PlanArgument
+from gcs_cli.transfers.plan_parts import Uploads, parts_to_send, plan_parts, plan_problem
 
-if TYPE_CHECKING:
-    from flightstack.plan import MissionItem
-    from gcs_cli.link.connection import Connection
-    from gcs_cli.transfers.plan_parts import Uploads
+app = make_app(add_completion=False)
 
-app = make_app(help="The vehicle's mission.", no_args_is_help=True)
+_HOME_WAIT_S = 3.0
 
 
 class Part(StrEnum):
-    """What ``--type`` may be."""
+    """Values of ``--type``."""
 
     MISSION = "mission"
     FENCE = "fence"
@@ -29,26 +36,25 @@ class Part(StrEnum):
     ALL = "all"
 
 
+_PART_NAMES = {
+    Part.MISSION: "mission",
+    Part.FENCE: "geofence",
+    Part.RALLY: "rally points",
+    Part.ALL: "mission, geofence and rally points",
+}
+
+
 @app.command()
-def upload(
-    context: typer.Context,
-    file: PlanArgument,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
+@expand_options
+def upload(context: typer.Context, link: LinkOptions, file: PlanArgument) -> None:
     """Replace the vehicle's mission by that of a file.
 
-    Geofence and rally points are replaced if the file has any, else the vehicle keeps its own. They go first, because
-    the vehicle checks the mission against them. If a part is refused, or after Ctrl-C, the vehicle gets back the plans
-    that it held before; a second Ctrl-C ends at once.
+    Geofence and rally points are replaced if the file has any, else the vehicle keeps its own. They are uploaded
+    first, because the vehicle checks the mission against them. If a part is refused, or after Ctrl-C, the former
+    plans are restored; a second Ctrl-C ends at once.
     """
-    from flightstack.plan import load_plan  # noqa: PLC0415
-    from gcs_cli.fly.interruption import Interruption  # noqa: PLC0415
-    from gcs_cli.transfers.plan_parts import Uploads, parts_to_send  # noqa: PLC0415
-
     plan = load_plan(file)
-    with meet_vehicle(context, connect, timeout, instance) as connection, Interruption() as interruption:
+    with connect_vehicle(context, link) as connection, Interruption() as interruption:
         uploads = Uploads(connection.session, plan, restores=True, interrupted=lambda: interruption.reason)
         _complete(connection, uploads, file)
     for part in parts_to_send(plan):
@@ -58,8 +64,7 @@ def upload(
 
 
 def _complete(connection: Connection, uploads: Uploads, file: Path) -> None:
-    """Run an upload to its end; raise CliError, with what the vehicle holds if the upload ends early."""
-    from gcs_cli.errors import CliError, VehicleLostError  # noqa: PLC0415
+    """Run an upload to its end; if it ends early, raise CliError with the plans that the vehicle holds."""
 
     def name() -> str:
         return f"upload of the {uploads.name} of {file}"
@@ -76,15 +81,10 @@ def _complete(connection: Connection, uploads: Uploads, file: Path) -> None:
 
 @app.command()
 def check(file: PlanArgument) -> None:
-    """Check a file as the vehicle does, without one.
+    """Check a file as the vehicle does, without a vehicle.
 
-    Mission, geofence and rally points.
+    Checks mission, geofence and rally points.
     """
-    from flightstack.core.geodesy import GeoPoint  # noqa: PLC0415
-    from flightstack.plan import load_plan  # noqa: PLC0415
-    from gcs_cli.errors import FAILED, CliError  # noqa: PLC0415
-    from gcs_cli.transfers.plan_parts import plan_parts, plan_problem  # noqa: PLC0415
-
     plan = load_plan(file)
     first = next((item.position_deg for item in plan.items if item.position_deg is not None), (0.0, 0.0))
     problem = plan_problem(plan, plan.home or GeoPoint(*first, 0.0))
@@ -95,26 +95,20 @@ def check(file: PlanArgument) -> None:
 
 
 @app.command()
+@expand_options
 def download(
     context: typer.Context,
+    link: LinkOptions,
     file: Annotated[
-        Path | None, typer.Argument(help="Where to write it; without, it is printed.", show_default=False)
+        Path | None,
+        typer.Argument(help="File to write; without it, the plan is printed.", show_default=False),
     ] = None,
     overwrite: OverwriteOption = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
-    """Fetch the vehicle's mission, geofence and rally points."""
-    from flightstack.core.atomic_file import check_new  # noqa: PLC0415
-    from flightstack.core.geodesy import GeoPoint  # noqa: PLC0415
-    from flightstack.plan import MissionType, Plan, save_plan  # noqa: PLC0415
-    from gcs_cli.link import calls  # noqa: PLC0415
-    from gcs_cli.transfers.plan_parts import plan_parts  # noqa: PLC0415
-
+    """Download the vehicle's mission, geofence and rally points."""
     if file is not None:
         check_new(file, overwrite)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+    with connect_vehicle(context, link) as connection:
         session = connection.session
         items, fence, rally = (
             connection.complete(
@@ -122,9 +116,8 @@ def download(
             ).items
             for kind in (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)
         )
-        if file is not None:
-            # so that the file says where home is; a vehicle that does not tell leaves it open
-            connection.wait_for(lambda: session.view.home is not None, 3.0)
+        if file is not None:  # the file holds home too, if the vehicle sends it
+            connection.wait_for(lambda: session.view.home is not None, _HOME_WAIT_S)
         home = session.view.home
     plan = Plan(items, None if home is None else GeoPoint(*home[:3]), fence=fence, rally=rally)
     if file is not None:
@@ -138,52 +131,33 @@ def download(
 
 
 @app.command()
+@expand_options
 def clear(
     context: typer.Context,
+    link: LinkOptions,
     part: Annotated[Part, typer.Option("--type", help="What to remove.")] = Part.MISSION,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
     """Remove the vehicle's mission, geofence or rally points."""
-    from flightstack.plan import MissionType  # noqa: PLC0415
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    kind = MissionType[part.name]
-    name = {
-        Part.FENCE: "geofence",
-        Part.RALLY: "rally points",
-        Part.ALL: "mission, geofence and rally points",
-    }
-    said = name.get(part, "mission")
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        connection.complete(calls.clear(connection.session, kind), f"clearing the {said}")
-    typer.echo(f"{said} cleared")
+    name = _PART_NAMES[part]
+    with connect_vehicle(context, link) as connection:
+        connection.complete(calls.clear(connection.session, MissionType[part.name]), f"clearing the {name}")
+    typer.echo(f"{name} cleared")
 
 
 @app.command()
-def start(
-    context: typer.Context,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
+@expand_options
+def start(context: typer.Context, link: LinkOptions) -> None:
     """Start the mission; the vehicle arms for it."""
-    from gcs_cli.commands.actions import order  # noqa: PLC0415
-    from gcs_cli.link import calls  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        order(connection, calls.START_MISSION, "mission start")
+    with connect_vehicle(context, link) as connection:
+        connection.command(calls.START_MISSION, "mission start")
     typer.echo("mission started")
 
 
 def item_line(seq: int, item: MissionItem) -> str:
-    """Show one item on one line."""
-    from flightstack.plan import command_name  # noqa: PLC0415
-
-    place = ""
+    """Format one item on one line."""
+    position = ""
     if item.position_deg is not None:
         latitude, longitude = item.position_deg
-        place = f"{latitude:.7f} {longitude:.7f} {item.z:g} m"
+        position = f"{latitude:.7f} {longitude:.7f} {item.z:g} m"
     params = " ".join(f"{value:g}" for value in item.params)
-    return f"{seq:4d}  {command_name(item.command):<22} {place:<34} [{params}]".rstrip()
+    return f"{seq:4d}  {command_name(item.command):<22} {position:<34} [{params}]".rstrip()

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+import webbrowser
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from flightstack.process.command_line import make_app
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.settings import JsonOption, settings_of
+from gcs_cli.settings import JsonOption, OpenOption, settings_of
+
+app = make_app(add_completion=False)
 
 
+@app.command()
 def paper(
     context: typer.Context,
     out: Annotated[
@@ -33,7 +38,7 @@ def paper(
     jobs: Annotated[
         int | None, typer.Option(min=1, max=64, help="Flights at once.  [default: one for each processor]")
     ] = None,
-    open_report: Annotated[bool, typer.Option("--open", help="Open the report afterwards.")] = False,
+    open_report: OpenOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Fly every experiment of the paper and report the results.
@@ -41,15 +46,15 @@ def paper(
     A few minutes: report.html has verdicts, figures and tables, figures/ the figures as PDF and SVG, results.json the
     numbers, the same in each run.
     """
-    from gcs_cli.experiments.paper.printed import print_results  # noqa: PLC0415
-    from gcs_cli.experiments.paper.run import HTML_NAME, PaperOptions, run  # noqa: PLC0415
-    from gcs_cli.fly.fly_display import FlyConsole  # noqa: PLC0415
-    from gcs_cli.pil.targets import checked_target  # noqa: PLC0415
+    from gcs_cli.experiments.paper.printed import print_results
+    from gcs_cli.experiments.paper.run import HTML_NAME, PaperOptions, run
+    from gcs_cli.fly.fly_display import FlyConsole
+    from gcs_cli.pil.targets import checked_target
 
-    if settings_of(context).connect is not None:
+    if settings_of(context).link.connect is not None:
         raise CliError("paper flies vehicles of its own: leave --connect out", USAGE)
     if port is not None and no_pil:
-        raise CliError("--port names a target for what --no-pil leaves out: give one of them", USAGE)
+        raise CliError("--port and --no-pil exclude each other", USAGE)
     options = PaperOptions(out, not no_pil, not no_multibody, jobs=jobs)
     if port is not None:
         checked_target(port, flag="--port")
@@ -61,6 +66,4 @@ def paper(
     else:
         print_results(console, results, out)
     if open_report:
-        import webbrowser  # noqa: PLC0415
-
         webbrowser.open((out / HTML_NAME).resolve().as_uri())

@@ -4,55 +4,55 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich.console import Console
 
+from flightstack.core.atomic_file import check_new, write_text_atomically
+from flightstack.mavlink.param_values import Parameter
+from flightstack.params.param_file import is_parameter_name
 from flightstack.process.command_line import make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
-from gcs_cli.settings import (
-    ConnectOption,
-    InstanceOption,
-    JsonOption,
-    OverwriteOption,
-    TimeoutOption,
-    meet_vehicle,
+from gcs_cli.link import calls
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.vehicle_link import connect_vehicle
+from gcs_cli.option_groups import expand_options
+from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
+from gcs_cli.transfers import param_calls
+from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, load_parameters, number_text, render_parameters
+from gcs_cli.vehicle.param_table import (
+    change_line,
+    description,
+    facts,
+    is_changed,
+    matching,
+    parameter_table,
 )
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from flightstack.mavlink.param_values import Parameter
-    from gcs_cli.link.connection import Connection
-    from gcs_cli.vehicle.param_info import ParamInfo
-
-app = make_app(help="The vehicle's parameters.", no_args_is_help=True)
+app = make_app(add_completion=False)
 
 NameArgument = Annotated[str, typer.Argument(metavar="NAME", show_default=False)]
-_WIDE = 200  # columns where nobody looks: a pipe or a file
-_RESET_ALL = 2.0  # PREFLIGHT_STORAGE, parameter 1
+_WIDE = 200  # columns of a pipe or file
 
 
 @app.command("list")
+@expand_options
 def list_parameters(
     context: typer.Context,
+    link: LinkOptions,
     pattern: Annotated[
         str,
         typer.Argument(
-            metavar="[PATTERN]", help="A part of the name, or a pattern: MPC_*.", show_default=False
+            metavar="[PATTERN]", help="Part of the name, or a pattern: MPC_*.", show_default=False
         ),
     ] = "*",
     as_json: JsonOption = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
-    """List the parameters; those that are not at their default stand out."""
-    from gcs_cli.transfers import param_calls  # noqa: PLC0415
-    from gcs_cli.vehicle.param_table import matching  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+    """List the parameters; highlight those that are not at their default."""
+    with connect_vehicle(context, link) as connection:
         found = matching(param_calls.fetch_all(connection), pattern)
         infos = param_calls.fetch_metadata(connection) if found else {}
     if not found:
@@ -61,44 +61,29 @@ def list_parameters(
 
 
 @app.command()
-def get(
-    context: typer.Context,
-    name: NameArgument,
-    as_json: JsonOption = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
+@expand_options
+def get(context: typer.Context, link: LinkOptions, name: NameArgument, as_json: JsonOption = False) -> None:
     """Show one parameter."""
-    from gcs_cli.transfers import param_calls  # noqa: PLC0415
-    from gcs_cli.vehicle.param_info import UNKNOWN  # noqa: PLC0415
-    from gcs_cli.vehicle.param_table import description, facts  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        told = param_calls.fetch(connection, name.upper())
+    with connect_vehicle(context, link) as connection:
+        parameter = param_calls.fetch(connection, name.upper())
         infos = param_calls.fetch_metadata(connection)
     if as_json:
-        typer.echo(json.dumps(facts(told, infos)))
+        typer.echo(json.dumps(facts(parameter, infos)))
     else:
-        typer.echo(description(told, infos.get(told.name, UNKNOWN)))
+        typer.echo(description(parameter, infos.get(parameter.name, UNKNOWN)))
 
 
 @app.command("set", context_settings={"ignore_unknown_options": True})  # a value may be negative
+@expand_options
 def set_parameter(
     context: typer.Context,
+    link: LinkOptions,
     name: NameArgument,
     value: Annotated[str, typer.Argument(metavar="VALUE", show_default=False)],
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
     """Set a parameter."""
-    from gcs_cli.transfers import param_calls  # noqa: PLC0415
-    from gcs_cli.vehicle.param_info import UNKNOWN  # noqa: PLC0415
-    from gcs_cli.vehicle.param_table import change_line  # noqa: PLC0415
-
     number = _number(value)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+    with connect_vehicle(context, link) as connection:
         before = param_calls.fetch(connection, name.upper())
         after = param_calls.change(connection, name.upper(), number)
         infos = param_calls.fetch_metadata(connection)
@@ -106,81 +91,57 @@ def set_parameter(
 
 
 @app.command()
+@expand_options
 def reset(
     context: typer.Context,
+    link: LinkOptions,
     names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", show_default=False)] = None,
     everything: Annotated[bool, typer.Option("--all", help="All parameters.")] = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
-    """Give parameters their defaults back."""
+    """Reset parameters to their defaults."""
     if bool(names) == everything:
         raise CliError("reset: expected names of parameters, or --all", USAGE)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+    with connect_vehicle(context, link) as connection:
         if everything:
-            _reset_all(connection)
+            connection.command(calls.RESET_PARAMETERS, "reset of all parameters")
+            typer.echo("all parameters have their defaults")
         else:
             _reset_some(connection, [name.upper() for name in names or ()])
 
 
 @app.command()
+@expand_options
 def save(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(help="Where to write them.", show_default=False)],
+    link: LinkOptions,
+    file: Annotated[Path, typer.Argument(help="File to write.", show_default=False)],
     overwrite: OverwriteOption = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
     """Write all parameters to a file, as QGroundControl does."""
-    from flightstack.core.atomic_file import check_new, write_text_atomically  # noqa: PLC0415
-    from flightstack.params.param_file import is_parameter_name  # noqa: PLC0415
-    from gcs_cli.transfers import param_calls  # noqa: PLC0415
-    from gcs_cli.vehicle.param_file import render_parameters  # noqa: PLC0415
-
     check_new(file, overwrite)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        told = param_calls.fetch_all(connection)
-        kept = [parameter for parameter in told if is_parameter_name(parameter.name)]
-        write_text_atomically(file, render_parameters(kept, *connection.session.target))
-    typer.echo(f"{len(kept)} parameters saved to {file}")
-    if len(kept) < len(told):
-        names = ", ".join(parameter.name for parameter in told if parameter not in kept)
-        typer.echo(f"gcs: left out, as no parameter can have this name: {names}", err=True)
+    with connect_vehicle(context, link) as connection:
+        parameters = param_calls.fetch_all(connection)
+        saved = [parameter for parameter in parameters if is_parameter_name(parameter.name)]
+        write_text_atomically(file, render_parameters(saved, *connection.session.target))
+    typer.echo(f"{len(saved)} parameters saved to {file}")
+    if len(saved) < len(parameters):
+        names = ", ".join(parameter.name for parameter in parameters if parameter not in saved)
+        typer.echo(f"gcs: not saved, not valid as parameter names: {names}", err=True)
 
 
 @app.command()
+@expand_options
 def load(
     context: typer.Context,
+    link: LinkOptions,
     file: Annotated[
-        Path, typer.Argument(help="A file of this command or of QGroundControl.", show_default=False)
+        Path, typer.Argument(help="A file of `gcs param save` or of QGroundControl.", show_default=False)
     ],
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
     """Set the parameters that a file has; the others stay as they are."""
-    from gcs_cli.transfers import param_calls  # noqa: PLC0415
-    from gcs_cli.vehicle.param_file import load_parameters  # noqa: PLC0415
-
     wanted = load_parameters(file)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        present = {told.name: told for told in param_calls.fetch_all(connection)}
-        failures: list[str] = []
-        changed = 0
-        for name, value in wanted.items():
-            if name in present and _same(present[name].value, value):
-                continue
-            try:
-                if name not in present:
-                    raise CliError(f"{name}: the vehicle has no such parameter")
-                param_calls.change(connection, name, value)
-                changed += 1
-            except CliError as error:
-                if error.exit_code != FAILED:
-                    raise
-                failures.append(str(error))
+    with connect_vehicle(context, link) as connection:
+        failures, changed = _set_all(connection, wanted)
     typer.echo(f"{changed} of {len(wanted)} parameters changed")
     for failure in failures:
         typer.echo(f"gcs: {failure}", err=True)
@@ -188,62 +149,64 @@ def load(
         raise CliError(f"{len(failures)} parameters of {file} were not set")
 
 
+def _set_all(connection: Connection, wanted: dict[str, float]) -> tuple[list[str], int]:
+    """Set the parameters that differ; return the failures, and the number of changed ones."""
+    present = {parameter.name: parameter for parameter in param_calls.fetch_all(connection)}
+    failures: list[str] = []
+    changed = 0
+    for name, value in wanted.items():
+        if name in present and number_text(present[name].value) == number_text(value):
+            continue
+        try:
+            if name not in present:
+                raise CliError(f"{name}: the vehicle has no such parameter")
+            param_calls.change(connection, name, value)
+            changed += 1
+        except CliError as error:
+            if error.exit_code != FAILED:
+                raise
+            failures.append(str(error))
+    return failures, changed
+
+
 @app.command()
+@expand_options
 def diff(
     context: typer.Context,
+    link: LinkOptions,
     file: Annotated[
         Path | None, typer.Argument(help="A parameter file; without it, the defaults.", show_default=False)
     ] = None,
     as_json: JsonOption = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
-    """Show what differs from the defaults, or from a file."""
-    from gcs_cli.transfers import param_calls  # noqa: PLC0415
-    from gcs_cli.vehicle.param_file import load_parameters  # noqa: PLC0415
-    from gcs_cli.vehicle.param_info import UNKNOWN  # noqa: PLC0415
-    from gcs_cli.vehicle.param_table import is_changed  # noqa: PLC0415
-
+    """Show parameters that differ from the defaults, or from a file."""
     wanted = None if file is None else load_parameters(file)
-    with meet_vehicle(context, connect, timeout, instance) as connection:
-        told = param_calls.fetch_all(connection)
+    with connect_vehicle(context, link) as connection:
+        parameters = param_calls.fetch_all(connection)
         infos = param_calls.fetch_metadata(connection)
-    if wanted is not None:  # the file takes the place of the defaults
+    if wanted is not None:  # the values of the file take the place of the defaults
         infos = {name: infos.get(name, UNKNOWN)._replace(default=value) for name, value in wanted.items()}
     elif not infos:
         raise CliError(
-            "the vehicle does not tell the defaults of its parameters: name a file to compare with"
+            "the vehicle does not send the defaults of its parameters: name a file to compare with"
         )
-    different = [parameter for parameter in told if is_changed(parameter, infos)]
+    different = [parameter for parameter in parameters if is_changed(parameter, infos)]
     if different or as_json:
         _show(different, infos, as_json, "file" if file else "default")
     else:
         typer.echo(f"all parameters are as in {file}" if file else "all parameters have their defaults")
-    missing = sorted(set(wanted or ()) - {parameter.name for parameter in told})
+    missing = sorted(set(wanted or ()) - {parameter.name for parameter in parameters})
     if missing and not as_json:
         typer.echo(f"not known to the vehicle: {', '.join(missing)}")
 
 
-def _reset_all(connection: Connection) -> None:
-    from flightstack.mavlink.dialect import mavlink  # noqa: PLC0415
-    from gcs_cli.commands.actions import order  # noqa: PLC0415
-
-    order(connection, (int(mavlink.MAV_CMD_PREFLIGHT_STORAGE), (_RESET_ALL,)), "reset of all parameters")
-    typer.echo("all parameters have their defaults")
-
-
 def _reset_some(connection: Connection, names: Iterable[str]) -> None:
-    from gcs_cli.transfers import param_calls  # noqa: PLC0415
-    from gcs_cli.vehicle.param_info import UNKNOWN  # noqa: PLC0415
-    from gcs_cli.vehicle.param_table import change_line  # noqa: PLC0415
-
     infos = param_calls.fetch_metadata(connection)
     for name in names:
         before = param_calls.fetch(connection, name)
         info = infos.get(name, UNKNOWN)
         if info.default is None:
-            raise CliError(f"{name}: the vehicle does not tell its default: use `gcs param set {name} VALUE`")
+            raise CliError(f"{name}: the vehicle does not send its default: use `gcs param set {name} VALUE`")
         after = param_calls.change(connection, name, info.default)
         typer.echo(change_line(name, before.value, after.value, info))
 
@@ -251,13 +214,9 @@ def _reset_some(connection: Connection, names: Iterable[str]) -> None:
 def _show(
     parameters: Sequence[Parameter], infos: dict[str, ParamInfo], as_json: bool, compared: str = "default"
 ) -> None:
-    from gcs_cli.vehicle.param_table import facts, parameter_table  # noqa: PLC0415
-
     if as_json:
-        typer.echo(json.dumps([facts(told, infos) for told in parameters]))
+        typer.echo(json.dumps([facts(parameter, infos) for parameter in parameters]))
         return
-    from rich.console import Console  # noqa: PLC0415
-
     console = Console()
     if not console.is_terminal:
         console = Console(width=_WIDE)
@@ -272,9 +231,3 @@ def _number(text: str) -> float:
     if not math.isfinite(number):
         raise CliError(f"{text}: expected a number", USAGE)
     return number
-
-
-def _same(one: float, other: float) -> bool:
-    from gcs_cli.vehicle.param_info import number_text  # noqa: PLC0415
-
-    return number_text(one) == number_text(other)

@@ -4,57 +4,54 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
 
+from flightstack.process.command_line import make_app
 from gcs_cli.errors import NO_ANSWER, CliError
-from gcs_cli.settings import (
-    ConnectOption,
-    InstanceOption,
-    JsonOption,
-    TimeoutOption,
-    meet_vehicle,
-    settings_of,
-)
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.subscription import LOOP_TIMING
+from gcs_cli.link.vehicle_link import connect_vehicle
+from gcs_cli.option_groups import expand_options
+from gcs_cli.settings import JsonOption, LinkOptions, link_options
+from gcs_cli.tui.panels import number
+from gcs_cli.vehicle.view_types import LoopTiming
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from gcs_cli.link.connection import Connection
-    from gcs_cli.vehicle.view_types import LoopTiming
+app = make_app(add_completion=False)
 
 
+@app.command()
+@expand_options
 def perf(
     context: typer.Context,
-    repeat: Annotated[bool, typer.Option("--watch", help="Go on until Ctrl-C.")] = False,
+    link: LinkOptions,
+    repeat: Annotated[bool, typer.Option("--watch", help="Repeat until Ctrl-C.")] = False,
     as_json: JsonOption = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
 ) -> None:
     """Show the timing of the flight stack's loops."""
-    from gcs_cli.link.subscription import LOOP_TIMING  # noqa: PLC0415
-
-    patience_s = settings_of(context).merged(connect, timeout, instance).patience_s
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+    timeout_s = link_options(context, link).timeout_s
+    with connect_vehicle(context, link) as connection:
         connection.session.subscribe(LOOP_TIMING)
-        timing = next_timing(connection, None, patience_s)
+        timing = next_timing(connection, None, timeout_s)
         _show(timing, as_json)
         try:
             while repeat:
-                timing = next_timing(connection, timing, patience_s)
+                timing = next_timing(connection, timing, timeout_s)
                 _show(timing, as_json)
         except KeyboardInterrupt:
             return
 
 
-def next_timing(connection: Connection, before: LoopTiming | None, patience_s: float) -> LoopTiming:
+def next_timing(connection: Connection, before: LoopTiming | None, timeout_s: float) -> LoopTiming:
     """Wait for the next FS_LOOP_TIMING after ``before``; raise CliError (no answer)."""
     session = connection.session
-    if not connection.wait_for(lambda: session.view.timing not in (None, before), patience_s):
+    if not connection.wait_for(lambda: session.view.timing not in (None, before), timeout_s):
         raise CliError(
-            f"the vehicle sent no FS_LOOP_TIMING within {patience_s:g} s: only flightstack does, while its "
+            f"the vehicle sent no FS_LOOP_TIMING within {timeout_s:g} s: only flightstack does, while its "
             "loops run",
             NO_ANSWER,
         )
@@ -66,19 +63,12 @@ def _show(timing: LoopTiming, as_json: bool) -> None:
     if as_json:
         print(json.dumps(timing._asdict()), flush=True)
         return
-    from rich.console import Console  # noqa: PLC0415
-
     Console().print(timing_table(timing))
     sys.stdout.flush()
 
 
 def timing_table(timing: LoopTiming) -> Table:
-    """Return the figures as a table; times in µs, and as a share of the inner loop's period."""
-    from rich import box  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
-
-    from gcs_cli.tui.panels import number  # noqa: PLC0415
-
+    """Return the timing as a table: times in µs, and in percent of the inner loop's period."""
     clock = "lockstep" if timing.lockstep else "real time"
     factor = f", {timing.real_time_factor:.1f}× real time" if timing.real_time_factor else ""
     title = f"inner {number(timing.inner_hz, 0)} Hz, outer {number(timing.outer_hz, 0)} Hz, {clock}{factor}"

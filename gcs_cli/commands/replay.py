@@ -9,15 +9,21 @@ from typing import Annotated
 
 import typer
 
+from flightstack.flight_log.poses_file import write_poses
 from flightstack.process import command_line as asked
-from flightstack.process.command_line import own_program
+from flightstack.process.command_line import make_app, own_program
 from flightstack.process.console import complain
 from gcs_cli.errors import FAILED, CliError
+from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.replay import find_run, poses_of
+
+app = make_app(add_completion=False)
 
 _NAME = "gcs replay"
-_PATIENCE_S = 10.0
+_END_TIMEOUT_S = 10.0
 
 
+@app.command()
 def replay(
     run: Annotated[Path, typer.Argument(help="Directory of a flight, or its log.", show_default=False)],
     png: asked.Png = None,
@@ -37,20 +43,16 @@ def replay(
 ) -> None:
     """Draw a flight: pictures, a film, or a window.
 
-    Without --png, --sheet, --video or --view it makes a film, replay.mp4 beside the log. That takes minutes without
-    a graphics card; --from, --to and --size make it shorter.
+    Without --png, --sheet, --video or --view it makes a film, replay.mp4 next to the log. That takes minutes without
+    a graphics card; --from, --to and --size shorten it.
     """
-    from flightstack.flight_log.poses_file import write_poses  # noqa: PLC0415
-    from gcs_cli.report.analysis import read_flight  # noqa: PLC0415
-    from gcs_cli.report.replay import find_run, poses_of  # noqa: PLC0415
-
     found = find_run(run)
     flight = read_flight(found.log)
     poses = poses_of(flight, found, vehicle)
     if flight.damaged:
         complain(f"gcs: warning: the log is damaged; drawn up to {poses.time_s[-1]:.1f} s")
     if not (png or sheet or video or view):
-        video, overwrite = found.film, True  # it belongs to the run, as its report does
+        video, overwrite = found.film, True  # part of the run, like its report
     options = asked.PictureOptions(
         png, sheet, video, view, at, camera, size, fps, begin, end, speed, no_words, overwrite
     )
@@ -63,9 +65,9 @@ def replay(
 
 
 def _render(arguments: list[str]) -> int:
-    """Run ``sim-bridge render``, which says itself what it has to say; return its exit code.
+    """Run ``sim-bridge render``, which reports its errors itself; return its exit code.
 
-    It has a session of its own: Ctrl-C is ours, and one signal lets it end in order.
+    It runs in a session of its own, so that Ctrl-C sends it a single signal.
     """
     program = own_program("sim_bridge", "render", *arguments)
     with subprocess.Popen(program, start_new_session=True) as child:
@@ -73,7 +75,7 @@ def _render(arguments: list[str]) -> int:
             code = child.wait()
         except KeyboardInterrupt:
             child.terminate()
-            if _ended(child) != FAILED:  # it had not got far enough to say so
+            if _ended(child) != FAILED:  # it ended before it could report
                 raise
             return FAILED
     if code < 0:
@@ -82,9 +84,9 @@ def _render(arguments: list[str]) -> int:
 
 
 def _ended(child: subprocess.Popen[bytes]) -> int:
-    """Wait for the end that was asked for, not for ever; return the exit code."""
+    """Wait for the end, and kill the process after a timeout; return the exit code."""
     try:
-        return child.wait(_PATIENCE_S)
+        return child.wait(_END_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         child.kill()
         return child.wait()

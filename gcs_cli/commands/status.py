@@ -1,35 +1,33 @@
-"""``gcs status``: how the vehicle is, once."""
+"""``gcs status``: the state of the vehicle."""
 
 from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
-from gcs_cli.settings import ConnectOption, InstanceOption, JsonOption, TimeoutOption, meet_vehicle
+from flightstack.process.command_line import make_app
+from gcs_cli.link.subscription import ROTORS_AND_TIMING
+from gcs_cli.link.vehicle_link import connect_vehicle
+from gcs_cli.option_groups import expand_options
+from gcs_cli.settings import JsonOption, LinkOptions
+from gcs_cli.vehicle.view_types import VehicleView
 
-if TYPE_CHECKING:
-    from gcs_cli.vehicle.view_types import VehicleView
+app = make_app(add_completion=False)
 
 GATHER_S = 2.0
 
 
-def status(
-    context: typer.Context,
-    as_json: JsonOption = False,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
-    """Show how the vehicle is."""
-    from gcs_cli.link.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
-
-    with meet_vehicle(context, connect, timeout, instance) as connection:
+@app.command()
+@expand_options
+def status(context: typer.Context, link: LinkOptions, as_json: JsonOption = False) -> None:
+    """Show the state of the vehicle."""
+    with connect_vehicle(context, link) as connection:
         session = connection.session
         session.subscribe(ROTORS_AND_TIMING)
-        # most of what is shown comes several times a second; what the vehicle does not send stays unknown
+        # most messages come several times a second; values that the vehicle does not send stay unknown
         connection.wait_for(lambda: _is_full(session.view), GATHER_S)
         view = session.view
     facts = status_facts(view)
@@ -53,7 +51,7 @@ def _is_full(view: VehicleView) -> bool:
 
 
 def status_facts(view: VehicleView) -> dict[str, Any]:
-    """Return what ``--json`` prints: SI units, degrees for angles, null for what is not known."""
+    """Return the values of ``--json``: SI units, degrees for angles, null for unknown values."""
     attitude = view.attitude
     battery, geo, timing = view.battery, view.geo, view.timing
     return {

@@ -1,82 +1,98 @@
-"""``gcs watch``: the vehicle live on the terminal, or as lines where there is no terminal."""
+"""``gcs watch``: the live state of the vehicle, full screen on a terminal, else as lines."""
 
 from __future__ import annotations
 
 import os
+import select
 import sys
-from typing import TYPE_CHECKING
+import termios
+import tty
+from typing import Any
 
 import typer
+from rich.console import Console
+from rich.live import Live
 
-from gcs_cli.settings import ConnectOption, InstanceOption, TimeoutOption, open_link, settings_of
+from flightstack.process.command_line import make_app
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.subscription import ROTORS_AND_TIMING
+from gcs_cli.link.vehicle_link import open_link
+from gcs_cli.option_groups import expand_options
+from gcs_cli.settings import LinkOptions, link_options
+from gcs_cli.tui.watch_lines import state_line, text_line
+from gcs_cli.tui.watch_render import render
 
-if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
-
-    from gcs_cli.link.connection import Connection
+app = make_app(add_completion=False)
 
 FRAME_S = 0.125
 LINE_S = 1.0
 
 
-def watch(
-    context: typer.Context,
-    connect: ConnectOption = None,
-    timeout: TimeoutOption = None,
-    instance: InstanceOption = None,
-) -> None:
+@app.command()
+@expand_options
+def watch(context: typer.Context, link: LinkOptions) -> None:
     """Watch the vehicle; q or Ctrl-C ends."""
-    from gcs_cli.link.subscription import ROTORS_AND_TIMING  # noqa: PLC0415
-
-    settings = settings_of(context).merged(connect, timeout, instance)
-    with open_link(settings) as connection:
+    chosen = link_options(context, link)
+    with open_link(context, link) as connection:
         connection.session.subscribe(ROTORS_AND_TIMING)
         try:
-            if _draws():
+            if _can_draw():
                 watch_screen(connection)
             else:
-                if settings.timeout_s is not None:
-                    connection.meet(settings.patience_s)
+                if chosen.timeout is not None:
+                    connection.wait_for_vehicle(chosen.timeout)
                 watch_lines(connection)
         except KeyboardInterrupt:
             return
 
 
-def _draws() -> bool:
-    """Tell whether stdout is a terminal that can be drawn on."""
+def _can_draw() -> bool:
+    """Return True if stdout is a terminal that can draw."""
     return sys.stdout.isatty() and os.environ.get("TERM") not in ("dumb", "unknown")
+
+
+class Keyboard:
+    """Reads single keys from the terminal without waiting or echo, within the ``with`` block.
+
+    If stdin is not a terminal, no key is ever pressed.
+    """
+
+    def __init__(self) -> None:
+        self._descriptor = sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None
+        self._before: list[Any] = []
+
+    def pressed(self, key: str) -> bool:
+        """Return True if ``key``, in either case, was pressed since the last call."""
+        if self._descriptor is None or not select.select([self._descriptor], [], [], 0)[0]:
+            return False
+        return key in os.read(self._descriptor, 1024).decode(errors="replace").lower()
+
+    def __enter__(self) -> Keyboard:
+        if self._descriptor is not None:
+            self._before = termios.tcgetattr(self._descriptor)
+            tty.setcbreak(self._descriptor)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._descriptor is not None:
+            termios.tcsetattr(self._descriptor, termios.TCSADRAIN, self._before)
 
 
 def watch_screen(connection: Connection) -> None:
     """Draw the full-screen view until q is pressed."""
-    from rich.console import Console  # noqa: PLC0415
-    from rich.live import Live  # noqa: PLC0415
-
-    from gcs_cli.tui.keyboard import Keyboard  # noqa: PLC0415
-
     console = Console()
     with Keyboard() as keyboard, Live(console=console, screen=True, auto_refresh=False) as live:
         while not keyboard.pressed("q"):
-            live.update(_picture(connection, console), refresh=True)
-            _run(connection, connection.now_s + FRAME_S)
-
-
-def _picture(connection: Connection, console: Console) -> RenderableType:
-    from gcs_cli.tui.watch_render import render  # noqa: PLC0415
-
-    width, height = console.size
-    return render(connection.session.view, connection.now_s, width, height, str(connection.endpoint))
-
-
-def _run(connection: Connection, until_s: float) -> None:
-    while connection.now_s < until_s:
-        connection.step(until_s)
+            now_s, (width, height) = connection.now_s, console.size
+            live.update(
+                render(connection.session.view, now_s, width, height, str(connection.endpoint)), refresh=True
+            )
+            while connection.now_s < now_s + FRAME_S:
+                connection.step(now_s + FRAME_S)
 
 
 def watch_lines(connection: Connection) -> None:
-    """Print a line a second and one for each status text, until interrupted."""
-    from gcs_cli.tui.watch_lines import state_line, text_line  # noqa: PLC0415
-
+    """Print one line per second and one per status text, until interrupted."""
     seen = 0
     next_s = connection.now_s
     while True:

@@ -1,1 +1,1 @@
-"""``gcs fly``: simulator and flight stack started, a mission flown and watched."""
+"""``gcs fly``: start simulator and flight stack, fly a mission, write the results."""

@@ -1,7 +1,7 @@
-"""One flight from the ground's side, without I/O: connect, upload, arm, start, fly, shut down.
+"""The ground station's side of one flight, sans-IO: connect, upload, arm, start, fly, shut down.
 
-``step`` is called whenever something arrived or a deadline passed. Nothing relies on seeing each message: at
-many times real time telemetry is sparse, and any datagram may be lost.
+Call ``step`` after each message and deadline. No step relies on a single message: at many times real time telemetry
+is sparse, and any datagram may be lost.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from gcs_cli.transfers.plan_parts import Uploads
 from gcs_cli.vehicle.view_types import VehicleView
 
 READY_PAUSE_S = 0.1
-"""Between two questions whether the vehicle is ready."""
-SHUT_DOWN_PATIENCE_S = 3.0
+"""Pause between two requests for the vehicle's state before arming."""
+SHUT_DOWN_TIMEOUT_S = 3.0
 _FACTOR_NEEDS_S = 0.05
 _IN_AIR = 2  # MAV_LANDED_STATE
 
 
 class Phase(Enum):
-    """Where the flight is; the value is for people."""
+    """Phase of a flight; the value is its description."""
 
     CONNECT = "waiting for the vehicle"
     UPLOAD = "uploading the plan"
@@ -36,7 +36,7 @@ class Phase(Enum):
     ARM = "arming"
     START = "starting the mission"
     FLY = "flying"
-    CONFIRM = "asking how the mission ended"
+    CONFIRM = "requesting the result of the mission"
     SHUT_DOWN = "shutting the vehicle down"
     OVER = "flight completed"
 
@@ -61,26 +61,26 @@ class Flight:
         self.shut_down_accepted = False
         self._session = session
         self._items = plan.items
-        self._uploads = Uploads(session, plan, restores=False)  # the vehicle began without plans
+        self._uploads = Uploads(session, plan, restores=False)  # the vehicle starts without plans
         self._ends_in_air = ends_in_air(plan.items)
         self._connect_s = connect_s
         self._connect_due_s = now_s + connect_s
         self._limit_s = limit_s
         self._call: Call | None = None
-        self._ask_again_s: float | None = None
-        self._questions: list[calls.Command] = []
+        self._next_request_s: float | None = None
+        self._requests: list[calls.Command] = []
         self._start_time_s: float | None = None
         self._watch = Watch(stall_s, connect_s)
         self._phase_due_s = 0.0
 
     @property
     def view(self) -> VehicleView:
-        """The vehicle."""
+        """State of the vehicle."""
         return self._session.view
 
     @property
-    def over(self) -> bool:
-        """Whether there is nothing left to do."""
+    def is_over(self) -> bool:
+        """True after the end of the flight."""
         return self.phase is Phase.OVER
 
     @property
@@ -92,7 +92,7 @@ class Flight:
 
     @property
     def real_time_factor(self) -> float | None:
-        """Simulated over wall time since the start of the mission, as far as it is known."""
+        """Ratio of simulated to wall time since the start of the mission; None if unknown."""
         if self.began_s is None or self.flown_s is None or self.view.link.last_received_s is None:
             return None
         wall_s = self.view.link.last_received_s - self.began_s
@@ -100,18 +100,18 @@ class Flight:
 
     @property
     def upload_progress(self) -> tuple[int, int]:
-        """Items sent and in all, while the plan is uploaded."""
+        """Uploaded items and their total."""
         return self._uploads.progress
 
     def abort(self, outcome: Outcome, now_s: float, vehicle_is_gone: bool = False) -> None:
-        """End the flight for a reason from outside; a vehicle that is not gone is asked to shut down."""
+        """End the flight with ``outcome``; shut the vehicle down unless it is gone."""
         if self.outcome is None:
             self._end(outcome, now_s, vehicle_is_gone)
 
     def step(self, now_s: float) -> None:
-        """Go on as far as possible."""
+        """Advance the flight as far as possible."""
         before = None
-        while before is not self.phase and not self.over:
+        while before is not self.phase and not self.is_over:
             before = self.phase
             if self.outcome is None and self.phase is not Phase.CONNECT:
                 self._watch_vehicle(now_s)
@@ -123,7 +123,7 @@ class Flight:
             reason = f"the flight stack shut down{at} while {self.phase.value}"
             self._end(Outcome(Code.PROCESS_ENDED, reason), now_s)
             return
-        lost = self._watch.lost(self.view.silent_s(now_s), self.view.time_s, self.phase.value)
+        lost = self._watch.loss(self.view.silent_s(now_s), self.view.time_s, self.phase.value)
         if lost is not None:
             self._end(Outcome(Code.VEHICLE_LOST, lost), now_s)
 
@@ -139,27 +139,27 @@ class Flight:
         if self._accepted(
             self._uploads.answer(now_s), f"the vehicle refused the {self._uploads.name}: ", now_s
         ):
-            self._order(calls.REQUEST_SYS_STATUS, now_s)
+            self._command(calls.REQUEST_SYS_STATUS, now_s)
             self.phase = Phase.READY
 
     def _ready(self, now_s: float) -> None:
-        """Wait for the simulator's first state; telemetry may be still until time begins, so ask."""
+        """Wait for the simulator's first state; request it, because telemetry may start with simulated time."""
         if self.view.healthy:
-            self._order(calls.ARM, now_s)
+            self._command(calls.ARM, now_s)
             self.phase = Phase.ARM
         elif now_s >= self._connect_due_s:
             self._end(Outcome(Code.NO_VEHICLE, no_state(self._connect_s), NO_ANSWER), now_s)
-        elif self._ask_again_s is not None:
-            if now_s >= self._ask_again_s:
-                self._ask_again_s = None
-                self._order(calls.REQUEST_SYS_STATUS, now_s)
+        elif self._next_request_s is not None:
+            if now_s >= self._next_request_s:
+                self._next_request_s = None
+                self._command(calls.REQUEST_SYS_STATUS, now_s)
         elif self._call is None or self._call.answer(now_s) is not None:
-            self._ask_again_s = now_s + READY_PAUSE_S
+            self._next_request_s = now_s + READY_PAUSE_S
 
     def _arm(self, now_s: float) -> None:
         if self._answered("the vehicle refused to arm: ", now_s):
             self._start_time_s = self.view.time_s or 0.0
-            self._order(calls.START_MISSION, now_s)
+            self._command(calls.START_MISSION, now_s)
             self.phase = Phase.START
 
     def _start(self, now_s: float) -> None:
@@ -171,29 +171,29 @@ class Flight:
 
     def _fly(self, now_s: float) -> None:
         view = self.view
-        held_up = self._watch.held_up(view.time_s, now_s)
+        stall = self._watch.stall(view.time_s, now_s)
         heard_since_start = self.began_s is not None and (view.last_heartbeat_s or 0.0) > self.began_s
         if heard_since_start and not view.armed:
             self.ended_s = now_s
-            self._questions = [calls.REQUEST_LOOP_TIMING, calls.REQUEST_MISSION_CURRENT]
+            self._requests = [calls.REQUEST_LOOP_TIMING, calls.REQUEST_MISSION_CURRENT]
             self._call = None
             self.phase = Phase.CONFIRM
         elif (self.flown_s or 0.0) > self._limit_s:
             self._end(too_late(view, self._items, self._limit_s), now_s)
-        elif held_up is not None:
-            self._end(Outcome(Code.STALLED, held_up), now_s)
+        elif stall is not None:
+            self._end(Outcome(Code.STALLED, stall), now_s)
         elif self._ends_in_air and view.mission.complete and view.mode == "HOLD" and not self.returned_by_us:
             self.returned_by_us = True
-            self._order(calls.RETURN, now_s)
+            self._command(calls.RETURN, now_s)
         elif self.returned_by_us and view.landed_state == _IN_AIR:
-            self._answered("the mission is flown, but the vehicle refused to return: ", now_s)
+            self._answered("the mission is complete, but the vehicle refused to return: ", now_s)
 
     def _confirm(self, now_s: float) -> None:
-        """Ask for what the last telemetry may not have said; the answers are in the view."""
+        """Request values that the last telemetry may lack; the answers are in the view."""
         if self._call is not None and self._call.answer(now_s) is None:
             return
-        if self._questions:
-            self._order(self._questions.pop(), now_s)
+        if self._requests:
+            self._command(self._requests.pop(), now_s)
         else:
             self._end(judged(self.view, self._items), now_s)
 
@@ -206,11 +206,11 @@ class Flight:
 
     # -- helpers
 
-    def _order(self, command: calls.Command, now_s: float) -> None:
+    def _command(self, command: calls.Command, now_s: float) -> None:
         self._call = calls.command(self._session, *command, now_s)
 
     def _answered(self, refusal: str, now_s: float) -> bool:
-        """Tell whether the request under way was accepted; end the flight when it was refused."""
+        """Return True if the pending request was accepted; end the flight if it was refused."""
         return self._accepted(self._call.answer(now_s) if self._call else None, refusal, now_s)
 
     def _accepted(self, answer: Answer | None, refusal: str, now_s: float) -> bool:
@@ -231,8 +231,8 @@ class Flight:
         reachable = self.view.identity is not None and not gone
         self.phase = Phase.SHUT_DOWN if reachable else Phase.OVER
         if reachable:
-            self._phase_due_s = now_s + SHUT_DOWN_PATIENCE_S
-            self._order(calls.SHUT_DOWN, now_s)
+            self._phase_due_s = now_s + SHUT_DOWN_TIMEOUT_S
+            self._command(calls.SHUT_DOWN, now_s)
 
 
 _STEPS: dict[Phase, Callable[[Flight, float], None]] = {

@@ -1,4 +1,4 @@
-"""How long a mission may take: a multiple of the time that its plan needs in still air. Pure."""
+"""Longest simulated time of a mission: a multiple of the time that its plan needs in still air. Pure."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from collections.abc import Sequence
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.params.behaviour import Behaviour
 from flightstack.plan import Command, MissionItem
+from gcs_cli.fly.fly_flags import LONGEST_S
 
 MARGIN = 3.0
-"""Longest flight over the time that the plan needs."""
+"""Ratio of the longest flight to the time that the plan needs."""
 EXTRA_S = 60.0
 ITEM_S = 3.0
-"""Allowance for each item beside its way: speeding up, slowing down, settling."""
-LONGEST_S = 1e6
+"""Allowance per item for acceleration, braking and settling."""
 ENDLESS_S = 3600.0
-"""Longest flight of a mission that repeats for ever."""
+"""Longest flight of a mission that repeats forever."""
 
 
-class _Walk:
-    """Adds up the time of items, flown one after the other from home."""
+class _FlightTime:
+    """Sums the time of items that are flown one after the other from home."""
 
     def __init__(self, home: GeoPoint, behaviour: Behaviour) -> None:
         self.needed_s = 0.0
@@ -28,7 +28,7 @@ class _Walk:
         self._north_east = (0.0, 0.0)
         self._altitude_m = 0.0
         self.has_landed = True
-        """Whether the last item was a landing or a return."""
+        """True if the last item was a landing or a return."""
         self._speed_m_s = behaviour.cruise_speed_m_s
 
     def add(self, item: MissionItem) -> None:
@@ -56,24 +56,24 @@ class _Walk:
         self._land()
 
     def _go_to(self, item: MissionItem) -> None:
-        place, altitude_m = item.position_deg, self._altitude_m
-        there = self._north_east
-        if place is not None:
-            there = self._frame.to_ned(GeoPoint(*place, self._home.altitude_m))[:2]
+        position_deg, altitude_m = item.position_deg, self._altitude_m
+        target = self._north_east
+        if position_deg is not None:
+            target = self._frame.to_ned(GeoPoint(*position_deg, self._home.altitude_m))[:2]
         if item.command != Command.NAV_LAND and math.isfinite(item.z):
             altitude_m = item.z if item.altitude_is_relative else item.z - self._home.altitude_m
-        self._move(there, altitude_m, self._speed_m_s)
+        self._move(target, altitude_m, self._speed_m_s)
         if item.command == Command.NAV_LAND:
             self._land()
         elif item.command != Command.NAV_TAKEOFF and item.param1 > 0.0:
             self.needed_s += item.param1
 
-    def _move(self, there: tuple[float, float], altitude_m: float, speed_m_s: float) -> None:
+    def _move(self, target: tuple[float, float], altitude_m: float, speed_m_s: float) -> None:
         b = self._behaviour
         slowest_m_s = min(b.climb_speed_m_s, b.takeoff_speed_m_s, b.descent_speed_m_s)
-        self.needed_s += ITEM_S + math.dist(there, self._north_east) / speed_m_s
+        self.needed_s += ITEM_S + math.dist(target, self._north_east) / speed_m_s
         self.needed_s += abs(altitude_m - self._altitude_m) / slowest_m_s
-        self._north_east, self._altitude_m, self.has_landed = there, altitude_m, False
+        self._north_east, self._altitude_m, self.has_landed = target, altitude_m, False
 
     def _land(self) -> None:
         b = self._behaviour
@@ -82,19 +82,19 @@ class _Walk:
 
 
 def flight_limit_s(items: Sequence[MissionItem], home: GeoPoint, behaviour: Behaviour) -> float:
-    """Return the simulated time after which a flight of ``items`` from ``home`` is given up [s]."""
+    """Return the simulated time after which a flight of ``items`` from ``home`` is aborted [s]."""
     jumps = [item.param2 if item.command == Command.DO_JUMP else 0.0 for item in items]
-    walk, seq = _Walk(home, behaviour), 0
+    time, seq = _FlightTime(home, behaviour), 0
     while seq < len(items):
-        if MARGIN * walk.needed_s >= LONGEST_S:
+        if MARGIN * time.needed_s >= LONGEST_S:
             return ENDLESS_S if min(jumps) < 0.0 else LONGEST_S
         item, jumps_left = items[seq], jumps[seq]
         if jumps_left != 0.0:
             jumps[seq] -= 1.0 if jumps_left > 0.0 else 0.0
         elif item.command != Command.DO_JUMP:
-            walk.add(item)
+            time.add(item)
         ends = item.command == Command.NAV_RETURN_TO_LAUNCH
         seq = len(items) if ends else int(item.param1) if jumps_left != 0.0 else seq + 1
-    if not walk.has_landed:
-        walk.go_home()
-    return float(math.ceil(EXTRA_S + MARGIN * walk.needed_s))
+    if not time.has_landed:
+        time.go_home()
+    return float(math.ceil(EXTRA_S + MARGIN * time.needed_s))

@@ -1,4 +1,4 @@
-"""What ``gcs fly`` shows while it flies: a bar on a terminal, lines elsewhere."""
+"""Display of ``gcs fly`` in flight: a bar on a terminal, else lines."""
 
 from __future__ import annotations
 
@@ -23,53 +23,53 @@ _WARNING = 4  # MAV_SEVERITY_WARNING
 
 
 class FlyConsole(Console):
-    """A console whose broken pipe or full disk does not end the flight: the rest is not printed."""
+    """A console that stops printing after a broken pipe or on a full disk, so that the flight continues."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print; an output that cannot be written gets no more."""
+        """Print; stop printing after an error."""
         try:
             super().print(*objects, **options)
         except OSError:
             self.on_broken_pipe()
 
     def on_broken_pipe(self) -> None:
-        """Send what is still to be printed nowhere."""
+        """Discard all further output."""
         self.quiet = True
         drop(self.file)
 
 
 class Display(Protocol):
-    """Shows the course of a flight."""
+    """Shows the progress of a flight."""
 
     def update(self, flight: Flight) -> None:
-        """Show how the flight stands."""
+        """Show the state of the flight."""
 
     def note(self, line: str) -> None:
-        """Show a warning, or progress, of simulator or flight stack."""
+        """Show a warning or a progress line of simulator or flight stack."""
 
     def close(self) -> None:
-        """Leave the terminal as it was."""
+        """Restore the terminal."""
 
 
 def make_display(console: Console) -> Display:
-    """Return the display that fits where ``console`` writes to."""
+    """Return the display for the output of ``console``."""
     return BarDisplay(console) if draws_bars(console) else LineDisplay(console)
 
 
 def draws_bars(console: Console) -> bool:
-    """Tell whether ``console`` writes to a terminal that can draw a line anew."""
+    """Return True if ``console`` writes to a terminal that can redraw a line."""
     return console.is_terminal and not console.is_dumb_terminal
 
 
 class _NewTexts:
-    """Status texts not shown yet; what the vehicle says of being shut down early is of no use to anybody."""
+    """Status texts not shown yet, without those that a shutdown in flight causes."""
 
     def __init__(self) -> None:
         self._seen = 0
         self._ended = False
 
     def of(self, flight: Flight) -> tuple[StatusText, ...]:
-        """Return them, once each."""
+        """Return the new texts."""
         new = () if self._ended else flight.view.texts_since(self._seen)
         self._seen = flight.view.text_count
         self._ended = flight.outcome is not None
@@ -98,7 +98,7 @@ class BarDisplay:
             self._live.update(progress(flight, now_s, self._spinner, width), refresh=True)
 
     def note(self, line: str) -> None:
-        """Print it above the live line."""
+        """Print the line above the live one."""
         self._live.console.print(Text(line, style="yellow"), soft_wrap=True)
 
     def close(self) -> None:
@@ -115,7 +115,7 @@ class LineDisplay:
         self._texts = _NewTexts()
 
     def update(self, flight: Flight) -> None:
-        """Print what is new."""
+        """Print changes."""
         for entry in self._texts.of(flight):
             self._print(text_line(entry))
         words = f"{phase_words(flight)}{item_words(flight)}"
@@ -124,18 +124,18 @@ class LineDisplay:
             self._print("  ".join(part for part in (words, place_words(flight), speed_words(flight)) if part))
 
     def note(self, line: str) -> None:
-        """Print it."""
+        """Print the line."""
         self._print(line)
 
     def _print(self, text: str) -> None:
         self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def close(self) -> None:
-        """Nothing is held open."""
+        """Do nothing."""
 
 
 def progress(flight: Flight, now_s: float, spinner: Spinner, width: int) -> RenderableType:
-    """Return the live line; a narrow terminal shows the first of its parts, whole."""
+    """Return the live line; a narrow terminal shows only its first parts."""
     done, total = _share(flight)
     bar = ProgressBar(total=max(1, total), completed=done, complete_style="green")
     item = Text(item_words(flight).strip(), style="bold")
@@ -164,14 +164,14 @@ def _share(flight: Flight) -> tuple[float, float]:
 
 
 def phase_words(flight: Flight) -> str:
-    """Say what is going on: the mode in flight, else the phase."""
-    if flight.over and flight.outcome is not None and not flight.outcome.completed:
+    """Return the mode in flight, else the phase."""
+    if flight.is_over and flight.outcome is not None and not flight.outcome.completed:
         return "flight ended"
     return flight.view.mode or "flying" if flight.phase is Phase.FLY else flight.phase.value
 
 
 def item_words(flight: Flight) -> str:
-    """Say which item is flown."""
+    """Return the current item."""
     mission = flight.view.mission
     if flight.phase is not Phase.FLY or mission.current is None or not mission.total or mission.complete:
         return ""
@@ -179,7 +179,7 @@ def item_words(flight: Flight) -> str:
 
 
 def place_words(flight: Flight) -> str:
-    """Say where the vehicle is."""
+    """Return the position of the vehicle."""
     position = flight.view.position_ned_m
     if flight.phase is not Phase.FLY or position is None:
         return ""
@@ -188,7 +188,7 @@ def place_words(flight: Flight) -> str:
 
 
 def speed_words(flight: Flight) -> str:
-    """Say how long it has flown in simulated time, and how fast that passes."""
+    """Return the simulated flight time and the real-time factor."""
     if flight.phase is not Phase.FLY or flight.flown_s is None:
         return ""
     words = f"t {flight.flown_s:6.1f} s"

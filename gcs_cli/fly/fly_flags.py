@@ -1,31 +1,50 @@
-"""The flags of a flight in simulation: one table for the commands that fly, and for what their children are told.
+"""The options of a flight in simulation: one table for ``gcs fly``, ``gcs pil`` and the processes that they start.
 
-A field with an option is a flag of ``gcs fly`` and ``gcs pil``. Those in ``TO_SIMULATOR`` and ``TO_STACK`` are passed
-on as they are; ``NOT_PASSED`` says what becomes of the children's other options.
+A field with an option is an option of both commands. Those in ``TO_SIMULATOR`` and ``TO_STACK`` are passed on
+unchanged; ``NOT_PASSED`` lists the other options of simulator and flight stack.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-import inspect
+import copy
 import math
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
 import typer
 
 from flightstack.core.port_numbers import ground_station_port, simulator_port
 from flightstack.process import command_line as world
 from flightstack.process import options as stack
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.settings import (
+    FlownInstanceOption,
+    FlownTimeoutOption,
+    JsonOption,
+    LinkOptions,
+    OpenOption,
+    OverwriteOption,
+    link_options,
+    settings_of,
+)
 from gcs_cli.transfers.plan_files import DEFAULT_PLAN, PlanArgument
+
+LONGEST_S = 1e6
+"""Longest limit of a flight [s of simulated time]."""
+
+
+def _ranged(option: Any, low: float, high: float) -> Any:
+    """Return a copy of an option with its allowed range."""
+    ranged = copy.copy(option)
+    ranged.min, ranged.max = low, high
+    return ranged
 
 
 @dataclass(frozen=True)
 class FlyOptions:
-    """What is flown, and under what."""
+    """The plan, the vehicle and the conditions of a flight."""
 
     plan_path: PlanArgument = Path(DEFAULT_PLAN)
     controller: stack.Controller = "pid"
@@ -34,10 +53,10 @@ class FlyOptions:
     speed: Annotated[str, world.SPEED] = "max"
     inner_hz: stack.InnerHz = 500.0
     outer_hz: stack.OuterHz = None
-    seed: Annotated[int, world.SEED] = 1
+    seed: Annotated[int, _ranged(world.SEED, 0, 2**31 - 1)] = 1
     wind: Annotated[str | None, world.WIND] = None
-    gust: Annotated[float | None, world.GUST] = None
-    torque_gust: Annotated[float | None, world.TORQUE_GUST] = None
+    gust: Annotated[float | None, _ranged(world.GUST, 0.0, 50.0)] = None
+    torque_gust: Annotated[float | None, _ranged(world.TORQUE_GUST, 0.0, 100.0)] = None
     vehicle: Annotated[str, world.VEHICLE] = "paper_quad"
     instance: int = 0
     ideal_rotors: Annotated[bool, world.IDEAL_ROTORS] = False
@@ -46,12 +65,14 @@ class FlyOptions:
         float | None,
         typer.Option(
             "--limit",
+            min=1.0,
+            max=LONGEST_S,
             help="Longest flight, s of simulated time.  [default: 60 s more than three times the plan's]",
         ),
     ] = None
-    battery_start: Annotated[float | None, world.BATTERY_START] = None
-    battery_capacity: Annotated[float | None, world.BATTERY_CAPACITY] = None
-    battery_drain: Annotated[float | None, world.BATTERY_DRAIN] = None
+    battery_start: Annotated[float | None, _ranged(world.BATTERY_START, 0.0, 100.0)] = None
+    battery_capacity: Annotated[float | None, _ranged(world.BATTERY_CAPACITY, 1.0, 1e6)] = None
+    battery_drain: Annotated[float | None, _ranged(world.BATTERY_DRAIN, 0.0, 1e4)] = None
     faults: Annotated[list[str] | None, world.FAULTS] = None
     params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None
     loops: stack.Loops = "python"
@@ -60,27 +81,23 @@ class FlyOptions:
     physics_hz: Annotated[float | None, world.PHYSICS_HZ] = None
     home: Annotated[
         str | None,
-        typer.Option(metavar="LAT,LON,ALT", help="Where the vehicle stands.  [default: the plan's home]"),
+        typer.Option(
+            metavar="LAT,LON,ALT", help="Start position of the vehicle.  [default: the plan's home]"
+        ),
     ] = None
     param: stack.Assignments = None
     view: Annotated[bool, world.VIEW] = False
     drag: Annotated[bool, world.DRAG] = False
-
-    @property
-    def outer_rate_hz(self) -> float:
-        """Rate of the outer loop: as given, else the one nearest to 100 Hz that divides the inner one."""
-        from flightstack.process.clock import nearest_outer_hz  # noqa: PLC0415  # slow to load
-
-        return nearest_outer_hz(self.inner_hz) if self.outer_hz is None else self.outer_hz
+    signing_key: Path | None = None
 
     @property
     def speed_factor(self) -> float:
-        """How many times real time the flight shall be; infinite for ``max``."""
+        """Speed of the flight as a multiple of real time; infinite for ``max``."""
         return math.inf if self.speed == "max" else float(self.speed)
 
     @property
     def gcs_port(self) -> int:
-        """UDP port of ground stations beside us."""
+        """UDP port of other ground stations."""
         return ground_station_port(self.instance)
 
     @property
@@ -101,22 +118,22 @@ NOT_PASSED = {
     "host": _SET, "port": _SET, "sim_host": _SET, "sim_port": _SET, "gcs": _SET, "gcs_port": _SET,
     "wait_for_start": _SET, "exit_on_gcs_loss": _SET, "clock": "lockstep: the flight is the same at any speed",
     "timeout": "--timeout of gcs fly", "sim_timeout": "--timeout of gcs fly", "log": "--out of gcs fly",
-    "params": "--params of gcs fly, which begins no file", "outer_hz": "--outer-hz of gcs fly",
+    "params": "--params of gcs fly, which creates no file", "outer_hz": "--outer-hz of gcs fly",
     "home": "--home of gcs fly, or the plan's home", "overwrite": "--overwrite of gcs fly",
     "state": "none: a flight depends on its command line alone",
-    "api_port": _LOCAL, "tcp_port": _LOCAL, "listen": _LOCAL, "signing_key": _LOCAL, "allow_unsigned": _LOCAL,
-    "check": "gcs fly checks before it starts anything", "version": "gcs --version",
+    "api_port": _LOCAL, "tcp_port": _LOCAL, "listen": _LOCAL, "signing_key": "--signing-key of gcs",
+    "allow_unsigned": _LOCAL, "check": "gcs fly checks before it starts anything", "version": "gcs --version",
 }  # fmt: skip
-"""The children's options that are no flags of ours, or not passed on as they are, each with the reason."""
+"""Options of simulator and flight stack that are not passed on unchanged, each with the reason."""
 
 
 def flag_of(name: str) -> str:
-    """Return the flag of a field, and of a child's option of that name."""
+    """Return the flag of a field."""
     return "--fault" if name == "faults" else f"--{name.replace('_', '-')}"
 
 
 def passed(options: FlyOptions, names: Sequence[str]) -> list[str]:
-    """Return the command line of a child for the fields ``names``; what was not given is left to the child."""
+    """Return the command line arguments of the fields ``names`` that are set."""
     arguments: list[str] = []
     for name in names:
         value, flag = getattr(options, name), flag_of(name)
@@ -129,32 +146,34 @@ def passed(options: FlyOptions, names: Sequence[str]) -> list[str]:
     return arguments
 
 
-def flies(without: Collection[str] = ()) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command the flags of ``FlyOptions`` in place of its parameter ``options``, but for those ``without``."""
-    hints = get_type_hints(FlyOptions, include_extras=True)
-    flags = [
-        inspect.Parameter(
-            field.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=field.default,
-            annotation=hints[field.name],
+@dataclass(frozen=True)
+class ResultOptions:
+    """The options of a command that writes a directory of results."""
+
+    overwrite: OverwriteOption = False
+    open_report: OpenOption = False
+    as_json: JsonOption = False
+
+
+@dataclass(frozen=True)
+class RunOptions(ResultOptions):
+    """The options of a command that starts a vehicle of its own."""
+
+    instance: FlownInstanceOption = None
+    timeout: FlownTimeoutOption = None
+
+
+def complete_options(
+    context: typer.Context, command: str, options: FlyOptions, run: RunOptions
+) -> FlyOptions:
+    """Return the options with those given before the command; raise CliError (usage) for ``--connect``."""
+    settings = settings_of(context)
+    if settings.link.connect is not None:
+        raise CliError(
+            f"{command} starts a vehicle of its own: leave --connect out, or see --instance", USAGE
         )
-        for field in dataclasses.fields(FlyOptions)
-        if field.name not in without and hasattr(hints[field.name], "__metadata__")
-    ]
-
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        @functools.wraps(command)
-        def run(**given: Any) -> None:
-            chosen = {flag.name: given.pop(flag.name) for flag in flags}
-            command(options=FlyOptions(**chosen), **given)
-
-        own = inspect.signature(command, eval_str=True).parameters
-        named = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.values()]
-        at = list(own).index("options")
-        parameters = [*named[:at], *flags, *named[at + 1 :]]
-        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-        return run
-
-    return decorate
+    link = link_options(context, LinkOptions(timeout=run.timeout, instance=run.instance))
+    timeout_s = FlyOptions.timeout_s if link.timeout is None else link.timeout
+    return replace(
+        options, instance=link.instance or 0, timeout_s=timeout_s, signing_key=settings.signing_key
+    )

@@ -1,4 +1,4 @@
-"""What ``gcs fly`` is asked for: checked, and turned into the command lines of its two children."""
+"""Check the options of ``gcs fly``, and make the command lines of simulator and flight stack."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.port_numbers import INSTANCES, vehicle_api_port, vehicle_ground_port
+from flightstack.core.port_numbers import vehicle_api_port, vehicle_ground_port
 from flightstack.firmware.choice import parse_loops
 from flightstack.params.behaviour import SPECS, Behaviour
 from flightstack.params.config import parse_home
@@ -18,16 +18,17 @@ from flightstack.params.gains_file import hidden_gains, open_gains
 from flightstack.params.store import read_assignment
 from flightstack.params.vehicle import Vehicle, hidden_vehicle, load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
-from flightstack.process.clock import rates
+from flightstack.process.clock import nearest_outer_hz, rates
 from flightstack.process.console import complain
+from flightstack.process.signing_file import load_key
 from flightstack.transports.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.fly.flight_limit import LONGEST_S, flight_limit_s
+from gcs_cli.fly.flight_limit import flight_limit_s
 from gcs_cli.fly.fly_flags import TO_SIMULATOR, TO_STACK, FlyOptions, passed
 from gcs_cli.link.endpoint import LOOPBACK
 from gcs_cli.report.run_directory import LOG_NAME
 from gcs_cli.transfers.plan_parts import plan_problem
-from gcs_cli.vehicle.param_file import load_parameters
+from gcs_cli.vehicle.param_info import load_parameters
 
 CONTROLLERS = "flightstack.attitude_controllers"
 PLANTS = ("rigid", "multibody", "paper")
@@ -37,7 +38,7 @@ _RETURN = Command.NAV_RETURN_TO_LAUNCH
 
 
 def checked_plan(options: FlyOptions) -> Plan:
-    """Check all that can be before anything starts, and return the plan; raise CliError or ConfigError."""
+    """Check the options before anything starts, and return the plan; raise CliError or ConfigError."""
     _check_flags(options)
     plan = load_plan(options.plan_path)
     flown_vehicle(options)
@@ -46,32 +47,39 @@ def checked_plan(options: FlyOptions) -> Plan:
         if sentence is not None:
             complain(f"gcs: {sentence}")
     if options.params is not None and not options.params.is_file():
-        raise CliError(f"--params {options.params}: there is no such file", USAGE)
-    rates(options.inner_hz, options.outer_rate_hz)
+        raise CliError(f"--params {options.params}: no such file", USAGE)
+    if options.signing_key is not None:
+        load_key(options.signing_key)
+    rates(options.inner_hz, outer_rate_hz(options))
     if not plan.items:
-        raise CliError(f"{options.plan_path}: holds no mission to fly", USAGE)
+        raise CliError(f"{options.plan_path}: has no mission items", USAGE)
     problem = plan_problem(plan, home_of(options, plan))
     if problem is not None:
         raise CliError(f"{options.plan_path}: {problem}", USAGE)
     moving = (item.command for item in plan.items if item.command in POSITION_COMMANDS | {_RETURN})
     if next(moving, None) in (Command.NAV_LAND, _RETURN):
-        problem = "the mission begins with a landing or a return, and the vehicle stands on the ground"
+        problem = "the mission begins with a landing or a return, but the vehicle is on the ground"
         raise CliError(f"{options.plan_path}: {problem}", USAGE)
     return plan
 
 
+def outer_rate_hz(options: FlyOptions) -> float:
+    """Return the rate of the outer loop: as given, else the divisor of the inner rate nearest to 100 Hz."""
+    return nearest_outer_hz(options.inner_hz) if options.outer_hz is None else options.outer_hz
+
+
 def home_of(options: FlyOptions, plan: Plan) -> GeoPoint:
-    """Return where the vehicle stands: as given, else the plan's home; raise ConfigError."""
+    """Return the start position: as given, else the plan's home; raise ConfigError."""
     return plan.home or DEFAULT_HOME if options.home is None else parse_home(options.home)
 
 
 def flown_vehicle(options: FlyOptions) -> Vehicle:
-    """Return the vehicle as the simulator flies it; raise ConfigError, or CliError for wind that cannot act."""
+    """Return the vehicle that the simulator flies; raise ConfigError, or CliError for wind that has no effect."""
     vehicle = load_vehicle(options.vehicle)
     if options.drag:
         vehicle = vehicle.with_drag(options.plant)
-    blows = options.wind is not None and any(float(part) for part in options.wind.split(","))
-    if blows or options.gust:
+    has_wind = options.wind is not None and any(float(part) for part in options.wind.split(","))
+    if has_wind or options.gust:
         refusal = vehicle.wind_refusal(options.plant)
         if refusal is not None:
             raise CliError(f"{'--gust' if options.gust else '--wind'}: {refusal}", USAGE)
@@ -79,9 +87,9 @@ def flown_vehicle(options: FlyOptions) -> Vehicle:
 
 
 def longest_flight_s(options: FlyOptions, plan: Plan) -> float:
-    """Return the simulated time after which the flight is given up: as asked for, else as the plan needs.
+    """Return the simulated time after which the flight is aborted: as given, else derived from the plan.
 
-    Raise ConfigError for a parameter file that is not one, and for an assignment without a number.
+    Raise ConfigError for an invalid parameter file or assignment.
     """
     if options.limit_s is not None:
         return options.limit_s
@@ -97,7 +105,7 @@ def _check_flags(options: FlyOptions) -> None:
     known = sorted(point.name for point in entry_points(group=CONTROLLERS))
     if options.controller not in known:
         raise CliError(
-            f"--controller {options.controller}: there is none; known are {', '.join(known)}", USAGE
+            f"--controller {options.controller}: unknown controller; known are {', '.join(known)}", USAGE
         )
     if options.plant not in PLANTS:
         raise CliError(f"--plant {options.plant}: expected {', '.join(PLANTS[:-1])} or {PLANTS[-1]}", USAGE)
@@ -113,19 +121,6 @@ def _check_flags(options: FlyOptions) -> None:
         for part in parts:
             _number("--wind", part, -200.0, 200.0)
     _number("--inner-hz", options.inner_hz, 1.0, 1e5)
-    _number("--gust", options.gust or 0.0, 0.0, 50.0)
-    _number("--torque-gust", options.torque_gust or 0.0, 0.0, 100.0)
-    _number("--seed", options.seed, 0, 2**31 - 1)
-    _number("--instance", options.instance, 0, INSTANCES - 1)
-    _number("--timeout", options.timeout_s, 0.1, 86_400.0)
-    _number("--limit", _or(options.limit_s, LONGEST_S), 1.0, LONGEST_S)
-    _number("--battery-start", _or(options.battery_start, 100.0), 0.0, 100.0)
-    _number("--battery-capacity", _or(options.battery_capacity, 1.0), 1.0, 1e6)
-    _number("--battery-drain", _or(options.battery_drain, 1.0), 0.0, 1e4)
-
-
-def _or(value: float | None, default: float) -> float:
-    return default if value is None else value
 
 
 def _number(flag: str, value: str | float, low: float, high: float) -> None:
@@ -138,12 +133,12 @@ def _number(flag: str, value: str | float, low: float, high: float) -> None:
 
 
 def check_ports(options: FlyOptions) -> None:
-    """Make sure that the children find their ports free; raise CliError (usage) naming a busy one."""
+    """Raise CliError (usage) if a port of simulator or flight stack is in use."""
     try:
         for port in (vehicle_ground_port(options.instance), vehicle_api_port(options.instance)):
             UdpSocket(LOOPBACK, port).close()
     except PortBusyError as error:
-        raise busy(error) from None
+        raise _port_error(error) from None
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -151,11 +146,10 @@ def check_ports(options: FlyOptions) -> None:
             probe.listen(1)
         except OSError:
             problem = PortBusyError("TCP", (LOOPBACK, options.simulator_port), "is in use")
-            raise busy(problem) from None
+            raise _port_error(problem) from None
 
 
-def busy(error: PortBusyError) -> CliError:
-    """Return what to tell the user about a busy port."""
+def _port_error(error: PortBusyError) -> CliError:
     return CliError(f"{error}: end the program that uses it, or fly beside it with --instance N", USAGE)
 
 
@@ -170,10 +164,11 @@ def simulator_arguments(options: FlyOptions, home: GeoPoint) -> list[str]:
 
 
 def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_port: int) -> list[str]:
-    """Return the command line of ``flightstack``: it calls us at ``ground_port``, and the usual ground station."""
+    """Return the command line of ``flightstack``, which sends to ``ground_port`` and the default ground station."""
+    signing = [] if options.signing_key is None else [f"--signing-key={options.signing_key}"]
     return [
         *passed(options, TO_STACK),
-        f"--outer-hz={options.outer_rate_hz!r}",
+        f"--outer-hz={outer_rate_hz(options)!r}",
         f"--sim-port={options.simulator_port}",
         f"--sim-timeout={options.timeout_s:g}",
         f"--gcs={LOOPBACK}:{ground_port}",
@@ -184,6 +179,7 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_po
         f"--params={options.params or 'none'}",
         "--state=none",  # a flight depends on its command line alone
         "--wait-for-start",
+        *signing,
     ]
 
 

@@ -1,4 +1,4 @@
-"""A whole flight: ports, directory, children, mission, and what is left of it in files."""
+"""A whole flight of ``gcs fly``: ports, directory, processes, mission, results."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from flightstack.core.errors import ConfigError
 from flightstack.core.port_numbers import vehicle_ground_port
 from flightstack.params.vehicle import NO_DRAG_PLANT
 from flightstack.plan import Plan
@@ -22,15 +23,19 @@ from gcs_cli.fly.fly_options import (
     flown_vehicle,
     home_of,
     longest_flight_s,
+    outer_rate_hz,
     simulator_arguments,
     stack_arguments,
 )
-from gcs_cli.fly.interruption import Interruption
-from gcs_cli.fly.processes import Child, Children
+from gcs_cli.fly.processes import Child, Children, Interruption
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.endpoint import LOOPBACK, Endpoint
-from gcs_cli.link.tlog_file import TlogFile
-from gcs_cli.report.flight_outcome import Code, Outcome
+from gcs_cli.link.endpoint import LOOPBACK, VehicleEndpoint
+from gcs_cli.link.tlog import TlogFile
+from gcs_cli.link.vehicle_link import open_signing
+from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.flight_data import Flight as FlightData
+from gcs_cli.report.flight_outcome import Code, Outcome, with_log
+from gcs_cli.report.page import write_report
 from gcs_cli.report.run_directory import (
     LOG_NAME,
     REPORT_NAME,
@@ -40,13 +45,14 @@ from gcs_cli.report.run_directory import (
     TLOG_NAME,
     make_run_directory,
 )
+from gcs_cli.report.summary import RunInfo, summarise, write_summary
 
 _STEP_S = 0.1
-_END_PATIENCE_S = 10.0
+_END_TIMEOUT_S = 10.0
 
 
 class Flown(NamedTuple):
-    """A flight that is over."""
+    """A completed or aborted flight."""
 
     folder: Path
     outcome: Outcome
@@ -58,13 +64,14 @@ class Flown(NamedTuple):
 def fly(
     options: FlyOptions, plan: Plan, out: Path | None, display: Display, overwrite: bool = False
 ) -> Flown:
-    """Fly ``plan`` with children of our own; raise CliError when nothing could be started.
+    """Fly ``plan`` with a simulator and a flight stack of our own; raise CliError if they cannot be started.
 
-    The vehicle calls us at a port of our own, so that other ground stations may hold the usual one.
+    The vehicle sends to a port of our own, so that another ground station may use the default one.
     """
     vehicle = (LOOPBACK, vehicle_ground_port(options.instance))
-    own_port = Endpoint(LOOPBACK, 0, listens=True)
-    with Interruption() as interruption, Connection(own_port, vehicle=vehicle) as connection:
+    own_port = VehicleEndpoint(LOOPBACK, 0, listens=True)
+    signing = open_signing(options.signing_key)
+    with Interruption() as interruption, Connection(own_port, signing=signing, vehicle=vehicle) as connection:
         check_ports(options)
         folder = make_run_directory(options.plan_path, out, overwrite=overwrite)
         flight = Flight(
@@ -78,11 +85,12 @@ def fly(
         with _recording(connection, folder), Children(folder) as children:
             home = home_of(options, plan)
             children.start(SIMULATOR, "sim_bridge", simulator_arguments(options, home))
-            told = stack_arguments(options, home, folder, connection.local_port)
-            children.start(STACK, "flightstack", told)
+            children.start(
+                STACK, "flightstack", stack_arguments(options, home, folder, connection.local_port)
+            )
             _run(flight, connection, children, interruption, display)
             if flight.shut_down_accepted:
-                children.wait(_END_PATIENCE_S)
+                children.wait(_END_TIMEOUT_S)
             _show_notices(children, display)
     assert flight.outcome is not None
     wall_time_s = None
@@ -110,21 +118,21 @@ def _recording(connection: Connection, folder: Path) -> Iterator[None]:
 def _run(
     flight: Flight, connection: Connection, children: Children, interruption: Interruption, display: Display
 ) -> None:
-    while not flight.over:
+    while not flight.is_over:
         if flight.outcome is not None and children.wait(0.0):
-            return  # nobody is left who could be shut down
+            return  # no process is left to shut down
         now_s = connection.now_s
         if interruption.reason:
             flight.abort(Outcome(Code.INTERRUPTED, interruption.reason), now_s)
-        casualty = _casualty(flight, children)
-        if casualty is not None:
-            code = casualty.exit_code if casualty.exit_code in (USAGE, NO_ANSWER) else FAILED
+        failed = _failed_child(flight, children)
+        if failed is not None:
+            code = failed.exit_code if failed.exit_code in (USAGE, NO_ANSWER) else FAILED
             gone = any(child.name == STACK for child in children.ended())
-            flight.abort(Outcome(Code.PROCESS_ENDED, casualty.obituary, code), now_s, vehicle_is_gone=gone)
+            flight.abort(Outcome(Code.PROCESS_ENDED, failed.end_reason, code), now_s, vehicle_is_gone=gone)
         _show_notices(children, display)
         flight.step(now_s)
         display.update(flight)
-        if not flight.over:
+        if not flight.is_over:
             connection.step(now_s + _STEP_S)
 
 
@@ -133,14 +141,14 @@ def _show_notices(children: Children, display: Display) -> None:
         display.note(line)
 
 
-def _casualty(flight: Flight, children: Children) -> Child | None:
-    """Return the child that ended first and took the other along, while there is a flight to end.
+def _failed_child(flight: Flight, children: Children) -> Child | None:
+    """Return the child whose end ended the other one, or None if both run or the flight has ended.
 
-    Who said goodbye, or lost the other, has that one's exit still to come: it is what tells.
+    A child that shut down in order, or lost the other, may end before the one that failed.
     """
     if flight.outcome is not None or not (children.ended() or flight.view.powered_off):
         return None
-    return children.culprit(_END_PATIENCE_S)
+    return children.culprit(_END_TIMEOUT_S)
 
 
 def _drag_of(options: FlyOptions) -> tuple[float, float, float]:
@@ -148,14 +156,7 @@ def _drag_of(options: FlyOptions) -> tuple[float, float, float]:
 
 
 def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[str, Any], Outcome]:
-    """Write summary and report; return the summary, and the outcome with what writing them showed."""
-    from flightstack.core.errors import ConfigError  # noqa: PLC0415
-    from gcs_cli.report.analysis import read_flight  # noqa: PLC0415
-    from gcs_cli.report.flight_data import Flight as FlightData  # noqa: PLC0415
-    from gcs_cli.report.flight_outcome import with_log  # noqa: PLC0415
-    from gcs_cli.report.page import write_report  # noqa: PLC0415
-    from gcs_cli.report.summary import RunInfo, summarise, write_summary  # noqa: PLC0415
-
+    """Write summary and report; return the summary, and the outcome after reading the log."""
     log, outcome = flown.folder / LOG_NAME, flown.outcome
     try:
         data = read_flight(log)
@@ -165,7 +166,17 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
             outcome = Outcome(Code.NO_LOG, f"the mission was flown, but its log cannot be read: {error}")
     else:
         outcome = with_log(outcome, data, plan.items)
-    run = RunInfo(
+    summary = summarise(data, plan, _run_info(options, flown, outcome))
+    try:
+        write_summary(flown.folder / SUMMARY_NAME, summary)
+        write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
+    except OSError as error:
+        raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
+    return summary, outcome
+
+
+def _run_info(options: FlyOptions, flown: Flown, outcome: Outcome) -> RunInfo:
+    return RunInfo(
         outcome=outcome.code.value,
         outcome_text=outcome.reason,
         plan=str(options.plan_path),
@@ -190,14 +201,7 @@ def write_results(options: FlyOptions, plan: Plan, flown: Flown) -> tuple[dict[s
         params=None if options.params is None else str(options.params),
         param=tuple(options.param or ()),
         inner_hz=options.inner_hz,
-        outer_hz=options.outer_rate_hz,
+        outer_hz=outer_rate_hz(options),
         overruns=flown.overruns,
-        log_path=log,
+        log_path=flown.folder / LOG_NAME,
     )
-    summary = summarise(data, plan, run)
-    try:
-        write_summary(flown.folder / SUMMARY_NAME, summary)
-        write_report(flown.folder / REPORT_NAME, data, plan, summary, flown.folder / TLOG_NAME)
-    except OSError as error:
-        raise CliError(f"{flown.folder}: the results cannot be written: {error.strerror}") from None
-    return summary, outcome

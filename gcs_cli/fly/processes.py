@@ -1,25 +1,27 @@
-"""Child processes: started, watched and always ended; their output goes to files."""
+"""Child processes, which always end with their parent and write to files; signals as a flag."""
 
 from __future__ import annotations
 
 import re
+import signal
 import subprocess
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Protocol, TypeVar
+from types import FrameType
+from typing import Any, Protocol, TypeVar
 
 from flightstack.process.command_line import own_program
 
 _TAIL_BYTES = 4096
 _POLL_S = 0.02
 _NOTICE = re.compile(r"\S+: (warning: |compiling )|.*\wWarning: ")
-"""A line to show in flight: a warning of the child or of a library of its, or progress of compilation."""
-_BLAME = ("lost at", "lost:", "was shut down")  # in the words of simulator and flight stack
+"""A line to show in flight: a warning of the child or of one of its libraries, or progress of compilation."""
+_BLAME = ("lost at", "lost:", "was shut down")  # in the last line of simulator or flight stack
 
 
 class Process(Protocol):
-    """A process that has ended, or not yet."""
+    """A process, running or ended."""
 
     @property
     def exit_code(self) -> int | None:
@@ -27,17 +29,17 @@ class Process(Protocol):
 
     @property
     def blames_another(self) -> bool:
-        """Whether it ended because another process did."""
+        """True if it ended because another process did."""
 
 
 P = TypeVar("P", bound=Process)
 
 
 def is_explained(processes: Sequence[Process]) -> bool:
-    """Tell whether those that have ended say why, so that nobody else need be waited for.
+    """Return True if the processes that have ended explain the end of all.
 
-    Each process depends on those before it. One that failed, and blames nobody, is the cause. One that ended in
-    order and blames nobody is it only if it is the last: those that depend on it may have ended first, in order.
+    Each process depends on those before it. One that failed without blaming another is the cause. One that ended in
+    order without blaming another is the cause only if it is the last: its dependants may have ended before it.
     """
     *others, last = processes
     failed = (other for other in others if other.exit_code and not other.blames_another)
@@ -47,10 +49,10 @@ def is_explained(processes: Sequence[Process]) -> bool:
 
 
 def culprit(processes: Sequence[P]) -> P | None:
-    """Return the one whose end made the others end; each depends on those before it.
+    """Return the process whose end caused the others to end; each depends on those before it.
 
-    A signal comes before all else, then who blames nobody. Of two that ended in order, the one that depends on
-    the other would have blamed it.
+    One that a signal ended comes first, then one that blames no other. Of two that ended in order, the dependent one
+    would have blamed the other.
     """
     ended = [process for process in reversed(processes) if process.exit_code is not None]
     return min(
@@ -59,7 +61,7 @@ def culprit(processes: Sequence[P]) -> P | None:
 
 
 class Child:
-    """One child process, in a session of its own: Ctrl-C on our terminal is ours to handle."""
+    """One child process, in a session of its own, which Ctrl-C on the terminal does not reach."""
 
     def __init__(self, name: str, arguments: Sequence[str], log_path: Path) -> None:
         self.name = name
@@ -85,7 +87,7 @@ class Child:
         return self._process.poll()
 
     def notices(self) -> list[str]:
-        """Return warnings and progress that it wrote since the last call, whole lines."""
+        """Return the warnings and progress lines written since the last call."""
         with self._log_path.open("rb") as log:
             log.seek(self._read)
             text, newline, _ = log.read().rpartition(b"\n")
@@ -94,7 +96,7 @@ class Child:
 
     @property
     def last_line(self) -> str:
-        """The last line that it wrote, which says why it ended."""
+        """The last line of its output, which gives the reason of its end."""
         with self._log_path.open("rb") as log:
             log.seek(max(0, self._log_path.stat().st_size - _TAIL_BYTES))
             lines = log.read().decode(errors="replace").split("\n")
@@ -102,25 +104,25 @@ class Child:
 
     @property
     def blames_another(self) -> bool:
-        """Whether it ended because another process did."""
+        """True if it ended because another process did."""
         return any(words in self.last_line for words in _BLAME)
 
     @property
-    def obituary(self) -> str:
+    def end_reason(self) -> str:
         """How it ended, in one clause."""
         code = self.exit_code
-        if code is not None and code < 0:  # its last line was about something else
+        if code is not None and code < 0:  # its last line has another subject
             return f"{self.name} was killed by signal {-code}"
         ending = f"ended with code {code}"
         said = self.last_line.removeprefix(f"{self.name}: ")
         return f"{self.name} {ending}" + (f": {said}" if said else "")
 
     def terminate(self) -> None:
-        """Ask it to end; nothing happens when it has."""
+        """Send SIGTERM, unless it has ended."""
         self._process.terminate()
 
     def kill(self) -> None:
-        """End it at once."""
+        """Send SIGKILL and wait."""
         self._process.kill()
         self._process.wait()
 
@@ -128,7 +130,7 @@ class Child:
 class Children:
     """The children of a run. Leaving the ``with`` block ends them all.
 
-    What was started last is stopped first: it depends on those before it.
+    The last one started is stopped first: it depends on those before it.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -142,11 +144,11 @@ class Children:
         return child
 
     def add(self, child: Child) -> None:
-        """Take charge of a child."""
+        """Add a child."""
         self._all.append(child)
 
     def notices(self) -> list[str]:
-        """Return the warnings and the progress that the children wrote since the last call."""
+        """Return the warnings and progress lines of all children since the last call."""
         return [line for child in self._all for line in child.notices()]
 
     def ended(self) -> list[Child]:
@@ -154,20 +156,20 @@ class Children:
         return [child for child in self._all if child.exit_code is not None]
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until all have ended; return False when they have not within ``timeout_s``."""
+        """Wait until all have ended; return False after ``timeout_s``."""
         return _wait(self._all, timeout_s)
 
     def culprit(self, timeout_s: float) -> Child | None:
-        """Wait until those that have ended, or are about to, say why; return the one that began it."""
+        """Wait until the end is explained, ``timeout_s`` at most; return the child that caused it."""
         _wait_until(lambda: is_explained(self._all), timeout_s)
         return culprit(self._all)
 
-    def stop(self, patience_s: float = 5.0) -> None:
-        """Ask each to end, and kill it when it does not within ``patience_s``."""
+    def stop(self, timeout_s: float = 5.0) -> None:
+        """Terminate each child, and kill it after ``timeout_s``."""
         for child in reversed(self._all):
             if child.exit_code is None:
                 child.terminate()
-                if not _wait([child], patience_s):
+                if not _wait([child], timeout_s):
                     child.kill()
 
     def __enter__(self) -> Children:
@@ -192,3 +194,27 @@ def _wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
             return False
         time.sleep(_POLL_S)
     return True
+
+
+class Interruption:
+    """Keeps the first SIGINT, SIGTERM or SIGHUP as ``reason``; the second one raises KeyboardInterrupt."""
+
+    def __init__(self) -> None:
+        self.reason = ""
+        self._before: dict[int, Any] = {}
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        if self.reason:
+            raise KeyboardInterrupt
+        self.reason = (
+            "interrupted" if number == signal.SIGINT else f"interrupted ({signal.Signals(number).name})"
+        )
+
+    def __enter__(self) -> Interruption:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)

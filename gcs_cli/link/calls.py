@@ -1,4 +1,4 @@
-"""One request to the vehicle and its answer, with the vehicle's own words when it refuses. Without I/O."""
+"""One request to the vehicle and its answer, with the vehicle's reason if it is refused. Sans-IO."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from gcs_cli.clients.command_client import CommandClient, CommandResult
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID, Session
 
+OWN_ADDRESS = Address(SYSTEM_ID, COMPONENT_ID)
 TEXT_WAIT_S = 0.3
-"""How long to wait for the text that explains a refusal: it comes right after the answer."""
+"""How long to wait for the STATUSTEXT that explains a refusal; it follows the answer."""
 
 _WARNING = 4  # MAV_SEVERITY_WARNING; lower is worse
 _PREFIXES = (
@@ -30,11 +31,11 @@ class Answer(NamedTuple):
 
     accepted: bool
     reason: str = ""
-    """Why not, in the vehicle's words if it gave any."""
+    """The reason of a refusal: the vehicle's STATUSTEXT, if it sent one."""
     silent: bool = False
-    """Whether the vehicle did not answer at all."""
+    """True if the vehicle did not answer."""
     cancelled: bool = False
-    """Whether the ground station ended it."""
+    """True if the ground station ended the request."""
     items: tuple[MissionItem, ...] = ()
     """The plan, of a download."""
     result: int = MissionResult.ACCEPTED
@@ -42,14 +43,14 @@ class Answer(NamedTuple):
 
 
 class Request(Protocol):
-    """A request under way, or several in a row."""
+    """One pending request, or several in sequence."""
 
     def answer(self, now_s: float) -> Answer | None:
         """Return the answer once it is known."""
 
 
 class Call:
-    """A request under way. It takes over the session's service until it is answered."""
+    """A pending request. It is the session's service until it is answered."""
 
     def __init__(self, session: Session, client: CommandClient | MissionClient) -> None:
         self._session = session
@@ -60,7 +61,7 @@ class Call:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Items transferred and in all, of a mission transfer."""
+        """Transferred items and their total, of a mission transfer."""
         return self._client.progress if isinstance(self._client, MissionClient) else (0, 0)
 
     def answer(self, now_s: float) -> Answer | None:
@@ -98,14 +99,14 @@ class Call:
 
 
 def command(session: Session, number: int, params: Sequence[float], now_s: float) -> Call:
-    """Begin a command; parameters left out are zero."""
-    client = CommandClient(_vehicle(session), Address(SYSTEM_ID, COMPONENT_ID))
+    """Begin a command; omitted parameters are zero."""
+    client = CommandClient(vehicle_address(session), OWN_ADDRESS)
     client.send(number, params, now_s)
     return Call(session, client)
 
 
 def upload(session: Session, items: Sequence[MissionItem], kind: MissionType = MissionType.MISSION) -> Call:
-    """Begin to upload a mission, geofence or rally points; without items they are cleared."""
+    """Begin to upload a mission, geofence or rally points; an upload without items clears them."""
     client = mission_client(session, kind)
     client.start_upload(items)
     return Call(session, client)
@@ -127,10 +128,11 @@ def clear(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
 
 def mission_client(session: Session, kind: MissionType) -> MissionClient:
     """Return a client that transfers one type of plan."""
-    return MissionClient(_vehicle(session), Address(SYSTEM_ID, COMPONENT_ID), kind)
+    return MissionClient(vehicle_address(session), OWN_ADDRESS, kind)
 
 
-def _vehicle(session: Session) -> Address:
+def vehicle_address(session: Session) -> Address:
+    """Return system and component of the vehicle."""
     return Address(*session.target)
 
 
@@ -145,6 +147,7 @@ LAND: Command = (int(mavlink.MAV_CMD_NAV_LAND), (0.0, 0.0, 0.0, NAN, NAN, NAN, N
 RETURN: Command = (int(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH), ())
 START_MISSION: Command = (int(mavlink.MAV_CMD_MISSION_START), ())
 REBOOT: Command = (int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), (1.0,))
+RESET_PARAMETERS: Command = (int(mavlink.MAV_CMD_PREFLIGHT_STORAGE), (2.0,))
 SHUT_DOWN: Command = (int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), (2.0,))
 _REQUEST = int(mavlink.MAV_CMD_REQUEST_MESSAGE)
 REQUEST_MISSION_CURRENT: Command = (_REQUEST, (float(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT),))
@@ -153,26 +156,26 @@ REQUEST_SYS_STATUS: Command = (_REQUEST, (float(mavlink.MAVLINK_MSG_ID_SYS_STATU
 
 
 def takeoff_command(altitude_amsl_m: float = NAN) -> Command:
-    """Return the command to take off to an altitude above sea level; NaN: as high as the vehicle likes."""
+    """Return the command to take off to an altitude above mean sea level; NaN: the vehicle's default."""
     return int(mavlink.MAV_CMD_NAV_TAKEOFF), (0.0, 0.0, 0.0, NAN, NAN, NAN, altitude_amsl_m)
 
 
 def goto_command(latitude_deg: float, longitude_deg: float, altitude_amsl_m: float = NAN) -> Command:
-    """Return the command to hold at another place; an altitude that is NaN stays as it is."""
+    """Return the command to hold at another position; NaN keeps the altitude."""
     change_mode = float(mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE)
     params = (-1.0, change_mode, 0.0, NAN, latitude_deg, longitude_deg, altitude_amsl_m)
     return int(mavlink.MAV_CMD_DO_REPOSITION), params
 
 
 def speed_command(speed_m_s: float) -> Command:
-    """Return the command to fly at another ground speed."""
+    """Return the command to set the ground speed."""
     return int(mavlink.MAV_CMD_DO_CHANGE_SPEED), (1.0, speed_m_s, -1.0)
 
 
-def home_command(place: tuple[float, float, float] | None) -> Command:
-    """Return the command to move home to latitude, longitude, altitude above the sea; None: here."""
+def home_command(home: tuple[float, float, float] | None) -> Command:
+    """Return the command to set home to latitude, longitude and AMSL altitude; None: the current position."""
     number = int(mavlink.MAV_CMD_DO_SET_HOME)
-    return (number, (1.0,)) if place is None else (number, (0.0, 0.0, 0.0, NAN, *place))
+    return (number, (1.0,)) if home is None else (number, (0.0, 0.0, 0.0, NAN, *home))
 
 
 def mode_command(main: int, sub: int) -> Command:

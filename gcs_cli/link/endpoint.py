@@ -8,13 +8,13 @@ from flightstack.core.port_numbers import ground_station_port, vehicle_ground_po
 from gcs_cli.errors import USAGE, CliError
 
 LOOPBACK = "127.0.0.1"
-"""Where we listen unless told otherwise; ``udp:0.0.0.0:14550`` listens on every network."""
+"""Default local address; ``udp:0.0.0.0:14550`` listens on all interfaces."""
 
 DEFAULT_CONNECTION = f"udp:{LOOPBACK}:{ground_station_port(0)}"
 
 
 def vehicle_connection(instance: int) -> str:
-    """Return the link that calls a vehicle of this machine at its own port."""
+    """Return the connection string of a vehicle on this machine at its own port."""
     return f"udpout:{LOOPBACK}:{vehicle_ground_port(instance)}"
 
 
@@ -22,8 +22,8 @@ VEHICLE_CONNECTION = vehicle_connection(0)
 _FORMS = "udp:PORT, udpin:HOST:PORT or udpout:HOST:PORT"
 
 
-class Endpoint(NamedTuple):
-    """Where the vehicle is met: we listen there, or we send there first."""
+class VehicleEndpoint(NamedTuple):
+    """Address of the vehicle: a local address on which we listen, or a remote one to which we send first."""
 
     host: str
     port: int
@@ -33,7 +33,7 @@ class Endpoint(NamedTuple):
         return f"UDP {self.host}:{self.port}"
 
 
-def parse_endpoint(text: str) -> Endpoint:
+def parse_endpoint(text: str) -> VehicleEndpoint:
     """Read a connection string; raise CliError (usage)."""
     scheme, _, rest = text.partition(":")
     host, _, port_text = rest.rpartition(":")
@@ -42,4 +42,4 @@ def parse_endpoint(text: str) -> Endpoint:
         raise CliError(f"--connect {text}: expected {_FORMS}", USAGE)
     if not (port_text.isascii() and port_text.isdigit() and 0 < int(port_text) < 65536):
         raise CliError(f"--connect {text}: {port_text or 'nothing'} is not a port (1 to 65535)", USAGE)
-    return Endpoint(host or LOOPBACK, int(port_text), listens)
+    return VehicleEndpoint(host or LOOPBACK, int(port_text), listens)

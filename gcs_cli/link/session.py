@@ -1,4 +1,4 @@
-"""One vehicle over one link, without I/O: datagrams in and out, heartbeats, the view and a service."""
+"""One vehicle over one link, sans-IO: datagrams in and out, heartbeats, the view and a service."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import VehicleView
 
 SYSTEM_ID = 255
-COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, the custom of ground stations
+COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as most ground stations use
 HEARTBEAT_PERIOD_S = 1.0
-_ANYONE = 0
+_BROADCAST = 0
 _MOST_PEERS = 32
 
 
@@ -24,21 +24,21 @@ class Service(Protocol):
     """A client side of a MAVLink service: a state machine without I/O."""
 
     def receive(self, message: Message, now_s: float) -> None:
-        """Take a message from the vehicle."""
+        """Process a message from the vehicle."""
 
     def poll(self, now_s: float) -> list[Message]:
-        """Return what is to be sent now."""
+        """Return the messages to send now."""
 
     def next_deadline(self) -> float | None:
-        """Return when ``poll`` has something to do at the latest."""
+        """Return the time at which to call ``poll`` at the latest."""
 
 
 class Session:
     """The ground station's side of a link.
 
-    The first peer from which an autopilot's heartbeat comes is the vehicle; datagrams of others are dropped
-    unless that one has fallen silent. With ``peer``, only what comes from there is taken, and with ``system_id``,
-    only that vehicle. ``record`` gets every frame, sent and received, without its signature.
+    The first peer that sends an autopilot's heartbeat is the vehicle; datagrams of others are dropped unless the
+    vehicle is lost. With ``peer``, only datagrams from that address are accepted, and with ``system_id``, only that
+    vehicle. ``record`` gets every frame, sent and received, without its signature.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Session:
         self.view = VehicleView()
         self.peer = peer
         self.foreign_systems: set[int] = set()
-        """System ids of vehicles that were heard and are not ours."""
+        """System ids of other vehicles."""
         self._only_peer = peer
         self._system_id = system_id
         self.bad = 0
@@ -64,25 +64,25 @@ class Session:
 
     @property
     def target(self) -> tuple[int, int]:
-        """System and component of the vehicle; (0, 0), everyone, before one is heard."""
+        """System and component of the vehicle; (0, 0), broadcast, before its first heartbeat."""
         identity = self.view.identity
-        return (_ANYONE, _ANYONE) if identity is None else (identity.system_id, identity.component_id)
+        return (_BROADCAST, _BROADCAST) if identity is None else (identity.system_id, identity.component_id)
 
     def subscribe(self, rates_hz: Mapping[int, float]) -> None:
-        """Ask the vehicle for messages, id -> rate [Hz], until another service is used."""
+        """Request messages from the vehicle, id -> rate [Hz], until another service is used."""
         self.use(Subscription(lambda: self.target, rates_hz))
 
     def keep_vehicle(self) -> None:
-        """Take no other system for the vehicle from now on, however long this one is silent."""
+        """Accept no other vehicle from now on, even if this one is lost."""
         assert self.view.identity is not None
         self._system_id = self.view.identity.system_id
 
     def use(self, service: Service | None) -> None:
-        """Let ``service`` talk to the vehicle from now on, in place of the one before."""
+        """Replace the service that exchanges messages with the vehicle."""
         self._service = service
 
     def receive(self, data: bytes, peer: Address, now_s: float) -> None:
-        """Take a datagram."""
+        """Process a datagram."""
         if self._only_peer not in (None, peer):
             return
         heard = self.view.identity is not None and not self.view.lost(now_s)
@@ -94,11 +94,11 @@ class Session:
         bad_before = link.bad
         for message in link.decode(data):
             if link.is_authentic(message) and (heard or self._is_vehicle(message, peer, now_s)):
-                self._take(message, now_s)
+                self._process(message, now_s)
         self.bad += link.bad - bad_before
 
     def _is_vehicle(self, message: Message, peer: Address, now_s: float) -> bool:
-        """Tell whether this is from our vehicle; while there is none, the heartbeat of a new one decides."""
+        """Return True if the message is from our vehicle; without one, accept the first autopilot's heartbeat."""
         if self.view.identity is not None and peer == self.peer and not self._is_other_system(message):
             return True
         candidate = VehicleView() if self._is_other_system(message) else self.view
@@ -114,7 +114,7 @@ class Session:
     def _is_other_system(self, message: Message) -> bool:
         return (message.get_srcSystem(), message.get_srcComponent()) != self.target
 
-    def _take(self, message: Message, now_s: float) -> None:
+    def _process(self, message: Message, now_s: float) -> None:
         if self.record is not None:
             self.record(without_signature(bytes(message.get_msgbuf()), message.crc_extra))
         self.view = update(self.view, message, now_s)
@@ -134,14 +134,14 @@ class Session:
         return frames
 
     def next_deadline(self) -> float | None:
-        """Return when ``poll`` has something to do at the latest; None before there is anyone to talk to."""
+        """Return the time at which to call ``poll`` at the latest; None without a peer."""
         if self.peer is None:
             return None
         service = None if self._service is None else self._service.next_deadline()
         return self._heartbeat_due_s if service is None else min(self._heartbeat_due_s, service)
 
     def farewell(self) -> list[bytes]:
-        """Return the datagrams that say that this ground station leaves in order."""
+        """Return the HEARTBEAT in state POWEROFF, which ends the link in order."""
         return [] if self.peer is None else [self._encode(_heartbeat(mavlink.MAV_STATE_POWEROFF))]
 
     def _encode(self, message: Message) -> bytes:

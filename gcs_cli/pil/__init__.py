@@ -1,1 +1,1 @@
-"""The same mission with the loops in Python, in C and on a target: flown, compared, judged and reported."""
+"""Comparison of the loops in Python, in C and on a target: flights, replays, checks and reports."""

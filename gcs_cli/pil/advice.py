@@ -1,4 +1,4 @@
-"""What to change on a line to a target, from what it showed. Pure."""
+"""Advice on the link to a target, from its measurements. Pure."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from gcs_cli.pil.probe import Measurement
 from gcs_cli.pil.target_record import RESTARTED, SAFE, state_words
 
 FTDI_LATENCY_MS = 16.0
-"""An FTDI bridge, such as the XDS100v2 has, keeps what it received for so long unless it is told otherwise."""
+"""Default latency timer of an FTDI bridge, as in the XDS100v2."""
 _SLACK_S = 0.004
-"""More than this on top of the time on the wire is no processor's, but a bridge's."""
+"""Longest round trip beyond the time on the wire without a latency timer."""
 _MUCH_LOSS = 0.01
 _INNER_HZ = 500.0
 
 
 class Port(NamedTuple):
-    """A serial port as the system knows it."""
+    """A serial port of this machine."""
 
     device: str
     latency_ms: float | None = None
-    """Of its bridge's latency timer; None if it has none, or it is not known."""
+    """Latency timer of its bridge; None without one, or if unknown."""
     latency_path: str = ""
-    """Where that can be changed."""
+    """File that sets the latency timer."""
 
 
 def advice(port: Port | None, found: Sequence[Measurement], expected_hash: str) -> list[str]:
-    """Return sentences; none if nothing need be changed. ``port`` is None for a target without a serial port."""
+    """Return sentences, none without problems. ``port`` is None for a target without a serial port."""
     answered = [each for each in found if each.identity is not None]
     if not answered:
         return list(_silence(port, found))
@@ -44,7 +44,7 @@ def advice(port: Port | None, found: Sequence[Measurement], expected_hash: str) 
 
 def _silence(port: Port | None, found: Sequence[Measurement]) -> Iterator[str]:
     if port is None:
-        yield "The target started, but nothing of it answers: this is a fault of its program."
+        yield "The target started, but does not answer: its program is faulty."
         return
     bauds = ", ".join(str(each.baud) for each in found)
     yield (

@@ -1,4 +1,4 @@
-"""How far two flights of the same mission are apart, signal by signal. Pure."""
+"""Differences of two flights of the same mission, per signal. Pure."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from gcs_cli.pil.ulps import Float32Array, steps_apart, ulp_of
 
 
 class Difference(NamedTuple):
-    """Of one signal in two flights, over ticks in which the loops of both ran."""
+    """Difference of one signal in two flights, over ticks in which the loops of both ran."""
 
     pair: str
     signal: str
     samples: int
     largest: float
-    """In the signal's unit, of all components; infinite if only one of two values is a number."""
+    """Largest difference of all components, in the signal's unit; infinite if only one of two values is a number."""
     rms: float
     at_s: float
-    """When it was largest, since the start of the first log; NaN if nothing differs."""
+    """Time of the largest difference since the start of the first log [s]; NaN without a difference."""
     full_scale: float
     """Largest value of the signal in the first flight, or its ``least_scale``."""
     steps: int
@@ -41,7 +41,7 @@ class Difference(NamedTuple):
         return self.rms / ulp_of(self.full_scale)
 
     def as_json(self, signal: Signal) -> dict[str, Any]:
-        """Return what ``pil.json`` says of it; null for what is not finite."""
+        """Return the object for ``pil.json``; null for values that are not finite."""
         figures = {
             "largest": self.largest,
             "rms": self.rms,
@@ -62,7 +62,7 @@ class Difference(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """A signal's difference over time: the largest of its components at ``time_s`` (n,)."""
+    """Difference of a signal over time: the largest of its components at ``time_s`` (n,)."""
 
     time_s: FloatArray
     size: FloatArray
@@ -74,7 +74,7 @@ def compared(
     """Yield the difference of each signal that both flights have, in the order of ``SIGNALS``.
 
     ``airborne``: leave out the ticks in which a vehicle touches the ground. A touchdown is an impact, after which
-    flights that were a micrometre apart go different ways; of two that shall be the same, it may not be left out.
+    flights that differed by a micrometre diverge. Do not leave it out if the flights must be identical.
     """
     for signal in SIGNALS:
         matched = _matched(signal, first, second, airborne)
@@ -85,7 +85,7 @@ def compared(
 def deviation(
     signal: Signal, first: FlightSamples, second: FlightSamples, airborne: bool = False
 ) -> Deviation:
-    """Return how far a signal is apart over time; of no samples if one flight does not have it."""
+    """Return the difference of a signal over time; without samples if one flight lacks the signal."""
     matched = _matched(signal, first, second, airborne)
     if matched is None:
         return Deviation(np.zeros(0), np.zeros(0))
@@ -94,13 +94,13 @@ def deviation(
 
 
 def status_differences(first: FlightSamples, second: FlightSamples) -> tuple[int, int]:
-    """Return in how many ticks the status of the loops differs, and of how many that both logs have."""
+    """Return the number of ticks with different status of the loops, and the number of ticks in both logs."""
     a, b = _at_same_times(first.status, second.status)
     return int(np.count_nonzero(a.values != b.values)), len(a.time_us)
 
 
 def ticks_apart(first: FlightSamples, second: FlightSamples) -> int:
-    """Return in how many ticks the loops ran in one flight only."""
+    """Return the number of ticks in which the loops ran in one flight only."""
     return len(np.setxor1d(first.flown_us, second.flown_us))
 
 
@@ -134,7 +134,7 @@ def _same_sign(a: Samples, b: Samples) -> Samples:
 
 
 def _distance(a: Float32Array, b: Float32Array) -> FloatArray:
-    """Distance of each two values: 0 between equal ones, also infinite ones and two that are no numbers."""
+    """Return the distance of each pair of values: 0 between equal ones, two infinite ones and two NaN."""
     with np.errstate(invalid="ignore"):
         apart = np.abs(a.astype(np.float64) - b.astype(np.float64))
     same = (a == b) | (np.isnan(a) & np.isnan(b))

@@ -1,4 +1,4 @@
-"""``gcs pil doctor``: opens a line to a target at each baud rate and measures it."""
+"""Measurement of the link to a target at each baud rate, for ``gcs pil doctor``."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from gcs_cli.pil.probe import Measurement, measured
 from gcs_cli.pil.target_record import status_words
 
 BAUDS = (115_200, 230_400, 460_800, 921_600)
-"""Rates that the F28377S port can be built for, as its divider gives them within half a percent."""
+"""Rates of the F28377S port that its divider gives within half a percent."""
 
 
 def examine(
     choice: LoopsChoice, bauds: Sequence[int], exchanges: int, progress: Callable[[int, int], None]
 ) -> list[Measurement]:
-    """Measure the line at each baud rate; only once if it is not serial. Raise CliError when it cannot be opened."""
+    """Measure the link at each baud rate, or once if it is not serial; raise CliError if it cannot be opened."""
     found = []
     for baud in bauds if choice.kind == SERIAL else (None,):
         tried = choice if baud is None else choice._replace(baud=baud)
@@ -44,7 +44,7 @@ def examine(
 
 
 def port_of(choice: LoopsChoice) -> Port | None:
-    """Return what the system knows of the port; None if the target has none."""
+    """Return the port of a target and its latency timer; None without a port."""
     if choice.kind != SERIAL:
         return None
     path = Path("/sys/class/tty") / Path(choice.device).resolve().name / "device" / "latency_timer"
@@ -55,7 +55,7 @@ def port_of(choice: LoopsChoice) -> Port | None:
 
 
 def findings(choice: LoopsChoice, found: Sequence[Measurement]) -> dict[str, Any]:
-    """Return all that was found, as JSON holds it."""
+    """Return the measurements and the advice for JSON."""
     return {
         "target": choice.kind if choice.kind != SERIAL else choice.device,
         "sources_here": source_hash().hex(),
@@ -88,7 +88,7 @@ def _ms(seconds: float | None) -> float | None:
 
 
 def print_findings(console: Console, result: dict[str, Any]) -> None:
-    """Print who answered, a table of the rates, and what to change."""
+    """Print the target's identity, a table of the rates, and the advice."""
     identity = next((line["identity"] for line in result["lines"] if line["identity"]), None)
     if identity is not None:
         words = f"{identity['board']}, {identity['compiler']}, sources {identity['source_hash']}"
@@ -117,9 +117,9 @@ def _cells(line: dict[str, Any]) -> tuple[str, ...]:
 
 
 def check_findings(result: dict[str, Any]) -> None:
-    """Raise CliError when nothing answered (no answer), or nothing can fly on what did (failed).
+    """Raise CliError if no target answered (no answer), or if none can fly (failed).
 
-    One rate that works is enough: the advice tells of the others.
+    One rate that works is enough: the advice covers the others.
     """
     lines = [line for line in result["lines"] if line["answers"]]
     if not lines:

@@ -1,4 +1,4 @@
-"""The loops' inputs and outputs of a flight, as its log has them: float32, to the last bit."""
+"""Inputs and outputs of the loops in a flight log: float32, to the last bit."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.uint16]]
 _DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
 _TOPICS = sorted({signal.topic for signal in SIGNALS} | {"trajectory_setpoint"})
 GROUNDED = LoopStatus.IDLE | LoopStatus.INPUT_STALE
-"""Status of ticks in which the loops did not run: on the ground, or while their input stood still."""
+"""Status of ticks in which the loops did not run: on the ground, or with a frozen input."""
 AIRBORNE_M = 0.05
-"""Higher than this above the place where it stood at first, a vehicle touches nothing."""
+"""Height above the start position from which a vehicle does not touch the ground."""
 
 
 class Samples(NamedTuple):
@@ -36,19 +36,19 @@ class Samples(NamedTuple):
 
 
 class FlightSamples(NamedTuple):
-    """What a log tells of the loops."""
+    """The loops in a log."""
 
     signals: Mapping[str, Samples]
-    """By the names of ``SIGNALS``; none that the log does not have."""
+    """Samples by the names of ``SIGNALS``, without those that the log lacks."""
     status: Samples
     """Status of the loops in each inner tick, (n, 1)."""
     topics: Mapping[str, Mapping[str, Any]]
-    """The columns of the topics, for who needs more."""
+    """The columns of the topics."""
     info: Mapping[str, Any]
     parameters: Mapping[str, float]
-    """At the start."""
+    """Parameters at the start."""
     changes: tuple[tuple[int, str, float], ...]
-    """Time [µs], name and value of each later change, in order; in force after the samples of that time."""
+    """Time [µs], name and value of each later change, in order; effective after the samples of that time."""
 
     @property
     def flown_us(self) -> TimeArray:
@@ -59,7 +59,7 @@ class FlightSamples(NamedTuple):
 
     @property
     def airborne_us(self) -> TimeArray:
-        """Times of those ticks in which the vehicle also touched nothing; none if the log has no position."""
+        """Times of those ticks in which the vehicle was in the air too; empty if the log has no position."""
         position, flown_us = self.signals.get("position"), self.flown_us
         if position is None or not len(position.time_us):
             return flown_us[:0]
@@ -70,9 +70,9 @@ class FlightSamples(NamedTuple):
 
 
 def read_samples(path: Path) -> FlightSamples:
-    """Read a flight log; raise ConfigError if it is none, or is not one of the loops'."""
+    """Read a flight log; raise ConfigError if it is not readable, or has no loops."""
     try:
-        # pyulog reports damage on stdout, which belongs to the command's own output
+        # pyulog reports damage on stdout, where it would mix with the output of the command
         with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):
             log = ULog(file, _TOPICS)
             return _samples(path, log)

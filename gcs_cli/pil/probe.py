@@ -1,4 +1,4 @@
-"""How well a line to a target works: who is at its other end, how long an exchange takes, what is lost."""
+"""Measurement of the link to a target: its identity, the round trip, lost exchanges."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ from flightstack.firmware.target_loops import described
 from flightstack.transports.byte_link import ByteLink
 
 EXCHANGES = 300
-"""Steps that are measured on a line that works."""
+"""Default number of measured steps."""
 HELLO_ATTEMPTS, STEADY_ATTEMPTS = 4, 5
-"""Fewer than in flight: a line that loses so much is found out sooner."""
+"""Fewer attempts than in flight, to detect a bad link sooner."""
 LEVEL = [0.0] * 6 + [1.0] + [0.0] * 16 + [1e-3]
-"""A vehicle that stands level where it shall stand: each step resets the loops, so that they stay at rest. The last
-number makes the frame as long as those of a flight: zeros at the end are not sent."""
+"""A level vehicle at its setpoint: each step resets the loops, so that they stay at rest. The last number makes the
+frame as long as those of a flight: zeros at the end are not sent."""
 _MOST_READS = 10_000
 _TROUBLES = ("bad_frames", "skipped_octets", "uart_overruns", "uart_errors", "dropped_frames")
 
 
 class Measurement(NamedTuple):
-    """What a line showed at one baud rate."""
+    """Measurement at one baud rate."""
 
     baud: int | None
-    """None: not a serial port."""
+    """None if it is not a serial port."""
     identity: dict[str, Any] | None
-    """Who answered; None: nobody did."""
+    """The target's identity; None without an answer."""
     problem: str | None = None
-    """Why the exchanges were given up, as a clause about the target."""
+    """The reason of an early end, as a clause about the target."""
     round_trips_s: tuple[float, ...] = ()
-    """Of each exchange, from the first sending to the answer."""
+    """Round trip of each exchange, from the first attempt to the answer [s]."""
     counters: PilCounters | None = None
     troubles: dict[str, int] = {}  # noqa: RUF012  # never changed
-    """What the target's own counters counted meanwhile, where it is not zero."""
+    """Nonzero differences of the target's own counters."""
     before: dict[str, Any] | None = None
-    """The target's FS_PIL_STATUS before its first step: only there it can be seen that its watchdog restarted it."""
+    """The target's FS_PIL_STATUS before its first step, the only one that shows a restart by the watchdog."""
 
     @property
     def steps_per_s(self) -> float | None:
-        """Steps of a flight that the line would carry each second."""
+        """Steps per second that the link can carry in flight."""
         return len(self.round_trips_s) / sum(self.round_trips_s) if sum(self.round_trips_s) > 0.0 else None
 
     @property
@@ -53,32 +53,32 @@ class Measurement(NamedTuple):
 
     @property
     def loss(self) -> float:
-        """The share of them."""
+        """Ratio of lost exchanges, 0 to 1."""
         sent = len(self.round_trips_s) + self.lost
         return self.lost / sent if sent else 0.0
 
     @property
     def wire_s(self) -> float | None:
-        """How long an exchange is on the line, 8N1: no round trip can take less."""
+        """Time of an exchange on the wire, 8N1: the shortest possible round trip."""
         if self.baud is None or self.counters is None or not self.round_trips_s:
             return None
         octets = self.counters.octets_sent + self.counters.octets_received
         return octets / len(self.round_trips_s) * 10.0 / self.baud
 
     def percentile_s(self, share: float) -> float | None:
-        """Return the round trip that this share of the exchanges (0 to 100) does not exceed."""
+        """Return a percentile (0 to 100) of the round trips."""
         return float(np.percentile(self.round_trips_s, share)) if self.round_trips_s else None
 
 
 class Probe:
-    """Runs single exchanges on a line."""
+    """Runs single exchanges on a link."""
 
     def __init__(
         self, link: ByteLink, timing: PilTiming, clock_s: Callable[[], float] = time.monotonic
     ) -> None:
-        """``timing``: that of flights on this line; see ``targets.timing_of``."""
+        """``timing`` is that of flights on this link; see ``targets.timing_of``."""
         self._link, self._timing, self._clock_s = link, timing, clock_s
-        self._waited_s = 0.0  # on top of the clock: an emulated target waits in no time
+        self._waited_s = 0.0  # in addition to the clock: an emulated target does not wait in real time
         self.client = PilClient(timing._replace(attempts=HELLO_ATTEMPTS))
 
     @property
@@ -86,13 +86,13 @@ class Probe:
         return self._clock_s() + self._waited_s
 
     def request(self, name: str) -> Any | None:
-        """Ask for a message; None when it does not come. Raise LineError."""
+        """Request a message; return None without an answer. Raise LineError."""
         self.client.timing = self._timing._replace(attempts=HELLO_ATTEMPTS)
         self.client.start_request(name)
         return self._finished()
 
     def step(self) -> float | None:
-        """Run a step at rest and return how long it took [s]; None when it was not answered. Raise LineError."""
+        """Run a step at rest and return its round trip [s]; None without an answer. Raise LineError."""
         self.client.timing = self._timing._replace(attempts=STEADY_ATTEMPTS)
         self.client.start_step(LoopFlags.RESET | LoopFlags.OUTER_DUE, LEVEL)
         began_s = self._now_s
@@ -129,7 +129,7 @@ def measured(
     timing: PilTiming = DEFAULT_TIMING,
     clock_s: Callable[[], float] = time.monotonic,
 ) -> Measurement:
-    """Measure a line; raise LineError when it is gone. Firmware of other sources is measured as well."""
+    """Measure a link; raise LineError if it breaks. Firmware from other sources is measured as well."""
     probe = Probe(link, timing, clock_s)
     identity = probe.request("FS_PIL_IDENTITY")
     if identity is None:

@@ -1,4 +1,4 @@
-"""What the stages of a step cost on a target: figures and histogram. Pure."""
+"""Cost of the stages of a step on a target: figures and histogram. Pure."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class StageProfile(NamedTuple):
     """The smallest cost that 99 % of the steps do not exceed."""
     largest: float
     edges: tuple[float, ...]
-    """Borders of the histogram's bins, rising; one more than there are bins."""
+    """Edges of the histogram's bins, ascending."""
     counts: tuple[int, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Return what ``pil.json`` says of it."""
+        """Return the object for ``pil.json``."""
         return {
             "count": self.steps,
             "min": self.smallest,
@@ -71,7 +71,7 @@ def _profile(stage: str, costs: FloatArray) -> StageProfile:
 
 
 def _edges(low: float, high: float) -> list[float]:
-    """Return borders of bins that are a whole number of units wide and hold all costs from low to high."""
+    """Return bin edges a whole number of units apart that cover all costs from low to high."""
     width = max(1, math.ceil((high - low + 1.0) / _BINS))
     bins = max(1, math.ceil((high - low + 1.0) / width))
     return [low - 0.5 + width * index for index in range(bins + 1)]

@@ -1,6 +1,6 @@
-"""Open-loop replay: what went into the loops in a recorded flight, and what a target makes of the same inputs. Pure.
+"""Open-loop replay: the inputs of the loops in a log, fed to a target. Pure.
 
-A log holds float32, which is what a link to a target carries: a flight whose loops were C replays to the last bit.
+Logs and links to targets both carry float32: a flight with the loops in C replays to the last bit.
 """
 
 from __future__ import annotations
@@ -39,43 +39,43 @@ _PROGRESS_STEPS = 500
 
 
 class Loops(Protocol):
-    """What computes the steps; see ``flightstack.firmware.c_loops.LoopExecutor``."""
+    """Computes steps of the loops; see ``flightstack.firmware.c_loops.LoopExecutor``."""
 
     input: FloatArray
     output: FloatArray
 
     def set(self, name: str, value: float) -> None:
-        """Change a number from the next step on."""
+        """Change a parameter from the next step on."""
 
     def step(self, flags: int) -> None:
         """Compute a step from ``input`` into ``output``."""
 
 
 class UnfitLogError(ValueError):
-    """A log does not hold what a replay needs; the text says what."""
+    """A log lacks data that a replay needs; the text names it."""
 
 
 class Recording(NamedTuple):
     """The steps of the loops in a flight, in order."""
 
     time_us: TimeArray
-    """Of each step, (n,)."""
+    """Time of each step, (n,)."""
     inputs: FloatArray
     """State (13), setpoint (11) and attitude target (5) of each step, (n, 29)."""
     flags: FlagArray
     """``LoopFlags`` of each step, (n,)."""
     is_outer: np.ndarray[Any, np.dtype[np.bool_]]
-    """Whether it is an outer tick, (n,)."""
+    """True for outer ticks, (n,)."""
     changes: Mapping[int, tuple[tuple[str, float], ...]]
     """Parameters that change before the step of that index."""
     tells_targets: bool
-    """Whether the log says which attitude targets were given to the loops. An older one does not: all are given."""
+    """True if the log marks the attitude targets that were given to the loops. If not, all are given."""
 
 
 def recording(flight: FlightSamples) -> Recording:
-    """Take the inputs of the loops out of a log; raise UnfitLogError.
+    """Return the inputs of the loops from a log; raise UnfitLogError.
 
-    Position, velocity and setpoint are logged, and used, at the outer rate; between they stay as they are.
+    Position, velocity and setpoint are logged and used at the outer rate, and held in between.
     """
     steps_us = flight.flown_us
     if not len(steps_us):
@@ -97,7 +97,7 @@ def recording(flight: FlightSamples) -> Recording:
 
 
 def _with_outer_ticks(steps_us: TimeArray, outer_us: TimeArray) -> TimeArray:
-    """Leave out the steps at the end of a log that was cut off before their outer ticks were written."""
+    """Leave out the last steps of a truncated log, whose outer ticks are missing."""
     if len(outer_us) < 2:
         raise UnfitLogError("it holds no outer ticks")
     whole: TimeArray = steps_us[steps_us < outer_us[-1] + np.diff(outer_us).min()]
@@ -139,7 +139,7 @@ def _of(flight: FlightSamples, name: str, times_us: TimeArray) -> FloatArray:
 
 
 def _outer_flags(flight: FlightSamples) -> tuple[FlagArray, bool]:
-    """What the loops began each outer tick with, and whether the log tells."""
+    """Return the attitude targets of the outer ticks, and True if the log marks the given ones."""
     setpoint = flight.topics["vehicle_attitude_setpoint"]
     if "loop_flags" not in setpoint:
         return np.full(len(setpoint["timestamp"]), LoopFlags.SET_TARGET, np.int64), False
@@ -147,7 +147,7 @@ def _outer_flags(flight: FlightSamples) -> tuple[FlagArray, bool]:
 
 
 def _begins(flight: FlightSamples, steps_us: TimeArray) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Tell which steps are the first after the vehicle stood with its loops at rest."""
+    """Return True for the steps that are the first after the loops were at rest."""
     times_us, status = flight.status.time_us, flight.status.values[:, 0].astype(np.int64)
     at = np.searchsorted(times_us, steps_us)
     rests = (status & LoopStatus.IDLE) != 0
@@ -155,7 +155,7 @@ def _begins(flight: FlightSamples, steps_us: TimeArray) -> np.ndarray[Any, np.dt
 
 
 def _changes(flight: FlightSamples, steps_us: TimeArray) -> dict[int, tuple[tuple[str, float], ...]]:
-    """A change is written behind the samples of its time; the next step is the first that knows it."""
+    """A change is logged after the samples of its time, and effective in the next step."""
     found: dict[int, tuple[tuple[str, float], ...]] = {}
     for at_us, name, value in flight.changes:
         index = int(np.searchsorted(steps_us, at_us, side="right"))
@@ -169,8 +169,7 @@ def replayed(
 ) -> FloatArray:
     """Feed all steps to ``loops`` and return their outputs, (n, 32).
 
-    ``known`` tells which parameters are of the loops. ``progress`` is told now and then how many steps of how many
-    are done.
+    ``known`` has the parameters of the loops. ``progress`` is called with the number of completed steps and the total.
     """
     count = len(record.time_us)
     outputs = np.empty((count, OUTPUT_SIZE))
@@ -189,10 +188,10 @@ def replayed(
 
 
 def as_flight(record: Recording, outputs: FloatArray, flight: FlightSamples) -> FlightSamples:
-    """Return the outputs in the form of a log, to be compared with the one that was replayed.
+    """Return the outputs in the form of a log, for comparison with the replayed one.
 
-    The attitude target is that of the outer ticks. Where the log does not tell which ones the outer loop made, all
-    were given, and there is nothing to compare.
+    The attitude target is that of the outer ticks. If the log does not mark those of the outer loop, all were given,
+    and none is compared.
     """
     signals = {
         name: Samples(record.time_us, outputs[:, columns].astype(np.float32))

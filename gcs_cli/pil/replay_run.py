@@ -1,4 +1,4 @@
-"""``gcs pil replay``: a log's inputs fed to a target, and its outputs compared with the log's."""
+"""``gcs pil replay``: feed the inputs of a log to a target, and compare its outputs with the log."""
 
 from __future__ import annotations
 
@@ -48,17 +48,17 @@ _MASS_TOLERANCE = 1e-6
 
 
 class Replay(NamedTuple):
-    """What is fed to the target, and how its loops are set up."""
+    """Inputs for the target, and the configuration of its loops."""
 
     flight: FlightSamples
     record: Recording
     setup: LoopsSetup
     numbers: Mapping[str, float]
-    """Parameters of the loops as the log has them at its start."""
+    """Parameters of the loops at the start of the log."""
 
 
 def prepared(log: Path, vehicle: str | None) -> Replay:
-    """Read a log and set up the loops that flew in it; raise ConfigError, CliError (usage)."""
+    """Read a log and configure the loops that flew it; raise ConfigError, CliError (usage)."""
     flight = read_samples(log)
     try:
         record = recording(flight)
@@ -83,7 +83,7 @@ def _setup(flight: FlightSamples, log: Path, vehicle: str | None) -> LoopsSetup:
     return LoopsSetup(
         _vehicle(flight, log, vehicle),
         controller,
-        open_gains(DEFAULT_GAINS),  # each of which is a parameter, and the log's values take their places
+        open_gains(DEFAULT_GAINS),  # each gain is a parameter, and the values of the log replace them
         math.radians(tilt_deg),
         inner_hz,
         outer_hz,
@@ -107,9 +107,9 @@ def _vehicle(flight: FlightSamples, log: Path, name: str | None) -> Vehicle:
 
 
 def fed(replay: Replay, target: str, folder: Path, console: Console) -> tuple[FloatArray, str]:
-    """Feed the recording to the target, which leaves its record in ``folder``; return outputs and its version.
+    """Feed the inputs to the target, which writes its record to ``folder``; return outputs and version.
 
-    Raise ConfigError, and CliError when the target is lost.
+    Raise ConfigError, and CliError if the target is lost.
     """
     names = replay.setup.numbers()
     try:
@@ -124,7 +124,7 @@ def fed(replay: Replay, target: str, folder: Path, console: Console) -> tuple[Fl
         return outputs, loops.version
     except TargetError as error:
         raise CliError(str(error), NO_ANSWER) from error
-    except ValueError as error:  # a number that C refuses
+    except ValueError as error:  # a value that the C loops refuse
         raise CliError(f"the log's parameters cannot be replayed: {error}") from error
 
 
@@ -157,7 +157,7 @@ def judged(
     same_bits: bool,
     facts: Mapping[str, Any],
 ) -> Outcome:
-    """Compare the outputs with the log's and judge them. Pure."""
+    """Compare the outputs with the log and check them. Pure."""
     flight = replay.flight
     made = as_flight(replay.record, outputs, flight)
     pair = pair_name(LOG, "target")

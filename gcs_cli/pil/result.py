@@ -34,12 +34,12 @@ from gcs_cli.pil.verdict import (
 FORMAT = "flightstack-pil-1"
 PASSED, FAILED = "passed", "failed"
 COMPLETED = "completed"
-"""Outcome of a flight that came to its end; see ``flight_outcome``."""
+"""Outcome of a completed flight; see ``flight_outcome``."""
 WALL_TIME = "ns"
 """Unit of the costs of a target that is a program on this machine."""
 _SHOWN = ("position", "target_attitude", "torque", "rotor_command")
 _LANDING_TICKS = 25.0
-"""Two flights whose touchdown differs may be found landed in different ticks of the land detector."""
+"""Largest difference of the ticks of landing: touchdowns that differ are detected in different ticks."""
 _SHARE_OF_STATUS = 1e-3
 
 
@@ -48,15 +48,15 @@ class Flown(NamedTuple):
 
     outcome: str
     samples: FlightSamples | None
-    """None: it left no readable log."""
+    """None without a readable log."""
     facts: Mapping[str, Any]
-    """What ``pil.json`` says of it besides."""
+    """Other values for ``pil.json``."""
     outcome_text: str = ""
     """The outcome as a sentence."""
 
 
 class Outcome(NamedTuple):
-    """What is written, and what the report draws."""
+    """The content of ``pil.json``, and the data of the report."""
 
     result: dict[str, Any]
     charts: list[DeviationChart]
@@ -76,9 +76,9 @@ def pair_name(first: str, second: str) -> str:
 def closed_loop(
     flights: Mapping[str, Flown], record: TargetRecord | None, same_bits: bool, facts: Mapping[str, Any]
 ) -> Outcome:
-    """Compare the flights MIL, SIL and PIL, each with its own vehicle, and judge them.
+    """Compare the flights MIL, SIL and PIL, each with its own vehicle, and check them.
 
-    ``same_bits``: the target's arithmetic is that of the host to the last bit. ``facts``: title, about, meaning and
+    ``same_bits``: the target's arithmetic is bit-identical to the host's. ``facts``: title, about, meaning and
     conditions.
     """
     there = {stage: flown.samples for stage, flown in flights.items() if flown.samples is not None}
@@ -121,7 +121,7 @@ def assembled(
     record: TargetRecord | None,
     facts: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return what every ``pil.json`` holds."""
+    """Return the keys that every ``pil.json`` has."""
     return {
         "format": FORMAT,
         **facts,
@@ -174,7 +174,7 @@ def _closed_loop_checks(
 
 
 def status_check(name: str, first: FlightSamples, second: FlightSamples, exact: bool) -> Check:
-    """Return the check of the loops' status; of no tick that both logs have, it fails."""
+    """Return the check of the loops' status; it fails without common ticks."""
     differing, ticks = status_differences(first, second)
     if not ticks:
         return Check(name, 0.0, math.nan, "", "no ticks to compare")
@@ -182,10 +182,10 @@ def status_check(name: str, first: FlightSamples, second: FlightSamples, exact: 
 
 
 def target_checks(record: TargetRecord | None, ticks: int) -> Iterator[Check]:
-    """Yield what must hold of a target that ``ticks`` ticks were flown on; ``record`` None: it left none.
+    """Yield the checks of a target after ``ticks`` ticks; ``record`` is None without one.
 
-    Safe states and overruns stand in the reports of the steps, and in the target's own counters, which also know of
-    what happened between steps. Where the two differ, the larger one counts.
+    Safe states and overruns are in the reports of the steps and in the target's own counters, which also cover the
+    time between steps. The larger value counts.
     """
     name = "steps flown without the target"
     if record is None:
@@ -199,12 +199,12 @@ def target_checks(record: TargetRecord | None, ticks: int) -> Iterator[Check]:
         safe_states = max(safe_states, record.counted["safe_states"])
         overruns = max(overruns, record.counted["loop_overruns"])
     yield Check("safe states of the target", 0.0, float(safe_states), "")
-    if record.unit != WALL_TIME:  # which passes while other programs run, too
+    if record.unit != WALL_TIME:  # not judged: other programs run on this machine too
         yield Check("steps that overran their period", 0.0, float(overruns), "")
 
 
 def profiles_of(record: TargetRecord | None) -> list[StageProfile]:
-    """Return the profile of each stage; none of a target that counts nothing."""
+    """Return the profile of each stage; empty if the target measures no cost."""
     return [] if record is None or not record.unit else stage_profiles(record.costs)
 
 
@@ -261,7 +261,7 @@ def _tiles(differences: Mapping[str, Sequence[Difference]], checks: Sequence[Che
 
 
 def target_tiles(record: TargetRecord | None) -> list[dict[str, str]]:
-    """Return the figures of target and link that stand on top of a report."""
+    """Return the figures of target and link at the top of a report."""
     if record is None:
         return []
     tiles = [{"name": "steps on the target", "value": f"{record.steps}"}]
@@ -272,7 +272,7 @@ def target_tiles(record: TargetRecord | None) -> list[dict[str, str]]:
 
 
 def largest_difference(differences: Sequence[Difference]) -> str:
-    """Say how large the largest difference is, in ulps."""
+    """Format the largest difference in ulps."""
     if not differences:
         return "–"
     largest = max(found.ulps for found in differences)

@@ -1,4 +1,4 @@
-"""``gcs pil MISSION``: three flights of the same mission, each in a directory of its own, compared and judged."""
+"""``gcs pil MISSION``: three flights of the same mission, each in its own directory, compared and checked."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.flight import Flight
 from gcs_cli.fly.fly_display import BarDisplay, Display, draws_bars
 from gcs_cli.fly.fly_flags import FlyOptions
+from gcs_cli.fly.fly_options import outer_rate_hz
 from gcs_cli.fly.fly_run import fly, write_results
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.report import render_report
@@ -30,29 +31,29 @@ JSON_NAME, HTML_NAME = "pil.json", "pil.html"
 
 
 class NoticeDisplay:
-    """Shows nothing of a flight but what should be known: for an output that cannot draw a bar."""
+    """Shows only the notices of a flight: for an output that cannot draw a bar."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
 
     def update(self, flight: Flight) -> None:
-        """Show nothing."""
+        """Do nothing."""
 
     def note(self, line: str) -> None:
-        """Print it."""
+        """Print the line."""
         self._console.print(line, markup=False, highlight=False, soft_wrap=True)
 
     def close(self) -> None:
-        """Nothing is held open."""
+        """Do nothing."""
 
 
 class Finished(NamedTuple):
-    """What a run left."""
+    """Results of a run."""
 
     folder: Path
     outcome: Outcome
     problem: CliError | None
-    """Why a flight did not come to its end; None: all did."""
+    """The error of a flight that was not completed, or None."""
 
 
 def run(
@@ -60,7 +61,7 @@ def run(
 ) -> Finished:
     """Fly the mission three times and write ``pil.json`` and ``pil.html``; raise CliError, ConfigError.
 
-    A flight that fails ends the run; what was flown until then is compared all the same.
+    A flight that fails ends the run; the flights until then are compared.
     """
     choice = checked_target(target)
     check_there(choice, options.controller)
@@ -87,7 +88,7 @@ def run(
 
 
 def make_pil_directory(name: str, out: Path | None, overwrite: bool = False) -> Path:
-    """Make and return the directory of a run; raise CliError when it cannot be, or holds another run.
+    """Make and return the directory of a run; raise CliError if that fails, or if it has another run.
 
     With ``overwrite``, the other run's results are removed.
     """
@@ -120,7 +121,7 @@ def fly_stage(
     summary, outcome = write_results(options, plan, flown)
     try:
         samples = read_samples(folder / place / LOG_NAME)
-    except ConfigError:  # a flight that never began left none; its outcome says why
+    except ConfigError:  # a flight that never began has no log; its outcome has the reason
         samples = None
     facts = {name: summary[name] for name in ("sim_time_s", "wall_time_s", "log_sha256")}
     problem = None
@@ -139,7 +140,7 @@ def _words(flown: Flown) -> str:
 def _record(folder: Path) -> TargetRecord | None:
     try:
         return read_record(folder / PIL.lower())
-    except ConfigError:  # the target was given up before it was known
+    except ConfigError:  # the target failed before its identity was known
         return None
 
 
@@ -156,7 +157,7 @@ def _conditions(options: FlyOptions, target: str) -> dict[str, Any]:
         "gains": options.gains,
         "plant": options.plant,
         "inner loop": f"{options.inner_hz:g} Hz",
-        "outer loop": f"{options.outer_rate_hz:g} Hz",
+        "outer loop": f"{outer_rate_hz(options):g} Hz",
         "seed": options.seed,
         "wind": options.wind,
         "gusts": options.gust,
@@ -182,7 +183,7 @@ def _battery(options: FlyOptions) -> str | None:
 
 
 def write_outcome(folder: Path, outcome: Outcome) -> None:
-    """Write ``pil.json`` and ``pil.html``, each whole or not at all; raise CliError."""
+    """Write ``pil.json`` and ``pil.html`` atomically; raise CliError."""
     text = json.dumps(outcome.result, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
     html = render_report(outcome.result, outcome.charts, outcome.profiles)
     try:

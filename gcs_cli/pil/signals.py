@@ -1,4 +1,4 @@
-"""What is compared: the output of each stage of the loops and the flight that comes of it, as the log names them."""
+"""The compared signals: outputs of each stage of the loops and the trajectory, with their names in the log."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ TARGET, REFERENCE, WRENCH, ACTUATORS, TRAJECTORY = (
     "trajectory",
 )
 STAGES = (TARGET, REFERENCE, WRENCH, ACTUATORS, TRAJECTORY)
-"""From the outer loop's output on; the trajectory is what the vehicle does with it."""
+"""In the order of the loops, from the output of the outer loop; the trajectory is last."""
 
 
 class Signal(NamedTuple):
-    """One quantity of a flight log; all its components together."""
+    """One quantity of a flight log, with all components."""
 
     name: str
     """Key in ``pil.json``."""
@@ -27,12 +27,12 @@ class Signal(NamedTuple):
     unit: str
     topic: str
     fields: tuple[str, ...]
-    """Of the topic; those that a log does not have are left out: a vehicle may have fewer rotors."""
+    """Fields of the topic. Fields that a log lacks are left out: a vehicle may have fewer rotors."""
     least_scale: float
-    """Differences are measured against the signal's largest value, or this where a flight hardly moves it: straight
-    up and down, torques are nothing but rounding."""
+    """Smallest full scale of differences, otherwise the signal's largest value: straight up and down, torques are only
+    rounding errors."""
     is_attitude: bool = False
-    """A quaternion: its negative is the same attitude."""
+    """True for a quaternion, whose negative is the same attitude."""
 
 
 def _elements(name: str, count: int) -> tuple[str, ...]:

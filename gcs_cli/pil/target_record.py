@@ -1,4 +1,4 @@
-"""What a flight on a target left beside its log: who the target is, what each step cost, how the link did."""
+"""The record of a flight on a target: its identity, the cost of each step, figures of the link."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from flightstack.firmware.pil_record import COST_UNITS, LINK_FILE, STEPS_FILE
 
 StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 NO_COUNTERS = ("time_boot_ms", "stack_size", "stack_high_water", "state")
-"""Fields of FS_PIL_STATUS that count nothing."""
+"""Fields of FS_PIL_STATUS that are not counters."""
 SAFE, RESTARTED = "safe state", "restarted by its watchdog"
 STATES = ("ready", "stepping", SAFE, RESTARTED)
-"""FS_PIL_STATUS.state in words."""
+"""Names of FS_PIL_STATUS.state."""
 
 
 class TargetRecord(NamedTuple):
@@ -28,23 +28,23 @@ class TargetRecord(NamedTuple):
 
     identity: Mapping[str, Any]
     link: Mapping[str, Any]
-    """Counters of the link, and the round trips' figures."""
+    """Counters of the link, and figures of the round trips."""
     at_start: Mapping[str, Any]
-    """The target's FS_PIL_STATUS before the first step. It counts since its start, over all flights."""
+    """The target's FS_PIL_STATUS before the first step. Counters run since its start, over all flights."""
     status: Mapping[str, Any]
-    """Its FS_PIL_STATUS after the last step; empty if it did not tell."""
+    """Its FS_PIL_STATUS after the last step; empty without an answer."""
     costs: FloatArray
     """Outer loop, inner loop, mixer and whole step of each step, (steps, 4), in ``identity``'s cost unit."""
     overruns: int
-    """Steps whose report says that they took longer than their period."""
+    """Steps reported to have taken longer than their period."""
     bad_inputs: int
-    """Steps whose report says that the target stopped its rotors."""
+    """Steps reported with stopped rotors."""
     ending: str | None = None
-    """Why the target was given up; None: it was not."""
+    """The reason of an early end, or None."""
 
     @property
     def counted(self) -> dict[str, int]:
-        """What the target's own counters counted in this flight; empty if it did not tell them in the end."""
+        """Differences of the target's own counters in this flight; empty without a status at the end."""
         return {
             name: (value - self.at_start[name]) & 0xFFFF_FFFF
             for name, value in self.status.items()
@@ -53,23 +53,23 @@ class TargetRecord(NamedTuple):
 
     @property
     def steps(self) -> int:
-        """Steps that the target has answered."""
+        """Number of answered steps."""
         return len(self.costs)
 
     @property
     def unit(self) -> str:
-        """Unit of the costs; empty for a target that counts nothing."""
+        """Unit of the costs; empty if the target measures none."""
         unit = str(self.identity["cost_unit"])
         return "" if unit == COST_UNITS[0] else unit
 
 
 def state_words(state: int) -> str:
-    """Say what FS_PIL_STATUS.state means."""
+    """Return the name of FS_PIL_STATUS.state."""
     return STATES[state] if state < len(STATES) else f"state {state}"
 
 
 def status_words(status: Mapping[str, Any]) -> str:
-    """Say what a target tells of itself: its state, since when it runs, and what it has counted."""
+    """Return the state, the uptime and the counters of a target."""
     counted = [
         f"{name.replace('_', ' ')} {value}"
         for name, value in status.items()
@@ -80,7 +80,7 @@ def status_words(status: Mapping[str, Any]) -> str:
 
 
 def read_record(folder: Path) -> TargetRecord:
-    """Read both files; raise ConfigError when one is missing or damaged."""
+    """Read both files; raise ConfigError if one is missing or damaged."""
     path = folder / LINK_FILE
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -98,7 +98,7 @@ def record_of(content: Mapping[str, Any], costs: FloatArray, statuses: StatusArr
     """Return the record from the content of its first file, and the costs and FS_PIL_REPORT.status of the steps."""
     trips = content["round_trip_s"] or {}
     link = dict(content["link"])
-    link["lost"] = max(0, link["resent"] - link["late"])  # in either direction: nothing came of that sending
+    link["lost"] = max(0, link["resent"] - link["late"])  # in either direction
     for name, seconds in trips.items():
         link[f"round_trip_{name}_us"] = round(seconds * 1e6, 1)
     overruns, bad_inputs = (int(np.count_nonzero(statuses & bit)) for bit in (OVERRUN, BAD_INPUT))

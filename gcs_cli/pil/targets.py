@@ -1,4 +1,4 @@
-"""The targets that the loops can be checked on: the word behind ``--target``, its meaning, and whether it is there."""
+"""The targets for the loops: the value of ``--target``, its meaning, and a check that it exists."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from gcs_cli.errors import USAGE, CliError
 MEANINGS = {
     C: "The target is the C core inside this program, compiled for this machine.",
     HOST: (
-        "The third flight is no PIL of a board here, but SIL across a process: the whole C program, with its protocol, "
-        "on this machine behind a pseudo terminal. It checks program and protocol, on no other processor than this one."
+        "The third flight is not PIL on a board, but SIL in another process: the whole C program, with its protocol, "
+        "on this machine behind a pseudo terminal. It checks program and protocol on this processor only."
     ),
     EMULATED: (
         "PIL: the whole firmware, cross-compiled for a Cortex-M4F and executed by an emulator, instruction by "
@@ -29,7 +29,7 @@ _STAGES = "MIL: the loops in Python, float64. SIL: the loops in C, float32, insi
 def checked_target(text: str, more: tuple[str, ...] = (), flag: str = "--target") -> LoopsChoice:
     """Read ``emulated``, ``host``, ``serial:DEVICE[:BAUD]`` or one of ``more``; raise CliError (usage), ConfigError.
 
-    ``flag`` is what the user wrote before it, for the sentence.
+    ``flag`` is the name of the option, for the error.
     """
     if text.partition(":")[0] not in (HOST, EMULATED, SERIAL, *more):
         known = ", ".join([EMULATED, HOST, *more])
@@ -38,11 +38,9 @@ def checked_target(text: str, more: tuple[str, ...] = (), flag: str = "--target"
 
 
 def check_there(target: LoopsChoice, controller: str) -> None:
-    """Make sure before anything flies that C can fly it and that the target is there; raise CliError (usage)."""
+    """Raise CliError (usage) if the controller is not available in C, or if the target does not open."""
     if controller not in (known.name for known in CONTROLLERS):
-        raise CliError(
-            f"--controller {controller}: exists in Python alone, so there is nothing to compare", USAGE
-        )
+        raise CliError(f"--controller {controller}: exists in Python only: choose pid or backstepping", USAGE)
     try:
         host_library()
         open_link(target).close()
@@ -51,11 +49,11 @@ def check_there(target: LoopsChoice, controller: str) -> None:
 
 
 def has_same_bits(target: LoopsChoice) -> bool:
-    """Tell whether the target's arithmetic is the host's to the last bit: a board's need not be."""
+    """Return True if the target's arithmetic is bit-identical to the host's; a board's may differ."""
     return target.kind in (C, HOST, EMULATED)
 
 
 def meaning(target: LoopsChoice, replay: bool = False) -> str:
-    """Say what a run on this target shows, and what it does not."""
+    """Return a description of the results on this target and their limits."""
     words = MEANINGS.get(target.kind, _SERIAL_MEANING)
     return words if replay else _STAGES + words

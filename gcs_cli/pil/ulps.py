@@ -1,4 +1,4 @@
-"""Differences of float32 numbers, counted in their own spacing."""
+"""Differences of float32 numbers in units of the last place."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _MAGNITUDE = 0x7FFF_FFFF
 
 
 def steps_apart(first: Float32Array, second: Float32Array) -> IntArray:
-    """Return how many representable numbers lie between each two: 0 for the same one; −0 and 0 are the same.
+    """Return the number of float32 steps between each pair of numbers: 0 if equal; −0 equals 0.
 
-    Near zero representable numbers are dense, so that rounding which is nothing to the signal counts much here:
-    ``in_ulps`` measures against the signal's own size.
+    Representable numbers are dense near zero, so that rounding errors count much here: ``in_ulps`` measures against
+    the magnitude of the signal.
     """
     apart: IntArray = np.abs(_ordinal(first) - _ordinal(second))
     return apart

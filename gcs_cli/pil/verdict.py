@@ -1,4 +1,4 @@
-"""Whether the loops on a target are those that were designed: stated limits beside what was measured. Pure."""
+"""The checks of loops on a target: limits and measured values. Pure."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ from gcs_cli.pil.signals import BY_NAME, STAGES
 
 MIL, SIL, PIL = "MIL", "SIL", "PIL"
 SAME_BITS_ULPS = 0.0
-"""Between two builds of the C core on processors with IEEE arithmetic: not a bit may differ."""
+"""Limit between two builds of the C core on processors with IEEE arithmetic: no bit may differ."""
 BOARD_FACTOR = 2.0
-"""Between the host and a board whose arithmetic may not be IEEE's to the last bit (F28377S: no denormals, TI's own
-division): twice what C may be from Python, since rounding errors of the same kind come twice. No board was measured
-yet."""
+"""Factor on the limits between C and Python for a board whose arithmetic may differ from IEEE in the last bit (F28377S:
+no denormals, TI's division), because rounding errors occur in both. No board was measured yet."""
 
 CLOSED_LOOP_ULPS = {
     "target_attitude": 128.0,  # measured 12
@@ -34,7 +33,7 @@ CLOSED_LOOP_ULPS = {
     "rates": 8192.0,  # 648
 }
 """Limits between Python's float64 loops and C's float32 ones, each flying its own vehicle, in the air; beside each the
-largest difference of ten flights of both vehicles with both laws, in wind and without."""
+largest difference of ten flights of both vehicles with both laws, with and without wind."""
 
 OPEN_LOOP_ULPS = {
     "target_attitude": 64.0,  # measured 5
@@ -52,7 +51,7 @@ OPEN_LOOP_ULPS = {
 
 
 def same_bits_limits(limits_ulps: Mapping[str, float]) -> dict[str, float]:
-    """Return the limits of the same signals where not a bit may differ."""
+    """Return the limits of the same signals if no bit may differ."""
     return dict.fromkeys(limits_ulps, SAME_BITS_ULPS)
 
 
@@ -62,7 +61,7 @@ def board_limits(limits_ulps: Mapping[str, float]) -> dict[str, float]:
 
 
 class Check(NamedTuple):
-    """One thing that must hold: ``measured`` is at most ``limit``, in ``unit``."""
+    """One check: ``measured`` must be at most ``limit``, in ``unit``."""
 
     name: str
     limit: float
@@ -72,16 +71,16 @@ class Check(NamedTuple):
 
     @property
     def passed(self) -> bool:
-        """Whether it holds; what is not a number does not."""
+        """True if ``measured`` is within the limit; False for NaN."""
         return self.measured <= self.limit
 
     @property
     def margin(self) -> float | None:
-        """How many times larger the measured value might be; None if nothing was measured, or all is lost."""
+        """Ratio of limit to measured value; None unless both are positive."""
         return self.limit / self.measured if self.measured > 0.0 and self.limit > 0.0 else None
 
     def as_json(self) -> dict[str, Any]:
-        """Return what ``pil.json`` says of it."""
+        """Return the object for ``pil.json``."""
         return {
             "name": self.name,
             "passed": self.passed,
@@ -99,10 +98,9 @@ def difference_checks(
     limits_ulps: Mapping[str, float],
     left_out: str | None = None,
 ) -> Iterator[Check]:
-    """Yield a check of each stage: of its signals, the one that comes nearest to its limit, or exceeds it most.
+    """Yield a check per stage, of the signal nearest to its limit, or furthest beyond it.
 
-    Every signal that has a limit must have been compared: one that was not, or in no tick, fails its stage.
-    ``left_out``: a stage that is not judged.
+    A signal with a limit that was not compared in any tick fails its stage. ``left_out``: a stage without a check.
     """
     there = {found.signal: found for found in differences}
     for stage in STAGES:
@@ -136,6 +134,6 @@ def _closeness(check: Check) -> float:
 
 
 def all_passed(checks: Iterable[Check]) -> bool:
-    """Tell whether all hold; of no check at all, nothing does."""
+    """Return True if all checks passed; False without checks."""
     listed = list(checks)
     return bool(listed) and all(check.passed for check in listed)

@@ -10,7 +10,7 @@ import numpy as np
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID
 from flightstack.mavlink.link import Message
-from gcs_cli.link.tlog_file import read_messages
+from gcs_cli.link.tlog import read_messages
 from gcs_cli.report.flight_data import LoopTiming, Series, empty_series, loop_timing, series
 
 _SYS_STATUS, _LOCAL_POSITION_NED = 1, 32

@@ -1,1 +1,1 @@
-"""Parameters, logs and plans transferred between files and the vehicle."""
+"""Transfers of parameters, logs and plans between files and the vehicle."""

@@ -1,53 +1,49 @@
-"""Requests about the vehicle's logs, each run to its end on a connection."""
+"""Transfers of the vehicle's logs over a connection."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from flightstack.mavlink.fields import REPLACEMENT
 from flightstack.mavlink.files import Entry
-from flightstack.mavlink.link import Address
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
-from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID
-
-if TYPE_CHECKING:
-    from gcs_cli.link.connection import Connection
+from gcs_cli.link.calls import OWN_ADDRESS, vehicle_address
+from gcs_cli.link.connection import Connection
 
 LOG_FOLDER = "@MAV_LOG"
-"""Where a vehicle shows its logs over MAVLink FTP, if it does."""
+"""Directory of the logs on MAVLink FTP."""
 FTP_WAIT_S = 1.5
-"""How long a vehicle may take to show them; many never answer."""
-_STEP_S = 0.1
+"""Timeout of the directory; many vehicles never answer."""
 
 Progress: TypeAlias = Callable[[int, int], None]
-"""Called with the bytes that have come, and bytes in all."""
+"""Called with the received bytes and their total."""
 
 
 def fetch_list(connection: Connection) -> tuple[LogEntry, ...]:
     """Return all logs of the vehicle; raise CliError."""
-    client = LogClient(_vehicle(connection))
+    client = LogClient(vehicle_address(connection.session))
     client.start_list()
-    _run(connection, client, "log list")
+    connection.run(client, "log list")
     if isinstance(client.result, LogDone):
         return client.result.entries
     raise _error(client.result, "log list")
 
 
 def fetch_files(connection: Connection) -> tuple[Entry, ...]:
-    """Return the logs that the vehicle shows over MAVLink FTP; none when it does not know how."""
+    """Return the logs on the vehicle's MAVLink FTP; none if it does not support that."""
     client = _ftp_client(connection)
     client.start_list(LOG_FOLDER)
-    _run(connection, client, "log list", patience_s=FTP_WAIT_S)
+    connection.run(client, "log list", timeout_s=FTP_WAIT_S)
     if not isinstance(client.result, FtpDone):
         return ()
     return tuple(entry for entry in client.result.entries if is_plain_name(entry.name))
 
 
 def file_of(log: LogEntry, logs: tuple[LogEntry, ...], files: tuple[Entry, ...]) -> Entry | None:
-    """Return the file that holds ``log``: numbers and names are only joined by a size that is there once."""
+    """Return the file of ``log``, or None: numbers and names are matched by a size that is unique."""
     if [entry.size for entry in logs].count(log.size) != 1:
         return None
     found = [file for file in files if file.size == log.size]
@@ -55,50 +51,30 @@ def file_of(log: LogEntry, logs: tuple[LogEntry, ...], files: tuple[Entry, ...])
 
 
 def fetch_log(connection: Connection, log: LogEntry, file: Entry | None, show: Progress) -> bytes:
-    """Return the bytes of ``log``, as the file over MAVLink FTP if it is known, which is faster; raise CliError."""
+    """Return the content of ``log``, over MAVLink FTP if ``file`` is known, which is faster; raise CliError."""
     name = f"log {log.log_id}"
     if file is not None:
         over_ftp = _ftp_client(connection)
         over_ftp.start_download(f"{LOG_FOLDER}/{file.name}")
-        _run(connection, over_ftp, name, show)
+        connection.run(over_ftp, name, show=show)
         if isinstance(over_ftp.result, FtpDone):
             return over_ftp.result.content
-    client = LogClient(_vehicle(connection))
+    client = LogClient(vehicle_address(connection.session))
     client.start_download(log)
-    _run(connection, client, name, show)
+    connection.run(client, name, show=show)
     if isinstance(client.result, LogDone):
         return client.result.content
     raise _error(client.result, name)
 
 
 def is_plain_name(name: str) -> bool:
-    """Tell whether a name from the vehicle may name a file here: no path, nothing hidden, nothing replaced."""
+    """Return True if a name from the vehicle is safe as a file name: no path, not hidden, no replaced characters."""
     return (
         bool(name)
         and name.isprintable()
         and not name.startswith(".")
         and not set(name) & {*"/\\:", REPLACEMENT}
     )
-
-
-def _run(
-    connection: Connection,
-    client: LogClient | FtpClient,
-    name: str,
-    show: Progress | None = None,
-    patience_s: float | None = None,
-) -> None:
-    """Let ``client`` talk until it has a result; raise CliError when the vehicle goes away meanwhile."""
-    session = connection.session
-    session.use(client)
-    end_s = None if patience_s is None else connection.now_s + patience_s
-    while client.result is None and (end_s is None or connection.now_s < end_s):
-        if session.view.powered_off or session.view.lost(connection.now_s):
-            raise CliError(f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}")
-        connection.step(connection.now_s + _STEP_S)
-        if show is not None:
-            show(*client.progress)
-    session.use(None)
 
 
 def _error(result: object, name: str) -> CliError:
@@ -108,8 +84,4 @@ def _error(result: object, name: str) -> CliError:
 
 
 def _ftp_client(connection: Connection) -> FtpClient:
-    return FtpClient(_vehicle(connection), Address(SYSTEM_ID, COMPONENT_ID))
-
-
-def _vehicle(connection: Connection) -> Address:
-    return Address(*connection.session.target)
+    return FtpClient(vehicle_address(connection.session), OWN_ADDRESS)

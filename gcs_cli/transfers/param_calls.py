@@ -1,35 +1,26 @@
-"""Requests about parameters, each run to its end on a connection."""
+"""Transfers of parameters over a connection."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
-
-from flightstack.mavlink.link import Address
 from flightstack.mavlink.param_values import Parameter
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed, ParamTiming
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
-from gcs_cli.link.calls import TEXT_WAIT_S
-from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID
+from gcs_cli.link.calls import OWN_ADDRESS, TEXT_WAIT_S, vehicle_address
+from gcs_cli.link.connection import Connection
 from gcs_cli.vehicle.param_info import METADATA_PATH, ParamInfo, number_text, parse_metadata
 
-if TYPE_CHECKING:
-    from gcs_cli.link.connection import Connection
-
 METADATA_WAIT_S = 3.0
-"""How long a vehicle may take to send what it knows of its parameters; many know nothing."""
+"""Timeout of the parameter metadata; many vehicles have none."""
 TIMING = ParamTiming()
-_STEP_S = 0.25
 _WARNING = 4  # MAV_SEVERITY_WARNING; lower is worse
-
-_Client: TypeAlias = ParamClient | FtpClient
 
 
 def fetch_all(connection: Connection) -> tuple[Parameter, ...]:
     """Return all parameters, sorted by name; raise CliError."""
     client = _param_client(connection)
     client.start_list()
-    _run(connection, client, "the parameter list")
+    connection.run(client, "the parameter list")
     if isinstance(client.result, ParamDone):
         return tuple(sorted(client.result.parameters))
     raise _error(client.result, "parameters")
@@ -39,7 +30,7 @@ def fetch(connection: Connection, name: str) -> Parameter:
     """Return one parameter; raise CliError."""
     client = _param_client(connection)
     client.start_get(name)
-    _run(connection, client, name)
+    connection.run(client, name)
     if isinstance(client.result, ParamDone):
         return client.result.parameters[0]
     raise _error(client.result, name)
@@ -50,7 +41,7 @@ def change(connection: Connection, name: str, value: float) -> Parameter:
     texts_before = connection.session.view.text_count
     client = _param_client(connection)
     client.start_set(name, value)
-    _run(connection, client, name)
+    connection.run(client, name)
     result = client.result
     if isinstance(result, ParamDone):
         return result.parameters[0]
@@ -61,27 +52,15 @@ def change(connection: Connection, name: str, value: float) -> Parameter:
 
 
 def fetch_metadata(connection: Connection) -> dict[str, ParamInfo]:
-    """Return what the vehicle knows of its parameters, by name; nothing when it does not say."""
-    client = FtpClient(_vehicle(connection), Address(SYSTEM_ID, COMPONENT_ID))
+    """Return the metadata of the vehicle's parameters, by name; empty if it sends none."""
+    client = FtpClient(vehicle_address(connection.session), OWN_ADDRESS)
     client.start_download(METADATA_PATH)
-    _run(connection, client, "parameter metadata", METADATA_WAIT_S)
+    connection.run(client, "parameter metadata", METADATA_WAIT_S)
     return parse_metadata(client.result.content) if isinstance(client.result, FtpDone) else {}
 
 
-def _run(connection: Connection, client: _Client, name: str, patience_s: float | None = None) -> None:
-    """Let ``client`` talk until it has a result; raise CliError when the vehicle goes away meanwhile."""
-    session = connection.session
-    session.use(client)
-    end_s = None if patience_s is None else connection.now_s + patience_s
-    while client.result is None and (end_s is None or connection.now_s < end_s):
-        if session.view.powered_off or session.view.lost(connection.now_s):
-            raise CliError(f"{name}: the vehicle {'shut down' if session.view.powered_off else 'was lost'}")
-        connection.step(connection.now_s + _STEP_S)
-    session.use(None)
-
-
 def _explanation(connection: Connection, name: str, texts_before: int) -> str | None:
-    """Return the vehicle's own words for refusing ``name``, which come right after the answer."""
+    """Return the vehicle's STATUSTEXT about refusing ``name``, which follows the answer."""
     prefix = f"Parameter {name} refused: "
 
     def said() -> str | None:
@@ -102,8 +81,4 @@ def _error(result: object, what: str) -> CliError:
 
 
 def _param_client(connection: Connection) -> ParamClient:
-    return ParamClient(_vehicle(connection), Address(SYSTEM_ID, COMPONENT_ID), TIMING)
-
-
-def _vehicle(connection: Connection) -> Address:
-    return Address(*connection.session.target)
+    return ParamClient(vehicle_address(connection.session), OWN_ADDRESS, TIMING)

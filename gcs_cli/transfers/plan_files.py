@@ -1,4 +1,4 @@
-"""Which file a plan on the command line is: a path, or the bare name of a plan that comes with the program."""
+"""The plan on a command line: a path, or the name of an example plan of the installation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DEFAULT_PLAN = "square"
 
 
 def example_plans() -> dict[str, Path]:
-    """Return the plans that come with the program, by name: in the package where it is installed, else beside it."""
+    """Return the example plans by name: from the installed package, else from the source tree."""
     here = Path(__file__).resolve().parents[1]
     packaged = here / "missions"
     folder = packaged if packaged.is_dir() else here.parent / "missions"
@@ -21,7 +21,7 @@ def example_plans() -> dict[str, Path]:
 
 
 def plan_file(given: str | Path) -> Path:
-    """Return the file of a plan; a name without folder and suffix is an example's. Raise CliError (usage)."""
+    """Return the file of a plan; a name without folder and suffix is an example. Raise CliError (usage)."""
     text = str(given)
     if not text or set(text) & {"/", "\\", "."}:
         return Path(text)

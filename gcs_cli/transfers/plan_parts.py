@@ -1,4 +1,4 @@
-"""The three plans of a file or a vehicle - mission, geofence, rally points - and their upload as one."""
+"""The three plans of a file or a vehicle - mission, geofence, rally points - and their upload."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Call
 from gcs_cli.link.session import Session
 
-RESTORE_PATIENCE_S = 30.0
-"""How long restoring the former plans may take after an interrupt."""
+RESTORE_TIMEOUT_S = 30.0
+"""Longest time to restore the former plans after an interrupt."""
 _FORMER, _NEW, _UNKNOWN = "former", "new", "unknown"
 
 
@@ -42,7 +42,7 @@ def plan_parts(plan: Plan) -> list[PlanPart]:
 
 
 def plan_problem(plan: Plan, home: GeoPoint) -> str | None:
-    """Return what the vehicle would say against the parts of a plan, the geofence first: the others obey it."""
+    """Return the reason that a vehicle refuses the plan, or None; the geofence is checked first."""
     fence = fence_shape(plan.fence, home)
     checks = (
         ("geofence", check_fence(plan.fence, home)),
@@ -55,19 +55,19 @@ def plan_problem(plan: Plan, home: GeoPoint) -> str | None:
 def parts_to_send(plan: Plan) -> list[PlanPart]:
     """Return the parts of a plan in the order of their upload.
 
-    The vehicle checks mission and rally points against the geofence that it holds, so that the new geofence goes
-    first. The mission goes last, even without items; other parts without items stay as they are on the vehicle.
+    The vehicle checks mission and rally points against its geofence, so that the new geofence goes first. The mission
+    goes last, even without items; other parts without items are not sent.
     """
     mission, *others = plan_parts(plan)
     return [part for part in others if part.items] + [mission]
 
 
 class Uploads:
-    """Sends the parts of a plan to a vehicle: all of them, or none.
+    """Uploads the parts of a plan to a vehicle: all of them, or none.
 
-    With ``restores``, the parts that the vehicle holds are downloaded first, and uploaded again if one is not
-    accepted. Without, a vehicle that has accepted some of the parts keeps them. ``interrupted`` returns a reason to
-    end early, or nothing: the former plans are then restored too, for RESTORE_PATIENCE_S at most.
+    With ``restores``, the former parts are downloaded first, and restored if a new one is not accepted. Without, a
+    vehicle keeps the parts that it has accepted. ``interrupted`` returns a reason to end early, or an empty text: then
+    the former plans are restored too, for RESTORE_TIMEOUT_S at most.
     """
 
     def __init__(
@@ -84,40 +84,40 @@ class Uploads:
         self._answer: Answer | None = None
         self._sent = 0
         self._holds = {part.kind: _FORMER for part in self._parts}
-        self._under_way: MissionType | None = None
+        self._current: MissionType | None = None
         self._is_restoring = False
         self._restore_due_s: float | None = None
         self._now_s = 0.0
         self.name = self._parts[0].name
-        """The part that is being sent, or was not accepted."""
+        """The current part, or the one that was not accepted."""
         self.kept: list[PlanPart] = []
         """Parts that are not in the plan and stay on the vehicle; known after an upload with ``restores``."""
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Items sent and in all."""
-        is_sending = self._under_way is not None and not self._is_restoring
-        under_way = self._call.progress[0] if self._call and is_sending else 0
-        return self._sent + under_way, sum(len(part.items) for part in self._parts)
+        """Sent items and their total."""
+        is_sending = self._current is not None and not self._is_restoring
+        current = self._call.progress[0] if self._call and is_sending else 0
+        return self._sent + current, sum(len(part.items) for part in self._parts)
 
     @property
     def state(self) -> str:
         """Description of what the vehicle holds now."""
         holds = dict(self._holds)
-        if self._under_way is not None and self._is_all_sent:
-            holds[self._under_way] = _UNKNOWN
+        if self._current is not None and self._is_all_sent:
+            holds[self._current] = _UNKNOWN
         if set(holds.values()) == {_FORMER}:
             return "the vehicle holds its former plans"
         return "the vehicle holds: " + ", ".join(f"{part.name} {holds[part.kind]}" for part in self._parts)
 
     @property
     def _is_all_sent(self) -> bool:
-        """Whether the vehicle may have accepted the part under way: it replaces a part with the last item."""
+        """True if the vehicle may have accepted the current part: it replaces a part after the last item."""
         sent, count = self._call.progress if self._call else (0, 0)
         return sent >= count
 
     def answer(self, now_s: float) -> Answer | None:
-        """Go on as far as possible; return the answer once all is sent, or the first that is not an acceptance."""
+        """Continue; return the answer after the last part, or the first one that is not an acceptance."""
         self._now_s = now_s
         if self._call is None:
             self._call = next(self._steps)
@@ -132,20 +132,20 @@ class Uploads:
         return self._answer
 
     def _interruption(self) -> Answer | None:
-        """Return the answer of a transfer that an interrupt ends: the one under way, or a restore that takes long."""
+        """Return the answer of a transfer that an interrupt ends: the current one, or a restore after its timeout."""
         reason = self._interrupted()
         if not reason:
             return None
         if self._restore_due_s is None:
-            self._restore_due_s = self._now_s + RESTORE_PATIENCE_S
+            self._restore_due_s = self._now_s + RESTORE_TIMEOUT_S
             return None if self._is_restoring else Answer(False, reason, cancelled=True)
         if self._now_s >= self._restore_due_s:
-            return Answer(False, f"not done within {RESTORE_PATIENCE_S:g} s", cancelled=True)
+            return Answer(False, f"not done within {RESTORE_TIMEOUT_S:g} s", cancelled=True)
         return None
 
     def _run(self) -> Generator[Call, Answer, Answer]:
         before: list[PlanPart] = []
-        if self._restores and len(self._parts) > 1:  # the vehicle replaces one part whole or not at all
+        if self._restores and len(self._parts) > 1:  # a single part is replaced completely or not at all
             for part in self._parts:
                 self.name = part.name
                 answer = yield self._transfer(part.kind)
@@ -162,17 +162,17 @@ class Uploads:
             answer = yield from self._send(part, _NEW)
             if not answer.accepted:
                 if self._restores:
-                    answer = yield from self._undone(part, answer, before, current)
+                    answer = yield from self._undo(part, answer, before, current)
                 return answer
             self._sent += len(part.items)
         if self._restores:
             yield from self._find_kept()
         return answer
 
-    def _undone(
+    def _undo(
         self, part: PlanPart, answer: Answer, before: Sequence[PlanPart], current: int
     ) -> Generator[Call, Answer, Answer]:
-        """Restore the parts ``before``; return the answer with what the vehicle holds then."""
+        """Restore the parts ``before``; return the answer with a description of the vehicle's plans."""
         reasons = [answer.reason]
         is_refused = not (answer.silent or answer.cancelled)
         if is_refused and part.kind != MissionType.FENCE and "fence" in answer.reason.lower():
@@ -191,7 +191,7 @@ class Uploads:
         return answer._replace(reason="; ".join(reasons))
 
     def _restore(self, before: Sequence[PlanPart], current: int) -> Generator[Call, Answer, str]:
-        """Upload the former parts that were replaced; return a description of what the vehicle holds now."""
+        """Upload the former parts that were replaced; return a description of the vehicle's plans."""
         self._is_restoring = True
         for part in before:
             if self._holds[part.kind] == _FORMER:
@@ -207,7 +207,7 @@ class Uploads:
         return self.state
 
     def _find_kept(self) -> Generator[Call, Answer, None]:
-        """Download the parts that are not in the plan; those of a vehicle that does not answer stay unknown."""
+        """Download the parts that are not in the plan; without an answer they stay unknown."""
         for part in self._others:
             answer = yield self._transfer(part.kind)
             if answer.silent or answer.cancelled:
@@ -216,18 +216,18 @@ class Uploads:
                 self.kept.append(part._replace(items=answer.items))
 
     def _send(self, part: PlanPart, which: str) -> Generator[Call, Answer, Answer]:
-        """Upload a part, and note which one the vehicle holds then."""
-        self._under_way = part.kind
+        """Upload a part, and record which version the vehicle holds."""
+        self._current = part.kind
         answer = yield self._transfer(part.kind, part.items)
         if answer.accepted:
             self._holds[part.kind] = which
         elif (answer.silent or answer.cancelled) and self._is_all_sent:
             self._holds[part.kind] = _UNKNOWN
-        self._under_way = None
+        self._current = None
         return answer
 
     def _transfer(self, kind: MissionType, items: Sequence[MissionItem] | None = None) -> Call:
-        """Begin to upload ``items``, or to download; one client a kind, which keeps late messages apart."""
+        """Begin to upload ``items``, or to download; one client per type separates late messages."""
         if kind not in self._clients:
             self._clients[kind] = calls.mission_client(self._session, kind)
         client = self._clients[kind]

@@ -17,7 +17,7 @@ _LINE, _LADDER, _AIRCRAFT = "#f4f4f4", "#a9c4e2", "#ffd75f"
 _NO_DATA = "#303030"
 _PITCH_SPAN_DEG = 50.0  # from top to bottom
 _LADDER_STEP_DEG = 10.0
-_CELL_ASPECT = 1.0  # of half a character cell: it is about as wide as high
+_CELL_ASPECT = 1.0  # width over height of half a character cell
 _COMPASS = {0: "N", 45: "NE", 90: "E", 135: "SE", 180: "S", 225: "SW", 270: "W", 315: "NW"}
 
 
@@ -26,7 +26,7 @@ def horizon(attitude: Euler | None, width: int, height: int) -> Text:
     text = Text(no_wrap=True)
     for row in range(height):
         cells = [_cell(attitude, column, row, width, height) for column in range(width)]
-        for style, run in groupby(cells, key=itemgetter(1)):  # few runs are drawn faster than many cells
+        for style, run in groupby(cells, key=itemgetter(1)):  # runs are drawn faster than cells
             text.append("".join(mark for mark, _ in run), style)
         if row < height - 1:
             text.append("\n")

@@ -1,4 +1,4 @@
-"""The panels of the terminal view, each drawn from the vehicle's snapshot. Pure."""
+"""Panels of the terminal view, drawn from the vehicle's state. Pure."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _BLOCKS = "·▏▎▍▌▋▊▉"
 
 
 def number(value: float | None, digits: int = 2, unit: str = "") -> str:
-    """Show a number, or a dash when it is not known."""
+    """Format a number; a dash if unknown."""
     if value is None:
         return UNKNOWN
     if abs(value) >= 1e7:
@@ -32,13 +32,13 @@ def number(value: float | None, digits: int = 2, unit: str = "") -> str:
 
 
 def framed(title: str, content: RenderableType, style: str = "bright_black") -> Panel:
-    """Put a panel's frame around its content."""
+    """Return a panel with a frame around ``content``."""
     heading = Text(title, style="bold cyan")
     return Panel(content, title=heading, title_align="left", border_style=style, padding=(0, 1))
 
 
 def bar(fraction: float | None, width: int, style: str) -> Text:
-    """Draw a bar with eighths of a cell; an empty one when there is no figure."""
+    """Draw a bar with eighths of a cell; an empty one if the value is unknown."""
     full = min(1.0, max(0.0, fraction or 0.0)) * width
     whole = int(full)
     part = _BLOCKS[int((full - whole) * 8)] if whole < width else ""
@@ -48,7 +48,7 @@ def bar(fraction: float | None, width: int, style: str) -> Text:
 
 
 def attitude_panel(view: VehicleView, width: int, height: int) -> Panel:
-    """Artificial horizon, heading tape, the angles and, where there is room, their targets."""
+    """Artificial horizon, heading tape, the angles and, if there is room, their setpoints."""
     inner, room_for_targets = width - 4, height >= 14
     angles = view.attitude
     figures = [_angles(angles, inner, "bold")]
@@ -102,7 +102,7 @@ def position_panel(view: VehicleView) -> Panel:
 
 
 def rotors_panel(view: VehicleView, width: int) -> Panel:
-    """Rotor speeds as bars against a round number above the largest seen, throttle and battery."""
+    """Rotor speeds as bars scaled to a round number above the largest, throttle and battery."""
     scale = _round_above(view.rotor_peak_rpm)
     rows: list[RenderableType] = []
     for index, rpm in enumerate(view.rotor_rpm or (None,) * 4):
@@ -166,7 +166,7 @@ def mission_panel(view: VehicleView) -> Panel:
 
 
 def messages_panel(view: VehicleView, width: int, lines: int) -> Panel:
-    """The last status texts, newest at the bottom; long ones are wrapped."""
+    """The latest status texts, newest at the bottom; long ones are wrapped."""
     shown = [line for entry in view.texts for line in message_lines(entry, width - 4)]
     last = shown[-max(1, lines) :]
     return framed("Messages", Group(*last) if last else Text("none yet", style="bright_black"))
@@ -184,7 +184,7 @@ def message_lines(entry: StatusText, width: int) -> list[Text]:
 
 
 def clock_text(time_s: float | None) -> str:
-    """Show vehicle time as minutes and seconds."""
+    """Format vehicle time as minutes and seconds."""
     if time_s is None:
         return UNKNOWN
     minutes, seconds = divmod(time_s, 60)

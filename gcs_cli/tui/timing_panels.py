@@ -1,4 +1,4 @@
-"""Loop timing in the terminal view: a panel, or one line where there is no room for it. Pure."""
+"""Loop timing in the terminal view: a panel, or one line without room for it. Pure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gcs_cli.vehicle.view_types import LoopTiming
 
 
 def timing_panel(timing: LoopTiming | None, width: int) -> Panel:
-    """Loop rates, execution time against the period, lateness and overruns."""
+    """Loop rates, execution time over the period, lateness and overruns."""
     if timing is None:
         return framed("Loops", Text("no timing yet", style="bright_black"))
     grid = Table.grid(padding=(0, 1))
@@ -32,7 +32,7 @@ def timing_panel(timing: LoopTiming | None, width: int) -> Panel:
 
 
 def timing_line(timing: LoopTiming | None) -> Panel:
-    """The same on one line; in real time, which lateness shows, it is too long to say so too."""
+    """The same on one line; in real time it shows lateness instead of the clock."""
     if timing is None:
         return framed("Loops", Text("no timing yet", style="bright_black"))
     period_us = 1e6 / timing.inner_hz if timing.inner_hz else None

@@ -1,4 +1,4 @@
-"""A bar for a transfer: on a terminal only, where something waits to see it."""
+"""Progress bar of a transfer, on a terminal only."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from rich.progress import (
 
 
 class TransferBar:
-    """Shows how far a transfer is; leaves nothing behind on the terminal."""
+    """Shows the progress of a transfer, and removes itself at the end."""
 
     def __init__(
         self, name: str, console: Console | None = None, columns: Sequence[ProgressColumn] = ()
     ) -> None:
-        """Show ``columns`` behind the bar: if none are given, octets and their speed."""
+        """Show ``columns`` after the bar; by default bytes and their rate."""
         console = console or Console(stderr=True)
         draws = console.is_terminal and not console.is_dumb_terminal
         self._progress = Progress(
@@ -39,7 +39,7 @@ class TransferBar:
         self._task = self._progress.add_task(name, total=None)
 
     def show(self, done: int, total: int) -> None:
-        """Show ``done`` of ``total``; a total of 0 is not known yet."""
+        """Show ``done`` of ``total``; a total of 0 is unknown."""
         self._progress.update(self._task, completed=done, total=total or None)
 
     def __enter__(self) -> TransferBar:
@@ -56,5 +56,5 @@ class TransferBar:
 
 
 def step_bar(name: str, console: Console) -> TransferBar:
-    """Return a bar that counts steps instead of octets."""
+    """Return a bar that counts steps instead of bytes."""
     return TransferBar(name, console, (MofNCompleteColumn(),))

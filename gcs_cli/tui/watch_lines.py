@@ -1,4 +1,4 @@
-"""The vehicle in lines of text, for pipes and files. Pure."""
+"""State and texts of the vehicle as lines, for pipes and files. Pure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gcs_cli.vehicle.view_types import StatusText, VehicleView
 
 
 def state_line(view: VehicleView, now_s: float) -> str:
-    """Say in one line how the vehicle is; a dash stands for what is not known."""
+    """Return the state of the vehicle in one line; a dash for unknown values."""
     if view.identity is None:
         return "waiting for a vehicle"
     if view.powered_off:
@@ -36,5 +36,5 @@ def state_line(view: VehicleView, now_s: float) -> str:
 
 
 def text_line(entry: StatusText) -> str:
-    """Say one status text in one line."""
+    """Return one status text in one line."""
     return f"{clock_text(entry.vehicle_time_s)}  {SEVERITIES[min(entry.severity, 7)]}: {entry.text}"

@@ -1,4 +1,4 @@
-"""The whole terminal view: a pure function from a vehicle's snapshot to a screen."""
+"""The terminal view: from a vehicle's state to a screen. Pure."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def _armed_style(armed: bool) -> str:
 
 
 def link_text(view: VehicleView, now_s: float) -> Text:
-    """Link quality in a few words; what has happened to the vehicle when it is gone."""
+    """Link quality; the reason if the vehicle is gone."""
     if view.powered_off:
         return Text(" SHUT DOWN ", style="bold black on yellow")
     if view.lost(now_s):
@@ -146,7 +146,7 @@ def _footer(view: VehicleView, width: int) -> Text:
 
 
 def _compact(view: VehicleView, now_s: float, width: int, height: int) -> RenderableType:
-    """For a window too small for panels."""
+    """Draw the view for a window too small for panels."""
     position, mission = view.position_ned_m, view.mission
     place, item = "—", "none loaded"
     if position is not None:

@@ -1,1 +1,1 @@
-"""What is known of the vehicle: its state, modes, texts and parameters."""
+"""State, modes, texts and parameters of the vehicle."""

@@ -1,4 +1,4 @@
-"""What a vehicle says about its parameters: the file that QGroundControl reads (component metadata). Pure.
+"""Parameters of a vehicle: the metadata that it sends (component metadata), and parameter files.
 
 Schema: https://github.com/mavlink/mavlink/blob/master/component_metadata/parameter.schema.json
 """
@@ -8,19 +8,24 @@ from __future__ import annotations
 import json
 import lzma
 import math
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any, NamedTuple
 
+from flightstack.core.errors import ConfigError
 from flightstack.core.float32 import shortest
 from flightstack.mavlink.fields import clean
+from flightstack.mavlink.param_values import INT32, REAL32, Parameter
+from flightstack.params.param_file import read_param_file
 
 METADATA_PATH = "etc/extras/parameters.json.xz"
-"""Where PX4 and flightstack keep it; fetched over MAVLink FTP."""
-MOST_OCTETS = 16_000_000
-"""Of the file when it is unpacked. PX4's is 1.5 MB."""
+"""Path of the metadata on PX4 and flightstack, read over MAVLink FTP."""
+MAX_METADATA_BYTES = 16_000_000
+"""Largest unpacked metadata. PX4's has 1.5 MB."""
 
 
 class ParamInfo(NamedTuple):
-    """About one parameter; None and empty where the vehicle says nothing."""
+    """Metadata of one parameter; None or empty if the vehicle does not send it."""
 
     default: float | None = None
     low: float | None = None
@@ -44,7 +49,7 @@ UNKNOWN = ParamInfo()
 
 
 def number_text(value: float) -> str:
-    """Show a parameter's value as short as it can be told; equal texts are equal values on the wire."""
+    """Format a parameter's value as short as possible; equal texts are equal values on the wire."""
     return f"{shortest(value):.9g}"
 
 
@@ -53,9 +58,9 @@ def _end_text(value: float | None) -> str:
 
 
 def parse_metadata(packed: bytes) -> dict[str, ParamInfo]:
-    """Read the packed file; return what is there by name, nothing when it is no such file."""
+    """Return the metadata in the packed file, by name; empty if the file is invalid."""
     try:
-        text = lzma.LZMADecompressor(memlimit=128 * 2**20).decompress(packed, MOST_OCTETS)
+        text = lzma.LZMADecompressor(memlimit=128 * 2**20).decompress(packed, MAX_METADATA_BYTES)
         entries = json.loads(text)["parameters"]
     except (lzma.LZMAError, EOFError, ValueError, KeyError, TypeError, RecursionError):
         return {}
@@ -97,5 +102,26 @@ def _number(value: Any) -> float | None:
 
 
 def _text(value: Any) -> str:
-    """Return ``value``, fit to be shown, if it is a text."""
+    """Return ``value`` without control characters, or an empty text if it is not a text."""
     return clean(value) if isinstance(value, str) else ""
+
+
+def render_parameters(parameters: Iterable[Parameter], system_id: int, component_id: int) -> str:
+    """Return a parameter file in the format of QGroundControl."""
+    lines = [
+        f"# Onboard parameters for Vehicle {system_id}",
+        "#",
+        "# Vehicle-Id Component-Id Name Value Type",
+    ]
+    for parameter in parameters:
+        kind = INT32 if parameter.is_integer else REAL32
+        value = number_text(parameter.value)
+        lines.append(f"{system_id}\t{component_id}\t{parameter.name}\t{value}\t{kind}")
+    return "\n".join(lines) + "\n"
+
+
+def load_parameters(path: Path) -> dict[str, float]:
+    """Read a parameter file like the flight stack does; raise ConfigError that names file and line."""
+    if not path.exists():
+        raise ConfigError(path, "", "no such file")
+    return {line.name: float(line.value) for line in read_param_file(path)}

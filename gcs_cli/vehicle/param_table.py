@@ -21,21 +21,21 @@ def matching(parameters: Sequence[Parameter], pattern: str) -> list[Parameter]:
     wanted = pattern.upper()
     if not set(wanted) & set("*?["):
         wanted = f"*{wanted}*"
-    return [told for told in parameters if fnmatchcase(told.name.upper(), wanted)]
+    return [parameter for parameter in parameters if fnmatchcase(parameter.name.upper(), wanted)]
 
 
-def is_changed(told: Parameter, infos: Infos) -> bool:
-    """Tell whether a parameter is known to have another value than its default."""
-    default = infos.get(told.name, UNKNOWN).default
-    return default is not None and number_text(default) != number_text(told.value)
+def is_changed(parameter: Parameter, infos: Infos) -> bool:
+    """Return True if a parameter has a known default and another value."""
+    default = infos.get(parameter.name, UNKNOWN).default
+    return default is not None and number_text(default) != number_text(parameter.value)
 
 
-def facts(told: Parameter, infos: Infos) -> dict[str, Any]:
-    """Return what ``--json`` prints of a parameter; null for what the vehicle does not say."""
-    info = infos.get(told.name, UNKNOWN)
+def facts(parameter: Parameter, infos: Infos) -> dict[str, Any]:
+    """Return a parameter as ``--json`` prints it; null for values that the vehicle does not send."""
+    info = infos.get(parameter.name, UNKNOWN)
     return {
-        "name": told.name,
-        "value": int(told.value) if told.is_integer else told.value,
+        "name": parameter.name,
+        "value": int(parameter.value) if parameter.is_integer else parameter.value,
         "default": info.default,
         "min": info.low,
         "max": info.high,
@@ -46,9 +46,9 @@ def facts(told: Parameter, infos: Infos) -> dict[str, Any]:
 
 
 def parameter_table(parameters: Sequence[Parameter], infos: Infos, compared: str = "default") -> Table:
-    """Return name, value, range and help; a value that is not the default stands out, beside its default.
+    """Return a table of name, value, range and help; changed values are highlighted, with their default.
 
-    ``compared`` is the heading of the values that are taken for the defaults.
+    ``compared`` is the heading of the defaults.
     """
     table = Table(
         box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold"
@@ -57,16 +57,16 @@ def parameter_table(parameters: Sequence[Parameter], infos: Infos, compared: str
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("unit", no_wrap=True)
     if infos:
-        if any(is_changed(told, infos) for told in parameters):
+        if any(is_changed(parameter, infos) for parameter in parameters):
             table.add_column(compared, justify="right", no_wrap=True, style="bright_black")
         table.add_column("range", no_wrap=True, style="bright_black", max_width=16, overflow="ellipsis")
         table.add_column("help", overflow="fold")
-    for told in parameters:
-        info = infos.get(told.name, UNKNOWN)
-        changed = is_changed(told, infos)
+    for parameter in parameters:
+        info = infos.get(parameter.name, UNKNOWN)
+        changed = is_changed(parameter, infos)
         cells = [
-            Text(told.name, style="bold yellow" if changed else ""),
-            Text(number_text(told.value), style="bold yellow" if changed else ""),
+            Text(parameter.name, style="bold yellow" if changed else ""),
+            Text(number_text(parameter.value), style="bold yellow" if changed else ""),
             Text(info.unit, style="bright_black"),
         ]
         if len(table.columns) == 6:
@@ -76,9 +76,9 @@ def parameter_table(parameters: Sequence[Parameter], infos: Infos, compared: str
     return table
 
 
-def description(told: Parameter, info: ParamInfo) -> str:
-    """Return one parameter with all that is known of it, on as many lines as it takes."""
-    lines = [f"{told.name} = {number_text(told.value)}{_unit(info)}"]
+def description(parameter: Parameter, info: ParamInfo) -> str:
+    """Return one parameter with its metadata, on several lines."""
+    lines = [f"{parameter.name} = {number_text(parameter.value)}{_unit(info)}"]
     if info.help:
         lines.append(f"  {info.help}")
     limits = [
@@ -93,7 +93,7 @@ def description(told: Parameter, info: ParamInfo) -> str:
 
 
 def change_line(name: str, before: float, after: float, info: ParamInfo) -> str:
-    """Return what a change did, on one line."""
+    """Return the change of a parameter on one line."""
     later = "; it takes effect after a restart" if info.reboot_required else ""
     if number_text(before) == number_text(after):
         return f"{name} is {number_text(after)}{_unit(info)} already"

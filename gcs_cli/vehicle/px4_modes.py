@@ -1,4 +1,4 @@
-"""PX4's custom modes: the names a pilot reads and the numbers on the wire (``main << 16 | sub << 24``)."""
+"""PX4's custom modes: names, and numbers on the wire (``main << 16 | sub << 24``)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _ALIASES = {"LOITER": "HOLD", "RETURN": "RTL", "POSCTL": "POSITION", "ALTCTL": "
 
 
 def mode_name(custom_mode: int) -> str:
-    """Return the name of a PX4 custom mode; one that is not known is shown as its two numbers."""
+    """Return the name of a PX4 custom mode; an unknown one is shown by its two numbers."""
     main, sub = custom_mode >> 16 & 255, custom_mode >> 24 & 255
     if main == _AUTO and sub in _AUTO_NAMES:
         return _AUTO_NAMES[sub]
@@ -42,7 +42,7 @@ def mode_name(custom_mode: int) -> str:
 
 
 def mode_numbers(name: str) -> tuple[int, int] | None:
-    """Return PX4's main and sub mode for a name, in any case; None when there is no such mode."""
+    """Return PX4's main and sub mode for a name, in any case; None for an unknown mode."""
     wanted = _ALIASES.get(name.strip().upper(), name.strip().upper())
     for sub, known in _AUTO_NAMES.items():
         if known == wanted:
@@ -54,5 +54,5 @@ def mode_numbers(name: str) -> tuple[int, int] | None:
 
 
 def settable_modes() -> list[str]:
-    """Names that ``gcs mode`` takes, the automatic ones first."""
+    """Return the names for ``gcs mode``, the automatic modes first."""
     return [*_AUTO_NAMES.values(), *(name for main, name in _MAIN_NAMES.items() if main != _AUTO)]

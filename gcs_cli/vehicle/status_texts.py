@@ -1,4 +1,4 @@
-"""Fold STATUSTEXT into a ``VehicleView``: the pieces of a long text are joined and shown as one. Pure."""
+"""Fold STATUSTEXT into a ``VehicleView``: the pieces of a long text are joined. Pure."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from typing import Any
 from flightstack.mavlink.fields import clean
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, PartialText, StatusText, VehicleView
 
-PIECE_OCTETS = 50
-"""A piece of fewer octets ends a text (MAVLink, STATUSTEXT.chunk_seq)."""
-PIECE_PATIENCE_S = 0.25
-"""How long the first piece waits for the others, one of which may be lost."""
-_LONGEST_OCTETS = 500
+PIECE_BYTES = 50
+"""A piece of fewer bytes ends a text (MAVLink, STATUSTEXT.chunk_seq)."""
+PIECE_TIMEOUT_S = 0.25
+"""Time after which a text is shown without lost pieces."""
+_LONGEST_BYTES = 500
 
 
 def add_piece(view: VehicleView, message: Any, now_s: float) -> VehicleView:
     """Return ``view`` after a STATUSTEXT."""
-    octets = message._text_raw.partition(b"\0")[0]  # pymavlink's text is ASCII, and a vehicle speaks UTF-8
+    octets = message._text_raw.partition(b"\0")[0]  # pymavlink decodes ASCII, but vehicles send UTF-8
     before = view.partial_text
     if before and (message.id, message.chunk_seq) == (before.message_id, before.pieces):
-        joined = (before.octets + octets)[:_LONGEST_OCTETS]
+        joined = (before.octets + octets)[:_LONGEST_BYTES]
         partial = before._replace(octets=joined, pieces=before.pieces + 1)
     else:
         view = _shown(view)
         partial = PartialText(message.id, message.severity, octets, 1, now_s, view.time_s)
     view = view._replace(partial_text=partial)
-    return _shown(view) if not message.id or len(octets) < PIECE_OCTETS else view
+    return _shown(view) if not message.id or len(octets) < PIECE_BYTES else view
 
 
 def without_stale_piece(view: VehicleView, now_s: float) -> VehicleView:
-    """Return ``view`` with what is there of a text whose other pieces do not come."""
+    """Return ``view`` with an incomplete text whose other pieces are late."""
     partial = view.partial_text
-    stale = partial is not None and now_s - partial.received_s > PIECE_PATIENCE_S
+    stale = partial is not None and now_s - partial.received_s > PIECE_TIMEOUT_S
     return _shown(view) if stale else view
 
 

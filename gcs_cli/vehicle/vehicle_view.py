@@ -1,4 +1,4 @@
-"""Fold MAVLink messages into a ``VehicleView``. Pure; odd values on the wire never raise."""
+"""Fold MAVLink messages into a ``VehicleView``. Pure; invalid values on the wire never raise."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ _NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID: a ground station, a camera …
 _ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _IGNORE_POSITION, _IGNORE_VELOCITY, _IGNORE_YAW = 0b111, 0b111000, 1 << 10  # POSITION_TARGET_TYPEMASK
 _IGNORE_ATTITUDE = 128  # ATTITUDE_TARGET_TYPEMASK
-_PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: says whether to arm, not how the sensors are
+_PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
 _RATE_WINDOW_S = 1.0
 _MOST_ROTORS = 16
 _NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
 
 
 def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
-    """Return ``view`` after ``message``, received at ``now_s``; messages of others leave it as it is.
+    """Return ``view`` after ``message``, received at ``now_s``; messages of others are ignored.
 
-    The first heartbeat of an autopilot decides which vehicle this is.
+    The first heartbeat of an autopilot selects the vehicle.
     """
     if view.identity is None:
         if message.get_type() != "HEARTBEAT" or message.autopilot == _NO_AUTOPILOT:
@@ -71,7 +71,7 @@ def _vector(x: float, y: float, z: float) -> Vector | None:
 
 
 def _euler(q: Any) -> Euler | None:
-    """Angles of a quaternion (w, x, y, z) of any length; None when it has none."""
+    """Return the angles of a quaternion (w, x, y, z) of any length; None without a direction."""
     norm = math.sqrt(sum(v * v for v in q))
     if not 1e-6 < norm < 1e6:  # NaN fails this too
         return None
@@ -160,7 +160,7 @@ def _mission_current(view: VehicleView, message: Any, _now_s: float) -> VehicleV
     state = message.mission_state or None
     reached = view.mission.reached
     if total is not None and reached is not None and reached >= total:
-        reached = None  # of a mission that is no longer there
+        reached = None  # of a former mission
     return view._replace(mission=Mission(message.seq, total, reached, state))
 
 
@@ -174,7 +174,7 @@ def _rotors(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
         return view
     rpm = list(view.rotor_rpm) + [0.0] * (first + 4 - len(view.rotor_rpm))
     rpm[first : first + 4] = [float(value) for value in message.rpm]
-    if view.identity is not None and view.identity.rotors is not None:  # a message holds four, used or not
+    if view.identity is not None and view.identity.rotors is not None:  # a message always holds four
         rpm = rpm[: view.identity.rotors]
     peak = max(view.rotor_peak_rpm, *(abs(value) for value in rpm))
     return view._replace(rotor_rpm=tuple(rpm), rotor_peak_rpm=peak)

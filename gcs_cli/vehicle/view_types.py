@@ -1,4 +1,4 @@
-"""What a ground station knows of a vehicle: immutable values, None where nothing is known."""
+"""State of a vehicle as received by a ground station: immutable values, None if unknown."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 TEXTS_KEPT = 100
 LOST_AFTER_S = 5.0
-"""Silence after which a vehicle counts as lost: five missed heartbeats."""
+"""Heartbeat timeout of a vehicle: five missed heartbeats."""
 
 _POWEROFF = 7  # MAV_STATE_POWEROFF
 _KINDS = {
@@ -21,7 +21,7 @@ MISSION_COMPLETE = 5  # MISSION_STATE_COMPLETE
 
 
 class Vector(NamedTuple):
-    """Three numbers; the field that holds it tells frame and unit."""
+    """A vector; frame and unit are in the name of its field."""
 
     x: float
     y: float
@@ -29,7 +29,7 @@ class Vector(NamedTuple):
 
 
 class Identity(NamedTuple):
-    """Who the vehicle is: its MAVLink address and what it says it is."""
+    """MAVLink address and type of the vehicle."""
 
     system_id: int
     component_id: int
@@ -43,7 +43,7 @@ class Identity(NamedTuple):
 
     @property
     def rotors(self) -> int | None:
-        """Number of rotors that the type of vehicle has; None where it does not tell."""
+        """Number of rotors of the type of vehicle; None if unknown."""
         return _KINDS.get(self.vehicle_type, ("", 0))[1] or None
 
 
@@ -65,7 +65,7 @@ class GeoPosition(NamedTuple):
 
 
 class Setpoint(NamedTuple):
-    """What the vehicle's guidance asks for; None where it asks for nothing."""
+    """Setpoint of the vehicle's guidance; None for values that it does not control."""
 
     position_ned_m: Vector | None = None
     velocity_ned_m_s: Vector | None = None
@@ -82,12 +82,12 @@ class Mission(NamedTuple):
 
     @property
     def complete(self) -> bool:
-        """Whether the vehicle says that the mission is done."""
+        """True if the vehicle reports the mission as complete."""
         return self.state == MISSION_COMPLETE
 
 
 class Battery(NamedTuple):
-    """Battery, as far as the vehicle measures it."""
+    """State of the battery; None for values that the vehicle does not measure."""
 
     remaining: float | None
     voltage_v: float | None
@@ -114,7 +114,7 @@ class LoopTiming(NamedTuple):
 
 
 class StatusText(NamedTuple):
-    """A text from the vehicle. ``number`` counts them all."""
+    """A STATUSTEXT. ``number`` counts all texts."""
 
     number: int
     severity: int
@@ -135,7 +135,7 @@ class PartialText(NamedTuple):
 
 
 class LinkCounts(NamedTuple):
-    """Messages from the vehicle: taken, missing in the sequence, and the rate of late [1/s]."""
+    """Messages from the vehicle: received, missing in the sequence, and the recent rate [1/s]."""
 
     received: int = 0
     lost: int = 0
@@ -153,7 +153,7 @@ class LinkCounts(NamedTuple):
 
 
 class VehicleView(NamedTuple):
-    """One snapshot of a vehicle, folded from its messages. Times ``_s`` are on the receiver's clock."""
+    """State of a vehicle, folded from its messages. Times ``_s`` are on the receiver's clock."""
 
     identity: Identity | None = None
     last_heartbeat_s: float | None = None
@@ -163,7 +163,7 @@ class VehicleView(NamedTuple):
     system_status: int = 0
     landed_state: int = 0
     healthy: bool | None = None
-    """Whether all its sensors are well; in a simulation: whether the simulator's state is there."""
+    """True if all sensors are healthy; in a simulation: if the simulator's state is received."""
     attitude: Euler | None = None
     rates_frd_rad_s: Vector | None = None
     attitude_target: Euler | None = None
@@ -187,7 +187,7 @@ class VehicleView(NamedTuple):
 
     @property
     def powered_off(self) -> bool:
-        """Whether the vehicle has said that it shuts down."""
+        """True if the vehicle has reported that it shuts down."""
         return self.system_status == _POWEROFF
 
     def silent_s(self, now_s: float) -> float | None:
@@ -195,10 +195,10 @@ class VehicleView(NamedTuple):
         return None if self.last_heartbeat_s is None else max(0.0, now_s - self.last_heartbeat_s)
 
     def lost(self, now_s: float) -> bool:
-        """Whether a vehicle that was heard is heard no more."""
+        """True if the heartbeat has timed out."""
         silent = self.silent_s(now_s)
         return silent is not None and silent > LOST_AFTER_S
 
     def texts_since(self, count: int) -> tuple[StatusText, ...]:
-        """Status texts that came after the first ``count``, as far as they are kept."""
+        """Return the kept status texts after the first ``count``."""
         return tuple(text for text in self.texts if text.number >= count)

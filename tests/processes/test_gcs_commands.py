@@ -318,9 +318,9 @@ def test_beside_a_ground_station_the_vehicle_is_called_at_its_own_port(
     with UdpSocket("127.0.0.1") as taken, serve(vehicle) as socket:
         usual, own = taken.address[1], socket.address[1]
         monkeypatch.setattr("gcs_cli.settings.DEFAULT_CONNECTION", f"udp:127.0.0.1:{usual}")
-        monkeypatch.setattr("gcs_cli.settings.VEHICLE_CONNECTION", f"udpout:127.0.0.1:{own}")
+        monkeypatch.setattr("gcs_cli.link.vehicle_link.VEHICLE_CONNECTION", f"udpout:127.0.0.1:{own}")
         result = gcs(*command)
-    said = f"gcs: UDP 127.0.0.1:{usual} is in use: calling the vehicle at UDP 127.0.0.1:{own}\n"
+    said = f"gcs: UDP 127.0.0.1:{usual} is in use: connecting to the vehicle at UDP 127.0.0.1:{own}\n"
     assert result == ("armed\n" if command == ["arm"] else "watching\n", said, 0)
     assert vehicle.codec.total_packets_received > 0
 
@@ -330,11 +330,13 @@ def test_beside_a_ground_station_the_vehicle_is_called_at_its_own_port(
     [
         (["frobnicate"], "No such command"),
         (["arm", "--frobnicate"], "No such option"),
-        (["mode", "sideways"], "there is none; known are"),
-        (["takeoff", "--alt", "-3"], "--alt -3: expected metres above zero"),
+        (["mode", "sideways"], "unknown mode; known are"),
+        (["takeoff", "--alt", "-3"], "Invalid value for '--alt'"),
         (["takeoff", "--alt", "high"], "--alt"),
         (["--connect", "tcp:1", "status"], "expected udp:PORT"),
-        (["--timeout", "0", "status"], "--timeout 0: expected seconds above zero"),
+        (["--timeout", "0", "status"], "Invalid value for '--timeout'"),
+        (["goto", "--", "91", "0"], "Invalid value for 'latitude'"),
+        (["goto", "--", "0", "nan"], "Invalid value for 'longitude'"),
         (["--connect", "udpout:no.such.host.invalid:1", "status"], "no host named"),
         (["mission", "upload", "nowhere.plan"], "nowhere.plan: cannot be read: No such file"),
         (["fly", "nowhere.plan"], "nowhere.plan: cannot be read: No such file"),
@@ -354,7 +356,7 @@ def test_an_interrupted_wait_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Connection, "meet", interrupt)
+    monkeypatch.setattr(Connection, "wait_for_vehicle", interrupt)
     with UdpSocket("127.0.0.1") as silent:
         result = gcs("--connect", f"udpout:127.0.0.1:{silent.address[1]}", "arm")
     assert result == ("", "gcs: interrupted\n", 1)

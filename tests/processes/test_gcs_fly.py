@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from flightstack.core.port_numbers import simulator_port, vehicle_ground_port
+from flightstack.process.signing_file import create_key
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.processes import Child, Children
@@ -26,6 +27,7 @@ from tests.support.process import children_of
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds
 MISSIONS = Path(__file__).parents[2] / "missions"
 INSTANCE = free_instance()
+SIGNED = 0x01  # MAVLINK_IFLAG_SIGNED, in the third byte of a frame
 PATIENT = ["--speed", "1"]  # leaves time to interfere
 
 
@@ -131,6 +133,24 @@ def test_fly_works_beside_a_ground_station_that_holds_its_port(tmp_path: Path) -
     assert result.stdout.count("flightstack: warning: ") == 1
     summary = summary_of(tmp_path / "run")
     assert (summary["param"], summary["force_n"]) == (["MIS_TAKEOFF_ALT=4"], [0.1, 0.0, 0.0])
+
+
+def test_signing_key_signs_both_ends_of_the_link(tmp_path: Path) -> None:
+    key = tmp_path / "my.key"
+    create_key(key)
+    with UdpSocket("127.0.0.1", FlyOptions(Path(), instance=INSTANCE).gcs_port) as station:
+        result = gcs("--signing-key", key, *command(tmp_path / "run")[3:])
+        heard = [data for data, _ in station.receive()]
+    assert result.returncode == 0, result.stderr
+    assert heard
+    assert all(data[2] & SIGNED for data in heard)
+    assert (tmp_path / f"{key.name}.gcs.timestamp").exists()
+
+
+def test_missing_signing_key_is_refused_before_the_flight(tmp_path: Path) -> None:
+    result = gcs("--signing-key", tmp_path / "no.key", *command(tmp_path / "run")[3:])
+    assert result == ("", f"gcs: {tmp_path / 'no.key'}: No such file or directory\n", 2)
+    assert not (tmp_path / "run").exists()
 
 
 def test_overwrite_replaces_another_flight(tmp_path: Path) -> None:
@@ -254,7 +274,7 @@ def test_a_child_that_cannot_start_says_why(tmp_path: Path) -> None:
         child = children.start("sim-bridge", "sim_bridge", ["--plant=flat"])
         assert children.wait(LONG_S)
         assert child.exit_code == 2
-        assert child.obituary.startswith("sim-bridge ended with code 2: --plant: 'flat' is not one of")
+        assert child.end_reason.startswith("sim-bridge ended with code 2: --plant: 'flat' is not one of")
 
 
 def test_a_child_that_does_not_listen_is_killed(tmp_path: Path) -> None:
@@ -266,6 +286,6 @@ def test_a_child_that_does_not_listen_is_killed(tmp_path: Path) -> None:
     wait_until(lambda: child.last_line == "deaf", "it never started")
     with Children(tmp_path) as children:
         children.add(child)
-        children.stop(patience_s=0.1)
+        children.stop(timeout_s=0.1)
     assert child.exit_code == -signal.SIGKILL
-    assert child.obituary == "deaf was killed by signal 9"
+    assert child.end_reason == "deaf was killed by signal 9"

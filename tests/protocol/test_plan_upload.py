@@ -250,7 +250,7 @@ def test_an_upload_that_is_left_tells_what_the_vehicle_holds() -> None:
 
 
 def test_restoring_after_an_interrupt_has_a_time_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gcs_cli.transfers.plan_parts.RESTORE_PATIENCE_S", 0.0)
+    monkeypatch.setattr("gcs_cli.transfers.plan_parts.RESTORE_TIMEOUT_S", 0.0)
     world = World()
     world.hold(OLD)
     plan = Plan(mission(2, mark=1), fence=ELSEWHERE)

@@ -39,7 +39,7 @@ class VehicleProcesses:
 def wait_until_healthy(link: str) -> None:
     """Wait until the vehicle at ``link`` has a valid state. It sends SYS_STATUS only on request before."""
     with Connection(parse_endpoint(link)) as connection:
-        connection.meet(LONG_S)
+        connection.wait_for_vehicle(LONG_S)
         while not connection.session.view.healthy:
             connection.complete(
                 calls.command(connection.session, *calls.REQUEST_SYS_STATUS, connection.now_s), "SYS_STATUS"

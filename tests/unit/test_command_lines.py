@@ -14,6 +14,7 @@ import typer
 import flightstack
 from flightstack.__main__ import app as flightstack_app
 from gcs_cli.__main__ import app as gcs_app
+from gcs_cli.lazy_group import LazyGroup
 from sim_bridge.__main__ import app as sim_bridge_app
 from tests.support.commands import flightstack_command, gcs, sim_bridge_command
 
@@ -33,12 +34,27 @@ def pages() -> Iterator[tuple[str, Any, Any]]:
         while waiting:
             words, command, context = waiting.pop()
             yield words, command, context
-            for part, child in getattr(command, "commands", {}).items():
+            for part in getattr(command, "commands", ()):
+                child = command.resolve_command(context, [part])[1]
                 made = child.context_class(child, info_name=part, parent=context, **child.context_settings)
                 waiting.append((f"{words} {part}", child, made))
 
 
 PAGES = {words: (command, context) for words, command, context in pages()}
+
+
+LAZY = [
+    (words, name)
+    for words, (command, _) in PAGES.items()
+    if isinstance(command, LazyGroup)
+    for name in command.lazy
+]
+
+
+@pytest.mark.parametrize(("words", "name"), LAZY)
+def test_summary_of_a_lazy_command_is_that_of_its_help(words: str, name: str) -> None:
+    listed, (command, _) = PAGES[words][0].commands[name], PAGES[f"{words} {name}"]
+    assert listed.get_short_help_str(200) == command.get_short_help_str(200)
 
 
 def one_line(text: str) -> str:

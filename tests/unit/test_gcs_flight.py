@@ -60,7 +60,7 @@ def test_a_refused_part_of_the_plan_is_named(kind: MissionType, name: str) -> No
 def test_no_vehicle() -> None:
     story = Story(FakeVehicle(unsent={"HEARTBEAT"}), connect_s=3.0).run()
     assert story.reason.startswith(
-        "no vehicle answered within 3 s: flightstack has not begun; compiling its loops"
+        "no vehicle answered within 3 s: flightstack has not started; compiling its loops"
     )
     assert "see flightstack.log" in story.reason
     assert story.code == NO_ANSWER
@@ -223,7 +223,7 @@ def test_a_plan_that_ends_in_the_air_is_brought_home() -> None:
 def test_a_refused_return_ends_the_flight() -> None:
     vehicle = FakeVehicle(ends_in_air=True, refusals={RETURN: "Command refused: no home"})
     story = Story(vehicle, items=(TAKEOFF, WAYPOINT)).run()
-    assert story.reason == "the mission is flown, but the vehicle refused to return: no home"
+    assert story.reason == "the mission is complete, but the vehicle refused to return: no home"
 
 
 @pytest.mark.parametrize("phase", [Phase.UPLOAD, Phase.ARM, Phase.FLY])
@@ -238,7 +238,7 @@ def test_a_vehicle_that_is_gone_is_not_waited_for() -> None:
     story = Story(FakeVehicle()).run(until=Phase.FLY)
     gone = Outcome(Code.PROCESS_ENDED, "flightstack ended with code 1")
     story.flight.abort(gone, story.now_s, vehicle_is_gone=True)
-    assert story.flight.over
+    assert story.flight.is_over
 
 
 def test_a_vehicle_that_ignores_the_shut_down_does_not_hold_us() -> None:

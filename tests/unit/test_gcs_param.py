@@ -18,8 +18,13 @@ from flightstack.mavlink.param_values import Parameter
 from flightstack.mavlink.signing import timestamp_of
 from flightstack.params.param_file import ParamLine, format_params
 from gcs_cli.clients.param_client import ParamTiming
-from gcs_cli.vehicle.param_file import load_parameters, render_parameters
-from gcs_cli.vehicle.param_info import ParamInfo, number_text, parse_metadata
+from gcs_cli.vehicle.param_info import (
+    ParamInfo,
+    load_parameters,
+    number_text,
+    parse_metadata,
+    render_parameters,
+)
 from gcs_cli.vehicle.param_table import matching, parameter_table
 from tests.support.commands import Ended, gcs
 from tests.support.fake_vehicle import serve
@@ -57,7 +62,7 @@ def test_names_from_the_vehicle_cannot_add_lines_to_a_file(vehicle: ParamVehicle
     vehicle.values.update({**EVIL_NAMES, "A\t9\t9\n1\t1\tB": 6.0})
     result = told(vehicle, "save", tmp_path / "saved.params")
     assert result.stdout == f"3 parameters saved to {tmp_path / 'saved.params'}\n"
-    assert result.stderr.startswith("gcs: left out, as no parameter can have this name: ")
+    assert result.stderr.startswith("gcs: not saved, not valid as parameter names: ")
     assert result.stderr.rstrip("\n").isprintable()
     assert set(load_parameters(tmp_path / "saved.params")) == {"MPC_XY_CRUISE", "MPC_YAW_MODE", "ROLL_P"}
 
@@ -188,7 +193,7 @@ def test_reset_without_known_defaults_changes_nothing() -> None:
     vehicle.values["MPC_XY_CRUISE"] = 9.0
     result = told(vehicle, "reset", "MPC_XY_CRUISE")
     assert result.returncode == 1
-    assert "does not tell its default" in result.stderr
+    assert "does not send its default" in result.stderr
     assert vehicle.values["MPC_XY_CRUISE"] == 9.0
 
 
@@ -236,7 +241,7 @@ def test_a_bad_file_is_a_usage_error_before_anything_is_asked(tmp_path: Path) ->
     for command in ("load", "diff"):
         result = gcs("param", command, tmp_path / "none.params")
         assert result.returncode == 2
-        assert "none.params: there is no such file" in result.stderr
+        assert "none.params: no such file" in result.stderr
 
 
 def test_a_vehicle_that_does_not_answer_about_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -332,7 +337,7 @@ def test_a_file_that_is_no_text(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="there is no such file"):
+    with pytest.raises(ConfigError, match="no such file"):
         load_parameters(tmp_path / "none.params")
 
 

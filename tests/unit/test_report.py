@@ -13,7 +13,7 @@ import pytest
 from flightstack.mavlink.dialect import FsLoopTiming, mavlink
 from flightstack.mavlink.link import Link
 from flightstack.plan import Plan, load_plan
-from gcs_cli.link.tlog_file import TlogFile
+from gcs_cli.link.tlog import TlogFile
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.conditions import conditions
 from gcs_cli.report.flight_charts import mode_bands, time_figures

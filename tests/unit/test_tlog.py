@@ -13,8 +13,7 @@ from pymavlink import mavutil
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, FsLoopTiming, mavlink
 from flightstack.mavlink.link import Link
-from gcs_cli.link.tlog import decode_records, encode_record
-from gcs_cli.link.tlog_file import TlogFile, read_messages
+from gcs_cli.link.tlog import TlogFile, decode_records, encode_record, read_messages
 
 START_US = 1_760_000_000_000_000
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
 from flightstack.mavlink.link import Link
 from gcs_cli.vehicle.px4_modes import mode_name, mode_numbers, settable_modes
-from gcs_cli.vehicle.status_texts import PIECE_PATIENCE_S
+from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
 from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, VehicleView
 
@@ -226,7 +226,7 @@ def test_a_text_whose_last_piece_is_lost_is_not(vehicle: Vehicle) -> None:
     vehicle.send(mavlink.MAVLink_statustext_message(4, b"a" * 50, 7, 0))
     assert vehicle.view.partial_text is not None
     first_s = vehicle.view.partial_text.received_s
-    assert vehicle.send(heartbeat(), now_s=first_s + PIECE_PATIENCE_S).texts == ()
+    assert vehicle.send(heartbeat(), now_s=first_s + PIECE_TIMEOUT_S).texts == ()
     assert [entry.text for entry in vehicle.send(heartbeat(), now_s=first_s + 1.0).texts] == ["a" * 50]
 
 
