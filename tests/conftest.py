@@ -21,7 +21,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 # every run tries the same examples: one that fails does so on every machine, and again
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
-settings.load_profile("repeatable")
+settings.register_profile("explore", deadline=None, database=None, print_blob=True)
+settings.load_profile("explore" if os.environ.get("NIGHTLY") else "repeatable")
 
 HANGS_AFTER_S = 600.0
 

@@ -141,7 +141,7 @@ class FailsafeMonitor:
         self._update_battery_level()
         finite = bool(np.isfinite(self._state).all())
         qx, qy = float(self._state[7]), float(self._state[8])
-        breach = self.fence.text(self.fence.step(self._state))
+        breach = self.fence.text(self.fence.flags_at(self._state))
         return ArmingFacts(
             mode=mode,
             state_is_valid=finite and has_state,
@@ -207,12 +207,12 @@ class FailsafeMonitor:
         armed, mode = status
         states, faults = self.states, self.faults
         states.update(time_us, armed and not landed and faults.moves, self._behaviour.stale_s)
+        breached = self.fence.update(self._state, time_us)
         if not armed:
             self._memory = IDLE
             return None
         if not states.holds_rotors:
             faults.update(setpoint, row, self.position_is_controlled, self.on_ground)
-        breached = self.fence.update(self._state, time_us)
         entries = self._memory.entries
         if (
             faults.is_quiet

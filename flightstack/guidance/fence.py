@@ -219,6 +219,14 @@ class FenceEvaluator:
         fence_step(self._areas, self._vertices, self._groups, self._limits, state, self._breach)
         return int(self._breach["flags"][0])
 
+    def flags_at(self, state: FloatArray) -> int:
+        """Return the flags that ``step`` would return for ``state`` (13,), without a change of the evaluator."""
+        if not self.is_active:
+            return 0
+        breach = self._breach.copy()
+        fence_step(self._areas, self._vertices, self._groups, self._limits, state, breach)
+        return int(breach["flags"][0])
+
     @property
     def flags(self) -> FenceBreach:
         """Breached limits."""

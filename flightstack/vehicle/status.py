@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -57,8 +58,9 @@ class VehicleStatus:
     armed: bool
     mode: Mode
     landed: bool
-    can_arm: bool
-    """True if armed, or if an arm command would be accepted."""
+    can_arm: Callable[[], bool]
+    """Returns True if armed, or if an arm command would be accepted; evaluated for SYS_STATUS only: a check of a long
+    mission takes milliseconds."""
     failsafe_action: Action
     """Action of the active failsafes."""
     state_is_good: bool
@@ -104,7 +106,7 @@ def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> 
         armed=now.status.armed,
         mode=now.status.mode,
         landed=now.landed,
-        can_arm=now.status.armed or not parts.readiness.arming_refusals(),
+        can_arm=lambda: now.status.armed or not parts.readiness.arming_refusals(),
         failsafe_action=failsafes.decision.action,
         state_is_good=now.has_state and not failsafes.states.is_stale and bool(np.isfinite(now.state).all()),
         state=now.state.copy(),

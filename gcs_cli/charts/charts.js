@@ -41,6 +41,8 @@
     URL.revokeObjectURL(anchor.href);
   }
 
+  // names are escaped for plotly's pseudo-HTML
+  const text = name => String(name).replaceAll("&lt;", "<").replaceAll("&gt;", ">").replaceAll("&amp;", "&");
   const cell = value => /[",\n]/.test(value) ? `"${String(value).replaceAll('"', '""')}"` : value ?? "";
 
   function csv(chart) {
@@ -48,7 +50,7 @@
     const rows = [["series", "x", "y", "z", "x axis", "y axis"]];
     for (const trace of chart.data) {
       const titles = trace.type === "scatter3d" ? ["east [m]", "north [m]"] : [axis("x", trace.xaxis), axis("y", trace.yaxis)];
-      trace.x.forEach((x, i) => x !== null && rows.push([trace.name, x, trace.y[i], trace.z ? trace.z[i] : "", ...titles]));
+      trace.x.forEach((x, i) => x !== null && rows.push([text(trace.name), x, trace.y[i], trace.z ? trace.z[i] : "", ...titles]));
     }
     return rows.map(row => row.map(cell).join(",")).join("\n") + "\n";
   }

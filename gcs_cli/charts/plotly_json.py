@@ -192,8 +192,9 @@ def _bar_trace(bars: Bars, unit: str) -> Json:
         "name": plain(bars.name),
         "x": numbers(0.5 * (left + right), 8),
         "width": numbers(right - left),
-        "y": numbers(bars.heights),
-        "marker": {"color": colour(bars.colour), "line": {"width": 1, "color": colour("card")}},
+        "y": [height or None for height in numbers(bars.heights)],
+        # the line keeps a bar visible however small its share
+        "marker": {"color": colour(bars.colour), "line": {"width": 1.5, "color": colour(bars.colour)}},
         "customdata": [plain(hint) for hint in bars.hints],
         "hovertemplate": "%{customdata}<extra></extra>"
         if bars.hints

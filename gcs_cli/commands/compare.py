@@ -49,6 +49,10 @@ def compare(
     """
     if len(runs) < 2:
         raise CliError("give two flights or more to compare", USAGE)
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise CliError(f"--out {out}: give the page a name that ends in .html", USAGE)
+    if not out.parent.is_dir():
+        raise CliError(f"--out {out}: there is no directory {out.parent}", USAGE)
     check_new(out, overwrite)
     read = read_runs(runs)
     for run in read:

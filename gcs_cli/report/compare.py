@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 from flightstack.core.errors import ConfigError
 from flightstack.plan import Plan, load_plan
 from gcs_cli.charts.pages import UNKNOWN, render_page, shown
+from gcs_cli.errors import USAGE, CliError
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.compare_charts import overlaid_figures
 from gcs_cli.report.flight_data import Flight, Series, empty_series
 from gcs_cli.report.replay import find_run
-from gcs_cli.report.run_directory import LOG_NAME, TLOG_NAME
+from gcs_cli.report.run_directory import LOG_NAME, SUMMARY_NAME, TLOG_NAME
 from gcs_cli.report.summary import RunInfo, max_overshoot_m, summarise
 from gcs_cli.report.telemetry import read_telemetry
 
@@ -133,6 +134,7 @@ def read_runs(paths: Sequence[Path]) -> list[ComparedRun]:
         summary = run.summary or {
             **summarise(flight, Plan(()), RunInfo(outcome="", plan="")), "outcome": None, "plan": None,
         }  # fmt: skip
+        _check_summary(summary, run.log)
         of_run = run.log.name == LOG_NAME
         battery = (
             read_telemetry(run.log.with_name(TLOG_NAME), flight.start_s).battery
@@ -143,9 +145,20 @@ def read_runs(paths: Sequence[Path]) -> list[ComparedRun]:
     return runs
 
 
+def _check_summary(summary: Summary, log: Path) -> None:
+    """Raise CliError (usage) if a figure of a summary has another type than ``summarise`` gives it."""
+    for figure in _FIGURES:
+        try:
+            shown(figure.of(summary), figure.spec, figure.unit)
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError):
+            path = log.with_name(SUMMARY_NAME)
+            raise CliError(f"{path} is damaged: its figure {figure.key} cannot be read", USAGE) from None
+
+
 def _names(logs: Sequence[Path]) -> list[str]:
     """Return short names: of the directory or the log; with a number where two are the same."""
-    short = [log.resolve().parent.name if log.name == LOG_NAME else log.stem for log in logs]
+    names = [log.resolve().parent.name if log.name == LOG_NAME else log.stem for log in logs]
+    short = [name.encode("utf-8", "replace").decode() for name in names]  # a file's name may be any bytes
     return [
         name if short.count(name) == 1 else f"{name} ({short[: index + 1].count(name)})"
         for index, name in enumerate(short)

@@ -16,10 +16,9 @@ from flightstack.params.vehicle import load_vehicle
 from flightstack.plan import NAV_COMMANDS, load_plan
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.report.flight_data import Flight, Series
-from gcs_cli.report.run_directory import LOG_NAME
+from gcs_cli.report.run_directory import LOG_NAME, SUMMARY_NAME
 from gcs_cli.report.summary import item_ned_m
 
-_SUMMARY = "summary.json"
 _FILM = "replay.mp4"
 
 
@@ -57,10 +56,15 @@ def _summary(log: Path) -> dict[str, Any]:
     if log.name != LOG_NAME:
         return {}
     try:
-        content = json.loads((log.parent / _SUMMARY).read_text(encoding="utf-8"))
+        content = json.loads((log.parent / SUMMARY_NAME).read_text(encoding="utf-8"), parse_constant=_refuse)
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}
+
+
+def _refuse(constant: str) -> float:
+    """Refuse NaN and infinities, which JSON does not have; raise ValueError."""
+    raise ValueError(f"{constant} is not a number of JSON")
 
 
 def poses_of(flight: Flight, run: Run, vehicle: str | None) -> Poses:

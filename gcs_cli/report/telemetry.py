@@ -28,14 +28,20 @@ class Telemetry(NamedTuple):
 def read_telemetry(tlog: Path, start_s: float = 0.0) -> Telemetry:
     """Return what a telemetry log holds; nothing if there is no such file. ``start_s``: start of the flight log.
 
-    SYS_STATUS carries no time: it has that of the last LOCAL_POSITION_NED.
+    The first vehicle counts, until it reboots. SYS_STATUS carries no time: it has that of the last LOCAL_POSITION_NED.
     """
     timings: list[LoopTiming] = []
     battery: list[tuple[float, float, float]] = []
-    time_s = math.nan
+    time_s, vehicle = math.nan, None
     for record, message in read_messages(tlog, _MESSAGES) if tlog.exists() else ():
+        source = (message.get_srcSystem(), message.get_srcComponent())
+        if source != (vehicle or source):
+            continue
+        vehicle = source
         if record.message_id == _LOCAL_POSITION_NED:
-            time_s = message.time_boot_ms * 1e-3 - start_s
+            before_s, time_s = time_s, message.time_boot_ms * 1e-3 - start_s
+            if time_s < before_s:  # a reboot: its flights have logs of their own
+                break
         elif record.message_id == FS_LOOP_TIMING_ID:
             timings.append(_timing(message, start_s))
         elif math.isfinite(time_s):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from flightstack.commander.transitions import Event
+from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
@@ -96,3 +98,25 @@ def test_the_battery_has_the_state_that_the_failsafes_go_by() -> None:
         world.run(0.3)
         told.append(asked(world, BATTERY_STATUS).charge_state)
     assert told == [1, 2, 3, 4]
+
+
+def test_fence_status_counts_a_breach_before_arming() -> None:
+    world = World(vehicle="x_quad", params=["GF_ACTION=0", "GF_MAX_HOR_DIST=50"])
+    world.run(0.1)
+    far = world.stack.places.frame.to_geo(Vector3(200.0, 0.0, 0.0))
+    assert world.stack.area.set_home(far) is None
+    assert world.arm() == 0  # its checks evaluate the fence too
+    world.run(0.1)
+    status = asked(world, FENCE_STATUS)
+    assert (status.breach_status, status.breach_count) == (1, 1)
+    assert status.breach_type == mavlink.FENCE_BREACH_BOUNDARY
+
+
+def test_fence_status_counts_a_breach_beside_a_mode_request() -> None:
+    world = flying("GF_ACTION=1", "GF_PREDICT=0")
+    world.stack.params.set("GF_MAX_VER_DIST", 2.0)
+    assert world.stack.parts.requests.request(Event.SELECT_HOLD) is None
+    world.run(0.1)
+    status = asked(world, FENCE_STATUS)
+    assert (status.breach_status, status.breach_count) == (1, 1)
+    assert status.breach_type == mavlink.FENCE_BREACH_MAXALT

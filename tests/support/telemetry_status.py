@@ -34,7 +34,7 @@ def status(info: dict[str, object] | None = None, **changes: object) -> VehicleS
     constant = VehicleInfo("paper_quad", 1, False, 4, 12.0, (600.0,) * 4, LocalFrame(HOME))
     usual = VehicleStatus(
         info=constant._replace(**(info or {})), time_us=12_345_678, armed=True, mode=Mode.MISSION, landed=False,
-        can_arm=True, failsafe_action=Action.NONE, state_is_good=True,
+        can_arm=lambda: True, failsafe_action=Action.NONE, state_is_good=True,
         state=np.array([10.0, -20.0, -30.0, 1.0, -2.0, 0.5, W, X, Y, Z, 0.01, 0.02, 0.03]),
         setpoint=np.arange(11.0), attitude_target=np.array([1.0, 0.0, 0.0, 0.0, 5.0]), row=row, home=HOME,
         flight=FlightTimes(), mission=MissionProgress(2, 1, False, False), mission_count=5, mission_complete=False,

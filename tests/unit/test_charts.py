@@ -181,3 +181,15 @@ def test_print_of_linked_panels_keeps_each_y_axis() -> None:
     assert [axes.get_ylabel() for axes in canvas.axes] == ["a [m]", "b [m]", "c [m]", "d [m]"]
     assert [axes.get_xlabel() for axes in canvas.axes] == ["", "", "time [s]", "time [s]"]
     assert all(axes.yaxis.get_ticklabels()[0].get_visible() for axes in canvas.axes)
+
+
+def test_rare_bar_of_a_histogram_stays_visible() -> None:
+    """A bar of no visible height is drawn by its line; an empty one is not drawn."""
+    bars = Bars("cost", [0.0, 1.0, 2.0, 3.0], [99.999, 0.0, 0.001])
+    (trace,) = json.loads(chart_json(Figure("costs", "Costs", [Panel(Axis("share", "%"), bars=[bars])])))[
+        "data"
+    ]
+    assert trace["y"][1] is None
+    assert trace["y"][2] > 0.0
+    assert trace["marker"]["line"]["width"] >= 1.5
+    assert trace["marker"]["line"]["color"] == trace["marker"]["color"]

@@ -127,3 +127,31 @@ def test_bad_runs_are_one_sentence_and_write_nothing(
     assert not Path("compare.html").exists()
     with pytest.raises((CliError, ConfigError)):
         read_runs([runs[0], text])
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("flight_time_s", "12"), ("waypoints", [{"seq": 0}]), ("rms_torque_n_m", 3.0)]
+)
+def test_damaged_summary_is_one_sentence(tmp_path: Path, capfd: Any, key: str, value: object) -> None:
+    good, bad = make_run(tmp_path / "good", 20.0), make_run(tmp_path / "bad", 20.0)
+    summary = bad / "summary.json"
+    summary.write_text(json.dumps(json.loads(summary.read_text()) | {key: value}))
+    page = tmp_path / "page.html"
+    assert gcs("compare", good, bad, "--out", page) == USAGE
+    assert "bad/summary.json is damaged: its figure" in capfd.readouterr().err.replace("\n", " ")
+    assert not page.exists()
+
+
+def test_name_that_is_not_utf_8_is_shown(tmp_path: Path) -> None:
+    runs = [make_run(tmp_path / "good", 20.0), make_run(Path(f"{tmp_path}/bad\udcff"), 20.0)]
+    assert [run.name for run in read_runs(runs)] == ["good", "bad?"]
+    render_comparison(read_runs(runs)).encode("utf-8")
+
+
+@pytest.mark.parametrize("name", ["calm/flight.ulg", "nowhere/page.html"])
+def test_page_is_written_to_no_other_file(runs: list[Path], name: str, capfd: Any) -> None:
+    log = runs[0] / "flight.ulg"
+    before = log.read_bytes()
+    assert gcs("compare", *runs, "--out", runs[0].parent / name, "--overwrite") == USAGE
+    assert "--out" in capfd.readouterr().err
+    assert log.read_bytes() == before

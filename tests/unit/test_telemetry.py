@@ -191,7 +191,7 @@ def test_status_says_whether_it_can_arm_and_that_there_is_no_battery() -> None:
     prearm = mavlink.MAV_SYS_STATUS_PREARM_CHECK
     assert m.onboard_control_sensors_health & prearm
     assert (m.voltage_battery, m.current_battery, m.battery_remaining) == (65535, -1, -1)
-    refused = on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, can_arm=False)
+    refused = on_the_wire(mavlink.MAVLINK_MSG_ID_SYS_STATUS, can_arm=lambda: False)
     assert not refused.onboard_control_sensors_health & prearm
     assert refused.onboard_control_sensors_health
     assert not on_the_wire(

@@ -54,7 +54,7 @@ def is_available(message_id: int) -> bool:
 
 
 class Telemetry:
-    """Builds each message once per poll, for all links."""
+    """Builds each message once per poll and tick, for all links."""
 
     def __init__(
         self,
@@ -91,7 +91,9 @@ class Telemetry:
         return wrapped(self.time_us // 1000)
 
     def messages(self, message_id: int) -> tuple[Message, ...]:
-        """Return a message of ``STREAMED``, as of this poll."""
+        """Return a message of ``STREAMED``, as of this tick: ticks may come between two parts of a poll."""
+        if self._status is not None and self._status.time_us != self.time_us:
+            self.begin_poll()
         made = self._made.get(message_id)
         if made is None:
             made = self._made[message_id] = tuple(self._make(message_id))

@@ -107,7 +107,7 @@ def sys_status(f: VehicleStatus) -> Message:
     """SYS_STATUS with the health bits that MAVSDK and QGroundControl evaluate."""
     present = SENSORS | mavlink.MAV_SYS_STATUS_GEOFENCE | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     healthy = present if f.state_is_good else 0
-    if not f.can_arm:
+    if not f.can_arm():
         healthy &= ~mavlink.MAV_SYS_STATUS_PREARM_CHECK
     if f.fence_breached:
         healthy &= ~mavlink.MAV_SYS_STATUS_GEOFENCE
