@@ -52,7 +52,8 @@ def test_gcs_fly_flies_the_square_by_default(monkeypatch: pytest.MonkeyPatch) ->
         asked.append(options)
         raise CliError("enough", USAGE)
 
-    monkeypatch.setattr("gcs_cli.fly.fly_options.checked_plan", check)
+    monkeypatch.setattr("gcs_cli.fly.fly_command.checked_plan", check)
+    monkeypatch.setattr("gcs_cli.pil.pil_commands.checked_plan", check)
     assert main(["fly"]) == USAGE
     assert main(["pil", "hop"]) == USAGE
     assert [options.plan_path.name for options in asked] == ["square.plan", "hop.plan"]
