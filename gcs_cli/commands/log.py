@@ -15,11 +15,11 @@ from flightstack.process.command_line import make_app
 from gcs_cli.clients.log_client import LogEntry
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.vehicle_link import connect_vehicle
 from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
 from gcs_cli.transfers import log_calls
 from gcs_cli.tui.transfer_bar import TransferBar
+from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 

@@ -16,11 +16,11 @@ from gcs_cli.errors import FAILED, CliError, VehicleLostError
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.vehicle_link import connect_vehicle
 from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import LinkOptions, OverwriteOption
 from gcs_cli.transfers.plan_files import PlanArgument
 from gcs_cli.transfers.plan_parts import Uploads, parts_to_send, plan_parts, plan_problem
+from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 

@@ -18,7 +18,6 @@ from flightstack.process.command_line import make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.vehicle_link import connect_vehicle
 from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
 from gcs_cli.transfers import param_calls
@@ -31,6 +30,7 @@ from gcs_cli.vehicle.param_table import (
     matching,
     parameter_table,
 )
+from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 

@@ -15,11 +15,11 @@ from flightstack.process.command_line import make_app
 from gcs_cli.errors import NO_ANSWER, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import LOOP_TIMING
-from gcs_cli.link.vehicle_link import connect_vehicle
 from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import JsonOption, LinkOptions, link_options
 from gcs_cli.tui.panels import number
 from gcs_cli.vehicle.view_types import LoopTiming
+from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 

@@ -16,11 +16,11 @@ from rich.live import Live
 from flightstack.process.command_line import make_app
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
-from gcs_cli.link.vehicle_link import open_link
 from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import LinkOptions, link_options
 from gcs_cli.tui.watch_lines import state_line, text_line
 from gcs_cli.tui.watch_render import render
+from gcs_cli.vehicle_link import open_link
 
 app = make_app(add_completion=False)
 

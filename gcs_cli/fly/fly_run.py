@@ -31,7 +31,6 @@ from gcs_cli.fly.processes import Child, Children, Interruption
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import LOOPBACK, VehicleEndpoint
 from gcs_cli.link.tlog import TlogFile
-from gcs_cli.link.vehicle_link import open_signing
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.flight_data import Flight as FlightData
 from gcs_cli.report.flight_outcome import Code, Outcome, with_log
@@ -46,6 +45,7 @@ from gcs_cli.report.run_directory import (
     make_run_directory,
 )
 from gcs_cli.report.summary import RunInfo, summarise, write_summary
+from gcs_cli.vehicle_link import open_signing
 
 _STEP_S = 0.1
 _END_TIMEOUT_S = 10.0

@@ -318,7 +318,7 @@ def test_beside_a_ground_station_the_vehicle_is_called_at_its_own_port(
     with UdpSocket("127.0.0.1") as taken, serve(vehicle) as socket:
         usual, own = taken.address[1], socket.address[1]
         monkeypatch.setattr("gcs_cli.settings.DEFAULT_CONNECTION", f"udp:127.0.0.1:{usual}")
-        monkeypatch.setattr("gcs_cli.link.vehicle_link.VEHICLE_CONNECTION", f"udpout:127.0.0.1:{own}")
+        monkeypatch.setattr("gcs_cli.vehicle_link.VEHICLE_CONNECTION", f"udpout:127.0.0.1:{own}")
         result = gcs(*command)
     said = f"gcs: UDP 127.0.0.1:{usual} is in use: connecting to the vehicle at UDP 127.0.0.1:{own}\n"
     assert result == ("armed\n" if command == ["arm"] else "watching\n", said, 0)
