@@ -11,8 +11,7 @@ import math
 import numpy as np
 
 from flightstack.commander.arming_checks import ArmingFacts
-from flightstack.commander.conditions import BatteryReading, LinkFacts, StateSource
-from flightstack.commander.detectors import battery_level
+from flightstack.commander.detector_kernels import battery_level
 from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase
 from flightstack.commander.failsafe_step import (
     IDLE,
@@ -25,6 +24,7 @@ from flightstack.commander.failsafe_step import (
 )
 from flightstack.commander.fault_detector import FaultDetector
 from flightstack.commander.fence_monitor import FenceMonitor
+from flightstack.commander.inputs import BatteryReading, LinkFacts, StateSource
 from flightstack.commander.transitions import Event, Status
 from flightstack.commander.user_takeover import UserTakeover, conflicting_failsafes
 from flightstack.core.contract import FloatArray

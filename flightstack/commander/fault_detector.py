@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flightstack.commander.detectors import (
+from flightstack.commander.detector_kernels import (
     BEYOND_ATTITUDE,
     BEYOND_POSITION,
     DETECTORS,

@@ -19,16 +19,15 @@ from flightstack.core.portable_math import atan2
 from flightstack.guidance.params import GuidanceParams
 from flightstack.guidance.trajectory import Goal, Trajectory
 from flightstack.plan import MissionItem
+from flightstack.plan.vocabulary import Command
 
-WAYPOINT = 16
-LOITER_TIME = 19
-RETURN_TO_LAUNCH = 20
-LAND = 21
-TAKEOFF = 22
-NAV_DELAY = 93
-CONDITION_YAW = 115
-DO_JUMP = 177
-DO_CHANGE_SPEED = 178
+# numbers for the kernels: compiled code knows no enumeration
+WAYPOINT, LOITER_TIME, RETURN_TO_LAUNCH = (
+    int(Command.NAV_WAYPOINT), int(Command.NAV_LOITER_TIME), int(Command.NAV_RETURN_TO_LAUNCH)
+)  # fmt: skip
+LAND, TAKEOFF, NAV_DELAY = int(Command.NAV_LAND), int(Command.NAV_TAKEOFF), int(Command.NAV_DELAY)
+CONDITION_YAW, DO_JUMP = int(Command.CONDITION_YAW), int(Command.DO_JUMP)
+DO_CHANGE_SPEED = int(Command.DO_CHANGE_SPEED)
 
 LOG_SIZE = 64
 BEGIN, TRAVEL, STAY, RISE = range(4)

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flightstack.commander.conditions import StateSource
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.commander.ground_monitor import GroundMonitor
+from flightstack.commander.inputs import StateSource
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.geodesy import GeoPoint

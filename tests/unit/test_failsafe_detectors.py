@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from flightstack.commander.arming_checks import ArmingFacts, arming_refusals
-from flightstack.commander.detectors import (
+from flightstack.commander.detector_kernels import (
     BATTERY_HYSTERESIS,
     BEYOND_ATTITUDE,
     BEYOND_POSITION,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable
 
-from flightstack.commander.conditions import LinkFacts
+from flightstack.commander.inputs import LinkFacts
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.vehicle.flight_state import FlightState
