@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from flightstack.commander.transitions import Event
 from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.clients.mission_client import Failed
@@ -169,3 +170,13 @@ def test_a_state_that_is_not_finite_holds_the_rotors_and_is_reported(hovering: W
         assert np.array_equal(commands, row[31:39])
     hovering.run(0.05)
     assert any("not finite" in text for text in hovering.texts)
+
+
+def test_reboot_is_denied_from_the_start_of_a_takeoff() -> None:
+    world = World()
+    assert world.arm() == 0
+    assert world.stack.parts.requests.request(Event.SELECT_TAKEOFF) is None
+    reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+    assert world.stack.now.landed
+    assert world.command(reboot, 1.0) == mavlink.MAV_RESULT_DENIED
+    assert not world.stack.ground.vehicle.reboot_requested

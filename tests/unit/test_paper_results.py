@@ -448,7 +448,7 @@ def test_a_target_that_is_not_there_is_told_before_anything_flies(tmp_path: Path
         (["--connect", "udp:14999", "paper"], "gcs: paper flies vehicles of its own: leave --connect out"),
         (
             ["paper", "--no-pil", "--port", "serial:/dev/nobody"],
-            "gcs: --port names a target for what --no-pil leaves",
+            "gcs: --port and --no-pil exclude each other",
         ),
         (["paper", "--port", "serial:/dev/nobody"], "/dev/nobody"),
         (["paper", "--port", "board"], "gcs: --port board: "),

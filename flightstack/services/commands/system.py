@@ -40,14 +40,15 @@ def store_or_reset_parameters(vehicle: VehicleContext, command: Command) -> Answ
 
 
 def reboot_or_shut_down(vehicle: VehicleContext, command: Command) -> Answer:
-    """PREFLIGHT_REBOOT_SHUTDOWN: parameter 1 is 1 to reboot, 2 to shut down; denied in the air."""
+    """PREFLIGHT_REBOOT_SHUTDOWN: parameter 1 is 1 to reboot, 2 to shut down; denied during takeoff and in the air."""
     action = command.params[0]
     if action == DO_NOTHING:
         return Answer(ACCEPTED)
     if action not in (REBOOT, SHUT_DOWN):
         return Answer(UNSUPPORTED)
-    if vehicle.now.status.armed and not vehicle.now.landed:
-        return Answer(DENIED, "the vehicle is in the air")
+    now = vehicle.now
+    if now.status.armed and (now.flying or not now.landed):
+        return Answer(DENIED, "the vehicle is taking off" if now.landed else "the vehicle is in the air")
     if action == REBOOT and not vehicle.reboot_requested:
         problem = vehicle.prepare_reboot()
         if problem is not None:
