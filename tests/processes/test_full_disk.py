@@ -25,6 +25,7 @@ def test_a_disk_full_in_flight_is_told_once_and_the_flight_goes_on(tmp_path: Pat
         there.wait_until_healthy()
         assert gcs(*link, "takeoff", "--alt", 3).returncode == 0
         watch.wait_for("Logging stopped: File too large")
+        there.wait_until_in_air()
         assert gcs(*link, "hold").returncode == 0
         assert gcs(*link, "land").returncode == 0
         watch.wait_for("Disarmed")
@@ -54,6 +55,7 @@ def test_a_log_that_cannot_be_begun_is_told_once(tmp_path: Path) -> None:
         link = ("--connect", there.link, "--timeout", "60")
         there.wait_until_healthy()
         assert gcs(*link, "takeoff", "--alt", 3).returncode == 0
+        there.wait_until_in_air()
         for mode in ("hold", "land", "hold"):
             assert gcs(*link, mode).returncode == 0
         there.stack.terminate()

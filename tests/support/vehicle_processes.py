@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from flightstack.mavlink.dialect import mavlink
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import parse_endpoint, vehicle_connection
@@ -15,6 +16,8 @@ from tests.support.programs import Program
 
 LONG_S = 60.0
 """Hang guard [s]."""
+
+IN_AIR = mavlink.MAV_LANDED_STATE_IN_AIR
 
 
 @dataclass
@@ -34,6 +37,12 @@ class VehicleProcesses:
     def wait_until_healthy(self) -> None:
         """Wait for the first state of the simulator, before which the vehicle refuses to arm."""
         wait_until_healthy(self.link)
+
+    def wait_until_in_air(self) -> None:
+        """Wait until the vehicle reports that it flies: it accepts a takeoff earlier."""
+        with Connection(parse_endpoint(self.link)) as connection:
+            connection.wait_for_vehicle(LONG_S)
+            assert connection.wait_for(lambda: connection.session.view.landed_state == IN_AIR, LONG_S)
 
 
 def wait_until_healthy(link: str) -> None:
