@@ -38,7 +38,8 @@ class Session:
 
     The first peer that sends an autopilot's heartbeat is the vehicle; datagrams of others are dropped unless the
     vehicle is lost. With ``peer``, only datagrams from that address are accepted, and with ``system_id``, only that
-    vehicle. ``record`` gets every frame, sent and received, without its signature.
+    vehicle. ``heartbeat_type`` is the MAV_TYPE that this side announces. ``record`` gets every frame, sent and
+    received, without its signature.
     """
 
     def __init__(
@@ -47,6 +48,7 @@ class Session:
         record: Callable[[bytes], None] | None = None,
         signing: LinkSigning | None = None,
         system_id: int | None = None,
+        heartbeat_type: int = mavlink.MAV_TYPE_GCS,
     ) -> None:
         self.view = VehicleView()
         self.peer = peer
@@ -59,6 +61,9 @@ class Session:
         self._signing = signing
         self._out = Link(SYSTEM_ID, COMPONENT_ID, signing=signing)
         self.record = record
+        self.observe: Callable[[Message], None] | None = None
+        """Called with every message from the vehicle."""
+        self._heartbeat_type = heartbeat_type
         self._service: Service | None = None
         self._heartbeat_due_s = 0.0
 
@@ -118,6 +123,8 @@ class Session:
         if self.record is not None:
             self.record(without_signature(bytes(message.get_msgbuf()), message.crc_extra))
         self.view = update(self.view, message, now_s)
+        if self.observe is not None:
+            self.observe(message)
         if self._service is not None and not self._is_other_system(message):
             self._service.receive(message, now_s)
 
@@ -127,10 +134,10 @@ class Session:
             return []
         frames = []
         if now_s >= self._heartbeat_due_s:
-            frames.append(self._encode(_heartbeat(mavlink.MAV_STATE_ACTIVE)))
+            frames.append(self.encode(self._heartbeat(mavlink.MAV_STATE_ACTIVE)))
             self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
         if self._service is not None:
-            frames += [self._encode(message) for message in self._service.poll(now_s)]
+            frames += [self.encode(message) for message in self._service.poll(now_s)]
         return frames
 
     def next_deadline(self) -> float | None:
@@ -142,16 +149,16 @@ class Session:
 
     def farewell(self) -> list[bytes]:
         """Return the HEARTBEAT in state POWEROFF, which ends the link in order."""
-        return [] if self.peer is None else [self._encode(_heartbeat(mavlink.MAV_STATE_POWEROFF))]
+        return [] if self.peer is None else [self.encode(self._heartbeat(mavlink.MAV_STATE_POWEROFF))]
 
-    def _encode(self, message: Message) -> bytes:
+    def encode(self, message: Message) -> bytes:
+        """Return the frame of a message from this ground station."""
         frame = self._out.encode(message)
         if self.record is not None:
             self.record(without_signature(frame, message.crc_extra))
         return frame
 
-
-def _heartbeat(state: int) -> Message:
-    return mavlink.MAVLink_heartbeat_message(
-        mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, state, 3
-    )
+    def _heartbeat(self, state: int) -> Message:
+        return mavlink.MAVLink_heartbeat_message(
+            self._heartbeat_type, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, state, 3
+        )

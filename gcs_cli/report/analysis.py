@@ -30,7 +30,7 @@ from gcs_cli.report.flight_data import (
     series,
 )
 
-__all__ = ["Flight", "read_flight"]
+__all__ = ["Flight", "flight_of", "parse_ulog", "read_flight"]
 
 _FILE_HEADER = 16
 _MESSAGE_HEADER = 3  # size of the payload, two bytes, little endian; type
@@ -56,15 +56,30 @@ _TOPICS = [
 def read_flight(path: Path) -> Flight:
     """Read a ULog file, complete or cut off; raise ConfigError when it is none."""
     try:
-        # pyulog reports damage on stdout, which belongs to the command's own output
         content = path.read_bytes()
-        with contextlib.redirect_stdout(io.StringIO()):
-            log = ULog(io.BytesIO(content), _TOPICS)
-        return replace(_Reader(log).flight(), damaged=log.file_corruption or not is_whole(content))
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error
+    return flight_of(content, path)
+
+
+def flight_of(content: bytes, source: object) -> Flight:
+    """Read the bytes of a ULog file, complete or cut off; raise ConfigError, which names ``source``."""
+    log = parse_ulog(content, source, _TOPICS)
+    try:
+        flight = _Reader(log).flight()
     except _DAMAGE as error:
-        raise ConfigError(path, "", f"is not a readable flight log: {error}") from error
+        raise ConfigError(source, "", f"is not a readable flight log: {error}") from error
+    return replace(flight, damaged=log.file_corruption or not is_whole(content))
+
+
+def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) -> Any:
+    """Return pyulog's view of the bytes of a ULog file, of all ``topics`` by default; raise ConfigError."""
+    try:
+        # pyulog reports damage on stdout, which belongs to the command's own output
+        with contextlib.redirect_stdout(io.StringIO()):
+            return ULog(io.BytesIO(content), topics)
+    except _DAMAGE as error:
+        raise ConfigError(source, "", f"is not a readable flight log: {error}") from error
 
 
 class _Reader:

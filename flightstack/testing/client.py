@@ -1,0 +1,138 @@
+"""A ground station or companion in memory: the session of ``gcs`` on a simulated link."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from flightstack.core.enums import CUSTOM_MODE, Mode
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
+from flightstack.plan import MissionItem, MissionType, Plan
+from flightstack.services.routing.peer import PeerAddress
+from flightstack.testing.link import Link
+from gcs_cli.clients.param_client import ParamClient
+from gcs_cli.clients.param_operations import ParamDone, ParamFailed
+from gcs_cli.link import calls
+from gcs_cli.link.calls import Answer, Call
+from gcs_cli.link.session import Session
+from gcs_cli.transfers.plan_parts import Uploads
+
+STREAM_STEP_S = 0.05
+"""Interval of the messages of ``Client.streams``: 20 Hz."""
+
+
+class RefusedError(AssertionError):
+    """The vehicle refused a request, or did not answer it."""
+
+    def __init__(self, what: str, answer: Answer) -> None:
+        super().__init__(f"{what} {'not answered' if answer.silent else 'refused'}: {answer.reason}")
+        self.reason = answer.reason
+        self.is_silent = answer.silent
+
+
+class Client:
+    """One client of the vehicle. ``name`` also names its link in scenario files."""
+
+    def __init__(self, name: str, address: PeerAddress, link: Link, is_companion: bool) -> None:
+        self.name = name
+        self.address = address
+        self.link = link
+        """The link to the vehicle."""
+        kind = mavlink.MAV_TYPE_ONBOARD_CONTROLLER if is_companion else mavlink.MAV_TYPE_GCS
+        self.session = Session(address[1:], heartbeat_type=kind)
+        self.session.observe = self._take
+        self.received: dict[str, Message] = {}
+        """The newest message of each type."""
+        self.counts: dict[str, int] = {}
+        """The number of received messages of each type."""
+        self.texts: list[str] = []
+        """Status texts, oldest first."""
+        self.reached: list[int] = []
+        """Mission items that the vehicle reported as reached, in order."""
+        self.streams: dict[str, Callable[[], Message]] = {}
+        """Makers of messages that are sent at 20 Hz, such as offboard setpoints and stick positions."""
+        self._stream_due_s = -math.inf
+        self._outbox: list[bytes] = []
+
+    # ------------------------------------------------------------------ traffic
+
+    def send(self, message: Message) -> None:
+        """Send a message at the next exchange."""
+        self._outbox.append(self.session.encode(message))
+
+    def poll(self, now_s: float) -> list[bytes]:
+        """Return the datagrams to send now."""
+        if self.streams and now_s >= self._stream_due_s:
+            self._stream_due_s = now_s + STREAM_STEP_S
+            for make in self.streams.values():
+                self.send(make())
+        outbox, self._outbox = self._outbox, []
+        return outbox + self.session.poll(now_s)
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        """Process a datagram from the vehicle."""
+        self.session.receive(data, self.address[1:], now_s)
+
+    def _take(self, message: Message) -> None:
+        kind = message.get_type()
+        self.received[kind] = message
+        self.counts[kind] = self.counts.get(kind, 0) + 1
+        if kind == "STATUSTEXT":
+            if message.id and message.chunk_seq:
+                self.texts[-1] += message.text
+            else:
+                self.texts.append(message.text)
+        elif kind == "MISSION_ITEM_REACHED":
+            self.reached.append(message.seq)
+
+    # ------------------------------------------------------------------ requests
+
+    def command(self, number: int, params: Sequence[float], now_s: float) -> Call:
+        """Begin a MAV_CMD."""
+        return calls.command(self.session, number, params, now_s)
+
+    def upload(self, plan: Plan) -> Uploads:
+        """Begin to upload mission, geofence and rally points."""
+        return Uploads(self.session, plan, restores=False)
+
+    def upload_items(self, items: Sequence[MissionItem], kind: MissionType) -> Call:
+        """Begin to upload one type of plan."""
+        return calls.upload(self.session, items, kind)
+
+    def download(self, kind: MissionType) -> Call:
+        """Begin to download one type of plan."""
+        return calls.download(self.session, kind)
+
+    def mode_command(self, mode: Mode) -> tuple[int, Sequence[float]]:
+        """Return the command that selects ``mode``."""
+        custom = CUSTOM_MODE[mode]
+        return calls.mode_command(custom >> 16 & 0xFF, custom >> 24)
+
+    def parameter(self, name: str, value: float | None) -> ParamRequest:
+        """Begin to read a parameter, or to set it to ``value``."""
+        return ParamRequest(self.session, name, value)
+
+
+class ParamRequest:
+    """A pending read or change of one parameter."""
+
+    def __init__(self, session: Session, name: str, value: float | None) -> None:
+        self._client = ParamClient(calls.vehicle_address(session), calls.OWN_ADDRESS)
+        if value is None:
+            self._client.start_get(name)
+        else:
+            self._client.start_set(name, value)
+        self.value = math.nan
+        """The parameter's value on the vehicle, once answered."""
+        session.use(self._client)
+
+    def answer(self, _now_s: float) -> Answer | None:
+        """Return the answer once it is known."""
+        result = self._client.result
+        if isinstance(result, ParamDone):
+            self.value = float(result.parameters[0].value)
+            return Answer(True)
+        if isinstance(result, ParamFailed):
+            return Answer(False, result.reason, silent=result.silent)
+        return None

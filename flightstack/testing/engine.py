@@ -1,0 +1,156 @@
+"""Flight stack and simulator in one process: they exchange the bytes of their sockets in lockstep."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+
+from flightstack.control.backend import ControlBackend
+from flightstack.firmware.targets import make_loops
+from flightstack.flight_log.flight_log import FlightLog
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Link
+from flightstack.process.assembly import Stack, build, reboot_config, transfer_state
+from flightstack.services.logs.log_store import NO_LOGS, LogStore
+from flightstack.simulator_link.hot_frames import ActuatorsFrame
+from flightstack.testing.setup import Setup
+from flightstack.vehicle.lockstep import Lockstep
+from sim_bridge.server.failure_command import inject_failure
+from sim_bridge.simulator import SIMULATOR_COMPONENT, Simulator
+
+_TIMING_US = 1_000_000
+"""Interval of ``loop_timing`` in the log."""
+
+
+class LogBuffer(io.BytesIO):
+    """A log file in memory, readable after it was closed."""
+
+    content = b""
+
+    def close(self) -> None:
+        """Close the file and keep its content."""
+        self.content = self.getvalue()
+        super().close()
+
+
+class Engine:
+    """Advances vehicle and simulator by one exchange at a time."""
+
+    def __init__(
+        self,
+        setup: Setup,
+        flight_logs: LogStore = NO_LOGS,
+        wrap_loops: Callable[[ControlBackend], ControlBackend] = lambda loops: loops,
+    ) -> None:
+        """Build both; raise ConfigError. ``wrap_loops`` may replace the control loops."""
+        self.logs: list[LogBuffer] = []
+        """One log for each flight, oldest first."""
+        self.config = setup.stack_config()
+        self._open: FlightLog | None = None
+        self._flight_logs = flight_logs
+        self._wrap_loops = wrap_loops
+        self.stack = self._build()
+        self.simulator: Simulator = setup.simulator(self.stack.vehicle)
+        self.simulator.set_interval_us(self.stack.rates.interval_us)
+        self._codec = Link(1, SIMULATOR_COMPONENT)
+        self.actuators = ActuatorsFrame()
+        self.machine_ns = 0
+        """Wall time for a simulator whose clock stands still."""
+        self.loses_states = False
+        """If True, ticks go on without states, as in real time when a simulator hangs."""
+        self._begin()
+
+    def _build(self) -> Stack:
+        return build(
+            self.config,
+            self._open_log,
+            self._flight_logs,
+            lambda *choice: self._wrap_loops(make_loops(*choice)),
+        )
+
+    def _begin(self) -> None:
+        """Connect the stack to the simulator: it has its first state."""
+        self._lockstep = Lockstep(self.stack.simulator, self.stack.autopilot, self.stack.rates.interval_us)
+        self._missed_us = self._next_timing_us = self._ticks = 0
+        self.stack.simulator.receive(memoryview(self.states()))
+        self.stack.now.has_state = True
+
+    def _open_log(self) -> FlightLog:
+        self.logs.append(LogBuffer())
+        self._open = FlightLog(self.logs[-1], len(self.stack.vehicle.rotors))
+        return self._open
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        return self.stack.now.time_us * 1e-6
+
+    def newest_log(self) -> bytes:
+        """Return the log of the newest flight, up to now if it is not over; b"" before the first."""
+        if not self.logs:
+            return b""
+        if self.logs[-1].closed:
+            return self.logs[-1].content
+        assert self._open is not None
+        self._open.flush()
+        return self.logs[-1].getvalue()
+
+    def tick(self) -> bool:
+        """Run one exchange: state to the stack, actuators back, all as bytes. Return True after an outer tick."""
+        stack = self.stack
+        if self._missed_us:
+            commands = stack.autopilot.tick(stack.simulator.time_us + self._missed_us)
+        else:
+            commands = self._lockstep.tick(self.machine_ns)
+        for severity, text in stack.simulator.steps.take_notices():
+            stack.journal.say(severity, text)
+        self.take_answer(stack.simulator.answer(commands, stack.now.status.armed))
+        self._ticks += 1
+        is_outer = self._ticks % stack.rates.divisor == 0
+        if is_outer and stack.now.time_us >= self._next_timing_us:
+            time_us = stack.now.time_us
+            self._next_timing_us = time_us + _TIMING_US
+            stack.recorder.timing(time_us, **stack.report.log_fields(time_us // stack.rates.interval_us))
+        return is_outer
+
+    def advance(self) -> None:
+        """Advance the simulator by one interval with the newest actuators, and send the stack its state."""
+        self.simulator.apply(self.actuators)
+        if self.loses_states:
+            self._missed_us += self.stack.rates.interval_us
+        else:
+            assert self.stack.simulator.receive(memoryview(self.states()))
+
+    def states(self) -> bytes | memoryview:
+        """Return the bytes that the simulator sends for one step."""
+        return self.simulator.outgoing()
+
+    def take_answer(self, answer: bytes | memoryview) -> None:
+        """Take the stack's actuators."""
+        assert self.actuators.open(answer)
+
+    def pass_requests(self) -> None:
+        """Pass the vehicle's requests to the simulator, and the answers back."""
+        requests = self.stack.simulator.take_requests()
+        for request in self._codec.decode(requests) if requests else ():
+            result = inject_failure(self.simulator, request.param1, request.param2, request.param3)
+            ack = mavlink.MAVLink_command_ack_message(request.command, result)
+            self.stack.simulator.receive(memoryview(self._codec.encode(ack)))
+
+    def power_cycle(self, off_s: float) -> None:
+        """Switch the vehicle off for ``off_s`` and on again: rotors stop, plans and parameters survive."""
+        old = self.stack
+        old.recorder.close()
+        self.actuators = ActuatorsFrame()  # all zero: disarmed
+        for _ in range(round(off_s * old.rates.inner_hz)):
+            self.simulator.apply(self.actuators)
+        old.loops.close()
+        self.config = reboot_config(old, self.config)
+        self.stack = self._build()
+        transfer_state(old, self.stack)
+        self._begin()
+
+    def close(self) -> None:
+        """Close the log and the loops, which may hold a process."""
+        self.stack.recorder.close()
+        self.stack.loops.close()

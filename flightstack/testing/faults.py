@@ -1,0 +1,98 @@
+"""Faults of a world by their text: those of the simulator, of links, and of the vehicle's power."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+from flightstack.core.errors import ConfigError
+from flightstack.testing.link import Channel
+from sim_bridge.errors import UsageProblemError
+from sim_bridge.plant.faults import parse_fault
+
+if TYPE_CHECKING:
+    from flightstack.testing.world import World
+
+DIRECTIONS = ("to_vehicle", "from_vehicle")
+
+
+class LinkFault(NamedTuple):
+    """A change of a link: a word, the condition that it sets, and the largest value; 0 for none."""
+
+    condition: str
+    largest: float
+    meaning: str
+
+
+LINK_FAULTS: dict[str, LinkFault] = {
+    "cut": LinkFault("", 0.0, "nothing arrives"),
+    "restore": LinkFault("", 0.0, "the link is perfect again"),
+    "loss": LinkFault("loss", 1.0, "this share of the datagrams is lost"),
+    "delay": LinkFault("delay_s", 60.0, "each datagram arrives this time later [s]"),
+    "duplication": LinkFault("duplication", 1.0, "this share arrives twice"),
+    "reordering": LinkFault("reordering", 1.0, "this share is held back by up to 0.1 s"),
+    "garbage": LinkFault("garbage", 1.0, "this share is damaged, with random bytes before it"),
+}
+_LINK_FORM = "link [CLIENT] [to_vehicle|from_vehicle] " + "|".join(
+    f"{word} VALUE" if fault.largest else word for word, fault in LINK_FAULTS.items()
+)
+
+
+def apply_fault(world: World, text: str, for_s: float | None) -> None:
+    """Begin a fault now, and end it after ``for_s`` of simulated time; raise ConfigError."""
+    if for_s is not None and not 0.0 < for_s < math.inf:
+        raise ConfigError("fault", text, f"lasts {for_s:g} s: the time must be positive")
+    words = text.split()
+    if words[:1] == ["link"]:
+        _change_link(world, text, words[1:], for_s)
+    elif words == ["power", "cycle"]:
+        world.power_cycle(1.0 if for_s is None else for_s)
+    else:
+        _simulator_fault(world, text, for_s)
+
+
+def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
+    simulator = world.engine.simulator
+    try:
+        fault = parse_fault(text, len(world.engine.stack.vehicle.rotors))
+    except UsageProblemError as error:
+        raise ConfigError("fault", text, str(error).partition(": ")[2]) from None
+    begin_us = simulator.time_us + fault.begin_us
+    if for_s is not None:
+        fault = fault._replace(end_us=begin_us + round(for_s * 1e6))
+    elif fault.end_us is not None:
+        fault = fault._replace(end_us=simulator.time_us + fault.end_us)
+    simulator.inject(fault._replace(begin_us=begin_us))
+    world.happened("fault")
+
+
+def _change_link(world: World, text: str, words: list[str], for_s: float | None) -> None:
+    client = world.clients[words.pop(0)] if words[:1] and words[0] in world.clients else world.gcs
+    directions = (words.pop(0),) if words[:1] and words[0] in DIRECTIONS else DIRECTIONS
+    fault = LINK_FAULTS.get(words[0]) if words else None
+    if fault is None or len(words) != (2 if fault.largest else 1):
+        known = ", ".join(world.clients)
+        raise ConfigError("fault", text, f"is no change of a link: {_LINK_FORM}; clients are {known}")
+    change = _change(text, words, fault)
+    for direction in directions:
+        channel: Channel = getattr(client.link, direction)
+        before = channel.conditions
+        change(channel)
+        if for_s is not None:
+            world.after(for_s, lambda channel=channel, before=before: channel.set_all(before))  # type: ignore[misc]
+    world.happened(f"link_{words[0]}")
+    if for_s is not None:
+        world.after(for_s, lambda: world.happened(f"link_{words[0]}_end"))
+
+
+def _change(text: str, words: list[str], fault: LinkFault) -> Callable[[Channel], None]:
+    if not fault.largest:
+        return Channel.cut if words[0] == "cut" else Channel.restore
+    try:
+        value = float(words[1])
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= fault.largest:
+        raise ConfigError("fault", text, f"{words[0]} must be 0 to {fault.largest:g}")
+    return lambda channel: channel.set(**{fault.condition: value})

@@ -1,0 +1,139 @@
+"""The vehicle of a world and its conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from flightstack.core.contract import Vector3
+from flightstack.core.errors import ConfigError
+from flightstack.core.geodesy import GeoPoint
+from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, DEFAULT_INNER_HZ, StackConfig
+from flightstack.params.gains_file import DEFAULT_GAINS
+from flightstack.params.vehicle import DEFAULT_VEHICLE, Vehicle
+from flightstack.plan import Plan, load_plan
+from flightstack.process.clock import nearest_outer_hz
+from gcs_cli.transfers.plan_files import example_plans
+from sim_bridge.arguments import check_battery, check_plant, check_range
+from sim_bridge.errors import UsageProblemError
+from sim_bridge.plant.disturbance import Disturbance, check_wind
+from sim_bridge.plant.plant import PlantOptions
+from sim_bridge.simulator import Simulator
+
+_MOST_WIND_M_S, _MOST_GUST_M_S, _MOST_TORQUE_GUST_N_M = 200.0, 50.0, 100.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """The vehicle, its loops and the conditions of its flights. Equal setups fly equally, byte for byte.
+
+    >>> Setup(vehicle="x_quad", wind=(5.0, 0.0), gust=1.0, seed=3).changed()
+    {'vehicle': 'x_quad', 'wind': (5.0, 0.0), 'gust': 1.0, 'seed': 3}
+    """
+
+    vehicle: str = DEFAULT_VEHICLE
+    """A built-in vehicle, or the path of a vehicle file."""
+    controller: str = DEFAULT_CONTROLLER
+    gains: str = DEFAULT_GAINS
+    """A built-in set of gains, or the path of a gains file."""
+    loops: str = "python"
+    """``python``, ``c``, ``host`` or ``emulated``; see docs/reference/cli-flightstack.md."""
+    plant: str = "rigid"
+    """``rigid``, ``multibody`` or ``paper``."""
+    wind: Sequence[float] = (0.0, 0.0)
+    """Wind north, east and, optionally, down [m/s]."""
+    gust: float = 0.0
+    """Standard deviation of the gusts [m/s]."""
+    drag: bool = False
+    """True to give the vehicle the optional drag of its file; without drag wind has no effect and is refused."""
+    force: Sequence[float] = (0.0, 0.0, 0.0)
+    """Constant force NED [N]."""
+    torque: Sequence[float] = (0.0, 0.0, 0.0)
+    """Constant torque FRD [N m]."""
+    torque_gust: float = 0.0
+    """Standard deviation of the gusty torque about roll and pitch [N m]."""
+    battery_percent: float | None = None
+    """Charge at the start; None: full."""
+    battery_capacity_mah: float | None = None
+    battery_drain: float | None = None
+    """Factor on the discharge; None: 1."""
+    ideal_rotors: bool = False
+    """True for rotors without lag and limits, as in the paper."""
+    inner_hz: float = DEFAULT_INNER_HZ
+    outer_hz: float | None = None
+    """Rate of the outer loop; None: the divisor of ``inner_hz`` nearest to 100 Hz."""
+    home: GeoPoint = DEFAULT_HOME
+    params: Mapping[str, float] = field(default_factory=dict)
+    """Parameters of the vehicle that differ from their defaults."""
+    seed: int = 1
+    """Seed of gusts and of the faults of links."""
+    folder: Path = Path()
+    """Where plans are looked for; a name that is not there is that of an example plan."""
+
+    def changed(self) -> dict[str, Any]:
+        """Return the fields that differ from their defaults."""
+        default = Setup()
+        return {
+            item.name: value
+            for item in fields(self)
+            if (value := getattr(self, item.name)) != getattr(default, item.name)
+        }
+
+    def load_plan(self, plan: str | Path) -> Plan:
+        """Read a plan file: of ``folder``, else an example of the installation; raise ConfigError."""
+        path = self.folder / plan
+        example = example_plans().get(Path(plan).stem)
+        return load_plan(example if example is not None and not path.exists() else path)
+
+    def stack_config(self) -> StackConfig:
+        """Return the configuration of the flight stack."""
+        return StackConfig(
+            vehicle=self.vehicle,
+            controller=self.controller,
+            gains=self.gains,
+            loops=self.loops,
+            inner_hz=self.inner_hz,
+            outer_hz=nearest_outer_hz(self.inner_hz) if self.outer_hz is None else self.outer_hz,
+            ideal_rotors=self.ideal_rotors,
+            home=self.home,
+            params=tuple(f"{name}={value!r}" for name, value in self.params.items()),
+        )
+
+    def simulator(self, vehicle: Vehicle) -> Simulator:
+        """Return the simulator of ``vehicle``; raise ConfigError for conditions that it cannot simulate."""
+        try:
+            if self.drag:
+                vehicle = vehicle.with_drag(self.plant)
+            disturbance = self._disturbance()
+            check_wind(vehicle, check_plant(self.plant), disturbance)
+            battery = check_battery(
+                vehicle, self.battery_percent, self.battery_capacity_mah, self.battery_drain
+            )
+        except UsageProblemError as error:
+            name, _, problem = str(error).partition(": ")
+            raise ConfigError(
+                name.removeprefix("--"), "", problem.replace("add --drag", "set drag")
+            ) from None
+        return Simulator(
+            vehicle, self.plant, PlantOptions(disturbance=disturbance, seed=self.seed, battery=battery)
+        )
+
+    def _disturbance(self) -> Disturbance:
+        wind = _vector("wind", (*self.wind, 0.0)[:3] if len(self.wind) == 2 else self.wind)
+        for speed_m_s in wind:
+            check_range("wind", speed_m_s, -_MOST_WIND_M_S, _MOST_WIND_M_S)
+        return Disturbance(
+            wind,
+            check_range("gust", self.gust, 0.0, _MOST_GUST_M_S),
+            _vector("force", self.force),
+            _vector("torque", self.torque),
+            check_range("torque_gust", self.torque_gust, 0.0, _MOST_TORQUE_GUST_N_M),
+        )
+
+
+def _vector(name: str, values: Sequence[float]) -> Vector3:
+    if len(values) != 3:
+        raise UsageProblemError(f"{name}: {values!r} has {len(values)} numbers instead of 3")
+    return Vector3(*(float(value) for value in values))

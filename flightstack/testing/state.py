@@ -1,0 +1,98 @@
+"""The state of a vehicle at one instant, for conditions and assertions."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flightstack.core.contract import Quaternion, Vector3
+from flightstack.core.geometry import euler_from_quaternion
+from flightstack.process.assembly import Stack
+from sim_bridge.simulator import Simulator
+
+
+class State(NamedTuple):
+    """True motion of the vehicle, and what the vehicle reports of itself. Positions count from home at the start."""
+
+    time_s: float
+    """Simulated time."""
+    mode: str
+    """HOLD, TAKEOFF, MISSION, RETURN, LAND, POSITION, ALTITUDE, OFFBOARD or TERMINATION."""
+    armed: bool
+    landed: bool
+    """Result of the vehicle's land detector."""
+    altitude_m: float
+    position_ned_m: Vector3
+    velocity_ned_m_s: Vector3
+    roll_deg: float
+    pitch_deg: float
+    yaw_deg: float
+    distance_to_home_m: float
+    """Horizontal distance to home."""
+    battery_percent: float
+    """Charge that the vehicle reports; NaN without a battery."""
+    failsafes: tuple[str, ...]
+    """Active failsafes by their names, the most important first, such as GCS_LOST or BATTERY_LOW."""
+    item: int
+    """The current mission item, from 0; −1 without a mission."""
+    error_m: float
+    """Distance between position and position setpoint; NaN if the setpoint leaves an axis free."""
+
+    @property
+    def north_m(self) -> float:
+        """Position north of home at the start."""
+        return self.position_ned_m.x
+
+    @property
+    def east_m(self) -> float:
+        """Position east of home at the start."""
+        return self.position_ned_m.y
+
+    @property
+    def speed_m_s(self) -> float:
+        """Horizontal speed."""
+        return math.hypot(self.velocity_ned_m_s.x, self.velocity_ned_m_s.y)
+
+    @property
+    def climb_m_s(self) -> float:
+        """Vertical speed, positive upwards."""
+        return -self.velocity_ned_m_s.z
+
+    def __str__(self) -> str:
+        north, east, _ = self.position_ned_m
+        parts = [
+            f"t = {self.time_s:.2f} s: {self.mode}, {'armed' if self.armed else 'disarmed'}, "
+            f"{'landed' if self.landed else 'in the air'}",
+            f"{north:.2f} m north, {east:.2f} m east, {self.altitude_m:.2f} m high",
+            f"{self.speed_m_s:.2f} m/s, climbing {self.climb_m_s:.2f} m/s",
+            f"roll {self.roll_deg:.1f}°, pitch {self.pitch_deg:.1f}°, yaw {self.yaw_deg:.1f}°",
+        ]
+        if self.failsafes:
+            parts.append(f"failsafes {', '.join(self.failsafes)}")
+        return "; ".join(parts)
+
+
+def state_of(stack: Stack, simulator: Simulator) -> State:
+    """Return the present state."""
+    now, truth = stack.now, simulator.frame.state
+    position, velocity = Vector3(*truth[0:3].tolist()), Vector3(*truth[3:6].tolist())
+    euler = euler_from_quaternion(Quaternion(*truth[6:10].tolist()))
+    roll, pitch, yaw = (math.degrees(angle) for angle in euler)
+    home = stack.places.frame.to_ned(stack.area.home)
+    return State(
+        time_s=now.time_us * 1e-6,
+        mode=now.status.mode.name,
+        armed=now.status.armed,
+        landed=now.landed,
+        altitude_m=-position.z,
+        position_ned_m=position,
+        velocity_ned_m_s=velocity,
+        roll_deg=roll,
+        pitch_deg=pitch,
+        yaw_deg=yaw,
+        distance_to_home_m=math.hypot(position.x - home.x, position.y - home.y),
+        battery_percent=100.0 * stack.simulator.battery.remaining,
+        failsafes=tuple(failsafe.name for failsafe in stack.parts.failsafes.active),
+        item=now.progress.current if now.mission_count else -1,
+        error_m=math.dist(now.setpoint[0:3].tolist(), position),
+    )

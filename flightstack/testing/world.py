@@ -1,0 +1,369 @@
+"""A vehicle in a simulated world, with a ground station: one process, simulated time, no ports.
+
+world = World(vehicle="x_quad", wind=(4.0, 0.0))
+world.upload("square.plan")
+world.arm()
+world.start_mission()
+world.run_until(lambda s: not s.armed, timeout_s=120)
+assert world.flight().max_error_m < 0.5
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from flightstack.control.backend import ControlBackend
+from flightstack.core.contract import Vector3
+from flightstack.core.enums import Mode
+from flightstack.mavlink.dialect import mavlink
+from flightstack.plan import MissionItem, MissionType, Plan
+from flightstack.services.logs.log_store import NO_LOGS, LogStore
+from flightstack.testing.client import Client, RefusedError
+from flightstack.testing.engine import Engine
+from flightstack.testing.expression import Expression
+from flightstack.testing.faults import apply_fault
+from flightstack.testing.flight import Event, Flight
+from flightstack.testing.link import Link
+from flightstack.testing.log import Log
+from flightstack.testing.network import Network
+from flightstack.testing.setup import Setup
+from flightstack.testing.state import State, state_of
+from gcs_cli.fly.flight_limit import flight_limit_s
+from gcs_cli.link import calls
+from gcs_cli.link.calls import Request
+from gcs_cli.report.flight_outcome import Code, Outcome, ends_in_air, judged, too_late, with_log
+from gcs_cli.vehicle.view_types import MISSION_COMPLETE, Mission, VehicleView
+
+GROUND = "gcs"
+"""Name of the ground station that each world has."""
+_REQUEST_LIMIT_S = 120.0
+
+
+class ConditionTimeoutError(AssertionError):
+    """A condition did not come true within its limit of simulated time."""
+
+
+class World:
+    """One vehicle, its simulator and a ground station. Use it as a context manager or call ``close``.
+
+    Time is simulated everywhere, links and telemetry included: no call waits for the machine's clock. A request such
+    as ``arm`` advances time only if its answer needs time, as over a link with a delay.
+    """
+
+    def __init__(
+        self,
+        setup: Setup | None = None,
+        *,
+        telemetry: bool = False,
+        flight_logs: LogStore = NO_LOGS,
+        wrap_loops: Callable[[ControlBackend], ControlBackend] = lambda loops: loops,
+        **conditions: Any,
+    ) -> None:
+        """Build the world of ``setup``, or of ``conditions`` with the names of ``Setup``; raise ConfigError.
+
+        ``telemetry``: stream at PX4's default rates to ``gcs.received``, instead of a few messages per second.
+        """
+        self.setup = setup or Setup(**conditions)
+        self._telemetry = telemetry
+        self.engine = Engine(self.setup, flight_logs, wrap_loops)
+        """Flight stack and simulator; not part of the public interface."""
+        self.events: list[Event] = []
+        """Faults and changes of links, oldest first."""
+        self.outcome: Outcome | None = None
+        """Outcome of ``fly``."""
+        self.plan = Plan(())
+        """The plan that was uploaded last."""
+        self._network = Network(self.setup.seed)
+        self._watches: list[Callable[[], None]] = []
+        self._timers: list[tuple[float, Callable[[], None]]] = []
+        self.gcs: Client = self.add_client(GROUND)
+        """The ground station."""
+
+    # ------------------------------------------------------------------ parts
+
+    @property
+    def link(self) -> Link:
+        """The link of the ground station."""
+        return self.gcs.link
+
+    @property
+    def clients(self) -> dict[str, Client]:
+        """All clients by name."""
+        return self._network.clients
+
+    def add_client(self, name: str, *, is_companion: bool = False) -> Client:
+        """Connect another ground station, or a companion computer, whose heartbeats do not count as data link."""
+        return self._network.add(name, self.engine.stack.ground, self._telemetry, is_companion)
+
+    @property
+    def state(self) -> State:
+        """The present state."""
+        return state_of(self.engine.stack, self.engine.simulator)
+
+    @property
+    def texts(self) -> list[str]:
+        """Status texts that the ground station received, oldest first."""
+        return self.gcs.texts
+
+    @property
+    def reached(self) -> list[int]:
+        """Mission items that the ground station saw reached, in order."""
+        return self.gcs.reached
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time [s]."""
+        return self.engine.time_s
+
+    # ------------------------------------------------------------------ time
+
+    def tick(self) -> None:
+        """Run one inner tick, and exchange messages after an outer tick."""
+        engine = self.engine
+        if engine.tick():
+            engine.pass_requests()
+            self._network.exchange(engine.stack.ground, engine.time_s)
+            self._call_due()
+        engine.advance()
+
+    def _outer_tick(self) -> None:
+        for _ in range(self.engine.stack.rates.divisor):
+            self.tick()
+
+    def run_for(self, seconds: float) -> None:
+        """Run for ``seconds`` of simulated time."""
+        for _ in range(round(seconds * self.engine.stack.rates.inner_hz)):
+            self.tick()
+
+    def run_until(self, condition: Callable[[State], object] | str, timeout_s: float = 120.0) -> State:
+        """Run until ``condition`` of the state is true; return that state.
+
+        ``condition`` is a function, or an expression such as ``"altitude_m > 2.5"``. Raise ConditionTimeoutError with
+        the state after ``timeout_s`` of simulated time.
+        """
+        is_true = Expression(condition).of_state if isinstance(condition, str) else condition
+        rates = self.engine.stack.rates
+        for _ in range(round(timeout_s * rates.outer_hz) + 1):
+            state = self.state
+            if is_true(state):
+                return state
+            self._outer_tick()
+        what = f"{condition!r}" if isinstance(condition, str) else "the condition"
+        raise ConditionTimeoutError(
+            f"{what} did not come true within {timeout_s:g} s of simulated time; {self.state}{self._last_texts()}"
+        )
+
+    def watch(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` after every outer tick."""
+        self._watches.append(callback)
+
+    def after(self, seconds: float, callback: Callable[[], None]) -> None:
+        """Call ``callback`` once, ``seconds`` of simulated time from now."""
+        self._timers.append((self.time_s + seconds, callback))
+
+    def _call_due(self) -> None:
+        for watch in self._watches:
+            watch()
+        if self._timers:
+            due = [call for at_s, call in self._timers if at_s <= self.time_s + 1e-9]
+            self._timers = [timer for timer in self._timers if timer[0] > self.time_s + 1e-9]
+            for call in due:
+                call()
+
+    def _last_texts(self) -> str:
+        return f"; texts: {'; '.join(self.texts[-3:])}" if self.texts else ""
+
+    # ------------------------------------------------------------------ requests
+
+    def wait_for(self, request: Request, what: str) -> None:
+        """Wait for the answer of a request; raise RefusedError."""
+        hub, end_s = self.engine.stack.ground, self.time_s + _REQUEST_LIMIT_S
+        while True:
+            self._network.settle(hub, self.time_s)
+            answer = request.answer(self.time_s)
+            if answer is not None:
+                break
+            if self._network.exchange(hub, self.time_s):
+                continue  # the request has another step
+            self._outer_tick()
+            if self.time_s > end_s:
+                late = f"{what} had no result within {_REQUEST_LIMIT_S:g} s"
+                raise ConditionTimeoutError(f"{late}; {self.state}")
+        if not answer.accepted:
+            raise RefusedError(what, answer)
+
+    def command(self, number: int, *params: float, client: Client | None = None) -> None:
+        """Send a MAV_CMD as COMMAND_LONG; raise RefusedError with the vehicle's reason."""
+        sender = client or self._connected()
+        self.wait_for(sender.command(number, params, self.time_s), f"command {number}")
+
+    def _order(self, what: str, command: calls.Command) -> None:
+        self.wait_for(self._connected().command(*command, self.time_s), what)
+
+    def _connected(self) -> Client:
+        """Return the ground station once it knows the vehicle."""
+        if self.gcs.session.view.identity is None:
+            self._network.settle(self.engine.stack.ground, self.time_s)
+        return self.gcs
+
+    def upload(
+        self, plan: str | Path | Plan | Sequence[MissionItem], kind: MissionType = MissionType.MISSION
+    ) -> None:
+        """Upload a plan: a file, the name of a bundled one, a Plan, or items of one ``kind``; raise RefusedError."""
+        gcs = self._connected()
+        if isinstance(plan, (str, Path)):
+            plan = self.setup.load_plan(plan)
+        if isinstance(plan, Plan):
+            self.plan = plan
+            self.wait_for(gcs.upload(plan), "the plan")
+        else:
+            if kind is MissionType.MISSION:
+                self.plan = Plan(tuple(plan))
+            self.wait_for(gcs.upload_items(plan, kind), f"the {kind.name.lower()}")
+
+    def download(self, kind: MissionType = MissionType.MISSION) -> tuple[MissionItem, ...]:
+        """Download a plan of one kind; raise RefusedError."""
+        call = self._connected().download(kind)
+        self.wait_for(call, f"the {kind.name.lower()}")
+        answer = call.answer(self.time_s)
+        assert answer is not None
+        return answer.items
+
+    def arm(self) -> None:
+        """Arm; raise RefusedError with the vehicle's reason."""
+        self._order("arming", calls.ARM)
+
+    def disarm(self, *, force: bool = False) -> None:
+        """Disarm; with ``force`` in the air too."""
+        self._order("disarming", calls.FORCE_DISARM if force else calls.DISARM)
+
+    def takeoff(self, alt_m: float = math.nan) -> None:
+        """Take off to an altitude above home, by default MIS_TAKEOFF_ALT; arm first if disarmed."""
+        home_m = self.engine.stack.area.home.altitude_m
+        self._order("takeoff", calls.takeoff_command(home_m + alt_m))
+        if not self.engine.stack.now.status.armed:
+            self.arm()
+
+    def start_mission(self) -> None:
+        """Start the mission."""
+        self._order("the start of the mission", calls.START_MISSION)
+
+    def goto(self, north_m: float, east_m: float, alt_m: float = math.nan) -> None:
+        """Fly to a position north and east of home at the start, and hold there; NaN keeps the altitude."""
+        stack = self.engine.stack
+        place = stack.places.frame.to_geo(Vector3(north_m, east_m, 0.0))
+        amsl_m = stack.area.home.altitude_m + alt_m
+        self._order("goto", calls.goto_command(place.latitude_deg, place.longitude_deg, amsl_m))
+
+    def land(self) -> None:
+        """Land at the present position."""
+        self._order("landing", calls.LAND)
+
+    def rtl(self) -> None:
+        """Return to launch."""
+        self._order("the return", calls.RETURN)
+
+    def set_mode(self, mode: str | Mode) -> None:
+        """Select a mode by its name, as in ``State.mode``; raise ValueError for an unknown one."""
+        if isinstance(mode, str):
+            names = [known.name for known in Mode]
+            if mode not in names:
+                raise ValueError(f"no mode {mode!r}; the modes are {', '.join(names)}")
+            mode = Mode[mode]
+        self._order(f"mode {mode.name}", self.gcs.mode_command(mode))
+
+    def param_set(self, name: str, value: float) -> None:
+        """Set a parameter; raise RefusedError."""
+        self.wait_for(self._connected().parameter(name, value), f"{name} = {value:g}")
+
+    def param_get(self, name: str) -> float:
+        """Return a parameter; raise RefusedError."""
+        request = self._connected().parameter(name, None)
+        self.wait_for(request, name)
+        return request.value
+
+    # ------------------------------------------------------------------ faults
+
+    def fault(self, text: str, *, for_s: float | None = None) -> None:
+        """Begin a fault now, such as ``"rotor 2 dead"`` or ``"link loss 0.3"``; docs/how-to/faults.md lists them.
+
+        With ``for_s`` it ends after that simulated time. Raise ConfigError for an unknown fault.
+        """
+        apply_fault(self, text, for_s)
+
+    def happened(self, name: str) -> None:
+        """Record an event, to which properties may refer."""
+        self.events.append(Event(self.time_s, name))
+
+    def power_cycle(self, off_s: float = 1.0) -> None:
+        """Switch the vehicle off for ``off_s`` and on again; in the air it falls. Plans and parameters survive."""
+        self.engine.power_cycle(off_s)
+        for client in self.clients.values():
+            self._network.connect(client, self.engine.stack.ground, self._telemetry)
+        self.happened("power_cycle")
+
+    # ------------------------------------------------------------------ flights
+
+    def fly(self, plan: str | Path | Plan | None = None, limit_s: float | None = None) -> Flight:
+        """Upload, arm, start, and fly to the end as ``gcs fly`` does; return the flight, whatever its outcome.
+
+        ``limit_s`` is the longest flight, by default 60 s more than three times the time that the plan needs.
+        """
+        if plan is not None:
+            self.plan = plan if isinstance(plan, Plan) else self.setup.load_plan(plan)
+        stack = self.engine.stack
+        if limit_s is None:
+            limit_s = flight_limit_s(self.plan.items, self.setup.home, stack.now.behaviour)
+        try:
+            self.upload(self.plan)
+            self.arm()
+            self.start_mission()
+        except RefusedError as error:
+            self.outcome = Outcome(Code.VEHICLE_LOST if error.is_silent else Code.REFUSED, str(error))
+        else:
+            self.outcome = self._flown(self.time_s + limit_s, limit_s)
+        flight = self.flight()
+        self.outcome = with_log(self.outcome, flight.data, self.plan.items) if flight.log else self.outcome
+        return self.flight()
+
+    def _flown(self, end_s: float, limit_s: float) -> Outcome:
+        """Fly to the end, and return to launch after a mission that ends in the air."""
+        now, items, is_returning = self.engine.stack.now, self.plan.items, not ends_in_air(self.plan.items)
+        while now.status.armed:
+            if self.time_s > end_s:
+                return too_late(self._view(), items, limit_s)
+            if not is_returning and now.mission_complete and now.status.mode is Mode.HOLD:
+                is_returning = True
+                self.rtl()
+            self._outer_tick()
+        return judged(self._view(), items)
+
+    def _view(self) -> VehicleView:
+        """Return the ground station's view with the true progress, which messages on a bad link may lack."""
+        now = self.engine.stack.now
+        progress = Mission(
+            now.progress.current, now.mission_count, now.progress.reached,
+            MISSION_COMPLETE if now.mission_complete else None,
+        )  # fmt: skip
+        landed = mavlink.MAV_LANDED_STATE_ON_GROUND if now.landed else mavlink.MAV_LANDED_STATE_IN_AIR
+        return self.gcs.session.view._replace(mission=progress, landed_state=landed)
+
+    def flight(self) -> Flight:
+        """Return the newest flight from its log, up to now if it is not over."""
+        return Flight(Log(self.engine.newest_log()), self.outcome, self.plan, self.setup, tuple(self.events))
+
+    def close(self) -> None:
+        """Release the loops, which may run in a process."""
+        self.engine.close()
+
+    def __enter__(self) -> World:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
