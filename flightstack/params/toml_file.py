@@ -103,6 +103,10 @@ class Table:
             raise self.error(key, "must be an array of tables")
         return [Table(self.file, item, f"{self._name(key)}[{index}]") for index, item in enumerate(value)]
 
+    def values(self) -> dict[str, Any]:
+        """Return the values, unchecked."""
+        return self._values
+
     def has(self, key: str) -> bool:
         """Return True if ``key`` is present."""
         return key in self._values

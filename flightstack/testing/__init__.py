@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from flightstack.testing.link import Link
     from flightstack.testing.log import Log, Topic
     from flightstack.testing.properties import Margin, PropertyViolationError, Signals
+    from flightstack.testing.scenario import Scenario, is_scenario, load_scenario
+    from flightstack.testing.scenario_run import Verdict, run_scenario
     from flightstack.testing.setup import Setup
     from flightstack.testing.state import State
     from flightstack.testing.world import ConditionTimeoutError, World
@@ -37,19 +39,25 @@ _HOMES = {
     "ModeSpan": "flight",
     "PropertyViolationError": "properties",
     "RefusedError": "client",
+    "Scenario": "scenario",
     "SIGNALS": "expression",
     "Sample": "flight",
     "Setup": "setup",
     "Signals": "properties",
     "State": "state",
     "Topic": "log",
+    "Verdict": "scenario_run",
     "World": "world",
+    "is_scenario": "scenario",
+    "load_scenario": "scenario",
+    "run_scenario": "scenario_run",
 }
 """The module of each public name."""
 
 __all__ = [
     "SIGNALS", "Client", "ConditionTimeoutError", "Event", "Flight", "Link", "Log", "Margin", "ModeSpan",
-    "PropertyViolationError", "RefusedError", "Sample", "Setup", "Signals", "State", "Topic", "World",
+    "PropertyViolationError", "RefusedError", "Sample", "Scenario", "Setup", "Signals", "State", "Topic", "Verdict",
+    "World", "is_scenario", "load_scenario", "run_scenario",
 ]  # fmt: skip
 
 

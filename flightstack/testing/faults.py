@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from flightstack.core.errors import ConfigError
 from flightstack.testing.link import Channel
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.faults import parse_fault
+from sim_bridge.plant.faults import Fault, parse_fault
 
 if TYPE_CHECKING:
     from flightstack.testing.world import World
@@ -34,7 +35,7 @@ LINK_FAULTS: dict[str, LinkFault] = {
     "reordering": LinkFault("reordering", 1.0, "this share is held back by up to 0.1 s"),
     "garbage": LinkFault("garbage", 1.0, "this share is damaged, with random bytes before it"),
 }
-_LINK_FORM = "link [CLIENT] [to_vehicle|from_vehicle] " + "|".join(
+_LINK_FORM = "[to_vehicle|from_vehicle] " + "|".join(
     f"{word} VALUE" if fault.largest else word for word, fault in LINK_FAULTS.items()
 )
 
@@ -45,19 +46,32 @@ def apply_fault(world: World, text: str, for_s: float | None) -> None:
         raise ConfigError("fault", text, f"lasts {for_s:g} s: the time must be positive")
     words = text.split()
     if words[:1] == ["link"]:
-        _change_link(world, text, words[1:], for_s)
+        _change_link(world, words[1:], for_s)
     elif words == ["power", "cycle"]:
         world.power_cycle(1.0 if for_s is None else for_s)
     else:
         _simulator_fault(world, text, for_s)
 
 
-def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
-    simulator = world.engine.simulator
+def check_fault(text: str, rotors: int) -> None:
+    """Raise ConfigError for a fault that a vehicle with ``rotors`` rotors cannot have."""
+    words = text.split()
+    if words[:1] == ["link"]:
+        check_link(text.removeprefix("link "))
+    elif words != ["power", "cycle"]:
+        _parsed(text, rotors)
+
+
+def _parsed(text: str, rotors: int) -> Fault:
     try:
-        fault = parse_fault(text, len(world.engine.stack.vehicle.rotors))
+        return parse_fault(text, rotors)
     except UsageProblemError as error:
         raise ConfigError("fault", text, str(error).partition(": ")[2]) from None
+
+
+def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
+    simulator = world.engine.simulator
+    fault = _parsed(text, len(world.engine.stack.vehicle.rotors))
     begin_us = simulator.time_us + fault.begin_us
     if for_s is not None:
         fault = fault._replace(end_us=begin_us + round(for_s * 1e6))
@@ -67,23 +81,28 @@ def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
     world.happened("fault")
 
 
-def _change_link(world: World, text: str, words: list[str], for_s: float | None) -> None:
-    client = world.clients[words.pop(0)] if words[:1] and words[0] in world.clients else world.gcs
+def check_link(text: str) -> tuple[tuple[str, ...], str, Callable[[Channel], None]]:
+    """Return directions, word and function of a change of a link; raise ConfigError."""
+    words = text.split()
     directions = (words.pop(0),) if words[:1] and words[0] in DIRECTIONS else DIRECTIONS
     fault = LINK_FAULTS.get(words[0]) if words else None
     if fault is None or len(words) != (2 if fault.largest else 1):
-        known = ", ".join(world.clients)
-        raise ConfigError("fault", text, f"is no change of a link: {_LINK_FORM}; clients are {known}")
-    change = _change(text, words, fault)
+        raise ConfigError("link", text, f"is no change of a link, which is {_LINK_FORM}")
+    return directions, words[0], _change(text, words, fault)
+
+
+def _change_link(world: World, words: list[str], for_s: float | None) -> None:
+    client = world.clients[words.pop(0)] if words[:1] and words[0] in world.clients else world.gcs
+    directions, name, change = check_link(" ".join(words))
     for direction in directions:
         channel: Channel = getattr(client.link, direction)
         before = channel.conditions
         change(channel)
         if for_s is not None:
-            world.after(for_s, lambda channel=channel, before=before: channel.set_all(before))  # type: ignore[misc]
-    world.happened(f"link_{words[0]}")
+            world.after(for_s, partial(channel.set_all, before))
+    world.happened(f"link_{name}")
     if for_s is not None:
-        world.after(for_s, lambda: world.happened(f"link_{words[0]}_end"))
+        world.after(for_s, partial(world.happened, f"link_{name}_end"))
 
 
 def _change(text: str, words: list[str], fault: LinkFault) -> Callable[[Channel], None]:
@@ -94,5 +113,5 @@ def _change(text: str, words: list[str], fault: LinkFault) -> Callable[[Channel]
     except ValueError:
         value = math.nan
     if not 0.0 <= value <= fault.largest:
-        raise ConfigError("fault", text, f"{words[0]} must be 0 to {fault.largest:g}")
+        raise ConfigError("link", text, f"{words[0]} must be 0 to {fault.largest:g}")
     return lambda channel: channel.set(**{fault.condition: value})

@@ -101,8 +101,8 @@ class Setup:
             params=tuple(f"{name}={value!r}" for name, value in self.params.items()),
         )
 
-    def simulator(self, vehicle: Vehicle) -> Simulator:
-        """Return the simulator of ``vehicle``; raise ConfigError for conditions that it cannot simulate."""
+    def plant_options(self, vehicle: Vehicle) -> tuple[Vehicle, PlantOptions]:
+        """Return the vehicle that is simulated and its conditions; raise ConfigError for those without effect."""
         try:
             if self.drag:
                 vehicle = vehicle.with_drag(self.plant)
@@ -113,12 +113,14 @@ class Setup:
             )
         except UsageProblemError as error:
             name, _, problem = str(error).partition(": ")
-            raise ConfigError(
-                name.removeprefix("--"), "", problem.replace("add --drag", "set drag")
-            ) from None
-        return Simulator(
-            vehicle, self.plant, PlantOptions(disturbance=disturbance, seed=self.seed, battery=battery)
-        )
+            name = name.removeprefix("--").replace("-", "_")
+            raise ConfigError(name, "", problem.replace("add --drag", "set drag")) from None
+        return vehicle, PlantOptions(disturbance=disturbance, seed=self.seed, battery=battery)
+
+    def simulator(self, vehicle: Vehicle) -> Simulator:
+        """Return the simulator of ``vehicle``; raise ConfigError for conditions that it cannot simulate."""
+        flown, options = self.plant_options(vehicle)
+        return Simulator(flown, self.plant, options)
 
     def _disturbance(self) -> Disturbance:
         wind = _vector("wind", (*self.wind, 0.0)[:3] if len(self.wind) == 2 else self.wind)

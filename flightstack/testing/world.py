@@ -12,10 +12,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from flightstack.commander.failsafe import Failsafe
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
@@ -73,11 +75,10 @@ class World:
         """Flight stack and simulator; not part of the public interface."""
         self.events: list[Event] = []
         """Faults and changes of links, oldest first."""
-        self.outcome: Outcome | None = None
-        """Outcome of ``fly``."""
         self.plan = Plan(())
         """The plan that was uploaded last."""
         self._network = Network(self.setup.seed)
+        self._failsafes: tuple[Failsafe, ...] = ()
         self._watches: list[Callable[[], None]] = []
         self._timers: list[tuple[float, Callable[[], None]]] = []
         self.gcs: Client = self.add_client(GROUND)
@@ -130,7 +131,8 @@ class World:
             self._call_due()
         engine.advance()
 
-    def _outer_tick(self) -> None:
+    def step(self) -> None:
+        """Run for one period of the outer loop: the shortest time between two exchanges of messages."""
         for _ in range(self.engine.stack.rates.divisor):
             self.tick()
 
@@ -151,7 +153,7 @@ class World:
             state = self.state
             if is_true(state):
                 return state
-            self._outer_tick()
+            self.step()
         what = f"{condition!r}" if isinstance(condition, str) else "the condition"
         raise ConditionTimeoutError(
             f"{what} did not come true within {timeout_s:g} s of simulated time; {self.state}{self._last_texts()}"
@@ -166,6 +168,12 @@ class World:
         self._timers.append((self.time_s + seconds, callback))
 
     def _call_due(self) -> None:
+        active = self.engine.stack.parts.failsafes.active
+        if active != self._failsafes:
+            for failsafe in active:
+                if failsafe not in self._failsafes:
+                    self.happened(f"failsafe_{failsafe.name}")
+            self._failsafes = active
         for watch in self._watches:
             watch()
         if self._timers:
@@ -189,7 +197,7 @@ class World:
                 break
             if self._network.exchange(hub, self.time_s):
                 continue  # the request has another step
-            self._outer_tick()
+            self.step()
             if self.time_s > end_s:
                 late = f"{what} had no result within {_REQUEST_LIMIT_S:g} s"
                 raise ConditionTimeoutError(f"{late}; {self.state}")
@@ -198,17 +206,19 @@ class World:
 
     def command(self, number: int, *params: float, client: Client | None = None) -> None:
         """Send a MAV_CMD as COMMAND_LONG; raise RefusedError with the vehicle's reason."""
-        sender = client or self._connected()
-        self.wait_for(sender.command(number, params, self.time_s), f"command {number}")
+        self.request(f"command {number}", (number, params), client)
 
-    def _order(self, what: str, command: calls.Command) -> None:
-        self.wait_for(self._connected().command(*command, self.time_s), what)
+    def request(self, what: str, command: calls.Command, client: Client | None = None) -> None:
+        """Send a MAV_CMD with its parameters; ``what`` names it in the RefusedError."""
+        sender = self._connected(client)
+        self.wait_for(sender.command(*command, self.time_s), what)
 
-    def _connected(self) -> Client:
-        """Return the ground station once it knows the vehicle."""
-        if self.gcs.session.view.identity is None:
+    def _connected(self, client: Client | None = None) -> Client:
+        """Return a client, by default the ground station, once it knows the vehicle."""
+        client = client or self.gcs
+        if client.session.view.identity is None:
             self._network.settle(self.engine.stack.ground, self.time_s)
-        return self.gcs
+        return client
 
     def upload(
         self, plan: str | Path | Plan | Sequence[MissionItem], kind: MissionType = MissionType.MISSION
@@ -235,46 +245,53 @@ class World:
 
     def arm(self) -> None:
         """Arm; raise RefusedError with the vehicle's reason."""
-        self._order("arming", calls.ARM)
+        self.request("arming", calls.ARM)
 
     def disarm(self, *, force: bool = False) -> None:
         """Disarm; with ``force`` in the air too."""
-        self._order("disarming", calls.FORCE_DISARM if force else calls.DISARM)
+        self.request("disarming", calls.FORCE_DISARM if force else calls.DISARM)
 
     def takeoff(self, alt_m: float = math.nan) -> None:
         """Take off to an altitude above home, by default MIS_TAKEOFF_ALT; arm first if disarmed."""
-        home_m = self.engine.stack.area.home.altitude_m
-        self._order("takeoff", calls.takeoff_command(home_m + alt_m))
+        self.request("takeoff", self.takeoff_command(alt_m))
         if not self.engine.stack.now.status.armed:
             self.arm()
 
     def start_mission(self) -> None:
         """Start the mission."""
-        self._order("the start of the mission", calls.START_MISSION)
+        self.request("the start of the mission", calls.START_MISSION)
 
     def goto(self, north_m: float, east_m: float, alt_m: float = math.nan) -> None:
         """Fly to a position north and east of home at the start, and hold there; NaN keeps the altitude."""
+        self.request("goto", self.goto_command(north_m, east_m, alt_m))
+
+    def takeoff_command(self, alt_m: float = math.nan) -> calls.Command:
+        """Return the command to take off to an altitude above home."""
+        return calls.takeoff_command(self.engine.stack.area.home.altitude_m + alt_m)
+
+    def goto_command(self, north_m: float, east_m: float, alt_m: float = math.nan) -> calls.Command:
+        """Return the command to fly to a position relative to home at the start."""
         stack = self.engine.stack
         place = stack.places.frame.to_geo(Vector3(north_m, east_m, 0.0))
         amsl_m = stack.area.home.altitude_m + alt_m
-        self._order("goto", calls.goto_command(place.latitude_deg, place.longitude_deg, amsl_m))
+        return calls.goto_command(place.latitude_deg, place.longitude_deg, amsl_m)
 
     def land(self) -> None:
         """Land at the present position."""
-        self._order("landing", calls.LAND)
+        self.request("landing", calls.LAND)
 
     def rtl(self) -> None:
         """Return to launch."""
-        self._order("the return", calls.RETURN)
+        self.request("the return", calls.RETURN)
 
-    def set_mode(self, mode: str | Mode) -> None:
+    def set_mode(self, mode: str | Mode, client: Client | None = None) -> None:
         """Select a mode by its name, as in ``State.mode``; raise ValueError for an unknown one."""
         if isinstance(mode, str):
             names = [known.name for known in Mode]
             if mode not in names:
                 raise ValueError(f"no mode {mode!r}; the modes are {', '.join(names)}")
             mode = Mode[mode]
-        self._order(f"mode {mode.name}", self.gcs.mode_command(mode))
+        self.request(f"mode {mode.name}", self.gcs.mode_command(mode), client)
 
     def param_set(self, name: str, value: float) -> None:
         """Set a parameter; raise RefusedError."""
@@ -315,31 +332,34 @@ class World:
         """
         if plan is not None:
             self.plan = plan if isinstance(plan, Plan) else self.setup.load_plan(plan)
-        stack = self.engine.stack
+        return self.flight(self.fly_plan(self.plan, limit_s))
+
+    def fly_plan(
+        self, plan: Plan, limit_s: float | None = None, step: Callable[[], bool | None] | None = None
+    ) -> Outcome:
+        """Fly a plan with ``step`` in place of ``World.step``; it may return True to end the flight early."""
+        self.plan = plan
         if limit_s is None:
-            limit_s = flight_limit_s(self.plan.items, self.setup.home, stack.now.behaviour)
+            limit_s = flight_limit_s(plan.items, self.setup.home, self.engine.stack.now.behaviour)
         try:
-            self.upload(self.plan)
+            self.upload(plan)
             self.arm()
             self.start_mission()
         except RefusedError as error:
-            self.outcome = Outcome(Code.VEHICLE_LOST if error.is_silent else Code.REFUSED, str(error))
-        else:
-            self.outcome = self._flown(self.time_s + limit_s, limit_s)
-        flight = self.flight()
-        self.outcome = with_log(self.outcome, flight.data, self.plan.items) if flight.log else self.outcome
-        return self.flight()
+            return Outcome(Code.VEHICLE_LOST if error.is_silent else Code.REFUSED, str(error))
+        return self._flown(self.time_s + limit_s, limit_s, step or self.step)
 
-    def _flown(self, end_s: float, limit_s: float) -> Outcome:
+    def _flown(self, end_s: float, limit_s: float, step: Callable[[], bool | None]) -> Outcome:
         """Fly to the end, and return to launch after a mission that ends in the air."""
-        now, items, is_returning = self.engine.stack.now, self.plan.items, not ends_in_air(self.plan.items)
-        while now.status.armed:
+        items, is_returning = self.plan.items, not ends_in_air(self.plan.items)
+        while (now := self.engine.stack.now).status.armed:
             if self.time_s > end_s:
                 return too_late(self._view(), items, limit_s)
             if not is_returning and now.mission_complete and now.status.mode is Mode.HOLD:
                 is_returning = True
                 self.rtl()
-            self._outer_tick()
+            if step():
+                break
         return judged(self._view(), items)
 
     def _view(self) -> VehicleView:
@@ -352,9 +372,13 @@ class World:
         landed = mavlink.MAV_LANDED_STATE_ON_GROUND if now.landed else mavlink.MAV_LANDED_STATE_IN_AIR
         return self.gcs.session.view._replace(mission=progress, landed_state=landed)
 
-    def flight(self) -> Flight:
-        """Return the newest flight from its log, up to now if it is not over."""
-        return Flight(Log(self.engine.newest_log()), self.outcome, self.plan, self.setup, tuple(self.events))
+    def flight(self, outcome: Outcome | None = None) -> Flight:
+        """Return the newest flight from its log, up to now if it is not over; ``outcome`` is that of ``fly_plan``."""
+        log = Log(self.engine.newest_log())
+        flight = Flight(log, outcome, self.plan, self.setup, tuple(self.events))
+        if outcome is None or not log:
+            return flight
+        return replace(flight, result=with_log(outcome, flight.data, self.plan.items))
 
     def close(self) -> None:
         """Release the loops, which may run in a process."""

@@ -1,0 +1,172 @@
+"""Judge a flight by the expectations of a scenario."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from flightstack.core.contract import FloatArray
+from flightstack.core.enums import Mode
+from flightstack.core.errors import ConfigError
+from flightstack.plan import NAV_COMMANDS
+from flightstack.testing import properties
+from flightstack.testing.expression import Expression
+from flightstack.testing.flight import Event, Flight
+from flightstack.testing.properties import Margin, parse_window
+from flightstack.testing.scenario import SEVERITIES, Expect
+from flightstack.testing.state import State
+from gcs_cli.report.flight_outcome import Code
+from gcs_cli.report.summary import item_ned_m
+
+_UNEXPECTED = ("unexpected", "not refused")
+_SHOWN_EVENTS = 8
+
+
+@dataclass(frozen=True)
+class Check:
+    """One expectation and whether it holds."""
+
+    name: str
+    passed: bool
+    found: str
+    margin: float | None = None
+    """How far from failing, in the unit of the expectation; None without a number."""
+    limit: float | None = None
+
+    @property
+    def share(self) -> float | None:
+        """The margin as a share of the limit; None without either."""
+        if self.margin is None or self.limit is None or not math.isfinite(self.margin):
+            return None
+        return self.margin / max(abs(self.limit), 1e-9)
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.found}"
+
+
+def judge(expect: Expect, flight: Flight, last: State, events: Sequence[Event]) -> tuple[Check, ...]:
+    """Return a check for each expectation."""
+    return tuple(_checks(expect, flight, last, events))
+
+
+def _checks(expect: Expect, flight: Flight, last: State, events: Sequence[Event]) -> Iterator[Check]:
+    yield _outcome(expect, flight, last, events)
+    for event in events:
+        if event.name.startswith(_UNEXPECTED):
+            yield Check("answers", False, f"{event.name} at t = {event.time_s:.2f} s")
+    if expect.reached is not None:
+        yield Check(
+            f"reached = {list(expect.reached)}", flight.reached == list(expect.reached), f"{flight.reached}"
+        )
+    yield from _limits(expect, flight)
+    for kind, texts in (("always", expect.always), ("eventually", expect.eventually)):
+        for text in texts:
+            yield _property(kind, text, flight)
+    for text in expect.at_end:
+        yield Check(f"at end {text}", Expression(text).of_state(last), str(last))
+    yield from _texts(expect, flight)
+
+
+def _outcome(expect: Expect, flight: Flight, last: State, events: Sequence[Event]) -> Check:
+    """Compare the outcome: a code, the mode of the landing, or a failsafe that was active."""
+    if expect.refusal is not None:
+        is_refused = flight.outcome == Code.REFUSED and expect.refusal in flight.outcome_text
+        return Check(f"refused: {expect.refusal}", is_refused, flight.outcome_text or "not refused")
+    wanted = expect.outcome or ("completed" if flight.outcome else "any")
+    name = f"outcome {wanted}"
+    if wanted == "any":
+        return Check(name, True, flight.outcome)
+    if wanted in Mode.__members__:
+        landings = [event.time_s for event in flight.events if event.name == "landing"]
+        mode = flight.at(landings[-1] - 0.05).mode if landings else last.mode
+        return Check(name, mode == wanted, f"it {'landed' if landings else 'ended'} in mode {mode}")
+    if wanted in tuple(Code):
+        return Check(name, flight.outcome == wanted, f"{flight.outcome}: {flight.outcome_text}")
+    failsafes = [
+        event.name.removeprefix("failsafe_") for event in events if event.name.startswith("failsafe_")
+    ]
+    return Check(name, wanted in failsafes, f"active failsafes: {', '.join(failsafes) or 'none'}")
+
+
+def _limits(expect: Expect, flight: Flight) -> Iterator[Check]:
+    for name, figure in _FIGURES.items():
+        limit = getattr(expect, name)
+        if limit is not None:
+            value = figure(flight)
+            yield Check(f"{name} ≤ {limit:g}", value <= limit, f"{value:.3f} m", limit - value, limit)
+    if expect.duration_s is not None:
+        low, high = expect.duration_s
+        value = flight.duration_s
+        margin = min(value - low, high - value)
+        yield Check(f"duration_s {low:g} to {high:g}", margin >= 0.0, f"{value:.1f} s", margin, high - low)
+
+
+def _property(kind: str, text: str, flight: Flight) -> Check:
+    check = properties.always if kind == "always" else properties.eventually
+    try:
+        margin: Margin = check(flight.signals, *parse_window(text))
+    except ConfigError as error:
+        return Check(f"{kind} {text}", False, str(error))
+    found = f"margin {margin.margin:.3g} at t = {margin.time_s:.2f} s"
+    if not margin.holds:
+        found = f"violated at t = {margin.time_s:.2f} s\n{margin.detail}"
+    limit = _number_in(text)
+    return Check(margin.prop, margin.holds, found, margin.margin if limit is not None else None, limit)
+
+
+def _number_in(text: str) -> float | None:
+    """Return the last number of an expression: the limit in most of them."""
+    parts = [part for part in parse_window(text)[0].replace("(", " ").replace(")", " ").split() if part]
+    for part in reversed(parts):
+        try:
+            return float(part)
+        except ValueError:
+            continue
+    return None
+
+
+def _texts(expect: Expect, flight: Flight) -> Iterator[Check]:
+    if expect.no_text_above is not None:
+        worse = flight.texts_above(SEVERITIES.index(expect.no_text_above))
+        found = "; ".join(f"{SEVERITIES[text.severity]}: {text.text}" for text in worse[:_SHOWN_EVENTS])
+        yield Check(f"no text above {expect.no_text_above}", not worse, found or "none")
+    for text in expect.texts:
+        yield Check(f"text {text!r}", any(text in said for said in flight.texts), "; ".join(flight.texts))
+
+
+def corridor_m(flight: Flight) -> float:
+    """Return the largest distance of the flight from the path of its plan: from home over its items; NaN of none."""
+    data = flight.data
+    time_s, position = data.position
+    flown = position[data.flying(time_s)]
+    places = [np.zeros(3)]
+    for item in flight.plan.items:
+        place = item_ned_m(item, data) if item.command in NAV_COMMANDS else None
+        if place is not None:
+            places.append(place)
+    if len(places) < 2 or not len(flown):
+        return math.nan
+    return float(_distances_m(flown, np.array(places)).max())
+
+
+def _distances_m(points: FloatArray, path: FloatArray) -> FloatArray:
+    """Return the distance of each point, shape (n, 3), from a line through ``path``, shape (m, 3)."""
+    smallest = np.full(len(points), math.inf)
+    for begin, end in pairwise(path):
+        leg = end - begin
+        along = np.clip((points - begin) @ leg / max(float(leg @ leg), 1e-30), 0.0, 1.0)
+        smallest = np.minimum(smallest, np.linalg.norm(begin + along[:, None] * leg - points, axis=1))
+    return smallest
+
+
+_FIGURES: dict[str, Callable[[Flight], float]] = {
+    "corridor_m": corridor_m,
+    "max_error_m": lambda flight: flight.max_error_m,
+    "rms_error_m": lambda flight: flight.rms_error_m,
+    "landing_error_m": lambda flight: flight.landing_error_m,
+}
+"""Figures with a largest value."""

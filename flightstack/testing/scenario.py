@@ -1,0 +1,236 @@
+"""Scenario files: a plan, a vehicle and its conditions, events, and what is expected of the flight."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from flightstack.core.errors import ConfigError
+from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, parse_home
+from flightstack.params.gains_file import DEFAULT_GAINS
+from flightstack.params.store import read_assignment
+from flightstack.params.toml_file import read_toml
+from flightstack.params.vehicle import DEFAULT_VEHICLE, load_vehicle
+from flightstack.testing.expression import Expression
+from flightstack.testing.faults import check_fault, check_link
+from flightstack.testing.orders import check_command
+from flightstack.testing.properties import parse_window
+from flightstack.testing.setup import Setup
+from flightstack.testing.toml_record import key, read_record
+
+SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
+_TRIGGERS = ("at_s", "at_item", "when", "after")
+_EFFECTS = ("fault", "link", "command", "param", "upload", "power")
+
+
+@dataclass(frozen=True)
+class Wind:
+    """``[wind]``."""
+
+    mean_m_s: tuple[float, ...] = key((0.0, 0.0), "mean wind north, east and, optionally, down",
+                                      low=-200.0, high=200.0, lengths=(2, 3))  # fmt: skip
+    gust_m_s: float = key(0.0, "standard deviation of the gusts", low=0.0, high=50.0)
+
+
+@dataclass(frozen=True)
+class ClientKey:
+    """``[[client]]``."""
+
+    name: str = key("", "name of a further client, for `client` of events")
+    companion: bool = key(False, "a companion computer, whose heartbeats do not count as data link")
+
+
+@dataclass(frozen=True)
+class Event:
+    """``[[event]]``: one trigger and one effect."""
+
+    at_s: float | None = key(None, "trigger: simulated time", low=0.0)
+    at_item: int | None = key(None, "trigger: this mission item is the current one", low=0, high=65535)
+    when: str | None = key(None, "trigger: an expression comes true")
+    after: str | None = key(None, "trigger: an event of the world happens, such as `link_cut`")
+    delay_s: float = key(0.0, "time from the trigger to the effect", low=0.0)
+    fault: str | None = key(None, "effect: a fault, such as `rotor 2 dead`")
+    link: str | None = key(None, "effect: a change of a link, such as `cut` or `to_vehicle loss 0.3`")
+    command: str | None = key(None, "effect: a request, such as `land`, `goto 5 0 10` or `mode HOLD`")
+    param: str | None = key(None, "effect: a parameter, `NAME=VALUE`")
+    upload: str | None = key(None, "effect: another plan")
+    power: str | None = key(None, "effect: the vehicle is switched off and on", choices=("cycle",))
+    for_s: float | None = key(None, "duration of a fault, a change of a link, or a power failure", low=1e-3)
+    client: str | None = key(None, "client whose link changes, or that sends the command")
+    refused: str | None = key(None, "the vehicle is expected to refuse, with a reason that has this text")
+
+
+@dataclass(frozen=True)
+class Expect:
+    """``[expect]``."""
+
+    outcome: str = key("", "a code of summary.json, a flight mode in which it lands, or an active failsafe; "
+                           "`any` for none")  # fmt: skip
+    refusal: str | None = key(None, "text of the reason with which the vehicle refuses to start")
+    reached: tuple[int, ...] | None = key(None, "mission items in the order in which they are reached", low=0)
+    corridor_m: float | None = key(None, "largest distance from the path of the plan", low=0.0)
+    max_error_m: float | None = key(None, "largest distance between position and setpoint", low=0.0)
+    rms_error_m: float | None = key(None, "root mean square of that distance", low=0.0)
+    landing_error_m: float | None = key(None, "largest distance of the touchdown from its place", low=0.0)
+    duration_s: tuple[float, ...] | None = key(None, "least and largest duration", low=0.0, lengths=(2,))
+    always: tuple[str, ...] = key((), "expressions that hold at every time")
+    eventually: tuple[str, ...] = key((), "expressions that hold once, also `… within 20 s of EVENT`")
+    at_end: tuple[str, ...] = key((), "expressions that hold in the last state")
+    no_text_above: str | None = key(None, "no status text is more severe than this", choices=SEVERITIES)
+    texts: tuple[str, ...] = key((), "texts of which each is part of a status text")
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A scenario. The keys are those of the file; ``path`` is where it was read."""
+
+    description: str = key("", "one sentence for the report")
+    plan: str | None = key(None, "a plan file beside the scenario, or the name of an example")
+    vehicle: str = key(DEFAULT_VEHICLE, "a built-in vehicle, or a vehicle file")
+    controller: str = key(DEFAULT_CONTROLLER, "an attitude controller")
+    gains: str = key(DEFAULT_GAINS, "a built-in set of gains, or a gains file")
+    loops: str = key("python", "`python`, `c`, `host` or `emulated`")
+    plant: str = key("rigid", "the simulated vehicle", choices=("rigid", "multibody", "paper"))
+    drag: bool = key(False, "give the vehicle the optional drag of its file")
+    ideal_rotors: bool = key(False, "rotors without lag and limits")
+    inner_hz: float = key(500.0, "rate of the inner loop", low=10.0, high=20000.0)
+    outer_hz: float | None = key(None, "rate of the outer loop", low=1.0, high=20000.0)
+    home: str | None = key(None, "LATITUDE,LONGITUDE,ALTITUDE of the start; otherwise the plan's")
+    seed: int = key(1, "seed of the first flight", low=0, high=2**31 - 1)
+    repeat: int = key(1, "number of flights, with the following seeds", low=1, high=1_000_000)
+    limit_s: float | None = key(
+        None, "longest flight; otherwise three times what the plan needs, and 60 s", low=1.0
+    )
+    duration_s: float | None = key(None, "end the flight after this time", low=0.1)
+    params: dict[str, float] | None = key(None, "parameters of the vehicle")  # noqa: RUF009
+    wind: Wind = key(Wind(), "wind")  # noqa: RUF009
+    force_n: tuple[float, ...] = key((0.0, 0.0, 0.0), "constant force NED", lengths=(3,))
+    torque_n_m: tuple[float, ...] = key((0.0, 0.0, 0.0), "constant torque FRD", lengths=(3,))
+    torque_gust_n_m: float = key(0.0, "standard deviation of the gusty torque", low=0.0, high=100.0)
+    battery_percent: float | None = key(None, "charge at the start", low=0.0, high=100.0)
+    battery_capacity_mah: float | None = key(None, "capacity of the battery", low=1.0)
+    battery_drain: float | None = key(None, "factor on the discharge", low=0.0, high=1e4)
+    client: tuple[ClientKey, ...] = key((), "further clients")
+    event: tuple[Event, ...] = key((), "events")
+    expect: Expect = key(Expect(), "what is expected")  # noqa: RUF009
+    path: Path = Path()
+
+    @property
+    def name(self) -> str:
+        """The name of the file without its ending."""
+        return self.path.stem
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """A seed for each flight."""
+        return tuple(range(self.seed, self.seed + self.repeat))
+
+    def setup(self, seed: int) -> Setup:
+        """Return the vehicle and conditions of the flight with ``seed``."""
+        same = (
+            "vehicle", "controller", "gains", "loops", "plant", "drag", "ideal_rotors", "inner_hz", "outer_hz",
+            "battery_percent", "battery_capacity_mah", "battery_drain",
+        )  # fmt: skip
+        folder = self.path.parent
+        made = Setup(
+            **{name: getattr(self, name) for name in same},
+            params=self.params or {},
+            wind=self.wind.mean_m_s,
+            gust=self.wind.gust_m_s,
+            force=self.force_n,
+            torque=self.torque_n_m,
+            torque_gust=self.torque_gust_n_m,
+            seed=seed,
+            folder=folder,
+        )
+        home = None if self.plan is None else made.load_plan(self.plan).home
+        home = home if self.home is None else parse_home(self.home)
+        return replace(
+            made,
+            home=home or DEFAULT_HOME,
+            vehicle=_beside(self.vehicle, folder),
+            gains=_beside(self.gains, folder),
+        )
+
+
+def _beside(name: str, folder: Path) -> str:
+    """Return a built-in name as it is, and a file's path relative to the scenario."""
+    return str(folder / name) if name.endswith(".toml") else name
+
+
+def is_scenario(path: Path) -> bool:
+    """Return True for a TOML file with a table ``[expect]``."""
+    try:
+        return path.suffix == ".toml" and "expect" in tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return False
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read a scenario file; raise ConfigError, which names the key and what is allowed."""
+    scenario = replace(read_record(Scenario, path, read_toml(path).values()), path=path)
+    for index, event in enumerate(scenario.event):
+        _check_event(path, f"event[{index}]", event, {client.name for client in scenario.client})
+    _check_texts(scenario)
+    if scenario.plan is None and scenario.duration_s is None and scenario.limit_s is None:
+        raise ConfigError(path, "plan", "is missing; without a plan give duration_s or limit_s")
+    return scenario
+
+
+def _check_event(path: Path, name: str, event: Event, clients: set[str]) -> None:
+    for what, keys in (("trigger", _TRIGGERS), ("effect", _EFFECTS)):
+        given = [key for key in keys if getattr(event, key) is not None]
+        if len(given) != 1:
+            has = f"has {' and '.join(given)}" if given else "has none"
+            raise ConfigError(path, name, f"needs one {what} of {', '.join(keys)}, and {has}")
+    if event.client is not None and event.client not in clients | {"gcs"}:
+        raise ConfigError(
+            path, f"{name}.client", f"{event.client!r} is not one of {', '.join(sorted(clients | {'gcs'}))}"
+        )
+    if event.for_s is not None and event.fault is event.link is event.power is None:
+        raise ConfigError(path, f"{name}.for_s", "is for fault, link and power")
+    if event.refused is not None and event.command is event.upload is event.param is None:
+        raise ConfigError(path, f"{name}.refused", "is for command, param and upload")
+
+
+def _check_texts(scenario: Scenario) -> None:
+    """Check everything that can be checked before a flight: plan, conditions, expressions, requests, faults."""
+    setup = scenario.setup(scenario.seed)
+    vehicle = load_vehicle(setup.vehicle)
+    setup.plant_options(vehicle)
+    checks: list[tuple[str, str, Callable[[str], object]]] = [
+        (name, text, Expression) for name, text in _expressions(scenario)
+    ]
+    by_key: dict[str, Callable[[str], object]] = {
+        "command": check_command,
+        "fault": lambda text: check_fault(text, len(vehicle.rotors)),
+        "link": check_link,
+        "param": read_assignment,
+        "upload": setup.load_plan,
+    }
+    for index, event in enumerate(scenario.event):
+        given = ((name, getattr(event, name)) for name in by_key)
+        checks += [(f"event[{index}].{name}", text, by_key[name]) for name, text in given if text is not None]
+    for name, text, check in checks:
+        try:
+            check(text)
+        except ConfigError as error:
+            raise ConfigError(scenario.path, name, str(error).partition(": ")[2]) from None
+
+
+def _expressions(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Yield the key and text of each expression."""
+    for index, event in enumerate(scenario.event):
+        if event.when is not None:
+            yield f"event[{index}].when", event.when
+    for name in ("always", "eventually", "at_end"):
+        for index, text in enumerate(getattr(scenario.expect, name)):
+            yield f"expect.{name}[{index}]", parse_window(text)[0]
+
+
+def repeat_command(scenario: Scenario, seed: int) -> str:
+    """Return the command that flies this scenario alone with this seed."""
+    seeds = "" if scenario.repeat == 1 and seed == scenario.seed else f" --seed {seed} --repeat 1"
+    return f"gcs test {scenario.path}{seeds}"

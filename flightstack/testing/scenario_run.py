@@ -1,0 +1,147 @@
+"""Fly a scenario: start it, let its events happen, and judge the flight. Simulated time, one process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from flightstack.testing.client import RefusedError
+from flightstack.testing.expression import Expression
+from flightstack.testing.flight import Flight
+from flightstack.testing.judge import Check, judge
+from flightstack.testing.orders import order
+from flightstack.testing.scenario import Event, Scenario, repeat_command
+from flightstack.testing.state import State
+from flightstack.testing.world import World
+from gcs_cli.report.flight_outcome import Outcome
+
+_DEFAULT_LIMIT_S = 600.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The result of one flight of a scenario."""
+
+    scenario: Scenario
+    seed: int
+    flight: Flight
+    last: State
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """True if every expectation holds."""
+        return all(check.passed for check in self.checks)
+
+    @property
+    def failures(self) -> list[str]:
+        """The expectations that do not hold, each with its values."""
+        return [str(check) for check in self.checks if not check.passed]
+
+    @property
+    def closest(self) -> Check | None:
+        """The check with the smallest finite margin relative to its limit."""
+        finite = [check for check in self.checks if check.share is not None]
+        return min(finite, key=lambda check: check.share or 0.0, default=None)
+
+    @property
+    def command(self) -> str:
+        """The command that repeats this flight."""
+        return repeat_command(self.scenario, self.seed)
+
+
+def run_scenario(scenario: Scenario, seed: int | None = None) -> Verdict:
+    """Fly a scenario with a seed, by default its first; raise ConfigError if it cannot begin."""
+    seed = scenario.seed if seed is None else seed
+    with World(scenario.setup(seed)) as world:
+        for client in scenario.client:
+            world.add_client(client.name, is_companion=client.companion)
+        outcome = _Run(world, scenario).fly()
+        flight = world.flight(outcome)
+        last = world.state
+        checks = judge(scenario.expect, flight, last, world.events)
+        return Verdict(scenario, seed, flight, last, checks)
+
+
+class _Run:
+    """Flies one scenario and fires its events."""
+
+    def __init__(self, world: World, scenario: Scenario) -> None:
+        self._world = world
+        self._scenario = scenario
+        self._waiting = [(event, _trigger(world, event)) for event in scenario.event]
+        self._due: list[tuple[float, Event]] = []
+        self._unexpected: list[str] = []
+
+    def fly(self) -> Outcome | None:
+        world, scenario = self._world, self._scenario
+        limit_s = scenario.limit_s
+        if scenario.plan is not None:
+            return world.fly_plan(
+                scenario.setup(world.setup.seed).load_plan(scenario.plan), limit_s, self._step
+            )
+        end_s = scenario.duration_s or limit_s or _DEFAULT_LIMIT_S
+        flew = False
+        while world.time_s < end_s and (world.state.armed or not flew):
+            flew = flew or world.state.armed
+            if self._step():
+                break
+        return None
+
+    def _step(self) -> bool:
+        """Fire the events that are due, and run one outer tick; return True at the end of the scenario's duration."""
+        world = self._world
+        now_s, waiting = world.time_s, self._waiting
+        if waiting or self._due:
+            state = world.state
+            fired = [event for event, is_due in waiting if is_due(state)]
+            self._waiting = [(event, is_due) for event, is_due in waiting if event not in fired]
+            self._due += [(now_s + event.delay_s, event) for event in fired]
+            due = [event for at_s, event in self._due if at_s <= now_s + 1e-9]
+            self._due = [entry for entry in self._due if entry[0] > now_s + 1e-9]
+            for event in due:
+                _happen(world, event)
+        world.step()
+        duration_s = self._scenario.duration_s
+        return duration_s is not None and world.time_s >= duration_s
+
+
+def _trigger(world: World, event: Event) -> Callable[[State], bool]:
+    """Return the function that tells from the state whether an event is triggered."""
+    if event.at_s is not None:
+        at_s = event.at_s - 1e-9
+        return lambda state: state.time_s >= at_s
+    if event.at_item is not None:
+        item = event.at_item
+        return lambda state: state.item == item
+    if event.when is not None:
+        return Expression(event.when).of_state
+    name = event.after
+    return lambda _state: any(happened.name == name for happened in world.events)
+
+
+def _happen(world: World, event: Event) -> None:
+    """Carry out the effect of an event; raise AssertionError for an answer that was not expected."""
+    client = world.clients[event.client or "gcs"]
+    try:
+        if event.fault is not None:
+            world.fault(event.fault, for_s=event.for_s)
+        elif event.link is not None:
+            world.fault(f"link {client.name} {event.link}", for_s=event.for_s)
+        elif event.power is not None:
+            world.fault("power cycle", for_s=event.for_s)
+        elif event.param is not None:
+            name, _, value = event.param.partition("=")
+            world.param_set(name.strip(), float(value))
+        elif event.upload is not None:
+            world.upload(event.upload)
+        else:
+            order(world, event.command or "", client)
+    except RefusedError as error:
+        if event.refused is None:
+            world.happened(f"unexpected refusal: {error}")
+        elif event.refused not in error.reason:
+            world.happened(f"unexpected reason: {error}, expected {event.refused!r}")
+    else:
+        if event.refused is not None:
+            world.happened(f"not refused: {event.command or event.param or event.upload}")
