@@ -66,8 +66,6 @@ def check_command(text: str) -> None:
         numbers = [float(value) for value in rest]
     except ValueError:
         numbers = [math.nan]
-    fits = (
-        order is not None and order.fewest <= len(numbers) <= order.most and all(map(math.isfinite, numbers))
-    )
-    if not fits:
+    fits = request is not None and request.fewest <= len(numbers) <= request.most
+    if not fits or not all(map(math.isfinite, numbers)):
         raise ConfigError("command", text, f"is none of {forms}")
