@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
@@ -38,8 +39,9 @@ class Session:
 
     The first peer that sends an autopilot's heartbeat is the vehicle; datagrams of others are dropped unless the
     vehicle is lost. With ``peer``, only datagrams from that address are accepted, and with ``system_id``, only that
-    vehicle. ``heartbeat_type`` is the MAV_TYPE that this side announces. ``record`` gets every frame, sent and
-    received, without its signature.
+    vehicle. Heartbeats are sent once per second of this clock and of vehicle time, because a simulation that is faster
+    than real time measures their timeout in its own time. ``heartbeat_type`` is the MAV_TYPE that this side announces.
+    ``record`` gets every frame, sent and received, without its signature.
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class Session:
         self._heartbeat_type = heartbeat_type
         self._service: Service | None = None
         self._heartbeat_due_s = 0.0
+        self._heartbeat_due_vehicle_s = math.inf
 
     @property
     def target(self) -> tuple[int, int]:
@@ -133,9 +136,11 @@ class Session:
         if self.peer is None:
             return []
         frames = []
-        if now_s >= self._heartbeat_due_s:
+        vehicle_s = self.view.time_s
+        if now_s >= self._heartbeat_due_s or (vehicle_s or 0.0) >= self._heartbeat_due_vehicle_s:
             frames.append(self.encode(self._heartbeat(mavlink.MAV_STATE_ACTIVE)))
             self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
+            self._heartbeat_due_vehicle_s = math.inf if vehicle_s is None else vehicle_s + HEARTBEAT_PERIOD_S
         if self._service is not None:
             frames += [self.encode(message) for message in self._service.poll(now_s)]
         return frames

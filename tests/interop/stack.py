@@ -11,6 +11,16 @@ from tests.support.process import Process
 HOST = "127.0.0.1"
 
 
+def timeouts(speed: float) -> list[str]:
+    """Return options that give a client the same wall time at any speed: losses count simulated time."""
+    values = {
+        "COM_DL_LOSS_T": round(10 * speed),
+        "COM_OF_LOSS_T": 1.0 * speed,
+        "COM_RC_LOSS_T": 0.5 * speed,
+    }
+    return [f"--param={name}={value}" for name, value in values.items()] if speed > 1.0 else []
+
+
 class RealVehicle:
     """``sim-bridge`` and ``flightstack`` at an instance of their own, at a speed against real time."""
 
@@ -25,7 +35,7 @@ class RealVehicle:
         number = ("--instance", str(self.instance))
         self.simulator = Process("sim_bridge", *number, "--speed", str(speed))
         self.stack = Process(
-            "flightstack", *number, "--log", str(self.log), "--state", str(directory), *options,
+            "flightstack", *number, "--log", str(self.log), "--state", str(directory), *timeouts(speed), *options,
         )  # fmt: skip
         try:
             self.stack.wait_for("flightstack: paper_quad")

@@ -42,6 +42,23 @@ def test_heartbeats_are_sent_once_a_second_as_a_ground_station() -> None:
     assert (message.type, message.autopilot) == (mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID)
 
 
+def test_heartbeats_follow_vehicle_time_when_it_is_faster_than_real_time() -> None:
+    session = met(Session(), FakeVehicle())
+
+    def arrives(time_s: float) -> None:
+        message = mavlink.MAVLink_system_time_message(0, round(time_s * 1000))
+        session.receive(Link(1, 1).encode(message), HERE, 0.01)
+
+    arrives(5.0)
+    assert len(heartbeats(session.poll(0.0))) == 1
+    arrives(5.9)
+    assert not heartbeats(session.poll(0.01))
+    arrives(6.0)
+    assert len(heartbeats(session.poll(0.02))) == 1
+    arrives(6.9)
+    assert not heartbeats(session.poll(0.03))
+
+
 def test_a_given_peer_is_spoken_to_first() -> None:
     session = Session(peer=HERE)
     assert len(heartbeats(session.poll(0.0))) == 1

@@ -1,4 +1,4 @@
-"""Timeouts of the ground link and of streams, on both the vehicle clock and the link clock. No I/O."""
+"""Timeouts of the ground link and of streams, in vehicle time. No I/O."""
 
 from __future__ import annotations
 
@@ -11,30 +11,26 @@ from flightstack.vehicle.flight_state import FlightState
 
 
 class SilenceTimer:
-    """Measures the silence of a link on the vehicle clock and on the link clock.
+    """Measures the silence of a link in vehicle time.
 
-    A link times out only if it is silent for the timeout on both. At 50 times real time, a ground station that sends
-    once per second of wall time is silent for 50 simulated seconds; while simulated time stands still, its silence on
-    the vehicle clock is zero. Neither is a loss.
+    In lockstep that is simulated time: a loss is the same at any speed, and while time stands still nothing is lost. A
+    client that sends by the machine's clock sends less often in simulated time the faster the simulation runs.
     """
 
     def __init__(self) -> None:
-        self._heard: tuple[float, int] | None = None
+        self._heard_us: int | None = None
 
-    def heard(self, now_s: float, time_us: int) -> None:
-        """Restart the timer at link time ``now_s`` and vehicle time ``time_us``."""
-        self._heard = now_s, time_us
+    def heard(self, time_us: int) -> None:
+        """Restart the timer."""
+        self._heard_us = time_us
 
-    def silent(self, now_s: float, time_us: int, limit_s: float) -> bool:
-        """Return True if the link was silent for ``limit_s`` on both clocks, or was never heard."""
-        if self._heard is None:
-            return True
-        heard_s, heard_us = self._heard
-        return now_s - heard_s > limit_s and (time_us - heard_us) * 1e-6 > limit_s
+    def silent(self, time_us: int, limit_s: float) -> bool:
+        """Return True if the link was silent for ``limit_s``, or was never heard."""
+        return self._heard_us is None or (time_us - self._heard_us) * 1e-6 > limit_s
 
-    def lost(self, now_s: float, time_us: int, limit_s: float) -> bool:
+    def lost(self, time_us: int, limit_s: float) -> bool:
         """Return True if the link was heard and is silent now."""
-        return self._heard is not None and self.silent(now_s, time_us, limit_s)
+        return self._heard_us is not None and self.silent(time_us, limit_s)
 
 
 class StreamMonitor:
@@ -53,14 +49,14 @@ class StreamMonitor:
         self._timer = SilenceTimer()
         self._is_lost = True
 
-    def heard(self, now_s: float) -> None:
-        """Restart the timeout at link time ``now_s``, and report the start at once: a mode change may follow."""
-        self._timer.heard(now_s, self._vehicle_time_us())
+    def heard(self) -> None:
+        """Restart the timeout, and report the start at once: a mode change may follow."""
+        self._timer.heard(self._vehicle_time_us())
         self._set_lost(False)
 
-    def check(self, now_s: float) -> None:
+    def check(self) -> None:
         """Evaluate the timeout."""
-        self._set_lost(self._timer.silent(now_s, self._vehicle_time_us(), self._timeout_s()))
+        self._set_lost(self._timer.silent(self._vehicle_time_us(), self._timeout_s()))
 
     def _set_lost(self, lost: bool) -> None:
         if lost is not self._is_lost:
@@ -103,7 +99,7 @@ class GroundLinkMonitor:
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a heartbeat."""
         if message.type == mavlink.MAV_TYPE_GCS:
-            self._timer.heard(now_s, self._now.time_us)
+            self._timer.heard(self._now.time_us)
             # not in ``poll``: the next message may be the arm command
             self._links.gcs_heard, self._links.gcs_lost = True, False
 
@@ -111,7 +107,7 @@ class GroundLinkMonitor:
         """Update the link facts. Send nothing."""
         links, behaviour = self._links, self._now.behaviour
         if links.gcs_heard:
-            links.gcs_lost = self._timer.lost(now_s, self._now.time_us, behaviour.gcs_loss_s)
+            links.gcs_lost = self._timer.lost(self._now.time_us, behaviour.gcs_loss_s)
         else:
             links.gcs_lost = behaviour.gcs_loss_action > 0
         return ()

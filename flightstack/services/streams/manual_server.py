@@ -40,11 +40,11 @@ class ManualServer:
         if message.target not in (0, self._own.system):
             return
         self._take_sticks(read_sticks(message))
-        self._monitor.heard(now_s)
+        self._monitor.heard()
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Evaluate the stream's timeout. Send nothing."""
-        self._monitor.check(now_s)
+        self._monitor.check()
         return []
 
     def next_deadline(self) -> float | None:

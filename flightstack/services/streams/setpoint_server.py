@@ -43,14 +43,14 @@ class SetpointServer:
         setpoint = read_setpoint(message, self._reference)
         if not isinstance(setpoint, str):
             self._accept(setpoint)
-            self._monitor.heard(now_s)
+            self._monitor.heard()
         elif now_s - self._warned_s >= _WARNING_INTERVAL_S:
             self._warned_s = now_s
             self._warn(f"Setpoint refused: {setpoint}")
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Evaluate the stream's timeout. Send nothing."""
-        self._monitor.check(now_s)
+        self._monitor.check()
         return []
 
     def next_deadline(self) -> float | None:
