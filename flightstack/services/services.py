@@ -12,22 +12,21 @@ from flightstack.core.enums import Severity
 from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_pack import pack_file
 from flightstack.params.metadata import parameters_json
-from flightstack.services.commands import VehicleContext
-from flightstack.services.commands.command_service import CommandService
+from flightstack.services.commands.command_server import CommandService
+from flightstack.services.commands.context import VehicleContext
 from flightstack.services.commands.failure_commands import FailureCommands
+from flightstack.services.commands.guided import GuidedItems
 from flightstack.services.commands.link_commands import LinkCommands
 from flightstack.services.files.component_metadata import ComponentMetadata, vehicle_files
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_server import LogServer
 from flightstack.services.logs.log_stream import LogStream
-from flightstack.services.mission.guided_items import GuidedItems
 from flightstack.services.mission.mission_service import MissionService
 from flightstack.services.params.param_server import ParamServer
 from flightstack.services.routing.peer import Peer
 from flightstack.services.streams.link_loss import GroundLinkMonitor, stream_monitors
 from flightstack.services.streams.manual_server import ManualServer
-from flightstack.services.streams.setpoint_messages import PoseReference
-from flightstack.services.streams.setpoint_server import SetpointServer
+from flightstack.services.streams.setpoint_server import PoseReference, SetpointServer
 from flightstack.services.streams.timesync import TimeService
 from flightstack.services.telemetry.fields import euler
 from flightstack.services.telemetry.telemetry import Telemetry

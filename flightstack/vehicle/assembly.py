@@ -23,10 +23,9 @@ from flightstack.vehicle.flight_monitor import FlightMonitor
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal, Recorder
 from flightstack.vehicle.mission import Mission
-from flightstack.vehicle.mode_control import ModeControl
+from flightstack.vehicle.mode_control import ModeControl, Takeoff
 from flightstack.vehicle.readiness import Readiness
 from flightstack.vehicle.requests import FlightRequests
-from flightstack.vehicle.takeoff import Takeoff
 
 
 class VehicleParts(NamedTuple):
