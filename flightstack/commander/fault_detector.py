@@ -23,7 +23,7 @@ from flightstack.core.contract import (
     Record,
     RecordArray,
 )
-from flightstack.core.portable_math import acos, asin, atan2, exp
+from flightstack.core.portable_math import acos, exp, pitch_angle, roll_angle
 from flightstack.params.behaviour import Behaviour
 from flightstack.params.vehicle import Vehicle
 
@@ -215,15 +215,14 @@ def detect(
             return NOT_FINITE | _fault_bits(memory)
     result = NOT_FINITE if status & _BAD_OUTPUT != 0 else 0
     now = vehicle_state(state)
-    v, w = now.velocity_ned_m_s, now.rates_frd_rad_s
-    if max(abs(v.x), abs(v.y), abs(v.z), abs(w.x), abs(w.y), abs(w.z)) > MOVING_ABOVE:
+    v, rates = now.velocity_ned_m_s, now.rates_frd_rad_s
+    if max(abs(v.x), abs(v.y), abs(v.z), abs(rates.x), abs(rates.y), abs(rates.z)) > MOVING_ABOVE:
         result |= MOVING
     for i in range(limits["rotors"]):
         if limits["limit"][ROTORS] > 0.0 and speeds["missing"][i] >= UNMEASURED_AFTER_S:
             result |= UNMEASURED
-    qw, qx, qy, qz = now.attitude
-    roll = atan2(2.0 * (qw * qx + qy * qz), 1.0 - 2.0 * (qx * qx + qy * qy))
-    pitch = asin(min(1.0, max(-1.0, 2.0 * (qw * qy - qz * qx))))
+    w, x, y, z = now.attitude
+    roll, pitch = roll_angle(w, x, y, z), pitch_angle(w, x, y, z)
     tilt_error = 0.0 if on_ground else _tilt_between(now.attitude, row[_REFERENCE_AT:])
     p = now.position_ned_m
     dx, dy, dz = p.x - setpoint[0], p.y - setpoint[1], p.z - setpoint[2]

@@ -9,6 +9,7 @@ from typing import Protocol
 from flightstack import __version__
 from flightstack.core.contract import Vector3
 from flightstack.core.enums import Severity
+from flightstack.core.portable_math import yaw_angle
 from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_pack import pack_file
 from flightstack.params.metadata import parameters_json
@@ -28,7 +29,6 @@ from flightstack.services.streams.link_loss import GroundLinkMonitor, stream_mon
 from flightstack.services.streams.manual_server import ManualServer
 from flightstack.services.streams.setpoint_server import PoseReference, SetpointServer
 from flightstack.services.streams.timesync import TimeService
-from flightstack.services.telemetry.fields import euler
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.status import VehicleInfo
@@ -101,7 +101,7 @@ def stream_services(own: Address, parts: VehicleParts, info: VehicleInfo) -> tup
     def reference() -> PoseReference:
         state: list[float] = now.state.tolist()
         return PoseReference(
-            Vector3(*state[:3]), euler(state[6:10])[2], info.frame, parts.area.home.altitude_m
+            Vector3(*state[:3]), yaw_angle(*state[6:10]), info.frame, parts.area.home.altitude_m
         )
 
     offboard, manual = stream_monitors(now, parts.failsafes.links)
