@@ -22,7 +22,7 @@ from flightstack.services.files.component_metadata import ComponentMetadata, veh
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_server import LogServer
 from flightstack.services.logs.log_stream import LogStream
-from flightstack.services.mission.mission_service import MissionService
+from flightstack.services.mission.mission_server import MissionService
 from flightstack.services.params.param_server import ParamServer
 from flightstack.services.routing.peer import Peer
 from flightstack.services.streams.link_loss import GroundLinkMonitor, stream_monitors

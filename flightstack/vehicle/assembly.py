@@ -24,8 +24,7 @@ from flightstack.vehicle.flight_monitor import FlightMonitor
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.mission import Mission
-from flightstack.vehicle.mode_control import ModeControl, Takeoff
-from flightstack.vehicle.readiness import Readiness
+from flightstack.vehicle.mode_control import ModeControl, Readiness, Takeoff
 from flightstack.vehicle.requests import FlightRequests
 
 

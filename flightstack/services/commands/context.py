@@ -17,8 +17,7 @@ from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.mission import Mission
-from flightstack.vehicle.mode_control import Takeoff
-from flightstack.vehicle.readiness import Readiness
+from flightstack.vehicle.mode_control import Readiness, Takeoff
 from flightstack.vehicle.requests import FlightRequests
 
 ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
