@@ -62,20 +62,20 @@ imports: $(READY)
 	$(BIN)/lint-imports
 
 generated: $(READY)
-	$(BIN)/python tools/generate_dialect.py --check
-	$(BIN)/python tools/generate_params.py --check
-	$(BIN)/python tools/generate_cli.py --check
-	$(BIN)/python tools/generate_tables.py --check
-	$(BIN)/python firmware/tools/generate_codec.py --check
-	$(BIN)/python firmware/tools/generate_core.py --check
+	$(BIN)/python -m tools.generate_dialect --check
+	$(BIN)/python -m tools.generate_params --check
+	$(BIN)/python -m tools.generate_cli --check
+	$(BIN)/python -m tools.generate_tables --check
+	$(BIN)/python -m firmware.tools.generate_codec --check
+	$(BIN)/python -m firmware.tools.generate_core --check
 
 generate: $(READY) ## Regenerate files made from others
-	$(BIN)/python tools/generate_dialect.py
-	$(BIN)/python tools/generate_params.py
-	$(BIN)/python tools/generate_cli.py
-	$(BIN)/python tools/generate_tables.py
-	$(BIN)/python firmware/tools/generate_codec.py
-	$(BIN)/python firmware/tools/generate_core.py
+	$(BIN)/python -m tools.generate_dialect
+	$(BIN)/python -m tools.generate_params
+	$(BIN)/python -m tools.generate_cli
+	$(BIN)/python -m tools.generate_tables
+	$(BIN)/python -m firmware.tools.generate_codec
+	$(BIN)/python -m firmware.tools.generate_core
 
 docs: $(READY) ## Build the documentation as a site into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flightstack.process import console, options
-from flightstack.process.command_line import UsageError, Version, make_app, with_options
+from flightstack.process.command_line import UsageError, Version, expand_options, make_app
 from flightstack.process.console import say
 
 if TYPE_CHECKING:  # heavy modules are imported when they are needed, so that --help is fast
@@ -62,7 +62,7 @@ class RunOptions:
 
 
 @app.command()
-@with_options(RunOptions)
+@expand_options
 def run(given: RunOptions) -> None:
     """Connect to a simulator, run the control loops, and serve ground stations over MAVLink."""
     from flightstack.core.errors import ConfigError, TargetError

@@ -8,11 +8,10 @@ import sys
 import typer
 
 from flightstack.core.errors import ConfigError
-from flightstack.process.command_line import UsageError, Version, make_app
+from flightstack.process.command_line import UsageError, Version, expand_options, make_app
 from flightstack.process.console import complain, drop, replace_unencodable
 from gcs_cli.commands import GcsGroup, add_groups
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
-from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import LinkOptions, Settings, SigningKeyOption
 
 app = make_app(

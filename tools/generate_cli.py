@@ -15,8 +15,9 @@ from typer.models import ArgumentInfo, CommandInfo, OptionInfo
 import flightstack.__main__
 import gcs_cli.__main__
 import sim_bridge.__main__
+from tools.generated import ROOT, write_or_check
 
-FOLDER = Path(__file__).resolve().parent.parent / "docs" / "reference"
+FOLDER = ROOT / "docs" / "reference"
 PROGRAMS = {
     "gcs": gcs_cli.__main__.app,
     "flightstack": flightstack.__main__.app,
@@ -158,18 +159,5 @@ def page(name: str, app: typer.Typer) -> str:
     return text + section("", name, own, summary, is_group=True) + "".join(parts)
 
 
-def main() -> int:
-    """Write or check the pages."""
-    stale = 0
-    for name, app in PROGRAMS.items():
-        path, text = FOLDER / f"cli-{name}.md", page(name, app)
-        if "--check" not in sys.argv:
-            path.write_text(text, encoding="utf-8")
-        elif not path.exists() or path.read_text(encoding="utf-8") != text:
-            print(f"docs/reference/{path.name} is stale: run `make generate`", file=sys.stderr)
-            stale = 1
-    return stale
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_or_check({FOLDER / f"cli-{name}.md": page(name, app) for name, app in PROGRAMS.items()}))

@@ -7,12 +7,13 @@ the file is stale.
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import Any
 
 from pymavlink.generator import mavparse
 
-FOLDER = Path(__file__).resolve().parent.parent / "flightstack" / "mavlink"
+from tools.generated import ROOT, write_or_check
+
+FOLDER = ROOT / "flightstack" / "mavlink"
 HEADER = '''"""Generated from flightstack.xml by tools/generate_dialect.py: do not edit."""
 
 from flightstack.mavlink.layout import Field, Layout
@@ -67,18 +68,5 @@ def generated() -> str:
     return HEADER + "\n".join(layout_source(message) for message in xml.message) + "\n)\n"
 
 
-def main() -> int:
-    """Write or check the file."""
-    target = FOLDER / "dialect_generated.py"
-    text = generated()
-    if "--check" in sys.argv:
-        if target.exists() and target.read_text() == text:
-            return 0
-        print("dialect_generated.py is stale: run `make generate`", file=sys.stderr)
-        return 1
-    target.write_text(text)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_or_check({FOLDER / "dialect_generated.py": generated()}))

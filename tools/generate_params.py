@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import sys
 from itertools import groupby
-from pathlib import Path
 
 from flightstack.control.controller_loading import load_controller
 from flightstack.control.loop_parameters import loop_numbers
@@ -14,8 +13,9 @@ from flightstack.params.config import identity_specs
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.spec import ParamSpec
 from flightstack.params.vehicle import DEFAULT_VEHICLE, load_vehicle
+from tools.generated import ROOT, write_or_check
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "parameters.md"
+PAGE = ROOT / "docs" / "reference" / "parameters.md"
 CONTROLLERS = ("pid", "backstepping")
 HEAD = """\
 # Parameters
@@ -80,17 +80,5 @@ def generated() -> str:
     return "".join(parts)
 
 
-def main() -> int:
-    """Write or check the page."""
-    text = generated()
-    if "--check" in sys.argv:
-        if PAGE.exists() and PAGE.read_text(encoding="utf-8") == text:
-            return 0
-        print("docs/reference/parameters.md is stale: run `make generate`", file=sys.stderr)
-        return 1
-    PAGE.write_text(text, encoding="utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_or_check({PAGE: generated()}))

@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 from pymavlink import generator
 from pymavlink.generator import mavparse
 
-ROOT = Path(__file__).resolve().parents[2]
+from tools.generated import ROOT, write_or_check
+
 TARGET = ROOT / "firmware" / "mavlink"
 OFFICIAL = Path(generator.__file__).resolve().parents[1] / "dialects" / "v20"
 SOURCES = (
@@ -286,19 +287,5 @@ def files() -> dict[Path, str]:
     }
 
 
-def main() -> int:
-    """Write or check the files."""
-    stale = {
-        path: text for path, text in files().items() if not path.exists() or path.read_text("utf-8") != text
-    }
-    if "--check" in sys.argv:
-        for path in stale:
-            print(f"{path.relative_to(ROOT)} is stale: run `make generate`", file=sys.stderr)
-        return 1 if stale else 0
-    for path, text in stale.items():
-        path.write_text(text, "utf-8")
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_or_check(files()))

@@ -15,8 +15,9 @@ from flightstack.control.attitude_reference import ReferenceMemory, ReferencePar
 from flightstack.control.position_pid import PositionMemory, PositionParams
 from flightstack.core import contract
 from flightstack.firmware.numbers import CONTROLLERS, TARGET_NUMBERS, TargetNumber, default_numbers
+from tools.generated import ROOT, write_or_check
 
-CORE = Path(__file__).resolve().parent.parent / "core"
+CORE = ROOT / "firmware" / "core"
 NOTICE = "/* Generated from Python by firmware/tools/generate_core.py: do not edit. */\n"
 ASCII = {"²": "^2", "³": "^3", "−": "-", "…": "to", "ẋ_d": "x_d'", "ẍ_d": "x_d''"}
 DIGITS = 12
@@ -174,21 +175,15 @@ def check_names(declared: tuple[TargetNumber, ...]) -> None:
         raise ValueError("parameter names must be different and have 16 characters at most")
 
 
-def main() -> int:
-    """Write or check the files."""
+def files() -> dict[Path, str]:
+    """Return the text of every generated file."""
     check_names(TARGET_NUMBERS)
-    stale = []
-    for name, text in {"fs_types.h": types(), "fs_numbers.h": numbers(), "fs_param_table.c": table()}.items():
-        path = CORE / name
-        if not path.exists() or path.read_text(encoding="utf-8") != text:
-            stale.append(name)
-            if "--check" not in sys.argv:
-                path.write_text(text, encoding="utf-8")
-    if stale and "--check" in sys.argv:
-        print(f"{', '.join(stale)} in firmware/core: stale, run `make generate`", file=sys.stderr)
-        return 1
-    return 0
+    return {
+        CORE / "fs_types.h": types(),
+        CORE / "fs_numbers.h": numbers(),
+        CORE / "fs_param_table.c": table(),
+    }
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(write_or_check(files()))

@@ -11,7 +11,6 @@ import math
 import numpy as np
 
 from flightstack.commander.arming_checks import ArmingFacts
-from flightstack.commander.detector_kernels import battery_level
 from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase
 from flightstack.commander.failsafe_step import (
     IDLE,
@@ -22,7 +21,7 @@ from flightstack.commander.failsafe_step import (
     override,
     restart,
 )
-from flightstack.commander.fault_detector import FaultDetector
+from flightstack.commander.fault_detector import FaultDetector, battery_level
 from flightstack.commander.fence_monitor import FenceMonitor
 from flightstack.commander.inputs import BatteryReading, LinkFacts, StateSource
 from flightstack.commander.transitions import Event, Status

@@ -191,8 +191,10 @@ def inner_kernel(
     ``memory`` has the layout of ``inner_layout``. Its ``last`` is the row of the previous tick: it provides saturation
     and Ω_r, and is repeated with a status bit if an input or a result is not finite. The target is interpolated from
     ``last_target`` (previous outer tick) to ``target``; ``fraction`` is the elapsed part of the outer period. Without
-    interpolation, steps of the target would excite the rotors at the outer rate. This function is a template:
-    ``specialise`` binds the controller.
+    interpolation, steps of the target would excite the rotors at the outer rate.
+
+    ``specialise`` binds the controller to this template, and to it alone. It is one long function because the values of
+    the controller's types stay inside: the cache of a function that takes them would refer to types that may go.
     """
     m = memory[0]
     target, last, dt_s = m["target"], m["last"], m["dt_s"]
@@ -227,7 +229,6 @@ def inner_kernel(
         ControllerParams(*as_tuple(m["controller_params"], CONTROLLER_PARAMS_SIZE)),
         dt_s,
     )
-    # pass no value of the controller's types to a function: its cache would refer to types that may be removed
     is_valid = _is_finite(torque)
     for value in advanced:
         is_valid = is_valid and math.isfinite(value)

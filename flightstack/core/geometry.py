@@ -10,7 +10,13 @@ import math
 
 from flightstack.core.compiled import compiled
 from flightstack.core.contract import Quaternion, Vector3
-from flightstack.core.portable_math import LARGEST_SQUARE, arc_tangent_series, asin, atan2, sin_cos
+from flightstack.core.portable_math import (
+    LARGEST_SQUARE,
+    arc_tangent_series,
+    euler_angles,
+    sin_cos,
+    yaw_angle,
+)
 
 LEAST_LENGTH = 1e-30
 """Replaces zero as a divisor."""
@@ -128,19 +134,13 @@ def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> 
 @compiled
 def euler_from_quaternion(q: Quaternion) -> Vector3:
     """Roll, pitch, yaw [rad] of a unit quaternion; roll and yaw in (−π, π], pitch in [−π/2, π/2]."""
-    sin_pitch = 2.0 * (q.w * q.y - q.z * q.x)
-    sin_pitch = min(1.0, max(-1.0, sin_pitch))
-    return Vector3(
-        atan2(2.0 * (q.w * q.x + q.y * q.z), 1.0 - 2.0 * (q.x * q.x + q.y * q.y)),
-        asin(sin_pitch),
-        heading(q),
-    )
+    return Vector3(*euler_angles(q.w, q.x, q.y, q.z))
 
 
 @compiled
 def heading(q: Quaternion) -> float:
     """Yaw [rad] of a unit quaternion, in (−π, π]."""
-    return atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+    return yaw_angle(q.w, q.x, q.y, q.z)
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Elementary functions with bit-identical results on every processor, built from + − × ÷ and √ alone.
+"""Elementary functions and Euler angles with bit-identical results on every processor, built from + − × ÷ and √ alone.
 
 IEEE 754 fixes the rounding of these five operations. libm selects variants by processor features (FMA, AVX2) that
 differ in the last place. Everything that a flight computes uses the functions here, which have the same polynomials in
@@ -170,5 +170,28 @@ def distance(x: float, y: float, z: float = 0.0) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
-FUNCTIONS = (sin_cos, tan, arc_tangent_series, atan2, asin, acos, exp, log, distance)
+def roll_angle(w: float, x: float, y: float, z: float) -> float:
+    """Return the roll [rad] (3-2-1) of a unit quaternion, body FRD to world NED, in (−π, π]."""
+    return atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+
+
+def pitch_angle(w: float, x: float, y: float, z: float) -> float:
+    """Return the pitch [rad] (3-2-1) of a unit quaternion, body FRD to world NED, in [−π/2, π/2]."""
+    return asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
+
+
+def yaw_angle(w: float, x: float, y: float, z: float) -> float:
+    """Return the yaw [rad] (3-2-1) of a unit quaternion, body FRD to world NED, in (−π, π]."""
+    return atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def euler_angles(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return roll, pitch and yaw [rad] of a unit quaternion."""
+    return roll_angle(w, x, y, z), pitch_angle(w, x, y, z), yaw_angle(w, x, y, z)
+
+
+FUNCTIONS = (
+    sin_cos, tan, arc_tangent_series, atan2, asin, acos, exp, log, distance,
+    roll_angle, pitch_angle, yaw_angle, euler_angles,
+)  # fmt: skip
 """Functions available to compiled code."""

@@ -27,7 +27,7 @@ OpenLog = Callable[[], FlightLog | None]
 
 
 class FlightRecorder:
-    """Implements the autopilot's ``Recorder``. Without an open log, rows go to a scratch row."""
+    """Records what the autopilot reports. Without an open log, rows go to a scratch row."""
 
     def __init__(
         self,

@@ -14,7 +14,8 @@ from flightstack.mavlink.fields import fitted, int32
 MAGIC = b"ULog\x01\x12\x35"
 VERSION = 1
 
-_MESSAGE = struct.Struct("<HB")
+MESSAGE_HEADER = struct.Struct("<HB")
+"""Header of a message: size of the content, type."""
 _SUBSCRIPTION = struct.Struct("<BH")
 _LOGGED_STRING = struct.Struct("<BQ")
 _FLAG_BITS = bytes(40)  # no flags, no appended data
@@ -22,6 +23,9 @@ _MAX_CONTENT = 0xFFFF
 
 HEADER_SIZE = len(MAGIC) + 1 + 8
 """Bytes of the file header, before the first message."""
+DEFINITION_TYPES = frozenset(b"BFIMPQA")
+"""Message types of the definitions; the first message of another type starts the data section."""
+MESSAGE_TYPES = DEFINITION_TYPES | frozenset(b"DRLCSO")
 DATA_HEADER = struct.Struct("<HBH")  # size, type 'D', subscription id
 DATA_TYPE = ord("D")
 
@@ -29,7 +33,7 @@ DATA_TYPE = ord("D")
 def _message(kind: str, content: bytes) -> bytes:
     if len(content) > _MAX_CONTENT:
         raise ValueError(f"a ULog message holds at most {_MAX_CONTENT} bytes, this one has {len(content)}")
-    return _MESSAGE.pack(len(content), ord(kind)) + content
+    return MESSAGE_HEADER.pack(len(content), ord(kind)) + content
 
 
 def file_header(time_us: int) -> bytes:
@@ -40,8 +44,8 @@ def file_header(time_us: int) -> bytes:
 def whole_messages(data: bytes | memoryview, count: int, begin: int = 0) -> int:
     """Return how many of the first ``count`` bytes are complete messages after ``begin`` header bytes."""
     end = begin
-    while end + _MESSAGE.size <= count:
-        after = end + _MESSAGE.size + _MESSAGE.unpack_from(data, end)[0]
+    while end + MESSAGE_HEADER.size <= count:
+        after = end + MESSAGE_HEADER.size + MESSAGE_HEADER.unpack_from(data, end)[0]
         if after > count:
             break
         end = after

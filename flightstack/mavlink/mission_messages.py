@@ -33,7 +33,7 @@ PROTOCOL = frozenset(
 """Messages of the protocol sent to a vehicle."""
 
 GOES_THERE, CHANGES_ALTITUDE = 2, 3
-"""Values of ``current`` for guided items, which are no part of a plan (``services.mission.guided_items``)."""
+"""Values of ``current`` for guided items, which are no part of a plan (``services.commands.guided``)."""
 
 _ITEM = struct.Struct("<ffffiifHB?")
 

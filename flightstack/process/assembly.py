@@ -25,7 +25,7 @@ from flightstack.params.param_file import LoadedParams
 from flightstack.params.store import ParamStore
 from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.process.clock import LoopTiming, Rates, TimingReport, rates
-from flightstack.services.commands import VehicleContext
+from flightstack.services.commands.context import VehicleContext
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.routing.hub import GroundHub
 from flightstack.services.telemetry.telemetry import Telemetry

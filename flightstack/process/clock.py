@@ -17,9 +17,9 @@ import numpy as np
 from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import FsLoopTiming
 from flightstack.mavlink.link import Message
+from flightstack.params.config import DEFAULT_OUTER_HZ
 
 MIN_INNER_HZ, MAX_INNER_HZ = 10.0, 20_000.0
-DEFAULT_OUTER_HZ = 100.0
 WINDOW = 4096
 
 
@@ -39,7 +39,7 @@ class Rates(NamedTuple):
 
 
 def nearest_outer_hz(inner_hz: float) -> float:
-    """Return the default outer rate: the one nearest to 100 Hz that divides ``inner_hz``."""
+    """Return the default outer rate: the one nearest to ``DEFAULT_OUTER_HZ`` that divides ``inner_hz``."""
     return inner_hz / max(1, round(inner_hz / DEFAULT_OUTER_HZ))
 
 

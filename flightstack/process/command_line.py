@@ -6,9 +6,9 @@ import dataclasses
 import functools
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
@@ -29,26 +29,42 @@ def make_app(**settings: Any) -> typer.Typer:
     )
 
 
-def with_options(options: type[Any]) -> Callable[[Callable[[Any], None]], Callable[..., None]]:
-    """Give a command one flag per field of the dataclass ``options``, which is its only argument."""
-    hints = get_type_hints(options, include_extras=True)
-    parameters = [
+def expand_options(command: Callable[..., None], without: Collection[str] = ()) -> Callable[..., None]:
+    """Replace each dataclass among the parameters of a command by one option per field.
+
+    A field is an option if its type is ``Annotated`` and its name is not in ``without``.
+    """
+    groups: dict[str, tuple[Any, list[inspect.Parameter]]] = {}
+    parameters: list[inspect.Parameter] = []
+    for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
+        if dataclasses.is_dataclass(parameter.annotation):
+            groups[name] = parameter.annotation, _options_of(parameter.annotation, without)
+            parameters += groups[name][1]
+        else:
+            parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
+
+    @functools.wraps(command)
+    def run(**given: Any) -> None:
+        built = {
+            name: group(**{option.name: given.pop(option.name) for option in options})
+            for name, (group, options) in groups.items()
+        }
+        command(**built, **given)
+
+    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return run
+
+
+def _options_of(group: Any, without: Collection[str]) -> list[inspect.Parameter]:
+    hints = get_type_hints(group, include_extras=True)
+    return [
         inspect.Parameter(
             field.name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name]
         )
-        for field in dataclasses.fields(options)
+        for field in dataclasses.fields(group)
+        if field.name not in without and hasattr(hints[field.name], "__metadata__")
     ]
-
-    def decorate(command: Callable[[Any], None]) -> Callable[..., None]:
-        @functools.wraps(command)
-        def run(**given: Any) -> None:
-            command(options(**given))
-
-        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-        return run
-
-    return decorate
 
 
 def own_program(module: str, *arguments: str) -> list[str]:
@@ -73,52 +89,48 @@ Version = Annotated[
     bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
 ]
 
-# options of ``gcs replay`` and ``sim-bridge render``
-Png = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="Write a picture of the middle of the flight, or of the time --at."),
-]
-Sheet = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Write nine times, or those of --at, in one picture.")
-]
-Video = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Write a film: .mp4 (needs an even size) or .gif.")
-]
-View = Annotated[bool, typer.Option("--view", help="Play the flight in a window.")]
-At = Annotated[
-    str | None,
-    typer.Option(metavar="T1[,T2,…]", help="Times of the pictures, s; several write numbered files."),
-]
-Camera = Annotated[str, typer.Option(help="chase, fixed, top, side, or whole (the whole path from above).")]
-Size = Annotated[
-    str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 1280x720; 480x270 for a gif]")
-]
-Fps = Annotated[float | None, typer.Option(help="Frames per second.  [default: 30; 12.5 for a gif]")]
-Begin = Annotated[float | None, typer.Option("--from", help="Start of the film, s.")]
-End = Annotated[float | None, typer.Option("--to", help="End of the film, s.")]
-Speed = Annotated[
-    float | None, typer.Option(help="Speed of the playback over that of the flight.  [default: 1]")
-]
-NoWords = Annotated[bool, typer.Option("--no-words", help="Omit figures, waypoint numbers and scale.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
 
 
-class PictureOptions(NamedTuple):
-    """Options of a picture or film, as given; None where not given."""
+@dataclasses.dataclass(frozen=True)
+class PictureOptions:
+    """Options of ``gcs replay`` and ``sim-bridge render``, as given; None where not given."""
 
-    png: Path | None = None
-    sheet: Path | None = None
-    video: Path | None = None
-    view: bool = False
-    at: str | None = None
-    camera: str = "chase"
-    size: str | None = None
-    fps: float | None = None
-    begin: float | None = None
-    end: float | None = None
-    speed: float | None = None
-    no_words: bool = False
-    overwrite: bool = False
+    png: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write a picture of the middle of the flight, or of the time --at."
+        ),
+    ] = None
+    sheet: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write nine times, or those of --at, in one picture.")
+    ] = None
+    video: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write a film: .mp4 (needs an even size) or .gif.")
+    ] = None
+    view: Annotated[bool, typer.Option("--view", help="Play the flight in a window.")] = False
+    at: Annotated[
+        str | None,
+        typer.Option(metavar="T1[,T2,…]", help="Times of the pictures, s; several write numbered files."),
+    ] = None
+    camera: Annotated[
+        str, typer.Option(help="chase, fixed, top, side, or whole (the whole path from above).")
+    ] = "chase"
+    size: Annotated[
+        str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 1280x720; 480x270 for a gif]")
+    ] = None
+    fps: Annotated[float | None, typer.Option(help="Frames per second.  [default: 30; 12.5 for a gif]")] = (
+        None
+    )
+    begin: Annotated[float | None, typer.Option("--from", help="Start of the film, s.")] = None
+    end: Annotated[float | None, typer.Option("--to", help="End of the film, s.")] = None
+    speed: Annotated[
+        float | None, typer.Option(help="Speed of the playback over that of the flight.  [default: 1]")
+    ] = None
+    no_words: Annotated[
+        bool, typer.Option("--no-words", help="Omit figures, waypoint numbers and scale.")
+    ] = False
+    overwrite: Overwrite = False
 
     def arguments(self) -> list[str]:
         """Return the same options as command line arguments."""

@@ -9,27 +9,26 @@ from typing import Protocol
 from flightstack import __version__
 from flightstack.core.contract import Vector3
 from flightstack.core.enums import Severity
+from flightstack.core.portable_math import yaw_angle
 from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_pack import pack_file
 from flightstack.params.metadata import parameters_json
-from flightstack.services.commands import VehicleContext
-from flightstack.services.commands.command_service import CommandService
+from flightstack.services.commands.command_server import CommandService
+from flightstack.services.commands.context import VehicleContext
 from flightstack.services.commands.failure_commands import FailureCommands
+from flightstack.services.commands.guided import GuidedItems
 from flightstack.services.commands.link_commands import LinkCommands
 from flightstack.services.files.component_metadata import ComponentMetadata, vehicle_files
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_server import LogServer
 from flightstack.services.logs.log_stream import LogStream
-from flightstack.services.mission.guided_items import GuidedItems
-from flightstack.services.mission.mission_service import MissionService
+from flightstack.services.mission.mission_server import MissionService
 from flightstack.services.params.param_server import ParamServer
 from flightstack.services.routing.peer import Peer
 from flightstack.services.streams.link_loss import GroundLinkMonitor, stream_monitors
 from flightstack.services.streams.manual_server import ManualServer
-from flightstack.services.streams.setpoint_messages import PoseReference
-from flightstack.services.streams.setpoint_server import SetpointServer
+from flightstack.services.streams.setpoint_server import PoseReference, SetpointServer
 from flightstack.services.streams.timesync import TimeService
-from flightstack.services.telemetry.fields import euler
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.status import VehicleInfo
@@ -102,7 +101,7 @@ def stream_services(own: Address, parts: VehicleParts, info: VehicleInfo) -> tup
     def reference() -> PoseReference:
         state: list[float] = now.state.tolist()
         return PoseReference(
-            Vector3(*state[:3]), euler(state[6:10])[2], info.frame, parts.area.home.altitude_m
+            Vector3(*state[:3]), yaw_angle(*state[6:10]), info.frame, parts.area.home.altitude_m
         )
 
     offboard, manual = stream_monitors(now, parts.failsafes.links)

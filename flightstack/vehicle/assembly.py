@@ -12,6 +12,7 @@ from flightstack.commander.inputs import StateSource
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.core.geodesy import GeoPoint
+from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.guidance.safe_places import SafePlaces, plan_limits
@@ -21,12 +22,10 @@ from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.autopilot import Autopilot
 from flightstack.vehicle.flight_monitor import FlightMonitor
 from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Journal, Recorder
+from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.mission import Mission
-from flightstack.vehicle.mode_control import ModeControl
-from flightstack.vehicle.readiness import Readiness
+from flightstack.vehicle.mode_control import ModeControl, Readiness, Takeoff
 from flightstack.vehicle.requests import FlightRequests
-from flightstack.vehicle.takeoff import Takeoff
 
 
 class VehicleParts(NamedTuple):
@@ -70,7 +69,7 @@ def assemble(
     home: GeoPoint,
     divisor: int,
     outer_hz: float,
-    recorder: Recorder,
+    recorder: FlightRecorder,
     state: FloatArray,
     rotor_speed_rad_s: FloatArray,
     source: StateSource,

@@ -6,10 +6,10 @@ from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import FloatArray, LoopFlags, LoopRow, LoopStatus
 from flightstack.core.enums import Mode
+from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.guidance.navigator import Navigator
 from flightstack.vehicle.flight_monitor import FlightMonitor
 from flightstack.vehicle.flight_state import FlightState
-from flightstack.vehicle.journal import Recorder
 
 # module constants for every tick: looking up an enumeration member takes seven times as long
 _MISSION = Mode.MISSION
@@ -27,7 +27,7 @@ class Autopilot:
         failsafes: FailsafeMonitor,
         navigator: Navigator,
         backend: ControlBackend,
-        recorder: Recorder,
+        recorder: FlightRecorder,
         divisor: int,
     ) -> None:
         """Run the outer loop every ``divisor`` ticks."""

@@ -12,8 +12,7 @@ from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.mission import Mission
-from flightstack.vehicle.mode_control import ModeControl
-from flightstack.vehicle.takeoff import Takeoff
+from flightstack.vehicle.mode_control import ModeControl, Takeoff
 
 AIRBORNE_MODES = (Mode.TAKEOFF, Mode.MISSION)
 """Modes that take off, at once or after a delay."""

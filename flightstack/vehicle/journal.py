@@ -2,46 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from flightstack.commander.transitions import Status
-from flightstack.core.contract import FloatArray, Vector3
+from flightstack.core.contract import Vector3
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
+from flightstack.flight_log.recorder import FlightRecorder
 from flightstack.guidance.navigator import MissionProgress
 from flightstack.vehicle.flight_state import FlightState
-
-
-class Recorder(Protocol):
-    """Interface of the flight log to the autopilot; implemented by ``flight_log.recorder``."""
-
-    def inner_row(self, time_us: int) -> FloatArray:
-        """Return the row, shape (48,), that the inner loop fills in this tick."""
-
-    def outer(
-        self,
-        time_us: int,
-        state: FloatArray,
-        setpoint: FloatArray,
-        attitude_target: FloatArray,
-        loop_flags: int,
-    ) -> None:
-        """Record one outer tick; ``loop_flags`` is a set of ``LoopFlags``, 0 while the loops do not run."""
-
-    def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
-        """Record a change of mode, arming, or failsafe."""
-
-    def landed(self, time_us: int, landed: bool) -> None:
-        """Record a change of the land detector."""
-
-    def mission(self, time_us: int, progress: MissionProgress, count: int) -> None:
-        """Record progress of the mission."""
-
-    def home(self, time_us: int, home: GeoPoint, position_ned_m: Vector3) -> None:
-        """Record a change of home."""
-
-    def text(self, time_us: int, severity: int, text: str) -> None:
-        """Record a text."""
 
 
 class Text(NamedTuple):
@@ -63,7 +32,7 @@ Event: TypeAlias = Text | ItemReached
 class Journal:
     """Queues events until telemetry takes them, and records them."""
 
-    def __init__(self, now: FlightState, recorder: Recorder) -> None:
+    def __init__(self, now: FlightState, recorder: FlightRecorder) -> None:
         self._now = now
         self._recorder = recorder
         self._events: list[Event] = []

@@ -1,20 +1,121 @@
-"""Transitions of mode and arming, and the start of loops and guidance that follows. No I/O, no clock."""
+"""Readiness to arm, transitions of mode and arming, takeoff, start of loops and guidance. No I/O, no clock."""
 
 from __future__ import annotations
 
+from flightstack.commander.arming_checks import arming_refusals
 from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.commander.ground_monitor import GroundMonitor
-from flightstack.commander.transitions import Event, Status, transition
+from flightstack.commander.transitions import Event, Facts, Need, Status, transition
 from flightstack.control.backend import ControlBackend
 from flightstack.core.enums import STREAM_MODES, Mode, Severity
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import SpeedOverrides
+from flightstack.guidance.safe_places import SafePlaces, plan_limits
 from flightstack.vehicle.area import FlightArea
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.mission import Mission
-from flightstack.vehicle.readiness import Readiness
-from flightstack.vehicle.takeoff import Takeoff
+
+
+class Readiness:
+    """Provides the facts of the transition table and the results of the arming checks."""
+
+    def __init__(
+        self, now: FlightState, failsafes: FailsafeMonitor, ground: GroundMonitor, mission: Mission
+    ) -> None:
+        self._now = now
+        self._failsafes = failsafes
+        self._ground = ground
+        self._mission = mission
+
+    @property
+    def facts(self) -> Facts:
+        """Facts that the transition table needs."""
+        now = self._now
+        known = self._failsafes.arming_facts(now.status.mode, now.has_state)
+        return Facts(
+            state_is_valid=known.state_is_valid and known.state_is_fresh,
+            upright=known.upright,
+            landed=now.landed,
+            has_mission=bool(self._mission.items),
+            mission_takes_off=self._mission.takes_off(),
+            manual_fresh=known.manual_fresh,
+            offboard_fresh=known.offboard_fresh,
+        )
+
+    def arming_refusals(self, mode: Mode | None = None, first: int | None = None) -> tuple[str, ...]:
+        """Return every reason against arming, in the current mode or in ``mode``; empty if the vehicle would arm.
+
+        ``first`` is the first mission item (default: the current one).
+        """
+        now = self._now
+        mode = now.status.mode if mode is None else mode
+        known = self._failsafes.arming_facts(mode, now.has_state)
+        known = known._replace(throttle=now.throttle, mode_fault=self._fault_on_ground(mode, first) or "")
+        known = known._replace(is_at_rest=self._ground.is_at_rest(now.time_us))
+        return arming_refusals(known, now.behaviour)
+
+    def _fault_on_ground(self, mode: Mode, first: int | None) -> str | None:
+        """Return the reason that ``mode`` cannot take off, or None."""
+        if mode in (Mode.RETURN, Mode.LAND):
+            return f"{mode.name.lower()} mode cannot take off: select another mode first"
+        if mode is not Mode.MISSION:
+            return None
+        if not self._mission.items:
+            return Need.MISSION.value
+        return self._mission.refusal() if self._mission.takes_off(first) else Need.TAKES_OFF.value
+
+
+class Takeoff:
+    """Holds the altitude to which TAKEOFF mode climbs."""
+
+    def __init__(self, now: FlightState, places: SafePlaces, area: FlightArea, readiness: Readiness) -> None:
+        self._now = now
+        self._area = area
+        self._readiness = readiness
+        self._places = places
+        self.altitude_m = now.behaviour.takeoff_altitude_m
+        """Target altitude above the origin of the local frame."""
+
+    def set_altitude(self, above_home_m: float | None) -> str | None:
+        """Set the altitude above home; None stands for MIS_TAKEOFF_ALT above both home and vehicle.
+
+        Return the refusal, or None.
+        """
+        b = self._now.behaviour
+        limit_m, vehicle_m = plan_limits(b).max_altitude_m, self._vehicle_above_home_m()
+        altitude = max(vehicle_m, 0.0) + b.takeoff_altitude_m if above_home_m is None else above_home_m
+        if altitude - vehicle_m < b.altitude_acceptance_m < altitude:
+            return f"takeoff altitude {altitude:g} m is not above the vehicle, which is at {vehicle_m:.4g} m above home"
+        if not altitude > b.altitude_acceptance_m:
+            return f"takeoff altitude {altitude:g} m is too low"
+        if altitude > limit_m:
+            return f"takeoff altitude {altitude:g} m is above {limit_m:g} m"
+        self.altitude_m = altitude + self._places.home.altitude_m
+        return None
+
+    @property
+    def is_reached(self) -> bool:
+        """True if the vehicle is at the takeoff altitude, within NAV_MC_ALT_RAD."""
+        error_m = float(self._now.state[2]) + self.altitude_m
+        return abs(error_m) <= self._now.behaviour.altitude_acceptance_m
+
+    @property
+    def home_altitude_m(self) -> float:
+        """Altitude of home above sea level at the takeoff: home may move to the vehicle on arming."""
+        moves = (
+            not self._now.status.armed and self._area.home_follows and self._readiness.facts.state_is_valid
+        )
+        return self._above_sea_m() if moves else self._area.home.altitude_m
+
+    def _vehicle_above_home_m(self) -> float:
+        """Return the height of the vehicle above home at the takeoff; 0 if it is unknown."""
+        if not self._readiness.facts.state_is_valid:
+            return 0.0
+        return self._above_sea_m() - self.home_altitude_m
+
+    def _above_sea_m(self) -> float:
+        return self._places.frame.origin.altitude_m - float(self._now.state[2])
 
 
 class ModeControl:

@@ -15,8 +15,7 @@ from flightstack.plan import MissionItem
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.mission import Mission
-from flightstack.vehicle.mode_control import ModeControl
-from flightstack.vehicle.readiness import Readiness
+from flightstack.vehicle.mode_control import ModeControl, Readiness
 
 PHASE_OF_REQUEST: dict[Event, Phase] = {
     rule.event: PHASE_OF_MODE[rule.mode] for rule in RULES if rule.mode is not None and rule.selects

@@ -6,11 +6,10 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process.command_line import make_app
+from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
-from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import LinkOptions
 from gcs_cli.vehicle.px4_modes import mode_numbers, settable_modes
 from gcs_cli.vehicle_link import connect_vehicle

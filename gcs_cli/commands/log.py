@@ -11,11 +11,10 @@ import typer
 
 from flightstack.core.atomic_file import check_new, write_bytes_atomically
 from flightstack.mavlink.files import Entry
-from flightstack.process.command_line import make_app
+from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.clients.log_client import LogEntry
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
-from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
 from gcs_cli.transfers import log_calls
 from gcs_cli.tui.transfer_bar import TransferBar

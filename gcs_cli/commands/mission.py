@@ -11,12 +11,11 @@ import typer
 from flightstack.core.atomic_file import check_new
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import MissionItem, MissionType, Plan, command_name, load_plan, save_plan
-from flightstack.process.command_line import make_app
+from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.errors import FAILED, CliError, VehicleLostError
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
-from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import LinkOptions, OverwriteOption
 from gcs_cli.transfers.plan_files import PlanArgument
 from gcs_cli.transfers.plan_parts import Uploads, parts_to_send, plan_parts, plan_problem

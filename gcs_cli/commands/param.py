@@ -14,11 +14,10 @@ from rich.console import Console
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.mavlink.param_values import Parameter
 from flightstack.params.param_file import is_parameter_name
-from flightstack.process.command_line import make_app
+from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
-from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
 from gcs_cli.transfers import param_calls
 from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, load_parameters, number_text, render_parameters

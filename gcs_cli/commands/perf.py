@@ -11,11 +11,10 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from flightstack.process.command_line import make_app
+from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.errors import NO_ANSWER, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import LOOP_TIMING
-from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import JsonOption, LinkOptions, link_options
 from gcs_cli.tui.panels import number
 from gcs_cli.vehicle.view_types import LoopTiming

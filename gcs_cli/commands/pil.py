@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process.command_line import make_app
+from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.fly.fly_flags import FlyOptions, ResultOptions, RunOptions, complete_options
-from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import JsonOption
 
 app = make_app(add_completion=False)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from flightstack.flight_log.poses_file import write_poses
-from flightstack.process import command_line as asked
-from flightstack.process.command_line import make_app, own_program
+from flightstack.process.command_line import PictureOptions, expand_options, make_app, own_program
 from flightstack.process.console import complain
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.report.analysis import read_flight
@@ -24,22 +24,11 @@ _END_TIMEOUT_S = 10.0
 
 
 @app.command()
+@expand_options
 def replay(
     run: Annotated[Path, typer.Argument(help="Directory of a flight, or its log.", show_default=False)],
-    png: asked.Png = None,
-    sheet: asked.Sheet = None,
-    video: asked.Video = None,
-    view: asked.View = False,
-    at: asked.At = None,
-    camera: asked.Camera = "chase",
-    size: asked.Size = None,
-    fps: asked.Fps = None,
-    begin: asked.Begin = None,
-    end: asked.End = None,
-    speed: asked.Speed = None,
+    options: PictureOptions,
     vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the log's]")] = None,
-    no_words: asked.NoWords = False,
-    overwrite: asked.Overwrite = False,
 ) -> None:
     """Draw a flight: pictures, a film, or a window.
 
@@ -51,11 +40,8 @@ def replay(
     poses = poses_of(flight, found, vehicle)
     if flight.damaged:
         complain(f"gcs: warning: the log is damaged; drawn up to {poses.time_s[-1]:.1f} s")
-    if not (png or sheet or video or view):
-        video, overwrite = found.film, True  # part of the run, like its report
-    options = asked.PictureOptions(
-        png, sheet, video, view, at, camera, size, fps, begin, end, speed, no_words, overwrite
-    )
+    if not (options.png or options.sheet or options.video or options.view):
+        options = replace(options, video=found.film, overwrite=True)  # part of the run, like its report
     with tempfile.TemporaryDirectory(prefix="gcs-replay-") as folder:
         file = Path(folder) / "poses.npz"
         write_poses(file, poses)

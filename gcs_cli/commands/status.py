@@ -8,9 +8,8 @@ from typing import Any
 
 import typer
 
-from flightstack.process.command_line import make_app
+from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
-from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import JsonOption, LinkOptions
 from gcs_cli.vehicle.view_types import VehicleView
 from gcs_cli.vehicle_link import connect_vehicle

@@ -13,10 +13,9 @@ import typer
 from rich.console import Console
 from rich.live import Live
 
-from flightstack.process.command_line import make_app
+from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
-from gcs_cli.option_groups import expand_options
 from gcs_cli.settings import LinkOptions, link_options
 from gcs_cli.tui.watch_lines import state_line, text_line
 from gcs_cli.tui.watch_render import render

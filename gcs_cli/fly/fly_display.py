@@ -12,6 +12,7 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
+from flightstack.core.enums import Severity
 from flightstack.process.console import drop
 from gcs_cli.fly.flight import Flight, Phase
 from gcs_cli.tui.watch_lines import text_line
@@ -19,7 +20,6 @@ from gcs_cli.vehicle.view_types import StatusText
 
 _FRAME_S = 0.1
 _WITH_BAR, _WITH_PLACE = 60, 90  # columns of the terminal
-_WARNING = 4  # MAV_SEVERITY_WARNING
 
 
 class FlyConsole(Console):
@@ -89,7 +89,7 @@ class BarDisplay:
     def update(self, flight: Flight) -> None:
         """Redraw, at most ten times a second."""
         for entry in self._texts.of(flight):
-            if entry.severity <= _WARNING:
+            if entry.severity <= Severity.WARNING:
                 self._live.console.print(Text(text_line(entry), style="yellow"))
         now_s = time.monotonic()
         if now_s >= self._due_s:

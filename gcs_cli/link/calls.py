@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
+from flightstack.core.enums import Severity
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.link import Address
 from flightstack.plan import MissionItem, MissionResult, MissionType
@@ -17,7 +18,6 @@ OWN_ADDRESS = Address(SYSTEM_ID, COMPONENT_ID)
 TEXT_WAIT_S = 0.3
 """How long to wait for the STATUSTEXT that explains a refusal; it follows the answer."""
 
-_WARNING = 4  # MAV_SEVERITY_WARNING; lower is worse
 _PREFIXES = (
     "Command refused: ",
     "Mission refused: ",
@@ -90,7 +90,7 @@ class Call:
         texts = [
             entry.text
             for entry in self._session.view.texts_since(self._texts_before)
-            if entry.severity <= _WARNING
+            if entry.severity <= Severity.WARNING
         ]
         text = texts[-1] if texts else ""
         for prefix in _PREFIXES:

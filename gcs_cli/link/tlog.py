@@ -14,13 +14,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
 
+from flightstack.mavlink.frames import MAGIC_V1, MAGIC_V2, frame_size, message_id_of
 from flightstack.mavlink.link import Link, Message
 
 _TIME = struct.Struct(">Q")
 _LINK_BITS = 3  # readers use the two lowest bits of the timestamp as the link number
-_MAGIC_V1, _MAGIC_V2 = 0xFE, 0xFD
-_SIGNED = 0x01
-_SIGNATURE_SIZE = 13
 
 
 class Record(NamedTuple):
@@ -36,31 +34,19 @@ def encode_record(time_us: int, frame: bytes | memoryview) -> bytes:
     return _TIME.pack(time_us & ~_LINK_BITS) + frame
 
 
-def _frame_size_and_id(data: memoryview) -> tuple[int, int] | None:
-    if len(data) < 10:  # only a v1 frame of 8 bytes at the end
-        return (data[1] + 8, data[5]) if len(data) >= 8 and data[0] == _MAGIC_V1 else None
-    if data[0] == _MAGIC_V2:
-        signature = _SIGNATURE_SIZE if data[2] & _SIGNED else 0
-        return data[1] + 12 + signature, data[7] | data[8] << 8 | data[9] << 16
-    if data[0] == _MAGIC_V1:
-        return data[1] + 8, data[5]
-    return None
-
-
 def decode_records(data: bytes) -> Iterator[Record]:
     """Yield the records of a log up to its end or its first invalid byte.
 
     A truncated record at the end is left out. Checksums are not checked.
     """
-    view = memoryview(data)
     at = 0
-    while len(view) - at > _TIME.size:
-        found = _frame_size_and_id(view[at + _TIME.size : at + _TIME.size + 10])
-        if found is None or at + _TIME.size + found[0] > len(view):
-            return
-        size, message_id = found
+    while len(data) - at > _TIME.size:
         start = at + _TIME.size
-        yield Record(_TIME.unpack_from(view, at)[0], message_id, bytes(view[start : start + size]))
+        size = frame_size(data, start) if data[start] in (MAGIC_V1, MAGIC_V2) else None
+        if size is None or start + size > len(data):
+            return
+        frame = data[start : start + size]
+        yield Record(_TIME.unpack_from(data, at)[0], message_id_of(frame), frame)
         at = start + size
 
 

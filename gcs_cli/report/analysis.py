@@ -18,6 +18,7 @@ from flightstack.core.contract import MAX_ROTORS, FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.core.geometry_bulk import euler_from_quaternions
+from flightstack.flight_log.ulog import HEADER_SIZE, MESSAGE_HEADER, MESSAGE_TYPES
 from gcs_cli.report.flight_data import (
     Flight,
     LoopTiming,
@@ -32,9 +33,6 @@ from gcs_cli.report.flight_data import (
 
 __all__ = ["Flight", "flight_of", "parse_ulog", "read_flight"]
 
-_FILE_HEADER = 16
-_MESSAGE_HEADER = 3  # size of the payload, two bytes, little endian; type
-_TYPES = frozenset(b"BFIMPQADRLCSO")
 _ARMED = 2  # vehicle_status.arming_state
 _TIMING_FIELDS = LoopTiming._fields[2:8]  # execution and lateness
 _DAMAGE = (ULogException, struct.error, ValueError, KeyError, IndexError, OverflowError, TypeError)
@@ -184,9 +182,10 @@ def is_whole(log: bytes) -> bool:
 
     The format has no end mark and no checksums.
     """
-    at, end = _FILE_HEADER, len(log)
-    while at + _MESSAGE_HEADER <= end:
-        if log[at + 2] not in _TYPES:
+    at, end = HEADER_SIZE, len(log)
+    while at + MESSAGE_HEADER.size <= end:
+        size, kind = MESSAGE_HEADER.unpack_from(log, at)
+        if kind not in MESSAGE_TYPES:
             return False
-        at += _MESSAGE_HEADER + log[at] + 256 * log[at + 1]
+        at += MESSAGE_HEADER.size + size
     return at == end

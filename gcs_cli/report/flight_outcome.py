@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
-from flightstack.core.enums import NAVIGATION_STATE, Mode
+from flightstack.core.enums import NAVIGATION_STATE, Mode, Severity
 from flightstack.plan import NAV_COMMANDS, Command, MissionItem
 from gcs_cli.errors import DONE, FAILED
 from gcs_cli.vehicle.view_types import VehicleView
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from gcs_cli.report.flight_data import Flight
 
 _ON_GROUND = 1  # MAV_LANDED_STATE
-_WARNING = 4  # MAV_SEVERITY_WARNING
 GROUND_ENDS = (Command.NAV_LAND, Command.NAV_RETURN_TO_LAUNCH)
 _TERMINATED = NAVIGATION_STATE[Mode.TERMINATION]
 _MOST_WARNINGS = 3
@@ -98,7 +97,7 @@ def _item(view: VehicleView, items: Sequence[MissionItem]) -> str:
 
 def _warnings(view: VehicleView) -> str:
     """Return the newest warnings of the vehicle, to stand at the end of a sentence."""
-    warnings = [entry.text for entry in view.texts if entry.severity <= _WARNING]
+    warnings = [entry.text for entry in view.texts if entry.severity <= Severity.WARNING]
     return f": {'; '.join(warnings[-_MOST_WARNINGS:])}" if warnings else ""
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from flightstack.core.atomic_file import write_text_atomically
+from flightstack.core.enums import Severity
 from flightstack.plan import Plan, command_name
 from gcs_cli.charts.figure import AnyFigure
 from gcs_cli.charts.pages import render_page, shown
@@ -19,8 +20,7 @@ from gcs_cli.report.telemetry import Telemetry, read_telemetry
 
 TEMPLATES = Path(__file__).parent / "templates"
 _COMPLETED = "completed"
-_LEVELS = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
-_WARNING = 4
+_LEVELS = [severity.name.lower() for severity in Severity]
 
 
 def write_report(path: Path, flight: Flight, plan: Plan, summary: dict[str, Any], tlog: Path) -> None:
@@ -48,7 +48,7 @@ def render_report(flight: Flight, plan: Plan, summary: dict[str, Any], telemetry
             (
                 text,
                 _LEVELS[text.level] if 0 <= text.level < len(_LEVELS) else text.level,
-                text.level <= _WARNING,
+                text.level <= Severity.WARNING,
             )
             for text in flight.texts
         ],

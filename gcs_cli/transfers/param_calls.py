@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flightstack.core.enums import Severity
 from flightstack.mavlink.param_values import Parameter
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed, ParamTiming
@@ -13,7 +14,6 @@ from gcs_cli.vehicle.param_info import METADATA_PATH, ParamInfo, number_text, pa
 METADATA_WAIT_S = 3.0
 """Timeout of the parameter metadata; many vehicles have none."""
 TIMING = ParamTiming()
-_WARNING = 4  # MAV_SEVERITY_WARNING; lower is worse
 
 
 def fetch_all(connection: Connection) -> tuple[Parameter, ...]:
@@ -65,7 +65,9 @@ def _explanation(connection: Connection, name: str, texts_before: int) -> str | 
 
     def said() -> str | None:
         texts = connection.session.view.texts_since(texts_before)
-        found = [text.text for text in texts if text.severity <= _WARNING and text.text.startswith(prefix)]
+        found = [
+            text.text for text in texts if text.severity <= Severity.WARNING and text.text.startswith(prefix)
+        ]
         return found[-1].removeprefix(prefix) if found else None
 
     connection.wait_for(lambda: said() is not None, TEXT_WAIT_S)

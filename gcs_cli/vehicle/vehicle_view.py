@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from flightstack.core.portable_math import euler_angles
 from gcs_cli.vehicle.px4_modes import mode_name
 from gcs_cli.vehicle.status_texts import add_piece, without_stale_piece
 from gcs_cli.vehicle.view_types import (
@@ -75,12 +76,7 @@ def _euler(q: Any) -> Euler | None:
     norm = math.sqrt(sum(v * v for v in q))
     if not 1e-6 < norm < 1e6:  # NaN fails this too
         return None
-    w, x, y, z = (v / norm for v in q)
-    return Euler(
-        math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-        math.asin(max(-1.0, min(1.0, 2 * (w * y - x * z)))),
-        math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
-    )
+    return Euler(*euler_angles(*(v / norm for v in q)))
 
 
 def _heartbeat(view: VehicleView, message: Any, now_s: float) -> VehicleView:

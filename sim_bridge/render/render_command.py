@@ -14,8 +14,8 @@ import typer
 
 from flightstack.core.atomic_file import check_new
 from flightstack.core.errors import INSTALL_MULTIBODY, ConfigError
-from flightstack.process import command_line as shared
 from flightstack.process import console
+from flightstack.process.command_line import PictureOptions, expand_options
 from sim_bridge import arguments
 from sim_bridge.errors import UsageProblemError
 
@@ -36,33 +36,19 @@ def require(what: str, *modules: str) -> None:
         raise UsageProblemError(f"{what} needs MuJoCo: {INSTALL_MULTIBODY}")
 
 
+@expand_options
 def render(
     poses: Annotated[Path, typer.Argument(help="File of poses (.npz), as gcs replay writes it.")],
-    png: shared.Png = None,
-    sheet: shared.Sheet = None,
-    video: shared.Video = None,
-    view: shared.View = False,
-    at: shared.At = None,
-    camera: shared.Camera = "chase",
-    size: shared.Size = None,
-    fps: shared.Fps = None,
-    begin: shared.Begin = None,
-    end: shared.End = None,
-    speed: shared.Speed = None,
+    options: PictureOptions,
     vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the file's]")] = None,
-    no_words: shared.NoWords = False,
-    overwrite: shared.Overwrite = False,
     caller: Annotated[str, typer.Option(hidden=True, help="Command named in error messages.")] = _NAME,
 ) -> None:
     """Draw pictures or a film of a flight."""
-    options = shared.PictureOptions(
-        png, sheet, video, view, at, camera, size, fps, begin, end, speed, no_words, overwrite
-    )
     with _errors_reported(caller):
         _render(poses, options, vehicle, caller)
 
 
-def _render(poses: Path, options: shared.PictureOptions, vehicle: str | None, caller: str) -> None:
+def _render(poses: Path, options: PictureOptions, vehicle: str | None, caller: str) -> None:
     request = parse_request(options)
     is_mp4 = request.video is not None and request.video.suffix.lower() == ".mp4"
     require(caller.rsplit(maxsplit=1)[-1], "PIL", *(["imageio_ffmpeg"] if is_mp4 else []))
@@ -161,7 +147,7 @@ class RenderRequest(NamedTuple):
     overwrite: bool
 
 
-def parse_request(options: shared.PictureOptions) -> RenderRequest:
+def parse_request(options: PictureOptions) -> RenderRequest:
     """Return the checked request; raise UsageProblemError, ConfigError."""
     _check_conflicts(options)
     is_gif = options.video is not None and options.video.suffix.lower() == ".gif"
@@ -177,7 +163,7 @@ def parse_request(options: shared.PictureOptions) -> RenderRequest:
     return request
 
 
-def _check_conflicts(options: shared.PictureOptions) -> None:
+def _check_conflicts(options: PictureOptions) -> None:
     """Raise UsageProblemError for an option without effect, which may mean an unwanted long film."""
     if not (options.png or options.sheet or options.video or options.view):
         raise UsageProblemError("nothing to do: give --png, --sheet, --video or --view")

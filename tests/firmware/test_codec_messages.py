@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import importlib.util
 import math
 import random
 import struct
@@ -12,13 +11,13 @@ from typing import Any
 
 import pytest
 
+from firmware.tools import generate_codec
 from flightstack.mavlink.dialect import mavlink
 from tests.firmware.codec_support import (
     KINDS,
     LARGEST_FRAME,
     LARGEST_PAYLOAD,
     NAMES,
-    ROOT,
     SOURCES,
     WARNINGS,
     c_name,
@@ -47,19 +46,6 @@ WORDS = (0, 0x80000000, 0x7F800000, 0xFF800000, 0x7FC00000, 0x7F800001, 0xFFFFFF
 @pytest.fixture(scope="module")
 def codec(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     return load(tmp_path_factory.mktemp("codec"))
-
-
-def generator() -> Any:
-    path = ROOT / "firmware" / "tools" / "generate_codec.py"
-    spec = importlib.util.spec_from_file_location("generate_codec", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-GENERATOR = generator()
 
 
 def c_struct(kind: Any) -> type[ctypes.Structure]:
@@ -120,15 +106,19 @@ def payloads(kind: Any, count: int) -> list[bytes]:
 
 
 def test_the_generated_files_are_fresh() -> None:
-    assert [path.name for path, text in GENERATOR.files().items() if path.read_text("utf-8") != text] == []
-    assert sorted(GENERATOR.MESSAGES) == sorted(NAMES)
+    assert [
+        path.name for path, text in generate_codec.files().items() if path.read_text("utf-8") != text
+    ] == []
+    assert sorted(generate_codec.MESSAGES) == sorted(NAMES)
     assert len(KINDS) == len(NAMES)
 
 
 def test_a_field_that_the_c_code_cannot_move_is_refused_when_generating() -> None:
-    message = next(m for m in GENERATOR.parsed(GENERATOR.SOURCES[-1]).message if m.name == "FS_PLANT_STATE")
+    message = next(
+        m for m in generate_codec.parsed(generate_codec.SOURCES[-1]).message if m.name == "FS_PLANT_STATE"
+    )
     with pytest.raises(ValueError, match=r"no function for double\[3\] position_ned_m"):
-        GENERATOR.struct_source(message)
+        generate_codec.struct_source(message)
 
 
 @pytest.mark.parametrize("message_id", sorted(KINDS), ids=lambda number: KINDS[number].msgname)

@@ -167,4 +167,4 @@ def test_a_name_ends_at_nul_or_after_16_characters() -> None:
 
 
 def test_the_generated_files_are_fresh() -> None:
-    run_tool([PYTHON, ROOT / "firmware" / "tools" / "generate_core.py", "--check"], cwd=ROOT)
+    run_tool([PYTHON, "-m", "firmware.tools.generate_core", "--check"], cwd=ROOT)

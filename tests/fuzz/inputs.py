@@ -9,7 +9,7 @@ from typing import NamedTuple
 from fastcrc import crc16
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.services.commands import HANDLERS
+from flightstack.services.commands.command_server import HANDLERS
 from flightstack.services.commands.link_commands import LINK_COMMANDS
 
 _VALUES = (

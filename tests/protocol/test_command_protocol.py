@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Link, Message
-from flightstack.services.commands.command_server import Command, CommandServer
+from flightstack.services.commands.command_server import CommandServer
+from flightstack.services.commands.context import Command
 from flightstack.transports.memory import LossyLink
 from gcs_cli.clients.command_client import CommandClient, CommandResult
 from tests.protocol.mission_harness import LOSSY, NAN, VEHICLE

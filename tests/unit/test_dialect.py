@@ -32,7 +32,7 @@ def test_layouts_are_the_xmls(name: str, parsed) -> None:
 
 
 def test_the_generated_file_is_fresh() -> None:
-    done = subprocess.run([sys.executable, "tools/generate_dialect.py", "--check"], cwd=ROOT, check=False)
+    done = subprocess.run([sys.executable, "-m", "tools.generate_dialect", "--check"], cwd=ROOT, check=False)
     assert done.returncode == 0
 
 

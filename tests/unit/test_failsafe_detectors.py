@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from flightstack.commander.arming_checks import ArmingFacts, arming_refusals
-from flightstack.commander.detector_kernels import (
+from flightstack.commander.failsafe import Failsafe
+from flightstack.commander.fault_detector import (
     BATTERY_HYSTERESIS,
     BEYOND_ATTITUDE,
     BEYOND_POSITION,
@@ -20,14 +21,13 @@ from flightstack.commander.detector_kernels import (
     NOT_FINITE,
     ROTOR_FAULT,
     ROTOR_SPEEDS,
+    FaultDetector,
     battery_level,
     detect,
     detector_limits,
     follow_rotors,
     rotor_lags,
 )
-from flightstack.commander.failsafe import Failsafe
-from flightstack.commander.fault_detector import FaultDetector
 from flightstack.commander.transitions import TERMINATED, Need
 from flightstack.core.contract import LoopRow, LoopStatus
 from flightstack.core.enums import Mode

@@ -12,7 +12,7 @@ from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import AttitudeSetpoint, PointSetpoint
 from flightstack.mavlink.dialect import mavlink
-from flightstack.services.streams.setpoint_messages import PoseReference, read_setpoint
+from flightstack.services.streams.setpoint_server import PoseReference, read_setpoint
 
 HOME = GeoPoint(47.0, 8.0, 500.0)
 HERE = PoseReference(Vector3(10.0, 20.0, -30.0), math.pi / 2, LocalFrame(HOME), HOME.altitude_m)

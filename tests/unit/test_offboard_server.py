@@ -7,8 +7,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import OffboardSetpoint, PointSetpoint
 from flightstack.mavlink.link import Address
 from flightstack.services.streams.link_loss import StreamMonitor
-from flightstack.services.streams.setpoint_messages import PoseReference
-from flightstack.services.streams.setpoint_server import SetpointServer
+from flightstack.services.streams.setpoint_server import PoseReference, SetpointServer
 from tests.support.streams import local_point
 
 

@@ -75,5 +75,5 @@ def test_every_declaration_is_sound() -> None:
 
 
 def test_the_page_is_fresh() -> None:
-    command = [sys.executable, str(ROOT / "tools" / "generate_params.py"), "--check"]
+    command = [sys.executable, "-m", "tools.generate_params", "--check"]
     assert subprocess.run(command, cwd=ROOT, check=False).returncode == 0

@@ -125,7 +125,7 @@ LIBM = {
 NOT_FLIGHT = (
     "sim_bridge/multibody/",  # MuJoCo's own arithmetic: docs/explanation/decisions.md
     "sim_bridge/render/",  # pictures
-    "flightstack/services/telemetry/",  # what ground stations are shown
+    "flightstack/services/telemetry/motion.py",  # what ground stations are shown
     "flightstack/core/geometry_bulk.py",  # reports
     "flightstack/flight_log/poses_file.py",  # pictures
     "flightstack/plan/fence_shape.py",  # whether a plan is accepted

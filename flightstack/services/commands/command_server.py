@@ -1,17 +1,30 @@
-"""Receiver side of the command protocol, without I/O.
+"""Receiver side of the command protocol: parse, execute and acknowledge commands. No I/O.
 
-Every command to this vehicle is acknowledged to its peer. The caller executes the command and then calls ``answer``.
+Every command to this vehicle is acknowledged to its peer. Handlers execute the commands, in tables by command number.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Hashable
+from collections.abc import Callable, Collection, Hashable
 from typing import NamedTuple
 
+from flightstack.core.enums import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.plan.item import is_unset
+from flightstack.services.commands import guided, mission, modes, system
+from flightstack.services.commands.context import (
+    ACCEPTED,
+    UNSUPPORTED,
+    Answer,
+    Command,
+    Handler,
+    VehicleContext,
+)
+from flightstack.services.commands.failure_commands import FailureCommands
+from flightstack.services.commands.link_commands import LINK_COMMANDS
+from flightstack.services.routing.peer import Peer
 
 _REPETITION_S = 4.0  # ground stations repeat after 0.5 s (MAVSDK) to 3 s (QGroundControl)
 _MAX_CLIENTS = 64
@@ -25,21 +38,16 @@ _GLOBAL_FRAMES = frozenset(
         mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
     }
 )
+INJECT_FAILURE = int(mavlink.MAV_CMD_INJECT_FAILURE)
+HANDLERS: dict[int, Handler] = {
+    **modes.HANDLERS,
+    **guided.HANDLERS,
+    **mission.HANDLERS,
+    **system.HANDLERS,
+}
+"""Handlers of the vehicle's commands, by command number."""
+
 _DONE = (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS)
-
-
-class Command(NamedTuple):
-    """A command from COMMAND_LONG or COMMAND_INT."""
-
-    command: int
-    params: tuple[float, float, float, float, float, float, float]
-    """NaN stays NaN. Parameters 5 and 6 of a COMMAND_INT are degrees, metres or plain numbers, by its frame."""
-    is_int: bool
-    frame: int | None
-    """MAV_FRAME of a COMMAND_INT; a COMMAND_LONG has none."""
-    peer: Hashable
-    source: Address
-    confirmation: int
 
 
 class _LastCommand(NamedTuple):
@@ -136,3 +144,69 @@ def _is_same(one: Command, other: Command) -> bool:
     """Return True if command and parameters are equal; NaN equals NaN."""
     pairs = zip(one.params, other.params, strict=True)
     return one.command == other.command and all(a == b or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
+
+
+def execute(vehicle: VehicleContext, command: Command) -> Answer:
+    """Execute a vehicle command. ``LinkCommands`` executes the commands of a link."""
+    handler = HANDLERS.get(command.command)
+    return Answer(UNSUPPORTED) if handler is None else handler(vehicle, command)
+
+
+class CommandService:
+    """Executes COMMAND_LONG, COMMAND_INT and the deprecated SET_MODE."""
+
+    handles = frozenset({"COMMAND_LONG", "COMMAND_INT", "SET_MODE"})
+
+    def __init__(
+        self,
+        own: Address,
+        vehicle: VehicleContext,
+        peer_at: Callable[[Hashable], Peer],
+        link_answer: Callable[[Peer, Command], Answer],
+        failures: FailureCommands,
+    ) -> None:
+        self._own = own
+        self._vehicle = vehicle
+        self._peer_at = peer_at
+        self._link_answer = link_answer
+        self._failures = failures
+        self._server = CommandServer(own, [*HANDLERS, *LINK_COMMANDS, INJECT_FAILURE])
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Execute and acknowledge a command."""
+        if message.get_type() == "SET_MODE":  # has no acknowledgement: the heartbeat shows the mode
+            if message.target_system in (0, self._own.system):
+                self._report(
+                    modes.select_custom_mode(self._vehicle.requests, message.custom_mode), "Mode change"
+                )
+            return
+        command = self._server.receive(message, peer, now_s)
+        if command is None:
+            return
+        if command.command == INJECT_FAILURE:
+            answer = self._failures.begin(command, now_s)
+        elif command.command in LINK_COMMANDS:
+            answer = self._link_answer(self._peer_at(peer), command)
+        else:
+            answer = execute(self._vehicle, command)
+        if answer is not None:
+            self._answer(command, answer)
+
+    def _answer(self, command: Command, answer: Answer) -> None:
+        self._server.answer(command, answer.result)
+        self._report(answer, "Command refused")
+
+    def _report(self, answer: Answer, what: str) -> None:
+        if answer.result not in (ACCEPTED, UNSUPPORTED) and answer.reason:
+            self._vehicle.journal.say(Severity.WARNING, f"{what}: {answer.reason}")
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return the acknowledgements to send now."""
+        for command, answer in self._failures.poll(now_s):
+            self._answer(command, answer)
+        return list(self._server.poll(now_s))
+
+    def next_deadline(self) -> float | None:
+        """Return the time of the next poll."""
+        deadlines = (self._server.next_deadline(), self._failures.next_deadline())
+        return min((deadline for deadline in deadlines if deadline is not None), default=None)

@@ -1,15 +1,15 @@
-"""Context and result of the command handlers."""
+"""Command, answer and context of the command handlers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol, TypeAlias
 
 from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Address
 from flightstack.params.store import ParamStore
-from flightstack.services.commands.command_server import Command
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.services.logs.log_stream import LogTail
 from flightstack.vehicle.area import FlightArea
@@ -17,9 +17,8 @@ from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
 from flightstack.vehicle.mission import Mission
-from flightstack.vehicle.readiness import Readiness
+from flightstack.vehicle.mode_control import Readiness, Takeoff
 from flightstack.vehicle.requests import FlightRequests
-from flightstack.vehicle.takeoff import Takeoff
 
 ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
 REJECTED = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
@@ -31,6 +30,20 @@ UNSUPPORTED_FRAME = 9
 RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 ABSOLUTE_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT, None)
 """Frames of altitudes above home (relative) and above sea level (absolute); a COMMAND_LONG has no frame."""
+
+
+class Command(NamedTuple):
+    """A command from COMMAND_LONG or COMMAND_INT."""
+
+    command: int
+    params: tuple[float, float, float, float, float, float, float]
+    """NaN stays NaN. Parameters 5 and 6 of a COMMAND_INT are degrees, metres or plain numbers, by its frame."""
+    is_int: bool
+    frame: int | None
+    """MAV_FRAME of a COMMAND_INT; a COMMAND_LONG has none."""
+    peer: Hashable
+    source: Address
+    confirmation: int
 
 
 class Answer(NamedTuple):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 
-from flightstack.services.commands.command_server import Command
 from flightstack.services.commands.context import (
     ACCEPTED,
     DENIED,
@@ -13,6 +12,7 @@ from flightstack.services.commands.context import (
     REJECTED,
     UNSUPPORTED,
     Answer,
+    Command,
     FailureLink,
 )
 

@@ -7,8 +7,7 @@ from collections.abc import Callable, Hashable
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_for
-from flightstack.services.commands.command_server import Command
-from flightstack.services.commands.context import ACCEPTED, DENIED, REJECTED, UNSUPPORTED, Answer
+from flightstack.services.commands.context import ACCEPTED, DENIED, REJECTED, UNSUPPORTED, Answer, Command
 from flightstack.services.files.component_metadata import ComponentMetadata
 from flightstack.services.logs.log_stream import LogStream
 from flightstack.services.routing.peer import Peer

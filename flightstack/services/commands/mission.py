@@ -5,8 +5,15 @@ from __future__ import annotations
 import math
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.services.commands.command_server import Command
-from flightstack.services.commands.context import ACCEPTED, DENIED, Answer, Handler, VehicleContext, answer_to
+from flightstack.services.commands.context import (
+    ACCEPTED,
+    DENIED,
+    Answer,
+    Command,
+    Handler,
+    VehicleContext,
+    answer_to,
+)
 
 
 def start_mission(vehicle: VehicleContext, command: Command) -> Answer:

@@ -7,8 +7,15 @@ import math
 from flightstack.commander.transitions import Event
 from flightstack.core.enums import MODE_OF_CUSTOM, Mode
 from flightstack.mavlink.dialect import mavlink
-from flightstack.services.commands.command_server import Command
-from flightstack.services.commands.context import ACCEPTED, DENIED, Answer, Handler, VehicleContext, answer_to
+from flightstack.services.commands.context import (
+    ACCEPTED,
+    DENIED,
+    Answer,
+    Command,
+    Handler,
+    VehicleContext,
+    answer_to,
+)
 from flightstack.vehicle.requests import FlightRequests
 
 FORCE_MAGIC = 21196.0

@@ -6,7 +6,6 @@ from flightstack.commander.transitions import Need
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
-from flightstack.services.commands.command_server import Command
 from flightstack.services.commands.context import (
     ACCEPTED,
     DENIED,
@@ -14,6 +13,7 @@ from flightstack.services.commands.context import (
     RELATIVE_FRAMES,
     UNSUPPORTED,
     Answer,
+    Command,
     Handler,
     VehicleContext,
     answer_to,

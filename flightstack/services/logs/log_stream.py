@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from typing import Protocol
 
+from flightstack.flight_log.ulog import DEFINITION_TYPES, HEADER_SIZE, MESSAGE_HEADER
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.services.rate_limit import RateLimit, always_has_room
@@ -18,10 +19,6 @@ CHUNK = 249
 NO_MESSAGE_BEGINS = 255
 RESEND_S = 0.25
 GIVE_UP_S = 5.0
-_FILE_HEADER_SIZE = 16
-_MESSAGE_HEADER_SIZE = 3
-_DEFINITIONS = frozenset(b"BFIMPQA")
-"""ULog message types of the definitions; the first message of another type starts the data section."""
 
 
 class LogTail(Protocol):
@@ -45,7 +42,7 @@ class _Boundaries:
     """Finds the message boundaries of a ULog file in chunks of any size."""
 
     def __init__(self) -> None:
-        self._to_next = _FILE_HEADER_SIZE  # bytes to the next message
+        self._to_next = HEADER_SIZE  # bytes to the next message
         self._header = b""
         self.in_data = False
         """True once the data section has started."""
@@ -61,12 +58,12 @@ class _Boundaries:
                 continue
             if not self._header and first == NO_MESSAGE_BEGINS:
                 first = at
-            missing = _MESSAGE_HEADER_SIZE - len(self._header)
+            missing = MESSAGE_HEADER.size - len(self._header)
             self._header += chunk[at : at + missing]
             at += missing
-            if len(self._header) == _MESSAGE_HEADER_SIZE:
-                self.in_data = self.in_data or self._header[2] not in _DEFINITIONS
-                self._to_next = int.from_bytes(self._header[:2], "little")
+            if len(self._header) == MESSAGE_HEADER.size:
+                self._to_next, kind = MESSAGE_HEADER.unpack(self._header)
+                self.in_data = self.in_data or kind not in DEFINITION_TYPES
                 self._header = b""
         return first
 

@@ -1,7 +1,8 @@
 """Vehicle side of the mission protocol for missions, geofences and rally points. No I/O.
 
-An upload replaces the stored plan only when it is complete and passes its check. There is one upload at a time per
-plan type, so that the items of different clients do not mix. Several clients may download at once.
+``MissionServer`` speaks the protocol, ``MissionService`` applies the uploaded plans to the vehicle. An upload replaces
+the stored plan only when it is complete and passes its check. There is one upload at a time per plan type, so that the
+items of different clients do not mix. Several clients may download at once.
 """
 
 from __future__ import annotations
@@ -9,9 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterable, Mapping
 
+from flightstack.core.enums import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.mavlink.mission_messages import DEFAULT_TIMING, GOES_THERE, PROTOCOL, Timing, ack_message
+from flightstack.plan.kept_plans import KeptPlans
 from flightstack.plan.rejection import Rejection
 from flightstack.plan.vocabulary import PLAN_NAMES, MissionResult, MissionType
 from flightstack.services.mission.mission_downloads import Downloads
@@ -19,11 +22,14 @@ from flightstack.services.mission.mission_store import (
     Check,
     CurrentRequested,
     Items,
+    MissionCleared,
     MissionEvent,
     MissionRefused,
+    MissionReplaced,
     PlanStore,
 )
 from flightstack.services.mission.mission_upload import Client, Upload
+from flightstack.vehicle.assembly import VehicleParts
 
 _MAX_ENDED = 32  # uploads whose acknowledgement can be repeated; bounds memory
 
@@ -234,3 +240,97 @@ class MissionServer:
 
     def _send(self, client: Client, message: Message) -> None:
         self._outbox.append((client.peer, message))
+
+
+class MissionService:
+    """Applies uploaded plans to the vehicle."""
+
+    handles = PROTOCOL
+
+    def __init__(self, own: Address, vehicle: VehicleParts) -> None:
+        self._vehicle = vehicle
+        self._server = MissionServer(
+            own,
+            {
+                MissionType.MISSION: vehicle.mission.check,
+                MissionType.FENCE: vehicle.area.check_fence,
+                MissionType.RALLY: vehicle.area.check_rally,
+            },
+        )
+        self._setters = {
+            MissionType.MISSION: vehicle.requests.set_mission,
+            MissionType.FENCE: vehicle.area.set_fence,
+            MissionType.RALLY: vehicle.area.set_rally,
+        }
+
+    def plans(self) -> KeptPlans:
+        """Return the plans in force. A finished mission restarts at its first item."""
+        mission, fence, rally = (self._server.items(kind) for kind in self._setters)
+        places, progress = self._vehicle.places, self._vehicle.now.progress
+        continues = not progress.finished and progress.current < len(mission)
+        home = places.home_point if places.home_is_chosen else None
+        return KeptPlans(mission, fence, rally, progress.current if continues else 0, home)
+
+    def restore(self, plans: KeptPlans) -> str | None:
+        """Restore plans that were in force before; return the first refusal, or None.
+
+        Home and the geofence come first, since the other plans were checked against them. If one of them is refused,
+        the rest is not restored.
+        """
+        refusal = None if plans.home is None else self._vehicle.area.set_home(plans.home)
+        if refusal is not None:
+            return f"home: {refusal}"
+        reasons: list[str] = []
+        for kind in (MissionType.FENCE, MissionType.MISSION, MissionType.RALLY):
+            items = plans.items(kind)
+            rejection = self._server.restore(kind, items) if items else None
+            self._take_events()
+            if rejection is not None:
+                reasons.append(f"{PLAN_NAMES[kind]}: {rejection.reason}")
+                if kind is MissionType.FENCE:
+                    break
+            elif kind is MissionType.MISSION and plans.current:
+                self._vehicle.mission.set_current(plans.current)
+        return reasons[0] if reasons else None
+
+    def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
+        """Take a message of the mission protocol."""
+        self._server.receive(message, peer, now_s)
+        self._take_events()
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return requests, items and acknowledgements."""
+        self._server.current_seq = self._vehicle.now.progress.current
+        outbox = list(self._server.poll(now_s))
+        self._take_events()
+        return outbox
+
+    def next_deadline(self) -> float | None:
+        """Return the time of the next poll."""
+        return self._server.next_deadline()
+
+    def _take_events(self) -> None:
+        journal = self._vehicle.journal
+        events = self._server.events()
+        if not events:  # the usual case: the plan ids have not changed
+            return
+        for event in events:
+            if isinstance(event, MissionReplaced):
+                self._setters[event.mission_type](event.items)
+                journal.say(Severity.NOTICE, f"{_name(event.mission_type)} loaded, items: {len(event.items)}")
+            elif isinstance(event, MissionCleared):
+                self._setters[event.mission_type](())
+            elif isinstance(event, CurrentRequested):
+                refusal = self._vehicle.mission.set_current(event.seq)
+                if refusal is not None:
+                    journal.say(Severity.WARNING, f"Mission item: {refusal}")
+            elif isinstance(event, MissionRefused):
+                journal.say(Severity.WARNING, f"{_name(event.mission_type)} refused: {event.reason}")
+        mission, fence, rally = (self._server.plan_id(kind) for kind in self._setters)
+        self._vehicle.places.ids = (mission, fence, rally)
+
+
+def _name(kind: MissionType) -> str:
+    """Return "Mission", "Geofence" or "List of rally points"."""
+    name = PLAN_NAMES[kind]
+    return name[0].upper() + name[1:]

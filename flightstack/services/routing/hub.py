@@ -16,8 +16,8 @@ from flightstack.mavlink.frames import FrameReader
 from flightstack.mavlink.link import Address, Link, Message, is_unknown
 from flightstack.mavlink.signing import Signing
 from flightstack.plan.kept_plans import KeptPlans
-from flightstack.services.commands import VehicleContext
-from flightstack.services.mission.mission_service import MissionService
+from flightstack.services.commands.context import VehicleContext
+from flightstack.services.mission.mission_server import MissionService
 from flightstack.services.routing.peer import Peer, PeerAddress
 from flightstack.services.routing.router import Router
 from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_signing, signing_setup

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from flightstack.core.contract import FloatArray
+from flightstack.core.portable_math import yaw_angle
 from flightstack.vehicle.status import VehicleStatus
 
 NAN = math.nan
@@ -35,17 +36,6 @@ def boot_ms(f: VehicleStatus) -> int:
     return wrapped(f.time_us // 1000)
 
 
-def euler(q: list[float]) -> tuple[float, float, float]:
-    """Return roll, pitch, yaw [rad] of a quaternion w, x, y, z. Plain Python: telemetry needs no compiled code."""
-    w, x, y, z = q
-    sin_pitch = min(1.0, max(-1.0, 2.0 * (w * y - z * x)))
-    return (
-        math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-        math.asin(sin_pitch),
-        math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-    )
-
-
 def heading_deg(q: list[float]) -> float:
     """Return the heading of a quaternion [deg], in [0, 360); 0 for a NaN quaternion."""
-    return math.degrees(euler(q)[2]) % 360.0 if math.isfinite(q[0]) else 0.0
+    return math.degrees(yaw_angle(*q)) % 360.0 if math.isfinite(q[0]) else 0.0

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 from flightstack.core.contract import LoopRow, Vector3
+from flightstack.core.portable_math import euler_angles
 from flightstack.mavlink.dialect import EscStatus, mavlink
 from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.link import Message
-from flightstack.services.telemetry.fields import NAN, boot_ms, euler, floats, heading_deg, singles, wrapped
+from flightstack.services.telemetry.fields import NAN, boot_ms, floats, heading_deg, singles, wrapped
 from flightstack.vehicle.status import VehicleStatus
 
 RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
@@ -19,7 +20,7 @@ UNKNOWN_SATELLITES = 255
 def attitude(f: VehicleStatus) -> Message:
     """ATTITUDE."""
     x = floats(f.state)
-    return mavlink.MAVLink_attitude_message(boot_ms(f), *euler(x[6:10]), *x[10:13])
+    return mavlink.MAVLink_attitude_message(boot_ms(f), *euler_angles(*x[6:10]), *x[10:13])
 
 
 def attitude_quaternion(f: VehicleStatus) -> Message:

@@ -13,13 +13,15 @@ from gcs_cli.experiments.paper.findings.claims_stability import (
     survives,
     yaw_saturated_percent,
 )
-from gcs_cli.experiments.paper.findings.comparisons import Cases, shared_overshoots, steady_m
+from gcs_cli.experiments.paper.findings.comparisons import Cases, Overshoots, shared_overshoots, steady_m
 from gcs_cli.experiments.paper.findings.verdicts import (
     NAMES,
     NotFlownError,
+    NothingToCompareError,
     Question,
     flights,
     less_or_more,
+    require_complete,
     where_of,
     who_ended,
 )
@@ -47,6 +49,41 @@ _READINGS = (PID, RATE_FED_PID)
 """Table II without and with the reference rate: the paper does not define it."""
 _ALL = (*_READINGS, BACKSTEPPING)
 
+_SIMILAR = Question(
+    "similar",
+    "the results of both controllers are quite similar",
+    "paper, IV.B",
+    f"RMS error in XY on the smooth profile within {SIMILAR_PERCENT:g} % of the PID's, "
+    "whether its rate is fed ahead or not",
+)
+_OVERSHOOT = Question(
+    "overshoot",
+    "backstepping overshoots less on hard profiles",
+    "paper, IV.B",
+    f"median overshoot of x and y lower than the PID's by {CLEARLY_POINTS:g} point or more, "
+    "whether its rate is fed ahead or not",
+)
+_LIMITS = Question(
+    "limits",
+    "the lower overshoot comes from how the laws meet the rotors' limits",
+    "our question",
+    f"there is an advantage of {CLEARLY_POINTS:g} point or more over the PID as flown, and without the limits, all "
+    f"else alike, it shrinks by {CLEARLY_POINTS:g} point or more",
+)
+_METHOD = Question(
+    "method",
+    "the advantage is due to the method, not to its gains",
+    "our question",
+    f"on the hard profile both a linear PD with the same poles and the PID with its rate fed ahead overshoot more, "
+    f"by {SAME_POINTS:g} point or more",
+)
+_TORQUE = Question(
+    "torque",
+    "backstepping rejects a sustained disturbance better",
+    "implied by the paper, I and V",
+    "smaller steady-state error in XY under a constant torque",
+)
+
 
 def claims(cases: Cases, linear: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the paper's claims and ours, each with verdict, threshold and a sentence with the figures.
@@ -56,11 +93,11 @@ def claims(cases: Cases, linear: Mapping[str, Any]) -> list[dict[str, Any]]:
     """
     both = (SMALL_ANGLE, RIGID)
     judges: tuple[tuple[Callable[[str], dict[str, Any]], Sequence[str]], ...] = (
-        (lambda plant: _similar(cases, plant), both),
-        (lambda plant: _lower_overshoot(cases, plant), both),
-        (lambda plant: _limits_matter(cases, plant), both),
-        (lambda plant: _method_or_gains(cases, plant), both),
-        (lambda plant: _torque(cases, plant), both),
+        (lambda plant: _compared(_similar, _SIMILAR, cases, plant), both),
+        (lambda plant: _compared(_lower_overshoot, _OVERSHOOT, cases, plant), both),
+        (lambda plant: _compared(_limits_matter, _LIMITS, cases, plant), both),
+        (lambda plant: _compared(_method_or_gains, _METHOD, cases, plant), both),
+        (lambda plant: _compared(_torque, _TORQUE, cases, plant), both),
         (lambda plant: stays_stable(linear, plant), both),
         (lambda plant: survives(cases, plant), both),
         (lambda _: spin_up(cases), (RIGID,)),
@@ -73,17 +110,25 @@ def claims(cases: Cases, linear: Mapping[str, Any]) -> list[dict[str, Any]]:
     return found
 
 
-def _similar(cases: Cases, plant: str) -> dict[str, Any]:
-    question = Question(
-        "similar",
-        "the results of both controllers are quite similar",
-        "paper, IV.B",
-        f"RMS error in XY on the smooth profile within {SIMILAR_PERCENT:g} % of the PID's, "
-        "whether its rate is fed ahead or not",
-    )
+def _compared(
+    judge: Callable[[Question, Cases, str], dict[str, Any]], question: Question, cases: Cases, plant: str
+) -> dict[str, Any]:
+    try:
+        return judge(question, cases, plant)
+    except NothingToCompareError as why:
+        return question.nothing_to_compare(str(why), where_of(plant))
+
+
+def _overshoots(found: Sequence[Mapping[str, Any]], where: str) -> Overshoots:
+    over = shared_overshoots(found)
+    if over is None:
+        raise NothingToCompareError(f"no move began at rest {where}")
+    return over
+
+
+def _similar(question: Question, cases: Cases, plant: str) -> dict[str, Any]:
     found = flights(cases, _ALL, SMOOTH, PLAIN, plant)
-    if (why := who_ended(_ALL, found)) is not None:
-        return question.nothing_to_compare(why, where_of(plant))
+    require_complete(_ALL, found)
     flown, fed, back = (case["path"]["rms_error_m"] for case in found)
     more = [100.0 * (back / one - 1.0) for one in (flown, fed)]
     words = (
@@ -101,20 +146,10 @@ def _similar(cases: Cases, plant: str) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def _lower_overshoot(cases: Cases, plant: str) -> dict[str, Any]:
-    question = Question(
-        "overshoot",
-        "backstepping overshoots less on hard profiles",
-        "paper, IV.B",
-        f"median overshoot of x and y lower than the PID's by {CLEARLY_POINTS:g} point or more, "
-        "whether its rate is fed ahead or not",
-    )
+def _lower_overshoot(question: Question, cases: Cases, plant: str) -> dict[str, Any]:
     found = flights(cases, _ALL, HARD, PLAIN, plant)
-    if (why := who_ended(_ALL, found)) is not None:
-        return question.nothing_to_compare(why, where_of(plant))
-    over = shared_overshoots(found)
-    if over is None:
-        return question.nothing_to_compare("no move began at rest with all of them", where_of(plant))
+    require_complete(_ALL, found)
+    over = _overshoots(found, "with all of them")
     median, worst = over.median_percent, over.worst_percent
     beyond = [100.0 * case["path"]["beyond_m"] for case in found]
     words = (
@@ -130,24 +165,14 @@ def _lower_overshoot(cases: Cases, plant: str) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def _limits_matter(cases: Cases, plant: str) -> dict[str, Any]:
-    question = Question(
-        "limits",
-        "the lower overshoot comes from how the laws meet the rotors' limits",
-        "our question",
-        f"there is an advantage of {CLEARLY_POINTS:g} point or more over the PID as flown, and without the limits, all "
-        f"else alike, it shrinks by {CLEARLY_POINTS:g} point or more",
-    )
+def _limits_matter(question: Question, cases: Cases, plant: str) -> dict[str, Any]:
     pair = (PID, BACKSTEPPING)
     found = [
         case for condition in (PLAIN, NO_LIMITS) for case in flights(cases, pair, HARD, condition, plant)
     ]
-    for names, flown, what in ((pair, found[:2], "with limits"), (pair, found[2:], "without limits")):
-        if (why := who_ended(names, flown)) is not None:
-            return question.nothing_to_compare(f"{what} {why}", where_of(plant))
-    over = shared_overshoots(found)
-    if over is None:
-        return question.nothing_to_compare("no move began at rest in all four flights", where_of(plant))
+    require_complete(pair, found[:2], "with limits ")
+    require_complete(pair, found[2:], "without limits ")
+    over = _overshoots(found, "in all four flights")
     a, b, c, d = over.median_percent
     words = (
         f"On the hard profile {where_of(plant)} the median overshoot, over {over.moves} moves, is {a:.1f} % with the "
@@ -163,21 +188,11 @@ def _limits_matter(cases: Cases, plant: str) -> dict[str, Any]:
     return question.answer(holds, words, limited_points=a - b, unlimited_points=c - d)
 
 
-def _method_or_gains(cases: Cases, plant: str) -> dict[str, Any]:
-    question = Question(
-        "method",
-        "the advantage is due to the method, not to its gains",
-        "our question",
-        f"on the hard profile both a linear PD with the same poles and the PID with its rate fed ahead overshoot more, "
-        f"by {SAME_POINTS:g} point or more",
-    )
+def _method_or_gains(question: Question, cases: Cases, plant: str) -> dict[str, Any]:
     names = (POLES, RATE_FED_PID, BACKSTEPPING)
     found = flights(cases, names, HARD, PLAIN, plant)
-    if (why := who_ended(names, found)) is not None:
-        return question.nothing_to_compare(why, where_of(plant))
-    over = shared_overshoots(found)
-    if over is None:
-        return question.nothing_to_compare("no move began at rest with all of them", where_of(plant))
+    require_complete(names, found)
+    over = _overshoots(found, "with all of them")
     poles, fed, back = over.median_percent
     words = (
         f"On the hard profile {where_of(plant)} the median overshoot, over {over.moves} moves, is {poles:.1f} % with "
@@ -189,17 +204,10 @@ def _method_or_gains(cases: Cases, plant: str) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def _torque(cases: Cases, plant: str) -> dict[str, Any]:
-    question = Question(
-        "torque",
-        "backstepping rejects a sustained disturbance better",
-        "implied by the paper, I and V",
-        "smaller steady-state error in XY under a constant torque",
-    )
+def _torque(question: Question, cases: Cases, plant: str) -> dict[str, Any]:
     pair = (PID, BACKSTEPPING)
     found = flights(cases, pair, SMOOTH, "torque", plant)
-    if (why := who_ended(pair, found)) is not None:
-        return question.nothing_to_compare(why, where_of(plant))
+    require_complete(pair, found)
     pid, back = (steady_m(case) for case in found)
     words = (
         f"Under the constant torque the vehicle comes to rest {1e3 * pid:.1f} mm beside its place with the PID and "

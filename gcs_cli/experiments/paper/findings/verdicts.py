@@ -31,6 +31,10 @@ class NotFlownError(Exception):
     """A verdict needs a flight or an analysis that is not part of this run."""
 
 
+class NothingToCompareError(Exception):
+    """A compared flight ended early, or the flights have no move in common; the text says which."""
+
+
 class Question(NamedTuple):
     """A claim and the threshold that decides it."""
 
@@ -83,6 +87,12 @@ def who_ended(names: Sequence[str], found: Sequence[Mapping[str, Any]]) -> str |
         if case["ended"] is not None
     ]
     return ", ".join(ended) or None
+
+
+def require_complete(names: Sequence[str], found: Sequence[Mapping[str, Any]], prefix: str = "") -> None:
+    """Raise NothingToCompareError, with ``prefix``, if a flight of these contenders ended early."""
+    if (why := who_ended(names, found)) is not None:
+        raise NothingToCompareError(prefix + why)
 
 
 def how_ended(case: Mapping[str, Any]) -> str:

@@ -5,7 +5,7 @@ Numbers come from ``results``, the content of results.json; curves come from the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -89,8 +89,6 @@ def _sections(
     def of(*names: str) -> list[AnyFigure]:
         return [figure for figure in drawn if figure.name in names]
 
-    found, linear, pil = results["cases"], results["linear"], results["pil"]
-    loops: tables.Loops = linear["loops"] if linear else ()
     yield Section(
         "tables", "Tables I to III", "–: not in the paper. Red: the flown value differs from the printed one.",
         tables.printed_tables(results["vehicle"], results["gains"]),
@@ -99,6 +97,25 @@ def _sections(
         "fig-7", "Fig. 7: desired trajectory", "The paper's figures have no numbers: this trajectory is a choice.",
         figures=of("fig-7-time", "fig-7-space"),
     )  # fmt: skip
+    yield from _flown(results["cases"], recordings, of)
+    yield from _analysed(results, of)
+    pil = results["pil"]
+    if pil and pil["controllers"]:
+        yield Section(
+            "fig-15", "Fig. 15: processor in the loop", _about_target(pil),
+            [tables.profile_table(pil), tables.equivalence_table(pil)], of("fig-15"),
+            [f"{folder_name(name, plant)}/pil.html" for name, plant, _ in pil_flights(pil)],
+        )  # fmt: skip
+    yield Section(
+        "corrections", "Corrections of the paper", "Reasons: docs/explanation/paper.md.",
+        [tables.corrections_table(results["corrections"])],
+    )  # fmt: skip
+
+
+def _flown(
+    found: Mapping[str, Any], recordings: figures.Recordings, of: Callable[..., list[AnyFigure]]
+) -> Iterator[Section]:
+    """Yield the sections of the flights; ``of`` returns the figures of these names."""
     yield Section(
         "fig-8", "Figs. 8 to 13: responses",
         "Roll and pitch errors refer to the target of each controller's outer loop; the PID's is drawn.",
@@ -118,6 +135,12 @@ def _sections(
         "RMS distance from the reference [m]; green: the smallest on that plant, and all within 1 % of it.",
         [tables.disturbance_table(found)],
     )  # fmt: skip
+
+
+def _analysed(results: Mapping[str, Any], of: Callable[..., list[AnyFigure]]) -> Iterator[Section]:
+    """Yield the sections of the linear analysis and of the comparison of the plants."""
+    loops: tables.Loops = results["linear"]["loops"] if results["linear"] else ()
+    onset = results["onset"] or ()
     yield Section(
         "margins", "Stability and margins of the attitude loops",
         "As flown: motor lag 5 ms, no delay; cut at the angular acceleration demand. Only the rigid body and the "
@@ -130,24 +153,13 @@ def _sections(
         [tables.outer_table(loops)],
     )  # fmt: skip
     yield Section(
-        "onset", "Lowest stable inner rates", _onset_note(results["onset"] or ()),
-        [tables.onset_table(results["onset"] or ())],
+        "onset", "Lowest stable inner rates", _onset_note(onset), [tables.onset_table(onset)],
     )  # fmt: skip
     yield Section(
         "plants", "Plants compared",
         "Largest difference along the desired trajectory. Undecided: the loop is unstable and amplifies rounding, "
         "as a push of 10⁻¹² N shows.",
         [tables.plants_table(results["plants"])], of("plants"),
-    )  # fmt: skip
-    if pil and pil["controllers"]:
-        yield Section(
-            "fig-15", "Fig. 15: processor in the loop", _about_target(pil),
-            [tables.profile_table(pil), tables.equivalence_table(pil)], of("fig-15"),
-            [f"{folder_name(name, plant)}/pil.html" for name, plant, _ in pil_flights(pil)],
-        )  # fmt: skip
-    yield Section(
-        "corrections", "Corrections of the paper", "Reasons: docs/explanation/paper.md.",
-        [tables.corrections_table(results["corrections"])],
     )  # fmt: skip
 
 
