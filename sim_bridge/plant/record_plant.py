@@ -111,8 +111,7 @@ class RecordPlant(ABC):
         from sim_bridge.multibody.default_parts import foot_z_m, propeller_radius_m  # noqa: PLC0415  # rarely needed
 
         m, vehicle, options = self.memory[0], self._vehicle, self._disturbance
-        wind, step = options.wind_ned_m_s, faults.wind_step_ned_m_s
-        m["wind"] = (wind.x + step.x, wind.y + step.y, wind.z + step.z)
+        m["wind"] = np.array(options.wind_ned_m_s) + np.array(faults.wind_step_ned_m_s)
         self._turbulence.set_gust(options.gust_m_s if faults.gust_m_s is None else faults.gust_m_s)
         m["alters_air"] = faults.wind_shear != 0.0 or faults.ground_effect
         m["shear"], m["surface_z"] = faults.wind_shear, foot_z_m(vehicle)

@@ -102,20 +102,16 @@ def derivative(x: FloatArray, rotors: RotorForces, m: Record, out: FloatArray) -
     r = rotation(x)
     rates = Vector3(x[10], x[11], x[12])
     wind, gust, drag = m["wind"], m["gust"], m["drag"]
-    blow, lift = 1.0, 1.0  # share of the mean wind, thrust over that far from the ground
+    wn, we, wd = wind[0], wind[1], wind[2]
+    thrust, tx, ty = rotors.thrust_n, rotors.roll_n_m, rotors.pitch_n_m
     if m["alters_air"] != 0:
-        blow, lift = wind_share(m, x[2]), thrust_ratio(m, x[2], r.row_d.z)
-    air = _to_body(
-        r,
-        Vector3(
-            x[3] - blow * wind[0] - gust[0], x[4] - blow * wind[1] - gust[1], x[5] - blow * wind[2] - gust[2]
-        ),
-    )
-    push = _to_world(
-        r, Vector3(-drag[0] * air.x, -drag[1] * air.y, -drag[2] * air.z - lift * rotors.thrust_n)
-    )
-    tx = lift * rotors.roll_n_m + m["torque"][0]
-    ty = lift * rotors.pitch_n_m + m["torque"][1]
+        share, lift = wind_share(m, x[2]), thrust_ratio(m, x[2], r.row_d.z)
+        wn, we, wd = share * wn, share * we, share * wd
+        thrust, tx, ty = lift * thrust, lift * tx, lift * ty
+    air = _to_body(r, Vector3(x[3] - wn - gust[0], x[4] - we - gust[1], x[5] - wd - gust[2]))
+    push = _to_world(r, Vector3(-drag[0] * air.x, -drag[1] * air.y, -drag[2] * air.z - thrust))
+    tx = tx + m["torque"][0]
+    ty = ty + m["torque"][1]
     tz = rotors.drag_torque_n_m + rotors.spin_up_torque_n_m + m["torque"][2]
     if _near_ground(x, m):
         force, torque = _contact(x, r, rates, m)

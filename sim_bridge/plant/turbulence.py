@@ -49,6 +49,7 @@ class _Gust:
     def __init__(
         self, record: Record, name: str, noise: str, spread: FloatArray, time_s: float, bits: np.random.PCG64
     ) -> None:
+        self.active = False
         self._record, self._name = record, name
         self._noise: FloatArray = record[noise]
         self._spread, self._time_s = np.zeros(3), time_s
@@ -56,11 +57,6 @@ class _Gust:
         self._step_s = 0.0
         self._paused: FloatArray | None = None  # unit deviates at which the process was disabled
         self.set_spread(spread)
-
-    @property
-    def active(self) -> bool:
-        """True with gusts."""
-        return bool(self._spread.any())
 
     def set_spread(self, spread: FloatArray) -> None:
         """Set the standard deviations, zero for none; the present gust is scaled."""
@@ -71,9 +67,10 @@ class _Gust:
             present = self._record[self._name] / self._spread
         elif present is None:
             present = normal_deviates(self._bits, 3)
-        started, self._spread, self._paused = not self.active, spread, present
+        has_noise, self.active = self.active, bool(spread.any())
+        self._spread, self._paused = spread, present
         self._record[self._name] = spread * present
-        if started:
+        if not has_noise:
             self.refill()
         self.set_step(self._step_s)
 
