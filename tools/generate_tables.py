@@ -1,4 +1,4 @@
-"""Write docs/reference/failsafes.md, log-topics.md and faults.md from their tables. ``--check`` fails if one is stale."""
+"""Write failsafes.md, log-topics.md and faults.md in docs/reference from their tables; ``--check`` finds stale ones."""
 
 from __future__ import annotations
 
@@ -118,6 +118,7 @@ NEEDS = {
     Need.DRAG: "drag, not `paper`",
     Need.MEAN_WIND: "a mean wind",
     Need.MASS: "not `paper`",
+    Need.PAYLOAD: "a payload",
     Need.GROUND: "ground, not `paper`",
 }
 
@@ -130,8 +131,9 @@ hide: [toc]
 
 {note}
 
-Faults and disturbances of the simulator: `--fault SPEC` of `gcs fly`, `gcs pil` and `sim-bridge`, repeatable, in either
-notation. `@BEGIN` or `@BEGIN-END` in simulated seconds follows it; without, the fault begins at once and lasts.
+Faults and disturbances of the simulator: `--fault SPEC` of `gcs fly`, `gcs pil` and `sim-bridge`, repeatable, in
+either notation. `@BEGIN` or `@BEGIN-END` in simulated seconds follows it; without, the fault begins at once and
+lasts.
 
 ```text
 rotor:2:weak=0.7@10-20
@@ -145,34 +147,38 @@ east, down. A fault that cannot act is refused.
 |---|---|---|---|---|
 """
 FAULTS_TAIL = """
-A fault begins and ends at the first exchange at or after its time. If two faults affect the same part, the last one wins:
-off, efficiency and stuck of a rotor exclude each other, a dead time comes on top; there is one payload. The same faults
-and the same seed give the same log, byte for byte, at any speed.
+A fault begins and ends at the first exchange at or after its time. If two faults affect the same part, the last one
+wins: off, efficiency and stuck of a rotor exclude each other, a dead time comes on top; there is one payload. The
+same faults and the same seed give the same log, byte for byte, at any speed.
 
-*Payload and centre of gravity*: position and velocity stay those of the origin of the vehicle file, where external forces
-and drag act. With the centre of gravity C at c, mass m and inertia J about C, F the forces without gravity and τ their
-torque about the origin, h the angular momentum of the rotors:
+*Payload and centre of gravity*: position and velocity stay those of the origin of the vehicle file, where external
+forces and drag act. With the centre of gravity C at c, mass m and inertia J about C, F the forces without gravity and
+τ their torque about the origin, h the angular momentum of the rotors:
 
 ```text
 J ω' = τ − c × F − ω × (J ω + h)
 a    = g + R [F / m − ω' × c − ω × (ω × c)]
 ```
 
-On the multibody plant MuJoCo computes them from another mass, centre and inertia of the frame. A payload that is attached
-in flight has the velocity of its point.
+On the multibody plant MuJoCo computes them from another mass, centre and inertia of the frame. A payload that is
+attached in flight has the velocity of its point. The feet of the rigid plant keep their springs: with 5 kg on them
+`paper_quad` sinks in by 4 mm.
 
-*Ground effect*: T / T∞ = 1 / (1 − (R / 4z)²), R the radius of the default propeller, z the mean height of the rotors, at
-least R / 2 (Cheeseman and Bennett, ARC R&M 3021, 1955); one factor for all rotors.
+*Ground effect*: T / T∞ = 1 / (1 − (R / 4z)²), R the radius of the default propeller, z the mean height of the rotors,
+at least R / 2 (Cheeseman and Bennett, ARC R&M 3021, 1955); one factor for all rotors.
 
-*Wind shear*: Hellmann's power law, 1/7 over open land; the height is at least 0.1 m. Gusts do not change with the height.
+*Wind shear*: Hellmann's power law, 1/7 over open land; the height is at least 0.1 m. Gusts do not change with the
+height.
 
-*Battery*: voltage and current change, and so does the charge with time; the rotors keep their speeds until it is empty.
+*Battery*: voltage and current change, and so does the charge with time; the rotors keep their speeds until it is
+empty.
 
 *Clock*: in lockstep a vehicle notices a stalled clock after 1 s of the machine's clock, not of simulated time
 ([Clocks of other simulators](simulator.md#clocks-of-other-simulators)).
 
-`tests/unit/test_fault_physics.py` compares payload, centre of gravity, wind, shear and ground effect with `solve_ivp` on both
-plants. After 1 s the error is below 1.2·10⁻⁸ with a payload and 3·10⁻¹³ without; the plants differ by less than 8·10⁻¹⁰.
+`tests/unit/test_fault_physics.py` compares payload, centre of gravity, wind, shear and ground effect with `solve_ivp`
+on both plants. After 1 s the error is below 1.2·10⁻⁸ with a payload and 3·10⁻¹³ without; the plants differ by less
+than 8·10⁻¹⁰.
 """
 
 
@@ -266,7 +272,11 @@ def faults_page() -> str:
 def main() -> int:
     """Write or check the pages."""
     stale = 0
-    pages = (("failsafes.md", failsafes_page()), ("log-topics.md", topics_page()), ("faults.md", faults_page()))
+    pages = (
+        ("failsafes.md", failsafes_page()),
+        ("log-topics.md", topics_page()),
+        ("faults.md", faults_page()),
+    )
     for name, text in pages:
         path = FOLDER / name
         if "--check" not in sys.argv:

@@ -54,6 +54,11 @@ def _mass(flight: Flight) -> str | None:
     return f"the paper's model has its centre of gravity in the origin; {_OTHER_PLANTS}"
 
 
+def _payload(flight: Flight) -> str | None:
+    has_payload = any(fault.kind is Kind.PAYLOAD for fault in flight.faults)
+    return None if has_payload else "there is no payload to cut"
+
+
 def _ground(flight: Flight) -> str | None:
     if flight.plant == NO_DRAG_PLANT:
         return f"the paper's model has no ground effect; {_OTHER_PLANTS}"
@@ -67,6 +72,7 @@ _REASONS: Mapping[Need, Callable[[Flight], str | None]] = MappingProxyType(
         Need.DRAG: _drag,
         Need.MEAN_WIND: _mean_wind,
         Need.MASS: _mass,
+        Need.PAYLOAD: _payload,
         Need.GROUND: _ground,
     }
 )

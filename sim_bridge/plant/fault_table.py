@@ -52,6 +52,7 @@ class Need(Enum):
     DRAG = "drag"
     MEAN_WIND = "a mean wind"
     MASS = "the plant rigid or multibody"
+    PAYLOAD = "a payload"
     GROUND = "the plant rigid or multibody with ground"
 
 
@@ -137,7 +138,7 @@ TABLE: tuple[Row, ...] = (
     ),
     Row(
         Kind.PAYLOAD_CUT, "payload:cut", "payload cut", "The payload is gone.",
-        is_event=True, ends=frozenset({Kind.PAYLOAD}),
+        needs=(Need.PAYLOAD,), is_event=True, ends=frozenset({Kind.PAYLOAD}),
     ),
     Row(
         Kind.CENTRE, "centre:at=X,Y,Z", "centre of gravity X,Y,Z",

@@ -46,7 +46,8 @@ def test_hover_carries_a_payload_beside_its_centre_and_drops_it(plant: str) -> N
     after, arm = squares(world), vehicle.rotors[0].position_frd_m[0]
     thrust = vehicle.rotors[0].thrust_coefficient_n_s2
     assert after.sum() / before.sum() == pytest.approx(1.0 + share, rel=1e-3)  # measured: 2.4e-4
-    assert (after[0] - after[2]) * thrust * arm == pytest.approx(payload_kg * 9.81 * x, rel=1e-3)  # measured: 5e-5
+    torque = (after[0] - after[2]) * thrust * arm
+    assert torque == pytest.approx(payload_kg * 9.81 * x, rel=1e-3)  # measured: 5e-5
     assert after[1] - after[3] == pytest.approx(0.0, abs=1e-6 * after.sum())  # measured: 0
     world.inject("payload cut")
     world.run(10.0)
