@@ -9,7 +9,7 @@ from typing import NamedTuple
 from flightstack.core.contract import Vector3
 from flightstack.params.vehicle import NO_DRAG_PLANT, Vehicle
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_table import ROWS, Fault, Kind, Need
+from sim_bridge.plant.fault_table import NO_END, ROWS, Fault, Kind, Need
 from sim_bridge.plant.plant import PlantOptions
 
 _STILL = Vector3(0.0, 0.0, 0.0)
@@ -82,8 +82,16 @@ def check_faults(faults: Sequence[Fault], flight: Flight, names: Sequence[str] =
     """Raise UsageProblemError for a fault that cannot act; ``names`` are those of the faults for the sentence."""
     flight = flight._replace(faults=(*flight.faults, *faults))
     for index, fault in enumerate(faults):
-        row = ROWS[fault.kind]
-        for need in row.needs:
-            reason = _REASONS[need](flight)
-            if reason is not None:
-                raise UsageProblemError(f"{names[index] if names else f'fault {row.words}'}: {reason}")
+        reason = _refusal(fault, flight)
+        if reason is not None:
+            raise UsageProblemError(
+                f"{names[index] if names else f'fault {ROWS[fault.kind].words}'}: {reason}"
+            )
+
+
+def _refusal(fault: Fault, flight: Flight) -> str | None:
+    """Return why a fault cannot act, or None."""
+    row = ROWS[fault.kind]
+    if row.is_event and fault.end_us is not None:
+        return NO_END
+    return next((reason for need in row.needs if (reason := _REASONS[need](flight)) is not None), None)

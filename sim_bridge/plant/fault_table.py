@@ -82,6 +82,9 @@ class Range(NamedTuple):
         return f"{self.low:g} to {self.high:g}" + (f" {self.unit}" if self.unit else "")
 
 
+NO_END = "it acts at one time: give no end"
+"""Reason to refuse an event with an end."""
+
 ROTOR_NUMBER = "N"
 """Placeholder of the number of a rotor, from 1."""
 

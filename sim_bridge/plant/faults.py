@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from flightstack.core.contract import Vector3
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_table import ROTOR_NUMBER, ROWS, TABLE, Fault, Kind, Range, Row
+from sim_bridge.plant.fault_table import NO_END, ROTOR_NUMBER, ROWS, TABLE, Fault, Kind, Range, Row
 
 __all__ = ["Fault", "Kind", "Schedule", "parse_fault"]
 
@@ -109,7 +109,7 @@ def _with_times(fault: Fault, begin: str | None, end: str | None) -> Fault:
     if end is None:
         return fault
     if ROWS[fault.kind].is_event:
-        raise ValueError(f"{fault.kind.value} acts at one time: give no end")
+        raise ValueError(NO_END)
     end_s = _parse_number(end, "the end", span)
     if not end_s > begin_s:
         raise ValueError(f"its end, {end_s:g} s, is not after its begin, {begin_s:g} s")

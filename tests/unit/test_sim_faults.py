@@ -92,7 +92,7 @@ def test_fault_is_parsed(text: str, fault: Fault) -> None:
         ("payload heavy", "expected payload KG at X,Y,Z (KG 0.001 to 100 kg; X,Y,Z -2 to 2 m)"),
         ("payload 1 at 0,0", "X,Y,Z must be three numbers separated by commas, each -2 to 2 m"),
         ("payload 1 at 0,0,3", "Z must be -2 to 2 m"),
-        ("payload cut @3-4", "payload cut acts at one time: give no end"),
+        ("payload cut @3-4", "acts at one time: give no end"),
         ("wind step 5", "three numbers"), ("state late", "expected state late SECONDS (SECONDS 0.0001 to 10 s)"),
         ("ground effect maybe", "expected ground effect on or ground effect off"), ("gust -1", "M_S must be 0 to 100"),
         ("wind:step=1,2,x", "D 'x' is not a number"), ("rotor=1=off", "the part is not one of rotor, payload"),
@@ -493,6 +493,12 @@ def test_wind_shear_needs_a_mean_wind() -> None:
         Simulator(vehicle).inject(shear)
     Simulator(vehicle).inject(shear, parse_fault("wind step 3,0,0 @5", 4))
     Simulator(vehicle, options=PlantOptions(Disturbance(Vector3(3.0, 0.0, 0.0)))).inject(shear)
+
+
+def test_event_with_an_end_is_refused() -> None:
+    """Callers that set times themselves, as ``for_s`` of a scenario does."""
+    with pytest.raises(UsageProblemError, match="fault battery level SHARE: it acts at one time"):
+        Simulator(PAPER).inject(parse_fault("battery level 0.5", 4)._replace(end_us=1_000_000))
 
 
 def test_ground_effect_needs_ground() -> None:
