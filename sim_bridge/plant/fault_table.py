@@ -45,15 +45,15 @@ STATE_KINDS = frozenset({Kind.STATE_FREEZE, Kind.STATE_NAN, Kind.STATE_DROP, Kin
 
 
 class Need(Enum):
-    """Condition for a fault to act."""
+    """Condition for a fault to act, in the words of the reference page."""
 
     BATTERY = "a battery"
-    CELLS = "a battery of at least two cells"
-    DRAG = "drag"
+    CELLS = "two cells or more"
+    DRAG = "drag, not `paper`"
     MEAN_WIND = "a mean wind"
-    MASS = "the plant rigid or multibody"
+    MASS = "not `paper`"
     PAYLOAD = "a payload"
-    GROUND = "the plant rigid or multibody with ground"
+    GROUND = "ground, not `paper`"
 
 
 class Fault(NamedTuple):
