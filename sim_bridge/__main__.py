@@ -93,11 +93,12 @@ def run(
     battery = arguments.check_battery(loaded, battery_start, battery_capacity, battery_drain)
     disturbance = _disturbance(wind, gust, force, torque, torque_gust)
     check_wind(loaded, plant, disturbance)
+    plant_options = PlantOptions(disturbance, seed, battery=battery)
     served = ServerOptions(
         vehicle=loaded,
         plant=plant,
-        plant_options=PlantOptions(disturbance, seed, battery=battery),
-        faults=arguments.parse_faults(fault or [], loaded),
+        plant_options=plant_options,
+        faults=arguments.parse_faults(fault or [], loaded, plant, plant_options),
         home=arguments.parse_home(home),
         speed=arguments.parse_speed(speed),
         host=host,

@@ -10,7 +10,9 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.battery import BatteryOptions
-from sim_bridge.plant.faults import Fault, Kind, parse_fault
+from sim_bridge.plant.fault_checks import Flight, check_faults
+from sim_bridge.plant.faults import Fault, parse_fault, shortened
+from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plants import MULTIBODY, NO_MUJOCO, PLANT_NAMES
 
 _LONGEST_QUOTE = 60
@@ -132,9 +134,8 @@ def check_battery(
     return BatteryOptions(start / 100.0, capacity_mah, factor)
 
 
-def parse_faults(texts: list[str], vehicle: Vehicle) -> tuple[Fault, ...]:
-    """Parse the faults."""
-    found = tuple(parse_fault(text, len(vehicle.rotors)) for text in texts)
-    if vehicle.battery is None and any(fault.kind is Kind.BATTERY_LEVEL for fault in found):
-        raise UsageProblemError(f"--fault battery:level: the vehicle {vehicle.name} has no [battery]")
-    return found
+def parse_faults(texts: list[str], vehicle: Vehicle, plant: str, options: PlantOptions) -> tuple[Fault, ...]:
+    """Parse the faults, and check that each can act."""
+    faults = tuple(parse_fault(text, len(vehicle.rotors), "--fault") for text in texts)
+    check_faults(faults, Flight(vehicle, plant, options), [f"--fault {shortened(text)}" for text in texts])
+    return faults

@@ -20,10 +20,14 @@ from flightstack.simulator_link.hot_frames import (
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.plant.battery import INTERVAL_US as BATTERY_INTERVAL_US
 from sim_bridge.plant.battery import battery_report
-from sim_bridge.plant.faults import Fault, Kind, Schedule
+from sim_bridge.plant.fault_checks import Flight, check_faults
+from sim_bridge.plant.fault_effects import plant_faults
+from sim_bridge.plant.fault_table import ROWS, STATE_KINDS, Fault, Kind
+from sim_bridge.plant.faults import Schedule
 from sim_bridge.plant.layout import CONTACT, DIVERGED, OUTPUT
 from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.plants import make_plant
+from sim_bridge.sent_state import SentState
 
 SIMULATOR_COMPONENT = 200
 DEFAULT_INTERVAL_US = 2000
@@ -51,7 +55,8 @@ class Simulator:
         system_id: int = 1,
     ) -> None:
         self.vehicle = vehicle
-        self.plant: Plant = make_plant(vehicle, plant, options or PlantOptions())
+        self._flight = Flight(vehicle, plant, options or PlantOptions())
+        self.plant: Plant = make_plant(*self._flight[:3])
         self.time_us = 0
         self._physics_dt_us = 1e6 / physics_hz
         self._frame = PlantStateFrame(system_id, SIMULATOR_COMPONENT)
@@ -61,11 +66,10 @@ class Simulator:
         self._battery_seq = 0
         self._battery_due_us = _NEVER_US if self.plant.battery is None else 0
         self._schedule = Schedule()
-        self._change_us = _NEVER_US
-        self._faulty: PlantStateFrame | None = None  # sent instead of the state during a fault
-        self._faulty_flags = 0
+        self._change_us = _NEVER_US  # of the next work of ``apply`` for faults
+        self._fault_us = _NEVER_US  # of the next begin or end of a fault
+        self._sent: SentState | None = None  # instead of the true state
         self.drops_state = False
-        self._state_fault: Kind | None = None
         self._system_id = system_id
         self.set_interval_us(interval_us)
         self._set_flags(self.plant.show())
@@ -100,8 +104,8 @@ class Simulator:
 
     def state_frame(self) -> memoryview:
         """Return the FS_PLANT_STATE frame of the present state, valid until the next call of ``apply``."""
-        if self._faulty is not None:
-            return self._faulty.seal(self.time_us, self._faulty_flags)
+        if self._sent is not None:
+            return self._sent.seal(self.time_us, self._flags)
         return self._frame.seal(self.time_us, self._flags)
 
     def battery_frame(self) -> bytes:
@@ -122,7 +126,12 @@ class Simulator:
     @property
     def shown(self) -> PlantStateFrame:
         """The state as sent, with its faults; read only."""
-        return self._frame if self._faulty is None else self._faulty
+        return self._frame if self._sent is None else self._sent.frame
+
+    @property
+    def stamp_us(self) -> int:
+        """Time stamp of the state as sent [µs]: ``time_us``, but for faults of the clock."""
+        return self.time_us if self._sent is None else self._sent.stamp_us(self.time_us)
 
     # ------------------------------------------------------------------ faults
 
@@ -131,59 +140,65 @@ class Simulator:
         """Active and scheduled faults."""
         return tuple(self._schedule.faults)
 
-    def inject(self, fault: Fault) -> None:
-        """Schedule a fault; one in the past begins at once. If two faults affect the same part, the last one wins."""
-        self._schedule.faults.append(fault)
+    def inject(self, *faults: Fault) -> None:
+        """Schedule faults; one in the past begins at once. If two faults affect the same part, the last one wins.
+
+        Raises UsageProblemError for a fault that cannot act, and schedules none then.
+        """
+        check_faults(faults, self._flight._replace(faults=self.faults))
+        for fault in faults:
+            late = ROWS[fault.kind].is_event and fault.begin_us < self.time_us
+            self._schedule.faults.append(fault._replace(begin_us=self.time_us) if late else fault)
         self._update_faults()
 
-    def clear_faults(self, rotor: int | None = None) -> None:
-        """Remove all faults, scheduled ones too; with ``rotor``, the active faults of this rotor."""
+    def clear_faults(self, rotor: int | None = None, part: str | None = None) -> None:
+        """Remove all faults, scheduled ones too; with ``rotor`` (from 0) or ``part``, the active ones of this part.
+
+        ``part`` is a first word of the compact notation, such as "payload". Charge and time stamps stay as they are.
+        """
         self._schedule.faults = [
             fault
             for fault in self._schedule.faults
-            if rotor is not None and (fault.rotor != rotor or fault.begin_us > self.time_us)
+            if (rotor is not None or part is not None)
+            and (
+                fault.begin_us > self.time_us
+                or rotor not in (None, fault.rotor)
+                or part not in (None, ROWS[fault.kind].part)
+            )
         ]
         self._update_faults()
 
     def _update_faults(self) -> None:
         """Apply the active faults, and find the time of the next change."""
         schedule, now_us = self._schedule, self.time_us
-        for rotor in range(len(self.vehicle.rotors)):
-            self.plant.set_rotor_fault(rotor)
-        state_fault: Fault | None = None
-        for fault in schedule.take_due_levels(now_us):
-            self.plant.set_charge(fault.value)
-            if self.plant.battery is not None:
+        events = schedule.take_due_events(now_us)
+        active = schedule.active(now_us)
+        self.plant.set_faults(plant_faults(active))
+        for event in events:
+            if event.kind is Kind.BATTERY_LEVEL:
+                self.plant.set_charge(event.value)
                 self._battery_due_us = now_us  # report the change at once
-        for fault in schedule.active(now_us):
-            if fault.kind is Kind.ROTOR_OFF:
-                self.plant.set_rotor_fault(fault.rotor, 1.0, 0.0)
-            elif fault.kind is Kind.ROTOR_WEAK:
-                self.plant.set_rotor_fault(fault.rotor, fault.value)
-            elif fault.kind is Kind.ROTOR_STUCK:
-                self.plant.set_rotor_fault(fault.rotor, 1.0, fault.value)
-            else:
-                state_fault = fault
-        self._set_state_fault(None if state_fault is None else state_fault.kind)
+        self._set_sent_state(active, [event for event in events if event.kind is Kind.CLOCK_JUMP])
         schedule.remove_past(now_us)
         change_us = schedule.next_change_us(now_us)
-        self._change_us = _NEVER_US if change_us is None else change_us
+        self._fault_us = _NEVER_US if change_us is None else change_us
+        self._change_us = 0 if self._sent is not None and self._sent.is_late else self._fault_us
 
-    def _set_state_fault(self, kind: Kind | None) -> None:
-        """Select the state that is sent from now on."""
-        self.drops_state = kind is Kind.STATE_DROP
-        if kind not in (Kind.STATE_FREEZE, Kind.STATE_NAN):
-            self._faulty = None
-            self._state_fault = kind
-            return
-        if self._faulty is not None and kind is self._state_fault:
-            return  # unchanged: another fault began or ended
-        self._state_fault = kind
-        self._faulty = PlantStateFrame(self._system_id, SIMULATOR_COMPONENT)
-        self._faulty.frame[:] = self._frame.frame
-        self._faulty_flags = self._flags
-        if kind is Kind.STATE_NAN:
-            self._faulty.state[:] = math.nan
+    def _set_sent_state(self, active: list[Fault], jumps: list[Fault]) -> None:
+        """Select the state that is sent from now on, and its time stamp."""
+        last = next((fault for fault in reversed(active) if fault.kind in STATE_KINDS), None)
+        stalls = any(fault.kind is Kind.CLOCK_STALL for fault in active)
+        if self._sent is None:
+            if last is None and not stalls and not jumps:
+                return
+            self._sent = SentState(self._frame, PlantStateFrame(self._system_id, SIMULATOR_COMPONENT))
+        self._sent.stall(stalls, self.time_us)
+        for jump in jumps:
+            self._sent.jump(jump.value, self.time_us)
+        self._sent.select(last, self.time_us, self._flags)
+        self.drops_state = self._sent.is_dropped
+        if self._sent.is_true:
+            self._sent = None
 
     # ------------------------------------------------------------------ time
 
@@ -195,7 +210,14 @@ class Simulator:
             self._set_flags(result)
         self._flags = _FLAGS[result]
         if self.time_us >= self._change_us:
+            self._follow_faults()
+
+    def _follow_faults(self) -> None:
+        """Begin and end faults that are due, and follow the true state with a late one."""
+        if self.time_us >= self._fault_us:
             self._update_faults()
+        elif self._sent is not None:
+            self._sent.update(self.time_us, self._flags)
 
     def _set_flags(self, result: int) -> None:
         if result & DIVERGED:

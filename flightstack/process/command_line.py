@@ -165,7 +165,7 @@ BATTERY_DRAIN = typer.Option(metavar="FACTOR", help="Factor on the discharge.  [
 FAULTS = typer.Option(
     "--fault",
     metavar="SPEC",
-    help="rotor:N:off, rotor:N:weak=SHARE, rotor:N:stuck=RAD_S, state:freeze, state:nan, state:drop or "
-    "battery:level=SHARE, each with @BEGIN or @BEGIN-END in seconds; may be repeated.",
+    help="Fault or disturbance, such as rotor:2:off@10-20 or 'payload 0.3 at 0.1,0,0.05 @12'; may be repeated. "
+    "All of them: docs/reference/faults.md.",
 )
 VIEW = typer.Option("--view", help="Show the vehicle in a window.")

@@ -18,9 +18,11 @@ from flightstack.core.geometry import quaternion_from_euler
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.multibody.assembly import assemble
 from sim_bridge.multibody.default_parts import foot_z_m
+from sim_bridge.multibody.frame_load import FrameLoad
 from sim_bridge.multibody.mjcf import contact_solref, model_xml
 from sim_bridge.plant import rotor_drive
 from sim_bridge.plant.layout import DIVERGED
+from sim_bridge.plant.loading import Loading
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.plant.record_plant import DEFAULT_STEP_S, RecordPlant
 from sim_bridge.plant.rotor_drive import LOST, NEAR
@@ -56,7 +58,9 @@ class MultibodyPlant(RecordPlant):
         self._on_rotors: FloatArray = self.data.xfrc_applied[first:]
         self._bind_arrays()
         self._drive: RecordArray = np.zeros(1, rotor_drive.DRIVE)
-        self._set_drive(len(vehicle.rotors))
+        self._set_drive(self.data)
+        self._contact_force[:] = 0.0  # the contact of the default pose is not that of the vehicle
+        self._frame_load: FrameLoad | None = None
         self.memory[0]["ground_z"], self.memory[0]["reach"] = foot_z_m(vehicle), self._reach_m()
         self._set_state(options.initial)
         self.set_step(DEFAULT_STEP_S)
@@ -72,19 +76,24 @@ class MultibodyPlant(RecordPlant):
         self._applied: FloatArray = data.qfrc_applied
         self._warm_start: FloatArray = data.qacc_warmstart
 
-    def _set_drive(self, rotors: int) -> None:
-        """Compute the constants of the drives from MuJoCo's mass matrix at the level attitude."""
-        model, data, d = self._model, self.data, self._drive[0]
+    def _set_drive(self, data: Any) -> None:
+        """Compute the constants of the drives from MuJoCo's mass matrix at the level attitude of new ``data``."""
+        model, d, rotors = self._model, self._drive[0], len(self._vehicle.rotors)
         mujoco.mj_forward(model, data)
         columns = np.eye(model.nv)
         mass = np.zeros((model.nv, model.nv))
         for row, column in zip(mass, columns, strict=True):
             mujoco.mj_mulM(model, data, row, column)
-        self._contact_force[:] = 0.0  # the contact of the default pose is not that of the vehicle
         row = np.linalg.solve(mass[:_FRAME, :_FRAME], mass[:_FRAME, _FRAME:]).T
         d["inertia"][:rotors, :rotors] = mass[_FRAME:, _FRAME:] - row @ mass[:_FRAME, _FRAME:]
         d["coupling"][:rotors] = row * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])  # FLU to FRD
         d["spin"][:rotors] = [rotor.spin for rotor in self._vehicle.rotors]
+
+    def _set_loading(self, loading: Loading) -> None:
+        super()._set_loading(loading)
+        self._frame_load = self._frame_load or FrameLoad(self._model)
+        self._frame_load.set(loading)
+        self._set_drive(mujoco.MjData(self._model))
 
     def _reach_m(self) -> float:
         """Return the distance from the origin to the farthest point with contact."""

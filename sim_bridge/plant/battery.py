@@ -47,10 +47,8 @@ class BatteryState(NamedTuple):
 
 def set_battery(m: Record, battery: Battery, options: BatteryOptions) -> None:
     """Write the battery to the record of a plant."""
-    count = len(battery.cell_voltage_v)
-    m["curve_count"] = count
-    m["curve"][:count] = [battery.cells * volt for volt in battery.cell_voltage_v]
-    m["resistance"] = battery.resistance_ohm
+    m["curve_count"] = len(battery.cell_voltage_v)
+    set_pack(m, battery)
     capacity_mah = battery.capacity_mah if options.capacity_mah is None else options.capacity_mah
     m["capacity"] = capacity_mah * 3.6
     m["drain"] = options.drain
@@ -58,6 +56,13 @@ def set_battery(m: Record, battery: Battery, options: BatteryOptions) -> None:
     m["avionics"] = battery.avionics_w
     m["charge"] = options.start
     settle(m, 0.0)
+
+
+def set_pack(m: Record, battery: Battery, extra_ohm: float = 0.0, dead_cells: int = 0) -> None:
+    """Write open-circuit voltage and resistance of the pack; they act from the next step on."""
+    cells = battery.cells - dead_cells
+    m["curve"][: len(battery.cell_voltage_v)] = [cells * volt for volt in battery.cell_voltage_v]
+    m["resistance"] = battery.resistance_ohm + extra_ohm
 
 
 @compiled

@@ -1,132 +1,137 @@
-"""Faults of rotors, state and battery at given simulated times: syntax and schedule.
+"""Faults and disturbances at given simulated times: parser of both notations, and schedule.
 
-    rotor:2:off@12.5          rotor 2 has no power from 12.5 s on
-    rotor:2:weak=0.7@10-20    it has 0.7 of its thrust and torque from 10 s to 20 s
-    rotor:1:stuck=150@8       it turns at 150 rad/s whatever the command, while armed
-    state:freeze@10-12        the same state is repeated with new timestamps
-    state:nan@5-5.1           all numbers of the state are sent as NaN
-    state:drop@5-6            no state is sent; impossible in lockstep
-    battery:level=0.1@20      at 20 s the charge of the battery is set to 10 %
+    rotor:2:weak=0.7@10-20    rotor 2 has 0.7 of its thrust and torque from 10 s to 20 s
+    rotor 2 dead @12.5        the same table in words, as in scenario files
 
 Without ``@`` a fault begins at once. A fault begins and ends at the first exchange at or after its time.
+``fault_table.py`` has all forms.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from enum import Enum
 from typing import NamedTuple
 
+from flightstack.core.contract import Vector3
 from sim_bridge.errors import UsageProblemError
+from sim_bridge.plant.fault_table import NO_END, ROTOR_NUMBER, ROWS, TABLE, Fault, Kind, Range, Row
+
+__all__ = ["Fault", "Kind", "Schedule", "parse_fault"]
 
 LONGEST_S = 1e6
 _SPEC = re.compile(r"(?P<what>[^@]*)(@(?P<begin>[^-]*)(-(?P<end>.*))?)?", re.DOTALL)
-_FORMS = (
-    "expected rotor:N:off, rotor:N:weak=SHARE, rotor:N:stuck=RAD_S, state:freeze, state:nan, state:drop or "
-    "battery:level=SHARE, each with @BEGIN or @BEGIN-END in seconds"
-)
 _LONGEST_QUOTE = 60
 
 
-class Kind(Enum):
-    """Effect of a fault."""
-
-    ROTOR_OFF = "rotor off"
-    ROTOR_WEAK = "rotor weak"
-    ROTOR_STUCK = "rotor stuck"
-    STATE_FREEZE = "state freeze"
-    STATE_NAN = "state nan"
-    STATE_DROP = "state drop"
-    BATTERY_LEVEL = "battery level"
-
-
-ROTOR_KINDS = frozenset({Kind.ROTOR_OFF, Kind.ROTOR_WEAK, Kind.ROTOR_STUCK})
-STATE_KINDS = frozenset({Kind.STATE_FREEZE, Kind.STATE_NAN, Kind.STATE_DROP})
-
-
-class Fault(NamedTuple):
-    """One fault. ``rotor`` counts from 0, −1 for none; ``end_us`` None is never."""
-
-    kind: Kind
-    rotor: int = -1
-    value: float = 0.0  # share of the thrust or of the charge, or speed in rad/s
-    begin_us: int = 0
-    end_us: int | None = None
-
-    def is_active(self, time_us: int) -> bool:
-        """Return True if the fault is active at ``time_us``."""
-        return self.begin_us <= time_us and (self.end_us is None or time_us < self.end_us)
-
-
-class _Syntax(NamedTuple):
-    kind: Kind
-    low: float | None  # None: takes no value
-    high: float | None
-
-
-_SYNTAX = {
-    ("rotor", "off"): _Syntax(Kind.ROTOR_OFF, None, None),
-    ("rotor", "weak"): _Syntax(Kind.ROTOR_WEAK, 0.0, 1.0),
-    ("rotor", "stuck"): _Syntax(Kind.ROTOR_STUCK, 0.0, 1e5),
-    ("state", "freeze"): _Syntax(Kind.STATE_FREEZE, None, None),
-    ("state", "nan"): _Syntax(Kind.STATE_NAN, None, None),
-    ("state", "drop"): _Syntax(Kind.STATE_DROP, None, None),
-    ("battery", "level"): _Syntax(Kind.BATTERY_LEVEL, 0.0, 1.0),
-}
-
-
-def parse_fault(text: str, rotor_count: int) -> Fault:
-    """Parse a fault; raise UsageProblemError with one sentence."""
+def parse_fault(text: str, rotor_count: int, label: str = "fault") -> Fault:
+    """Parse a fault in either notation; raise UsageProblemError with one sentence, which begins with ``label``."""
     match = _SPEC.fullmatch(text)
     assert match is not None  # the pattern matches any text
     try:
-        fault = _parse_effect(match["what"], rotor_count)
+        fault = _parse_effect(match["what"].strip(), rotor_count)
         return _with_times(fault, match["begin"], match["end"])
     except ValueError as error:
-        shown = text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
-        raise UsageProblemError(f"--fault {shown}: {error}") from None
+        raise UsageProblemError(f"{label} {shortened(text)}: {error}") from None
+
+
+def shortened(text: str) -> str:
+    """Return the begin of a long text."""
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}…"
+
+
+class _Form(NamedTuple):
+    """One notation of a row as words and separators."""
+
+    row: Row
+    words: list[str]
+
+    def agreement(self, given: list[str]) -> int:
+        """Return the number of leading words that agree."""
+        pairs = zip(self.words, given, strict=False)
+        return next(
+            (n for n, (own, word) in enumerate(pairs) if own != word and not self.row.is_placeholder(own)),
+            min(len(self.words), len(given)),
+        )
+
+
+def _words(text: str) -> list[str]:
+    """Split either notation; the separators of the compact one are words."""
+    spaced = re.sub(r"\s*,\s*", ",", text)
+    return re.split(r"([:=])", spaced) if ":" in spaced else spaced.split()
+
+
+_COMPACT = tuple(_Form(row, _words(row.compact)) for row in TABLE)
+_IN_WORDS = tuple(_Form(row, _words(row.words)) for row in TABLE)
 
 
 def _parse_effect(what: str, rotor_count: int) -> Fault:
-    """Parse kind, rotor and value of a fault; raise ValueError."""
-    unit, *rest = what.split(":")
-    rotor = -1
-    if unit == "rotor" and len(rest) == 2:
-        rotor = _parse_rotor(rest.pop(0), rotor_count)
-    word, has_value, text = rest[0].partition("=") if len(rest) == 1 else ("", "", "")
-    syntax = _SYNTAX.get((unit, word))
-    if syntax is None or (unit == "rotor") != (rotor >= 0):
-        raise ValueError(_FORMS)
-    if (syntax.low is None) == bool(has_value):
-        raise ValueError(f"{unit} {word} takes " + ("no value" if has_value else f"a value: {word}=NUMBER"))
-    if syntax.low is None or syntax.high is None:
-        return Fault(syntax.kind, rotor)
-    return Fault(syntax.kind, rotor, _parse_number(text, word, syntax.low, syntax.high))
+    """Parse kind, rotor and values of a fault; raise ValueError."""
+    given = _words(what)
+    forms = _COMPACT if ":" in what else _IN_WORDS
+    matches = [form for form in forms if form.agreement(given) == len(given) == len(form.words)]
+    if not matches:
+        raise ValueError(_expected(forms, given))
+    # a word of the notation is stronger than a placeholder: "payload cut" has no mass
+    row, words = max(matches, key=lambda form: sum(map(str.__eq__, form.words, given)))
+    fault = Fault(row.kind)
+    for name, word in zip(words, given, strict=True):
+        if name == ROTOR_NUMBER:
+            fault = fault._replace(rotor=_parse_rotor(word, rotor_count))
+        elif name in row.ranges and "," in name:
+            fault = fault._replace(vector=_parse_vector(word, name, row.ranges[name]))
+        elif name in row.ranges:
+            fault = fault._replace(value=_parse_number(word, name, row.ranges[name]))
+    return fault
+
+
+def _expected(forms: tuple[_Form, ...], given: list[str]) -> str:
+    """Return the forms that agree best with the given words, with their values."""
+    best = max(form.agreement(given) for form in forms)
+    if best == 0:
+        return f"the part is not one of {', '.join(dict.fromkeys(form.words[0] for form in forms))}"
+    rows = [form.row for form in forms if form.agreement(given) == best]
+    notations = [row.compact if forms is _COMPACT else row.words for row in rows]
+    told = [notation + _allowed(row) for notation, row in zip(notations, rows, strict=True)]
+    return "expected " + (f"{', '.join(told[:-1])} or {told[-1]}" if len(told) > 1 else told[0])
+
+
+def _allowed(row: Row) -> str:
+    """Return the allowed values of a row in parentheses."""
+    return f" ({'; '.join(f'{name} {span}' for name, span in row.ranges.items())})" if row.ranges else ""
 
 
 def _with_times(fault: Fault, begin: str | None, end: str | None) -> Fault:
     """Return the fault with its begin and end [s]; raise ValueError."""
-    begin_s = 0.0 if begin is None else _parse_number(begin, "the begin", 0.0, LONGEST_S)
+    span = Range(0.0, LONGEST_S, "s")
+    begin_s = 0.0 if begin is None else _parse_number(begin, "the begin", span)
     fault = fault._replace(begin_us=round(begin_s * 1e6))
     if end is None:
         return fault
-    if fault.kind is Kind.BATTERY_LEVEL:
-        raise ValueError("the charge is set at one time: give no end")
-    end_s = _parse_number(end, "the end", 0.0, LONGEST_S)
+    if ROWS[fault.kind].is_event:
+        raise ValueError(NO_END)
+    end_s = _parse_number(end, "the end", span)
     if not end_s > begin_s:
         raise ValueError(f"its end, {end_s:g} s, is not after its begin, {begin_s:g} s")
     return fault._replace(end_us=round(end_s * 1e6))
 
 
-def _parse_number(text: str, name: str, low: float, high: float) -> float:
+def _parse_number(text: str, name: str, allowed: Range) -> float:
     try:
         value = float(text) if "_" not in text else math.nan  # float() accepts 1_000
     except ValueError:
         raise ValueError(f"{name} {text[:_LONGEST_QUOTE]!r} is not a number") from None
-    if not low <= value <= high:
-        raise ValueError(f"{name} must be {low:g} to {high:g}")
+    if not allowed.low <= value <= allowed.high:
+        raise ValueError(f"{name} must be {allowed}")
     return value
+
+
+def _parse_vector(text: str, name: str, allowed: Range) -> Vector3:
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise ValueError(f"{name} must be three numbers separated by commas, each {allowed}")
+    x, y, z = (_parse_number(part, axis, allowed) for part, axis in zip(parts, name.split(","), strict=True))
+    return Vector3(x, y, z)
 
 
 def _parse_rotor(text: str, count: int) -> int:
@@ -146,10 +151,18 @@ class Schedule:
         """Return the faults that are active at ``time_us``."""
         return [fault for fault in self.faults if fault.is_active(time_us)]
 
-    def take_due_levels(self, time_us: int) -> list[Fault]:
-        """Remove and return the settings of the battery charge that are due."""
-        due = [f for f in self.faults if f.kind is Kind.BATTERY_LEVEL and f.begin_us <= time_us]
-        self.faults = [fault for fault in self.faults if fault not in due]
+    def take_due_events(self, time_us: int) -> list[Fault]:
+        """Remove and return the events that are due, by their times, and remove the faults that they end."""
+        due = [f for f in self.faults if ROWS[f.kind].is_event and f.begin_us <= time_us]
+        due.sort(key=lambda event: event.begin_us)
+        for event in due:
+            self.faults.remove(event)
+            ended = ROWS[event.kind].ends
+            self.faults = [
+                fault
+                for fault in self.faults
+                if fault.kind not in ended or ROWS[fault.kind].is_event or fault.begin_us > event.begin_us
+            ]
         return due
 
     def remove_past(self, time_us: int) -> None:

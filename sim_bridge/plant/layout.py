@@ -86,6 +86,16 @@ MEMORY = np.dtype(
         ("damping", "f8"),  # N s/m, all feet together
         ("ramp", "f8"),  # m, depth of full damping
         ("lever", "f8"),  # m, mean distance of the feet from the vertical axis
+        # faults and disturbances
+        ("is_loaded", "i8"),  # 1 with a payload or a moved centre of gravity
+        ("centre", "f8", 3),  # of gravity, m FRD
+        ("inertia_matrix", "f8", (3, 3)),  # about the centre of gravity, kg m²
+        ("inverse_inertia", "f8", (3, 3)),
+        ("alters_air", "i8"),  # 1 with wind shear or ground effect
+        ("shear", "f8"),  # exponent of the wind shear, 0 without
+        ("surface_z", "f8"),  # m NED, of the ground
+        ("rotor_z", "f8"),  # m FRD, mean of the rotors
+        ("propeller_radius", "f8"),  # m, 0 without ground effect
     ],
     align=True,
 )

@@ -7,6 +7,7 @@ from typing import NamedTuple, Protocol
 from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from sim_bridge.plant.battery import FULL, BatteryOptions, BatteryState
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
+from sim_bridge.plant.fault_effects import PlantFaults
 
 
 class InitialState(NamedTuple):
@@ -70,11 +71,8 @@ class Plant(Protocol):
         """Set the charge of the battery, 0 to 1."""
         ...
 
-    def set_rotor_fault(self, rotor: int, share: float = 1.0, speed_rad_s: float | None = None) -> None:
-        """Scale thrust and torque of a rotor (from 0), and fix its commanded speed if one is given.
-
-        The defaults clear the fault.
-        """
+    def set_faults(self, faults: PlantFaults) -> None:
+        """Set all faults and disturbances; those of an earlier call end."""
         ...
 
     def rotor_speeds_rad_s(self) -> list[float]:

@@ -7,11 +7,15 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from flightstack.core.contract import FloatArray, RecordArray
+from flightstack.core.contract import FloatArray, RecordArray, Vector3
 from flightstack.core.portable_math import distance, exp
-from flightstack.params.vehicle import Vehicle
-from sim_bridge.plant.battery import BatteryState, battery_state, set_battery
+from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
+from sim_bridge.plant.battery import BatteryState, battery_state, set_battery, set_pack
+from sim_bridge.plant.dead_time import DeadTime
+from sim_bridge.plant.fault_effects import PlantFaults, RotorFault
 from sim_bridge.plant.layout import MEMORY, OUTPUT
+from sim_bridge.plant.loading import AS_BUILT, Body, Loading, inverse, loaded
+from sim_bridge.plant.near_ground import wind_share
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plant.turbulence import Turbulence
 
@@ -30,7 +34,11 @@ class RecordPlant(ABC):
         disturbance = options.disturbance
         m["wind"], m["force"] = disturbance.wind_ned_m_s, disturbance.force_ned_n
         m["steady_torque"] = m["torque"] = disturbance.torque_frd_n_m
+        self._disturbance = disturbance
         self._turbulence = Turbulence(m, disturbance, options.seed)
+        self._dead_time = DeadTime()
+        self._is_plain = not self._turbulence.active  # no work between two steps
+        self._loading = AS_BUILT
         m["ground"] = options.ground
         m["mass"], m["weight"] = vehicle.mass_kg, vehicle.weight_n
         m["inertia"], m["drag"] = vehicle.inertia_kg_m2, vehicle.linear_drag_n_s_m
@@ -60,16 +68,55 @@ class RecordPlant(ABC):
             )
         self._healthy: RecordArray = m["rotor"].copy()
 
-    def set_rotor_fault(self, rotor: int, share: float = 1.0, speed_rad_s: float | None = None) -> None:
-        """Scale thrust and torque of a rotor, and fix its commanded speed; see ``Plant``."""
+    # ------------------------------------------------------------------ faults
+
+    def set_faults(self, faults: PlantFaults) -> None:
+        """Set all faults and disturbances; see ``Plant``."""
+        for index in range(len(self._vehicle.rotors)):
+            self._set_rotor_fault(index, faults.rotors[index])
+        if faults.loading != self._loading:
+            self._loading = faults.loading
+            self._set_loading(faults.loading)
+        self._set_air(faults)
+        if self._has_battery:
+            assert self._vehicle.battery is not None
+            set_pack(self.memory[0], self._vehicle.battery, faults.extra_resistance_ohm, faults.dead_cells)
+        self._is_plain = not (self._turbulence.active or self._dead_time.is_active)
+
+    def _set_rotor_fault(self, rotor: int, fault: RotorFault) -> None:
+        """Scale thrust and torque of a rotor, fix its commanded speed, and delay its commands."""
         m, healthy = self.memory[0], self._healthy[rotor]
         now = m["rotor"][rotor]
         for name in ("thrust", "roll", "pitch", "drag"):
-            now[name] = share * healthy[name]
+            now[name] = fault.share * healthy[name]
         now["min_speed"], now["max_speed"] = healthy["min_speed"], healthy["max_speed"]
-        if speed_rad_s is not None:
-            now["min_speed"] = now["max_speed"] = speed_rad_s
-            m["command"][rotor] = speed_rad_s  # holds also if the next command is invalid
+        self._dead_time.set_delay(rotor, fault.delay_s, float(m["command"][rotor]))
+        if fault.speed_rad_s is not None:
+            now["min_speed"] = now["max_speed"] = fault.speed_rad_s
+            m["command"][rotor] = fault.speed_rad_s  # holds also if the next command is invalid
+
+    def _set_loading(self, loading: Loading) -> None:
+        """Set payload and centre of gravity."""
+        m, vehicle = self.memory[0], self._vehicle
+        ix, iy, iz = vehicle.inertia_kg_m2
+        diagonal = (Vector3(ix, 0.0, 0.0), Vector3(0.0, iy, 0.0), Vector3(0.0, 0.0, iz))
+        body = loaded(Body(vehicle.mass_kg, Vector3(0.0, 0.0, 0.0), diagonal), loading)
+        m["mass"], m["weight"] = body.mass_kg, body.mass_kg * GRAVITY_M_S2
+        m["centre"], m["inertia_matrix"] = body.centre_m, body.inertia_kg_m2
+        m["inverse_inertia"] = inverse(body.inertia_kg_m2)
+        m["is_loaded"] = loading != AS_BUILT
+
+    def _set_air(self, faults: PlantFaults) -> None:
+        """Set mean wind, gusts, wind shear and ground effect."""
+        from sim_bridge.multibody.default_parts import foot_z_m, propeller_radius_m  # noqa: PLC0415  # rarely needed
+
+        m, vehicle, options = self.memory[0], self._vehicle, self._disturbance
+        m["wind"] = np.array(options.wind_ned_m_s) + np.array(faults.wind_step_ned_m_s)
+        self._turbulence.set_gust(options.gust_m_s if faults.gust_m_s is None else faults.gust_m_s)
+        m["alters_air"] = faults.wind_shear != 0.0 or faults.ground_effect
+        m["shear"], m["surface_z"] = faults.wind_shear, foot_z_m(vehicle)
+        m["rotor_z"] = math.fsum(rotor.position_frd_m[2] for rotor in vehicle.rotors) / len(vehicle.rotors)
+        m["propeller_radius"] = propeller_radius_m(vehicle) if faults.ground_effect else 0.0
 
     @property
     def battery(self) -> BatteryState | None:
@@ -93,6 +140,7 @@ class RecordPlant(ABC):
             decay = exp(-0.5 * step_s / rotor.lag_s) if rotor.lag_s > 0.0 else 0.0
             m["rotor"][index]["half_step_decay"] = decay
         self._turbulence.set_step(step_s)
+        self._dead_time.set_step(step_s)
 
     def rotor_speeds_rad_s(self) -> list[float]:
         """Return the rotor speeds in full precision, in the order of the vehicle file."""
@@ -109,19 +157,23 @@ class RecordPlant(ABC):
 
     def advance(self, command_rad_s: FloatArray, flags: int, steps: int) -> int:
         """Advance by ``steps`` steps with the commands (shape (8,), rad/s) held; see ``Plant``."""
-        if not self._turbulence.active:
+        if self._is_plain:
             return self._advance(command_rad_s, flags, steps)
         result = 0
         while steps > 0:
-            count = min(steps, self._turbulence.rows_left())
-            result = self._advance(command_rad_s, flags, count)
+            count = min(steps, self._turbulence.rows_left()) if self._turbulence.active else steps
+            acting = command_rad_s
+            if self._dead_time.is_active:
+                count, acting = 1, self._dead_time.delayed(command_rad_s)
+            result = self._advance(acting, flags, count)
             steps -= count
         return result
 
     def airspeed_m_s(self) -> float:
         """Return the airspeed."""
         m = self.memory[0]
-        return distance(*(m["body"][3:6] - m["wind"] - m["gust"]).tolist())
+        share = wind_share(m, m["body"][2]) if m["alters_air"] else 1.0
+        return distance(*(m["body"][3:6] - share * m["wind"] - m["gust"]).tolist())
 
     def description(self) -> str | None:
         """Return a description of the plant for the user, or None."""

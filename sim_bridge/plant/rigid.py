@@ -6,7 +6,8 @@ State vector: the array form of ``VehicleState`` (position NED, velocity NED, qu
     q' = ½ q ⊗ ω
     I ω' = −ω × (I ω + h e_z) + rotor torques − Σ s J_r Ω̇ e_z + external torque + contact
 
-with h = Σ s·J_r·Ω (errata.md's a1…a5, written without the small-angle kinematics).
+with h = Σ s·J_r·Ω (errata.md's a1…a5, written without the small-angle kinematics). ``loading.py`` has the equations for
+a payload or a moved centre of gravity, ``near_ground.py`` wind shear and ground effect.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from flightstack.core.contract import FloatArray, Quaternion, Record, Vector3
 from flightstack.core.geometry import cross
 from sim_bridge.plant.contact import contact_force, move_anchor, normal_force
 from sim_bridge.plant.layout import CONTACT
+from sim_bridge.plant.loading import loaded_acceleration
+from sim_bridge.plant.near_ground import thrust_ratio, wind_share
 from sim_bridge.plant.rotors import RotorForces
 
 
@@ -99,10 +102,16 @@ def derivative(x: FloatArray, rotors: RotorForces, m: Record, out: FloatArray) -
     r = rotation(x)
     rates = Vector3(x[10], x[11], x[12])
     wind, gust, drag = m["wind"], m["gust"], m["drag"]
-    air = _to_body(r, Vector3(x[3] - wind[0] - gust[0], x[4] - wind[1] - gust[1], x[5] - wind[2] - gust[2]))
-    push = _to_world(r, Vector3(-drag[0] * air.x, -drag[1] * air.y, -drag[2] * air.z - rotors.thrust_n))
-    tx = rotors.roll_n_m + m["torque"][0]
-    ty = rotors.pitch_n_m + m["torque"][1]
+    wn, we, wd = wind[0], wind[1], wind[2]
+    thrust, tx, ty = rotors.thrust_n, rotors.roll_n_m, rotors.pitch_n_m
+    if m["alters_air"] != 0:
+        share, lift = wind_share(m, x[2]), thrust_ratio(m, x[2], r.row_d.z)
+        wn, we, wd = share * wn, share * we, share * wd
+        thrust, tx, ty = lift * thrust, lift * tx, lift * ty
+    air = _to_body(r, Vector3(x[3] - wn - gust[0], x[4] - we - gust[1], x[5] - wd - gust[2]))
+    push = _to_world(r, Vector3(-drag[0] * air.x, -drag[1] * air.y, -drag[2] * air.z - thrust))
+    tx = tx + m["torque"][0]
+    ty = ty + m["torque"][1]
     tz = rotors.drag_torque_n_m + rotors.spin_up_torque_n_m + m["torque"][2]
     if _near_ground(x, m):
         force, torque = _contact(x, r, rates, m)
@@ -110,15 +119,22 @@ def derivative(x: FloatArray, rotors: RotorForces, m: Record, out: FloatArray) -
         tx, ty, tz = tx + torque.x, ty + torque.y, tz + torque.z
     out[0], out[1], out[2] = x[3], x[4], x[5]
     external, mass = m["force"], m["mass"]
-    out[3] = (push.x + external[0]) / mass
-    out[4] = (push.y + external[1]) / mass
-    out[5] = (push.z + external[2] + m["weight"]) / mass
     q = Quaternion(x[6], x[7], x[8], x[9])
     out[6] = -0.5 * (q.x * rates.x + q.y * rates.y + q.z * rates.z)
     out[7] = 0.5 * (q.w * rates.x + q.y * rates.z - q.z * rates.y)
     out[8] = 0.5 * (q.w * rates.y + q.z * rates.x - q.x * rates.z)
     out[9] = 0.5 * (q.w * rates.z + q.x * rates.y - q.y * rates.x)
     inertia, h = m["inertia"], rotors.momentum_n_m_s
+    if m["is_loaded"] != 0:
+        force = Vector3(push.x + external[0], push.y + external[1], push.z + external[2])
+        a = loaded_acceleration(m, _to_body(r, force), Vector3(tx, ty, tz), rates, h)
+        of_origin = _to_world(r, a.of_origin)
+        out[3], out[4], out[5] = of_origin.x, of_origin.y, of_origin.z + m["weight"] / mass
+        out[10], out[11], out[12] = a.angular.x, a.angular.y, a.angular.z
+        return
+    out[3] = (push.x + external[0]) / mass
+    out[4] = (push.y + external[1]) / mass
+    out[5] = (push.z + external[2] + m["weight"]) / mass
     out[10] = (tx + (inertia[1] - inertia[2]) * rates.y * rates.z - rates.y * h) / inertia[0]
     out[11] = (ty + (inertia[2] - inertia[0]) * rates.z * rates.x + rates.x * h) / inertia[1]
     out[12] = (tz + (inertia[0] - inertia[1]) * rates.x * rates.y) / inertia[2]

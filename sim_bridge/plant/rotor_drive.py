@@ -28,6 +28,7 @@ from flightstack.core.contract import MAX_ROTORS, FloatArray, Record, RecordArra
 from sim_bridge.plant.battery import discharge
 from sim_bridge.plant.integrator import LARGEST_TURN_RAD, next_gust
 from sim_bridge.plant.layout import CONTACT, DIVERGED
+from sim_bridge.plant.near_ground import thrust_ratio, wind_share
 from sim_bridge.plant.rigid import after_step, rotation
 from sim_bridge.plant.rotors import drive_acceleration, half_step, take_commands
 
@@ -152,7 +153,12 @@ def apply_forces(
     x, rotors, when = m["stage"], m["rotor_count"], (stage + 1) // 2
     n, e, z = rotation(x)
     wind, gust, push, torque, air_drag = m["wind"], m["gust"], m["force"], m["torque"], m["drag"]
-    vn, ve, vd = x[3] - wind[0] - gust[0], x[4] - wind[1] - gust[1], x[5] - wind[2] - gust[2]
+    blow, lift = 1.0, 1.0  # share of the mean wind, thrust over that far from the ground
+    if m["alters_air"] != 0:
+        blow, lift = wind_share(m, x[2]), thrust_ratio(m, x[2], z.z)
+    vn = x[3] - blow * wind[0] - gust[0]
+    ve = x[4] - blow * wind[1] - gust[1]
+    vd = x[5] - blow * wind[2] - gust[2]
     # drag in body axes, then with the external force in the world
     fx = -air_drag[0] * (n.x * vn + e.x * ve + z.x * vd)
     fy = -air_drag[1] * (n.y * vn + e.y * ve + z.y * vd)
@@ -166,10 +172,11 @@ def apply_forces(
     rotor, speed = m["rotor"], d["speed"]
     for i in range(rotors):
         w2 = speed[when, i] * abs(speed[when, i])
-        thrust, twist = rotor[i]["thrust"] * w2, rotor[i]["drag"] * w2
+        thrust, twist = lift * (rotor[i]["thrust"] * w2), rotor[i]["drag"] * w2
         on_body[i, 0], on_body[i, 1], on_body[i, 2] = -n.z * thrust, e.z * thrust, z.z * thrust
         on_body[i, 3], on_body[i, 4], on_body[i, 5] = n.z * twist, -e.z * twist, -z.z * twist
-        tx, ty, tz = tx + rotor[i]["roll"] * w2, ty + rotor[i]["pitch"] * w2, tz + twist
+        tx, ty = tx + lift * (rotor[i]["roll"] * w2), ty + lift * (rotor[i]["pitch"] * w2)
+        tz += twist
         north, east, down = north - n.z * thrust, east - e.z * thrust, down - z.z * thrust
     north += contact[0] - bias[0]
     east -= contact[1] - bias[1]

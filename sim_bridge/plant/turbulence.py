@@ -49,14 +49,30 @@ class _Gust:
     def __init__(
         self, record: Record, name: str, noise: str, spread: FloatArray, time_s: float, bits: np.random.PCG64
     ) -> None:
-        self.active = bool(spread.any())
+        self.active = False
         self._record, self._name = record, name
         self._noise: FloatArray = record[noise]
-        self._spread, self._time_s = spread, time_s
+        self._spread, self._time_s = np.zeros(3), time_s
         self._bits = bits
+        self._step_s = 0.0
+        self._paused: FloatArray | None = None  # unit deviates at which the process was disabled
+        self.set_spread(spread)
+
+    def set_spread(self, spread: FloatArray) -> None:
+        """Set the standard deviations, zero for none; the present gust is scaled."""
+        if np.array_equal(spread, self._spread):
+            return
+        present = self._paused
         if self.active:
-            record[name] = spread * normal_deviates(bits, 3)
+            present = self._record[self._name] / self._spread
+        elif present is None:
+            present = normal_deviates(self._bits, 3)
+        has_noise, self.active = self.active, bool(spread.any())
+        self._spread, self._paused = spread, present
+        self._record[self._name] = spread * present
+        if not has_noise:
             self.refill()
+        self.set_step(self._step_s)
 
     def refill(self) -> None:
         """Draw new noise."""
@@ -65,18 +81,23 @@ class _Gust:
 
     def set_step(self, step_s: float) -> None:
         """Set decay and noise of one step: spread and correlation time do not depend on the step."""
+        self._step_s = step_s
         decay = exp(-step_s / self._time_s)
         self._record[f"{self._name}_decay"] = decay
         self._record[f"{self._name}_scale"] = self._spread * math.sqrt(1.0 - decay * decay)
+
+
+def _wind_spread(gust_m_s: float) -> FloatArray:
+    return np.array([1.0, 1.0, GUST_DOWN_RATIO]) * gust_m_s
 
 
 class Turbulence:
     """Gusts of wind and torque of one plant, written to its record of ``MEMORY``."""
 
     def __init__(self, record: Record, disturbance: Disturbance, seed: int) -> None:
-        wind = np.array([1.0, 1.0, GUST_DOWN_RATIO]) * disturbance.gust_m_s
         torque = np.array([1.0, 1.0, TORQUE_GUST_YAW_RATIO]) * disturbance.torque_gust_n_m
         self._record = record
+        wind = _wind_spread(disturbance.gust_m_s)
         self._gusts = (
             _Gust(record, "gust", "noise", wind, GUST_TIME_S, np.random.PCG64(seed)),
             _Gust(
@@ -89,6 +110,11 @@ class Turbulence:
             ),
         )
         record["torque"] = record["steady_torque"] + record["torque_gust"]
+        self.active = any(gust.active for gust in self._gusts)
+
+    def set_gust(self, gust_m_s: float) -> None:
+        """Set the standard deviation of the gusts of wind."""
+        self._gusts[0].set_spread(_wind_spread(gust_m_s))
         self.active = any(gust.active for gust in self._gusts)
 
     def set_step(self, step_s: float) -> None:

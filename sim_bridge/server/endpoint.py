@@ -137,7 +137,7 @@ class FlightStackEndpoint:
         self.free_running = not actuators.flags & LOCKSTEP_FLAG
         if not self.free_running and not self._faults_checked:
             self._reject_drops()
-        if self.ready and actuators.time_us == self.simulator.time_us:
+        if self.ready and actuators.time_us == self.simulator.stamp_us:
             self.answered = True
         elif not self.free_running:
             self.stale += 1

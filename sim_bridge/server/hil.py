@@ -36,7 +36,7 @@ def hil_state(simulator: Simulator, frame: LocalFrame) -> Message:
     force = rotate(conjugate(attitude), Vector3(a.x, a.y, a.z - GRAVITY_M_S2))
     airspeed = whole(simulator.plant.airspeed_m_s() * 100.0, 0, 65535)
     return mavlink.MAVLink_hil_state_quaternion_message(
-        simulator.time_us,
+        simulator.stamp_us,
         shown[6:10],
         *shown[10:13],
         int32(geo.latitude_deg * 1e7),

@@ -115,8 +115,7 @@ def _make_simulator(options: ServerOptions) -> Simulator:
     )
     if description := simulator.plant.description():
         say(description)
-    for fault in options.faults:
-        simulator.inject(fault)
+    simulator.inject(*options.faults)
     return simulator
 
 

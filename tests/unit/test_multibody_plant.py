@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from flightstack.core.contract import Vector3
+from flightstack.core.contract import MAX_ROTORS, Vector3
 from flightstack.core.geodesy import LocalFrame
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.params.vehicle import Vehicle, load_vehicle
@@ -24,6 +24,8 @@ from sim_bridge.multibody.mjcf import model_xml
 from sim_bridge.multibody.plant import MultibodyPlant
 from sim_bridge.plant.contact import FRICTION
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
+from sim_bridge.plant.fault_effects import PlantFaults, RotorFault, plant_faults
+from sim_bridge.plant.faults import parse_fault
 from sim_bridge.plant.layout import CONTACT, DIVERGED
 from sim_bridge.plant.plant import AT_REST, InitialState, Plant, PlantOptions
 from sim_bridge.plants import PLANT_NAMES, make_plant
@@ -53,8 +55,7 @@ class Flight:
             self.plant.set_rotor_speeds(speeds)
             self.command[: len(speeds)] = speeds
         if not thrust:
-            for rotor in range(len(vehicle.rotors)):
-                self.plant.set_rotor_fault(rotor, share=0.0)
+            self.plant.set_faults(PlantFaults(rotors=[RotorFault(share=0.0)] * MAX_ROTORS))
         self.result = self.plant.show()
 
     def fly(self, seconds: float) -> Flight:
@@ -499,10 +500,9 @@ def test_faults_battery_and_gusts_act_as_on_the_rigid_plant() -> None:
         plant = make_plant(vehicle, name, PlantOptions(gusty, 5, start))
         command = np.full(8, hover(vehicle))
         plant.advance(command, ARMED_FLAG, 1100)
-        plant.set_rotor_fault(0, share=0.7)
+        plant.set_faults(plant_faults([parse_fault("rotor:1:weak=0.7", 4)]))
         plant.advance(command, ARMED_FLAG, 50)
-        plant.set_rotor_fault(0)
-        plant.set_rotor_fault(2, speed_rad_s=300.0)
+        plant.set_faults(plant_faults([parse_fault("rotor:3:stuck=300", 4)]))
         plant.advance(command, ARMED_FLAG, 50)
         plant.set_charge(0.0)
         plant.advance(command, ARMED_FLAG, 50)

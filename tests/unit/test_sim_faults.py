@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from sim_bridge.errors import UsageProblemError
+from sim_bridge.plant.disturbance import Disturbance
+from sim_bridge.plant.fault_table import TABLE, Row
 from sim_bridge.plant.faults import Fault, Kind, parse_fault
+from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.server.endpoint import HIL_STATE_QUATERNION_ID, FlightStackEndpoint
 from sim_bridge.simulator import Simulator
 
@@ -34,8 +40,7 @@ def command(speed: float = LAG_SPEED, flags: int = ARMED_FLAG, time_us: int = 0)
 
 def flown(*specs: str, seconds: float = 0.4, speed: float = LAG_SPEED) -> Simulator:
     simulator = Simulator(PAPER)
-    for spec in specs:
-        simulator.inject(parse_fault(spec, 4))
+    simulator.inject(*(parse_fault(spec, 4) for spec in specs))
     fly(simulator, seconds, speed)
     return simulator
 
@@ -72,26 +77,84 @@ def test_fault_is_parsed(text: str, fault: Fault) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "expected rotor:N:off"), ("rotor", "expected rotor"), ("rotor:off@3", "expected rotor"),
-        ("rotor:1:dance", "expected rotor"), ("state:1:freeze", "expected rotor"), ("engine:off", "expected rotor"),
+        ("", "the part is not one of rotor, payload,"), ("rotor", "expected rotor N dead, rotor N efficiency SHARE"),
+        ("rotor:off@3", "expected rotor:N:off, rotor:N:weak=SHARE (SHARE 0 to 1), rotor:N:stuck=RAD_S (RAD_S 0 to"),
+        ("rotor:1:dance", "expected rotor:N:off"), ("state:1:freeze", "expected state:freeze, state:nan, state:drop"),
+        ("engine:off", "the part is not one of rotor"), ("engine off", "the part is not one of rotor"),
         ("rotor:0:off", "rotors 1 to 4"), ("rotor:5:off", "rotors 1 to 4"), ("rotor:x:off", "rotors 1 to 4"),
-        ("rotor:1:off=3", "takes no value"), ("rotor:1:weak", "weak=NUMBER"), ("rotor:1:weak=2", "0 to 1"),
+        ("rotor:1:off=3", "expected rotor:N:off"), ("rotor:1:weak", "expected rotor:N:weak=SHARE (SHARE 0 to 1)"),
+        ("rotor:1:weak=2", "0 to 1"),
         ("rotor:1:weak=much", "not a number"), ("rotor:1:stuck=nan", "0 to 100000"), ("rotor:1:weak=1_0", "0 to 1"),
         ("rotor:1:off@", "not a number"), ("rotor:1:off@-3", "not a number"), ("rotor:1:off@5-", "not a number"),
         ("rotor:1:off@5-5", "not after its begin"), ("rotor:1:off@5-4", "not after its begin"),
         ("rotor:1:off@inf", "0 to 1e+06"), ("battery:level=0.5@3-4", "give no end"), ("battery:level=-1", "0 to 1"),
+        ("rotor 5 dead", "rotors 1 to 4"), ("rotor 1 delayed 3", "SECONDS must be 0.0001 to 2 s"),
+        ("payload heavy", "expected payload KG at X,Y,Z (KG 0.001 to 100 kg; X,Y,Z -2 to 2 m)"),
+        ("payload 1 at 0,0", "X,Y,Z must be three numbers separated by commas, each -2 to 2 m"),
+        ("payload 1 at 0,0,3", "Z must be -2 to 2 m"),
+        ("payload cut @3-4", "acts at one time: give no end"),
+        ("wind step 5", "three numbers"), ("state late", "expected state late SECONDS (SECONDS 0.0001 to 10 s)"),
+        ("ground effect maybe", "expected ground effect on or ground effect off"), ("gust -1", "M_S must be 0 to 100"),
+        ("wind:step=1,2,x", "D 'x' is not a number"), ("rotor=1=off", "the part is not one of rotor, payload"),
+        ("battery  level 2", "0 to 1"),
     ],
 )  # fmt: skip
 def test_a_bad_fault_is_named_in_one_sentence(text: str, said: str) -> None:
     with pytest.raises(UsageProblemError) as caught:
-        parse_fault(text, 4)
+        parse_fault(text, 4, "--fault")
     assert said in str(caught.value)
     assert str(caught.value).startswith(f"--fault {text}: ")
     assert "\n" not in str(caught.value)
 
 
+WORDS = {
+    "rotor 2 dead": Fault(Kind.ROTOR_OFF, 1), "rotor 2 efficiency 0.7": Fault(Kind.ROTOR_WEAK, 1, 0.7),
+    "rotor 2 stuck 150": Fault(Kind.ROTOR_STUCK, 1, 150.0), "rotor 2 delayed 0.05": Fault(Kind.ROTOR_DELAYED, 1, 0.05),
+    "payload 0.3 at 0.1,0,0.05": Fault(Kind.PAYLOAD, value=0.3, vector=Vector3(0.1, 0.0, 0.05)),
+    "payload cut": Fault(Kind.PAYLOAD_CUT),
+    "centre of gravity 0.02, 0, 0": Fault(Kind.CENTRE, vector=Vector3(0.02, 0.0, 0.0)),
+    "wind step 5,0,-1": Fault(Kind.WIND_STEP, vector=Vector3(5.0, 0.0, -1.0)),
+    "gust 2": Fault(Kind.WIND_GUST, value=2.0),
+    "wind shear 0.14": Fault(Kind.WIND_SHEAR, value=0.14), "ground effect on": Fault(Kind.GROUND_EFFECT),
+    "ground effect off": Fault(Kind.GROUND_EFFECT_OFF), "battery level 0.2": Fault(Kind.BATTERY_LEVEL, value=0.2),
+    "battery sag 0.05": Fault(Kind.BATTERY_SAG, value=0.05), "battery cell dead": Fault(Kind.BATTERY_CELL),
+    "state frozen": Fault(Kind.STATE_FREEZE), "state nan": Fault(Kind.STATE_NAN),
+    "state dropped": Fault(Kind.STATE_DROP),
+    "state late 0.1": Fault(Kind.STATE_LATE, value=0.1), "clock stalled": Fault(Kind.CLOCK_STALL),
+    "clock jump -0.5": Fault(Kind.CLOCK_JUMP, value=-0.5), "clear": Fault(Kind.CLEAR),
+}  # fmt: skip
+VALUES = {"N": "3", "SHARE": "0.25", "X,Y,Z": "0.1,0.2,-0.3", "N,E,D": "1,-2,3"}
+
+
+@pytest.mark.parametrize("text", WORDS)
+def test_fault_in_words_is_parsed(text: str) -> None:
+    assert parse_fault(text, 4) == WORDS[text]
+    assert parse_fault(f" {text} @ 3.5", 4) == WORDS[text]._replace(begin_us=3_500_000)
+
+
+def test_words_of_this_test_are_the_whole_table() -> None:
+    assert {fault.kind for fault in WORDS.values()} == set(Kind) == {row.kind for row in TABLE}
+
+
+@pytest.mark.parametrize("row", TABLE, ids=lambda row: row.compact)
+def test_both_notations_of_a_row_are_the_same_fault(row: Row) -> None:
+    compact, words = row.compact, row.words
+    for name in sorted(("N", *row.ranges), key=len, reverse=True):
+        value = VALUES.get(name, "0.5")
+        compact, words = (re.sub(rf"\b{name}(?![\w,])", value, text) for text in (compact, words))
+    fault = parse_fault(f"{compact}@7", 4)
+    assert fault == parse_fault(f"{words} @7", 4)
+    assert fault.kind is row.kind
+    assert fault.begin_us == 7_000_000
+
+
 @settings(max_examples=300)
-@given(st.one_of(st.text(max_size=40), st.from_regex(r"(rotor:\d*:|state:|battery:)\w*=?[\d.e-]*@?[\d.e-]*")))
+@given(
+    st.one_of(
+        st.text(max_size=40),
+        st.from_regex(r"(rotor:\d*:|state:|battery:|payload[: ])\w*=?[\d.e,-]*@?[\d.e-]*"),
+    )
+)
 def test_any_fault_text_is_parsed_or_rejected(text: str) -> None:
     try:
         fault = parse_fault(text, 4)
@@ -149,6 +212,40 @@ def test_last_of_two_faults_of_a_rotor_wins() -> None:
     simulator.clear_faults()
     fly(simulator, 0.2)
     assert speeds(simulator)[0] == pytest.approx(LAG_SPEED, rel=1e-6)
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.0133])
+def test_delayed_rotor_follows_its_command_after_the_dead_time(delay: float) -> None:
+    """A step of the command: the first-order lag begins after the dead time, in whole steps of 1 ms."""
+    simulator = flown(seconds=0.3)
+    simulator.inject(parse_fault(f"rotor 2 delayed {delay}", 4))
+    steps = math.ceil(delay * 1e3)
+    for tick in range(1, 50):
+        simulator.apply(command(250.0))
+        since_s = max(0.0, 2e-3 * tick - steps * 1e-3)
+        late = 250.0 + (LAG_SPEED - 250.0) * math.exp(-since_s / PAPER.rotors[0].lag_s)
+        prompt = 250.0 + (LAG_SPEED - 250.0) * math.exp(-2e-3 * tick / PAPER.rotors[0].lag_s)
+        assert speeds(simulator)[:2] == pytest.approx([prompt, late], rel=1e-6)
+
+
+def test_delayed_rotor_obeys_at_once_after_the_fault_and_when_disarmed() -> None:
+    simulator = flown("rotor 2 delayed 0.5 @0.1-0.2", seconds=0.1)
+    fly(simulator, 0.1, 250.0)
+    assert speeds(simulator)[1] == pytest.approx(LAG_SPEED, rel=1e-6)
+    fly(simulator, 0.1, 250.0)
+    assert speeds(simulator)[1] == pytest.approx(250.0, rel=1e-6)
+    simulator.inject(parse_fault("rotor 2 delayed 0.5", 4))
+    fly(simulator, 0.2, flags=0)
+    assert max(speeds(simulator)) < 1e-3
+
+
+def test_invalid_delayed_command_is_replaced_by_the_last_good_one() -> None:
+    simulator = flown("rotor 2 delayed 0.05", seconds=0.3)
+    simulator.apply(command(math.nan))
+    before = simulator.plant.bad_commands
+    fly(simulator, 0.1)
+    assert speeds(simulator)[1] == pytest.approx(LAG_SPEED, rel=1e-6)
+    assert simulator.plant.bad_commands == before + 2  # the late one, in both steps of its exchange
 
 
 # ---------------------------------------------------------------------- state
@@ -228,6 +325,202 @@ def test_faults_are_the_same_in_every_run() -> None:
     assert runs[0] == runs[1]
 
 
+def test_late_state_is_the_earlier_one_with_a_new_time() -> None:
+    simulator, twin = flown("state late 0.05 @0.5-0.7", seconds=0.48), flown(seconds=0.48)
+    seen, truth = states(simulator, 150), states(twin, 150)
+    assert [m.time_us for m in seen] == [m.time_us for m in truth]
+    for index, (late, true) in enumerate(zip(seen, truth, strict=True)):
+        held = max(10, index - 25) if 10 <= index < 110 else index
+        assert late.position_ned_m == truth[held].position_ned_m
+        assert late.rotor_speed_rad_s == truth[held].rotor_speed_rad_s
+        assert true.position_ned_m != truth[index - 1].position_ned_m
+
+
+def test_stalled_clock_repeats_its_time_and_resumes_from_it() -> None:
+    simulator, twin = flown("clock stalled @0.5-0.6", seconds=0.48), flown(seconds=0.48)
+    seen, truth = states(simulator, 100), states(twin, 100)
+    times = [m.time_us for m in seen]
+    assert times[:10] == [m.time_us for m in truth[:10]]
+    assert times[10:61] == [500_000] * 51  # the clock runs again from the exchange at 0.6 s
+    assert times[60:] == list(range(500_000, 580_000, 2000))
+    assert [m.position_ned_m for m in seen] == [m.position_ned_m for m in truth]
+
+
+def test_clock_jumps_once_and_not_below_zero() -> None:
+    simulator = flown("clock jump 0.5 @0.5", "clock jump -0.2 @0.51", "clock jump -99 @0.52", seconds=0.48)
+    times = [m.time_us for m in states(simulator, 25)]
+    assert times[:10] == list(range(480_000, 500_000, 2000))
+    assert times[10:15] == list(range(1_000_000, 1_010_000, 2000))
+    assert times[15:20] == list(range(810_000, 820_000, 2000))
+    assert times[20:] == list(range(0, 10_000, 2000))
+    assert simulator.faults == ()
+
+
+def test_weak_pack_sags_by_its_extra_resistance() -> None:
+    """The closed form of the load line P = (E − R·I)·I, before, during and after."""
+    battery, simulator = PAPER.battery, flown("battery sag 0.2 @0.3-0.4", seconds=0.3)
+    assert battery is not None
+    for seconds, extra in ((0.002, 0.2), (0.098, 0.2), (0.1, 0.0)):
+        fly(simulator, seconds)
+        state = simulator.plant.battery
+        assert state is not None
+        power = sum(r.torque_coefficient_n_m_s2 * LAG_SPEED**3 for r in PAPER.rotors) / battery.efficiency
+        power += battery.avionics_w
+        place = state.remaining * (len(battery.cell_voltage_v) - 1)
+        volt = battery.cells * float(
+            np.interp(place, range(len(battery.cell_voltage_v)), battery.cell_voltage_v)
+        )
+        resistance = battery.resistance_ohm + extra
+        current = (volt - math.sqrt(volt * volt - 4.0 * resistance * power)) / (2.0 * resistance)
+        assert state.current_a == pytest.approx(current, rel=1e-5)  # measured: 3e-7
+        assert state.voltage_v == pytest.approx(volt - resistance * current, rel=1e-5)
+
+
+def test_dead_cell_takes_its_voltage_from_the_pack() -> None:
+    assert PAPER.battery is not None
+    cells, found = PAPER.battery.cells, []
+    for spec in ((), ("battery cell dead",)):
+        state = flown(*spec, seconds=0.1, speed=0.0).plant.battery
+        assert state is not None
+        found.append(state.voltage_v + state.current_a * PAPER.battery.resistance_ohm)
+    assert found[1] / found[0] == pytest.approx((cells - 1) / cells, rel=1e-6)
+
+
+# ---------------------------------------------------------------------- schedule
+
+
+def mass(simulator: Simulator) -> float:
+    return float(simulator.plant.memory[0]["mass"])  # type: ignore[attr-defined]
+
+
+def test_payload_is_cut_at_its_time_whatever_the_order() -> None:
+    simulator = flown(
+        "payload cut @0.2", "payload 0.3 at 0,0,0.1 @0.1", "payload 0.1 at 0,0,0 @0.3", seconds=0.0
+    )
+    found = []
+    for _ in range(4):
+        found.append(mass(simulator) - PAPER.mass_kg)
+        fly(simulator, 0.1)
+    assert found == pytest.approx([0.0, 0.3, 0.0, 0.1])
+    simulator.inject(parse_fault("payload cut", 4))
+    assert mass(simulator) == PAPER.mass_kg
+    assert simulator.faults == ()
+
+
+def test_ground_effect_ends_by_its_own_words() -> None:
+    simulator = flown("ground effect on", seconds=0.1)
+    assert len(simulator.faults) == 1
+    simulator.inject(parse_fault("ground effect off", 4))
+    assert simulator.faults == ()
+
+
+def test_clear_ends_what_has_begun_and_keeps_what_has_not() -> None:
+    simulator = flown("rotor 1 dead", "payload 0.2 at 0,0,0", "state frozen @0.5", "clear @0.2", seconds=0.18)
+    assert len(simulator.faults) == 4
+    fly(simulator, 0.02)
+    assert [fault.kind for fault in simulator.faults] == [Kind.STATE_FREEZE]
+    fly(simulator, 0.2)
+    assert speeds(simulator)[0] == pytest.approx(LAG_SPEED, rel=1e-6)
+    assert mass(simulator) == PAPER.mass_kg
+
+
+def test_one_part_is_cleared() -> None:
+    simulator = flown("rotor 1 dead", "rotor 2 dead", "payload 0.2 at 0,0,0", "clock stalled", seconds=0.1)
+    simulator.clear_faults(part="payload")
+    assert mass(simulator) == PAPER.mass_kg
+    simulator.clear_faults(rotor=0)
+    simulator.clear_faults(part="clock")
+    assert [fault.rotor for fault in simulator.faults] == [1]
+    assert simulator.stamp_us == 0  # the clock resumes from where it stopped
+    simulator.clear_faults()
+    assert simulator.faults == ()
+
+
+@pytest.mark.parametrize("plant", ["rigid", "multibody"])
+def test_all_faults_give_the_same_bytes_in_each_run(plant: str) -> None:
+    specs = (
+        "rotor 2 delayed 0.013 @0.02-0.2", "payload 0.2 at 0.05,0,0.05 @0.05", "payload cut @0.15",
+        "centre of gravity 0.01,0,0 @0.1", "wind step 3,0,0 @0.05", "gust 1 @0.07-0.2", "wind shear 0.2",
+        "ground effect on", "battery sag 0.1 @0.1", "battery cell dead @0.12", "state late 0.02 @0.1-0.15",
+        "clock stalled @0.2-0.22", "clock jump 0.1 @0.25", "clear @0.27",
+    )  # fmt: skip
+    runs = []
+    for _ in range(2):
+        simulator = Simulator(PAPER.with_drag("rigid"), plant, PlantOptions(seed=3))
+        simulator.inject(*(parse_fault(spec, 4) for spec in specs))
+        data = b""
+        for _ in range(147):
+            data += bytes(simulator.outgoing())
+            simulator.apply(command(225.0))
+        runs.append(data)
+    assert runs[0] == runs[1]
+
+
+# ---------------------------------------------------------------------- faults that cannot act
+
+
+@pytest.mark.parametrize(
+    ("plant", "spec", "said"),
+    [
+        ("rigid", "wind step 5,0,0", "the vehicle paper_quad has no drag; add --drag"),
+        ("rigid", "gust 1", "has no drag"), ("paper", "wind step 1,0,0", "the paper's model has no drag"),
+        ("paper", "payload 0.1 at 0,0,0", "the paper's model has its centre of gravity in the origin"),
+        ("paper", "centre of gravity 0.1,0,0", "use --plant rigid or multibody"),
+        ("paper", "ground effect on", "the paper's model has no ground effect"),
+        ("rigid", "payload cut", "there is no payload to cut"),
+    ],
+)  # fmt: skip
+def test_fault_that_cannot_act_is_refused(plant: str, spec: str, said: str) -> None:
+    simulator = Simulator(PAPER, plant)
+    with pytest.raises(UsageProblemError, match=said):
+        simulator.inject(parse_fault(spec, 4))
+    assert simulator.faults == ()
+
+
+def test_battery_faults_need_a_battery() -> None:
+    assert PAPER.battery is not None
+    without, one = replace(PAPER, battery=None), replace(PAPER, battery=replace(PAPER.battery, cells=1))
+    for spec in ("battery level 0.5", "battery sag 1", "battery cell dead"):
+        with pytest.raises(UsageProblemError, match=r"has no \[battery\]"):
+            Simulator(without).inject(parse_fault(spec, 4))
+    with pytest.raises(UsageProblemError, match="has one cell"):
+        Simulator(one).inject(parse_fault("battery cell dead", 4))
+
+
+def test_wind_shear_needs_a_mean_wind() -> None:
+    vehicle, shear = PAPER.with_drag("rigid"), parse_fault("wind shear 0.14", 4)
+    with pytest.raises(UsageProblemError, match="no mean wind"):
+        Simulator(vehicle).inject(shear)
+    Simulator(vehicle).inject(shear, parse_fault("wind step 3,0,0 @5", 4))
+    Simulator(vehicle, options=PlantOptions(Disturbance(Vector3(3.0, 0.0, 0.0)))).inject(shear)
+
+
+def test_event_with_an_end_is_refused() -> None:
+    """Callers that set times themselves, as ``for_s`` of a scenario does."""
+    with pytest.raises(UsageProblemError, match="fault battery level SHARE: it acts at one time"):
+        Simulator(PAPER).inject(parse_fault("battery level 0.5", 4)._replace(end_us=1_000_000))
+
+
+def test_ground_effect_needs_ground() -> None:
+    with pytest.raises(UsageProblemError, match="there is no ground"):
+        Simulator(PAPER, options=PlantOptions(ground=False)).inject(parse_fault("ground effect on", 4))
+
+
+@pytest.mark.parametrize(
+    "spec", ["rotor 1 delayed 0.02", "battery sag 0.1", "state late 0.02", "clock jump 1"]
+)
+def test_paper_plant_has_the_faults_that_have_a_meaning(spec: str) -> None:
+    plain, faulty = Simulator(PAPER, "paper"), Simulator(PAPER, "paper")
+    faulty.inject(parse_fault(f"{spec} @0.01", 4))
+    rows: list[list[bytes]] = [[], []]
+    for tick in range(50):
+        for simulator, row in zip((plain, faulty), rows, strict=True):
+            row.append(bytes(simulator.outgoing()))
+            simulator.apply(command(250.0 + tick))
+    battery = [s.plant.battery for s in (plain, faulty)]
+    assert rows[0] != rows[1] or battery[0] != battery[1]
+
+
 # ---------------------------------------------------------------------- the link
 
 
@@ -262,6 +555,20 @@ def test_state_drop_is_rejected_in_lockstep() -> None:
     assert free.error is None
     assert [m.get_type() for m in Link(1, 1).decode(bytes(free.state()))] == ["BATTERY_STATUS"]
     assert bytes(free.state()) == b""
+
+
+def test_lockstep_goes_on_with_another_clock() -> None:
+    link = linked("clock jump 5 @0.004", "clock stalled @0.008-0.02")
+    for _ in range(20):
+        link.state()
+        link.receive(
+            memoryview(
+                bytes(command(flags=ARMED_FLAG | LOCKSTEP_FLAG, time_us=link.simulator.stamp_us).frame)
+            )
+        )
+        assert link.answered
+        link.step()
+    assert (link.stale, link.simulator.stamp_us) == (0, 5_028_000)
 
 
 def test_motors_fail_and_recover_by_command() -> None:

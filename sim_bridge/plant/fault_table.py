@@ -1,0 +1,213 @@
+"""The table of faults and disturbances: for each one its two notations, its values and its effect.
+
+Parser, error sentences, command help and docs/reference/faults.md follow this table. A new fault is a row here and an
+effect: of the plant in ``fault_effects.py``, of the state that is sent in ``sent_state.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from types import MappingProxyType
+from typing import NamedTuple
+
+from flightstack.core.contract import Vector3
+
+
+class Kind(Enum):
+    """Effect of a fault."""
+
+    ROTOR_OFF = "rotor off"
+    ROTOR_WEAK = "rotor weak"
+    ROTOR_STUCK = "rotor stuck"
+    ROTOR_DELAYED = "rotor delayed"
+    PAYLOAD = "payload"
+    PAYLOAD_CUT = "payload cut"
+    CENTRE = "centre of gravity"
+    WIND_STEP = "wind step"
+    WIND_GUST = "wind gust"
+    WIND_SHEAR = "wind shear"
+    GROUND_EFFECT = "ground effect"
+    GROUND_EFFECT_OFF = "ground effect off"
+    BATTERY_LEVEL = "battery level"
+    BATTERY_SAG = "battery sag"
+    BATTERY_CELL = "battery cell"
+    STATE_FREEZE = "state freeze"
+    STATE_NAN = "state nan"
+    STATE_DROP = "state drop"
+    STATE_LATE = "state late"
+    CLOCK_STALL = "clock stall"
+    CLOCK_JUMP = "clock jump"
+    CLEAR = "clear"
+
+
+STATE_KINDS = frozenset({Kind.STATE_FREEZE, Kind.STATE_NAN, Kind.STATE_DROP, Kind.STATE_LATE})
+
+
+class Need(Enum):
+    """Condition for a fault to act, in the words of the reference page."""
+
+    BATTERY = "a battery"
+    CELLS = "two cells or more"
+    DRAG = "drag, not `paper`"
+    MEAN_WIND = "a mean wind"
+    MASS = "not `paper`"
+    PAYLOAD = "a payload"
+    GROUND = "ground, not `paper`"
+
+
+class Fault(NamedTuple):
+    """One fault. ``rotor`` counts from 0, −1 for none; ``end_us`` None is never."""
+
+    kind: Kind
+    rotor: int = -1
+    value: float = 0.0
+    begin_us: int = 0
+    end_us: int | None = None
+    vector: Vector3 = Vector3(0.0, 0.0, 0.0)
+
+    def is_active(self, time_us: int) -> bool:
+        """Return True if the fault is active at ``time_us``."""
+        return self.begin_us <= time_us and (self.end_us is None or time_us < self.end_us)
+
+
+class Range(NamedTuple):
+    """Allowed values of a placeholder, or of each component of a vector."""
+
+    low: float
+    high: float
+    unit: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.low:g} to {self.high:g}" + (f" {self.unit}" if self.unit else "")
+
+
+NO_END = "it acts at one time: give no end"
+"""Reason to refuse an event with an end."""
+
+ROTOR_NUMBER = "N"
+"""Placeholder of the number of a rotor, from 1."""
+
+_NO_VALUES: Mapping[str, Range] = MappingProxyType({})
+
+
+class Row(NamedTuple):
+    """One fault of the table. Words in capitals are placeholders: a rotor number, or a key of ``ranges``."""
+
+    kind: Kind
+    compact: str
+    words: str
+    effect: str
+    ranges: Mapping[str, Range] = _NO_VALUES
+    needs: tuple[Need, ...] = ()
+    is_event: bool = False  # acts once, at its begin
+    ends: frozenset[Kind] = frozenset()  # active faults that this event ends
+
+    @property
+    def part(self) -> str:
+        """Part that fails: the first word of the compact notation."""
+        return self.compact.partition(":")[0]
+
+    def is_placeholder(self, word: str) -> bool:
+        """Return True if a word of a notation stands for a value."""
+        return word == ROTOR_NUMBER or word in self.ranges
+
+
+_SHARE = Range(0.0, 1.0)
+_POINT = Range(-2.0, 2.0, "m")
+
+TABLE: tuple[Row, ...] = (
+    Row(
+        Kind.ROTOR_OFF, "rotor:N:off", "rotor N dead",
+        "The rotor has no power and runs down with its lag.",
+    ),
+    Row(
+        Kind.ROTOR_WEAK, "rotor:N:weak=SHARE", "rotor N efficiency SHARE",
+        "It has this share of its thrust and torque.", {"SHARE": _SHARE},
+    ),
+    Row(
+        Kind.ROTOR_STUCK, "rotor:N:stuck=RAD_S", "rotor N stuck RAD_S",
+        "It turns at this speed whatever is commanded, while armed.", {"RAD_S": Range(0.0, 1e5, "rad/s")},
+    ),
+    Row(
+        Kind.ROTOR_DELAYED, "rotor:N:delayed=SECONDS", "rotor N delayed SECONDS",
+        "Its commands act later by this dead time, rounded up to integration steps. Until the first one acts, the "
+        "last command before the fault holds. Disarming acts at once.", {"SECONDS": Range(1e-4, 2.0, "s")},
+    ),
+    Row(
+        Kind.PAYLOAD, "payload:add=KG:at=X,Y,Z", "payload KG at X,Y,Z",
+        "A point mass is attached, in body axes FRD from the origin of the vehicle file. Mass, inertia and centre of "
+        "gravity change.", {"KG": Range(1e-3, 100.0, "kg"), "X,Y,Z": _POINT}, (Need.MASS,),
+    ),
+    Row(
+        Kind.PAYLOAD_CUT, "payload:cut", "payload cut", "The payload is gone.",
+        needs=(Need.PAYLOAD,), is_event=True, ends=frozenset({Kind.PAYLOAD}),
+    ),
+    Row(
+        Kind.CENTRE, "centre:at=X,Y,Z", "centre of gravity X,Y,Z",
+        "The centre of gravity of the vehicle without payload is at this point, FRD; the inertia about it is "
+        "unchanged.", {"X,Y,Z": Range(-0.5, 0.5, "m")}, (Need.MASS,),
+    ),
+    Row(
+        Kind.WIND_STEP, "wind:step=N,E,D", "wind step N,E,D",
+        "This wind adds to the mean wind.", {"N,E,D": Range(-200.0, 200.0, "m/s")}, (Need.DRAG,),
+    ),
+    Row(
+        Kind.WIND_GUST, "wind:gust=M_S", "gust M_S",
+        "The gusts have this standard deviation instead of that of `--gust`; the present gust scales with it.",
+        {"M_S": Range(0.0, 100.0, "m/s")}, (Need.DRAG,),
+    ),
+    Row(
+        Kind.WIND_SHEAR, "wind:shear=EXPONENT", "wind shear EXPONENT",
+        "The mean wind changes with the height h above the ground as (h / 10 m) to this power.",
+        {"EXPONENT": _SHARE}, (Need.DRAG, Need.MEAN_WIND),
+    ),
+    Row(
+        Kind.GROUND_EFFECT, "ground:effect=on", "ground effect on",
+        "The thrust grows near the ground (Cheeseman and Bennett).", needs=(Need.GROUND,),
+    ),
+    Row(
+        Kind.GROUND_EFFECT_OFF, "ground:effect=off", "ground effect off", "The ground effect ends.",
+        is_event=True, ends=frozenset({Kind.GROUND_EFFECT}),
+    ),
+    Row(
+        Kind.BATTERY_LEVEL, "battery:level=SHARE", "battery level SHARE",
+        "The charge is set to this share of the capacity.", {"SHARE": _SHARE}, (Need.BATTERY,), is_event=True,
+    ),
+    Row(
+        Kind.BATTERY_SAG, "battery:sag=OHM", "battery sag OHM",
+        "The internal resistance of the pack is larger by this.", {"OHM": Range(0.0, 100.0, "ohm")}, (Need.BATTERY,),
+    ),
+    Row(
+        Kind.BATTERY_CELL, "battery:cell", "battery cell dead",
+        "One cell has no voltage: the open-circuit voltage of the pack falls by one cell.",
+        needs=(Need.BATTERY, Need.CELLS),
+    ),
+    Row(Kind.STATE_FREEZE, "state:freeze", "state frozen", "The same state is sent, with new times."),
+    Row(Kind.STATE_NAN, "state:nan", "state nan", "All numbers of the state are NaN."),
+    Row(
+        Kind.STATE_DROP, "state:drop", "state dropped",
+        "No state is sent; refused in lockstep, where both sides would wait for ever.",
+    ),
+    Row(
+        Kind.STATE_LATE, "state:late=SECONDS", "state late SECONDS",
+        "The state sent is older by this time, with a new time stamp. The state at the begin is repeated until it is "
+        "that old.", {"SECONDS": Range(1e-4, 10.0, "s")},
+    ),
+    Row(
+        Kind.CLOCK_STALL, "clock:stall", "clock stalled",
+        "All states have the same time stamp while the plant moves on. The clock resumes from that time.",
+    ),
+    Row(
+        Kind.CLOCK_JUMP, "clock:jump=SECONDS", "clock jump SECONDS",
+        "The time stamps jump by this time, backwards not below zero.", {"SECONDS": Range(-1e5, 1e5, "s")},
+        is_event=True,
+    ),
+    Row(
+        Kind.CLEAR, "clear", "clear", "All faults that have begun end.",
+        is_event=True, ends=frozenset(Kind),
+    ),
+)  # fmt: skip
+"""All faults, by part."""
+
+ROWS: Mapping[Kind, Row] = MappingProxyType({row.kind: row for row in TABLE})
