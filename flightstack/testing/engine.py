@@ -55,7 +55,7 @@ class Engine:
         self._codec = Link(1, SIMULATOR_COMPONENT)
         self.actuators = ActuatorsFrame()
         self.machine_ns = 0
-        """Wall time for a simulator whose clock stands still."""
+        """Machine time of the exchanges: what passes while the simulator's clock stands still."""
         self.loses_states = False
         """If True, ticks go on without states, as in real time when a simulator hangs."""
         self._begin()
@@ -116,6 +116,7 @@ class Engine:
     def advance(self) -> None:
         """Advance the simulator by one interval with the newest actuators, and send the stack its state."""
         self.simulator.apply(self.actuators)
+        self.machine_ns += self.stack.rates.interval_us * 1000
         if self.loses_states:
             self._missed_us += self.stack.rates.interval_us
         else:

@@ -18,6 +18,7 @@ import numpy as np
 from flightstack.core.contract import FloatArray
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
+from flightstack.core.portable_math import distance
 
 SIGNALS: dict[str, str] = {
     "time_s": "simulated time",
@@ -44,7 +45,7 @@ Values: TypeAlias = Mapping[str, Any]
 _FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
     "abs": (abs, np.abs),
     "sqrt": (math.sqrt, np.sqrt),
-    "hypot": (math.hypot, np.hypot),
+    "hypot": (distance, np.hypot),
     "min": (min, np.minimum),
     "max": (max, np.maximum),
 }
@@ -54,7 +55,6 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Sub: np.subtract,
     ast.Mult: np.multiply,
     ast.Div: np.divide,
-    ast.Pow: np.power,
 }
 _COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 _ALLOWED = (

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from flightstack.core.errors import ConfigError
 from flightstack.testing.link import Channel
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.faults import Fault, parse_fault
+from sim_bridge.plant.fault_table import Fault
+from sim_bridge.plant.faults import parse_fault
 
 if TYPE_CHECKING:
     from flightstack.testing.world import World
@@ -73,11 +74,13 @@ def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
     simulator = world.engine.simulator
     fault = _parsed(text, len(world.engine.stack.vehicle.rotors))
     begin_us = simulator.time_us + fault.begin_us
+    end_us = None if fault.end_us is None else simulator.time_us + fault.end_us
     if for_s is not None:
-        fault = fault._replace(end_us=begin_us + round(for_s * 1e6))
-    elif fault.end_us is not None:
-        fault = fault._replace(end_us=simulator.time_us + fault.end_us)
-    simulator.inject(fault._replace(begin_us=begin_us))
+        end_us = begin_us + round(for_s * 1e6)
+    try:
+        simulator.inject(fault._replace(begin_us=begin_us, end_us=end_us))
+    except UsageProblemError as error:
+        raise ConfigError("fault", text, str(error).rpartition(": ")[2]) from None
     world.happened("fault")
 
 

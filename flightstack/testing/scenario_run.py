@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from flightstack.core.errors import ConfigError
 from flightstack.testing.client import RefusedError
 from flightstack.testing.expression import Expression
 from flightstack.testing.flight import Flight
@@ -142,6 +143,8 @@ def _happen(world: World, event: Event) -> None:
             world.happened(f"unexpected refusal: {error}")
         elif event.refused not in error.reason:
             world.happened(f"unexpected reason: {error}, expected {event.refused!r}")
+    except ConfigError as error:
+        world.happened(f"unexpected: {error}")
     else:
         if event.refused is not None:
             world.happened(f"not refused: {event.command or event.param or event.upload}")

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from flightstack.core.contract import Quaternion, Vector3
 from flightstack.core.geometry import euler_from_quaternion
+from flightstack.core.portable_math import distance
 from flightstack.process.assembly import Stack
 from sim_bridge.simulator import Simulator
 
@@ -51,7 +52,7 @@ class State(NamedTuple):
     @property
     def speed_m_s(self) -> float:
         """Horizontal speed."""
-        return math.hypot(self.velocity_ned_m_s.x, self.velocity_ned_m_s.y)
+        return distance(self.velocity_ned_m_s.x, self.velocity_ned_m_s.y)
 
     @property
     def climb_m_s(self) -> float:
@@ -90,9 +91,9 @@ def state_of(stack: Stack, simulator: Simulator) -> State:
         roll_deg=roll,
         pitch_deg=pitch,
         yaw_deg=yaw,
-        distance_to_home_m=math.hypot(position.x - home.x, position.y - home.y),
+        distance_to_home_m=distance(position.x - home.x, position.y - home.y),
         battery_percent=100.0 * stack.simulator.battery.remaining,
         failsafes=tuple(failsafe.name for failsafe in stack.parts.failsafes.active),
         item=now.progress.current if now.mission_count else -1,
-        error_m=math.dist(now.setpoint[0:3].tolist(), position),
+        error_m=distance(*(now.setpoint[0:3] - position).tolist()),
     )

@@ -128,11 +128,15 @@ NOT_FLIGHT = (
     "flightstack/services/telemetry/motion.py",  # what ground stations are shown
     "flightstack/core/geometry_bulk.py",  # reports
     "flightstack/flight_log/poses_file.py",  # pictures
+    "flightstack/testing/flight.py",  # figures of a flown flight
+    "flightstack/testing/judge.py",
+    "flightstack/testing/link.py",  # random.Random of lossy links, integers alone
     "flightstack/plan/fence_shape.py",  # whether a plan is accepted
     "flightstack/transports/memory.py",  # random.Random of a lossy line, integers alone
 )
 ALLOWED = {
     ("flightstack/params/vehicle.py", "linalg"),  # whether a vehicle is accepted: the rank of its rotors
+    ("flightstack/testing/expression.py", "hypot"),  # margins of a flown flight
     ("sim_bridge/plant/turbulence.py", "random"),  # PCG64, integers alone
 }
 
