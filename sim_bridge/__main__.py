@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -74,6 +75,7 @@ def run(
     home: options.Home = "47.397742,8.545594,488.0",
     view: options.View = False,
     timeout: options.Timeout = None,
+    check: options.Check = False,
     version: Version = False,  # handled by its callback
 ) -> None:
     """Simulate a vehicle for one flight stack, which connects over TCP.
@@ -110,7 +112,14 @@ def run(
         physics_hz=arguments.check_physics_hz(physics_hz),
         timeout_s=None if timeout is None else arguments.check_range("--timeout", timeout, 0.001, 1e6),
     )
+    if check:
+        raise typer.Exit
     raise typer.Exit(_serve(served, vehicle if view else None))
+
+
+def check_arguments(given: Sequence[str]) -> None:
+    """Check a command line of the simulator; raise UsageError, UsageProblemError or ConfigError."""
+    app([*given, "--check"], prog_name="sim-bridge", standalone_mode=False)
 
 
 def _serve(served: ServerOptions, viewed: str | None) -> int:

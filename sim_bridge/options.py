@@ -36,6 +36,7 @@ Timeout = Annotated[
     float | None,
     typer.Option(help="Timeout of the flight stack, s.  [default: none to connect, then 30]"),
 ]
+Check = Annotated[bool, typer.Option("--check", help="Check the options and exit.")]
 
 # of an open-loop flight
 Rotors = Annotated[str, typer.Option(metavar="W1,W2,…", help="Constant rotor speeds, rad/s.")]

@@ -13,8 +13,9 @@ from typing import NamedTuple, TypeAlias
 from flightstack import __version__
 from flightstack.control.backend import ControlBackend
 from flightstack.control.controller_loading import load_controller
+from flightstack.control.loop_parameters import loop_numbers
 from flightstack.firmware.c_loops import LoopsSetup
-from flightstack.firmware.choice import PYTHON
+from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
@@ -35,7 +36,12 @@ from flightstack.vehicle.assembly import VehicleParts, assemble
 from flightstack.vehicle.autopilot import Autopilot
 from flightstack.vehicle.flight_state import FlightState
 from flightstack.vehicle.journal import Journal
-from flightstack.vehicle.parameters import behaviour_of, connect_parameters, load_parameters
+from flightstack.vehicle.parameters import (
+    behaviour_of,
+    connect_parameters,
+    load_parameters,
+    read_parameters,
+)
 from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_status
 
 _KERNELS = (
@@ -104,17 +110,18 @@ def kernels_of(config: StackConfig) -> tuple[str, ...]:
     return tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
 
 
-def build(
-    config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS, make: LoopsMaker = make_loops
-) -> Stack:
-    """Build a stack with the loops of ``make`` that serves ``logs`` to ground stations.
+def check(config: StackConfig) -> None:
+    """Raise ConfigError for a configuration that ``build`` refuses; neither compile loops nor open a target."""
+    setup = _loops_setup(config, rates(config.inner_hz, config.outer_hz))
+    if parse_loops(config.loops).kind != PYTHON:
+        setup.numbers()
+    numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
+    read_parameters(config, numbers.specs)
 
-    Raise ConfigError for an invalid configuration.
-    """
-    vehicle = vehicle_of(config)
-    loop_rates = rates(config.inner_hz, config.outer_hz)
-    setup = LoopsSetup(
-        vehicle,
+
+def _loops_setup(config: StackConfig, loop_rates: Rates) -> LoopsSetup:
+    return LoopsSetup(
+        vehicle_of(config),
         load_controller(config.controller),
         open_gains(config.gains),
         math.radians(config.behaviour.max_tilt_deg),
@@ -122,9 +129,20 @@ def build(
         loop_rates.outer_hz,
         loop_rates.divisor,
     )
+
+
+def build(
+    config: StackConfig, open_log: OpenLog, logs: LogStore = NO_LOGS, make: LoopsMaker = make_loops
+) -> Stack:
+    """Build a stack with the loops of ``make`` that serves ``logs`` to ground stations.
+
+    Raise ConfigError for an invalid configuration.
+    """
+    loop_rates = rates(config.inner_hz, config.outer_hz)
+    setup = _loops_setup(config, loop_rates)
     backend = make(config.loops, setup, config.lockstep)
     try:
-        return _join(config, vehicle, loop_rates, backend, open_log, logs)
+        return _join(config, setup.vehicle, loop_rates, backend, open_log, logs)
     except BaseException:
         backend.close()  # a target may hold a process or a serial port
         raise

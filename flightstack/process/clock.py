@@ -39,14 +39,17 @@ class Rates(NamedTuple):
 
 
 def nearest_outer_hz(inner_hz: float) -> float:
-    """Return the default outer rate: the one nearest to ``DEFAULT_OUTER_HZ`` that divides ``inner_hz``."""
+    """Return the default outer rate: the one nearest to ``DEFAULT_OUTER_HZ`` that divides ``inner_hz``.
+
+    Raise ConfigError.
+    """
+    _check_inner_hz(inner_hz)
     return inner_hz / max(1, round(inner_hz / DEFAULT_OUTER_HZ))
 
 
 def rates(inner_hz: float, outer_hz: float) -> Rates:
     """Return the validated rates; raise ConfigError."""
-    if not MIN_INNER_HZ <= inner_hz <= MAX_INNER_HZ:
-        raise ConfigError("--inner-hz", f"{inner_hz:g}", f"is outside {MIN_INNER_HZ:g} to {MAX_INNER_HZ:g}")
+    _check_inner_hz(inner_hz)
     interval_us = round(1e6 / inner_hz)
     if abs(interval_us * inner_hz - 1e6) > 1e-6:
         raise ConfigError(
@@ -58,6 +61,11 @@ def rates(inner_hz: float, outer_hz: float) -> Rates:
     if abs(divisor * outer_hz - inner_hz) > 1e-9 * inner_hz:
         raise ConfigError("--outer-hz", f"{outer_hz:g}", f"does not divide the inner rate {inner_hz:g}")
     return Rates(inner_hz, outer_hz, divisor, interval_us)
+
+
+def _check_inner_hz(inner_hz: float) -> None:
+    if not MIN_INNER_HZ <= inner_hz <= MAX_INNER_HZ:
+        raise ConfigError("--inner-hz", f"{inner_hz:g}", f"is outside {MIN_INNER_HZ:g} to {MAX_INNER_HZ:g}")
 
 
 class Distribution(NamedTuple):

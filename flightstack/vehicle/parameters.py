@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,23 +25,23 @@ class Parameters(NamedTuple):
     """Content of the parameter file."""
 
 
-def declared(config: StackConfig, backend: ControlBackend) -> list[ParamSpec]:
+def declared(config: StackConfig, of_loops: Iterable[ParamSpec]) -> list[ParamSpec]:
     """Return the declarations of all parameters; raise ConfigError if a controller redeclares a name."""
     specs = {spec.name: spec for spec in (*SPECS.values(), *identity_specs(config.system_id))}
-    for spec in backend.parameter_specs:
+    for spec in of_loops:
         if specs.setdefault(spec.name, spec) is not spec:
             problem = f"declares the parameter {spec.name}, which the vehicle has already"
             raise controller_error(config.controller, problem)
     return list(specs.values())
 
 
-def load_parameters(config: StackConfig, backend: ControlBackend) -> Parameters:
-    """Load the parameters of a vehicle and set those of the loops; raise ConfigError.
+def read_parameters(config: StackConfig, of_loops: Iterable[ParamSpec]) -> Parameters:
+    """Read the parameters of a vehicle; ``of_loops`` declares those of its loops. Raise ConfigError.
 
     In rising precedence: defaults (for the loops from the gains file), the parameter file, and the configuration
     (``--param``), which is not saved.
     """
-    store = ParamStore(declared(config, backend))
+    store = ParamStore(declared(config, of_loops))
     loaded = NOTHING_LOADED
     if config.params_file is not None:
         loaded = load_into(store, Path(config.params_file))
@@ -48,10 +49,17 @@ def load_parameters(config: StackConfig, backend: ControlBackend) -> Parameters:
         if value != SPECS[name].default:
             store.override(name, value)
     apply_assignments(store, config.params)
-    for spec in backend.parameter_specs:
-        if store.value(spec.name) != backend.get_parameter(spec.name):
-            backend.set_parameter(spec.name, store.value(spec.name))
     return Parameters(store, loaded)
+
+
+def load_parameters(config: StackConfig, backend: ControlBackend) -> Parameters:
+    """Read the parameters of a vehicle and set those of the loops; raise ConfigError."""
+    parameters = read_parameters(config, backend.parameter_specs)
+    for spec in backend.parameter_specs:
+        value = parameters.store.value(spec.name)
+        if value != backend.get_parameter(spec.name):
+            backend.set_parameter(spec.name, value)
+    return parameters
 
 
 def behaviour_of(store: ParamStore) -> Behaviour:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import socket
-from importlib.metadata import entry_points
-from importlib.util import find_spec
 from pathlib import Path
 
-from flightstack.core.errors import INSTALL_MULTIBODY
 from flightstack.core.geodesy import GeoPoint
-from flightstack.core.port_numbers import vehicle_api_port, vehicle_ground_port
-from flightstack.firmware.choice import parse_loops
+from flightstack.core.port_numbers import system_id, vehicle_api_port, vehicle_ground_port
 from flightstack.params.behaviour import SPECS, Behaviour
-from flightstack.params.config import parse_home
-from flightstack.params.gains_file import hidden_gains, open_gains
+from flightstack.params.config import DEFAULT_HOME, StackConfig, parse_home
+from flightstack.params.gains_file import hidden_gains
 from flightstack.params.store import read_assignment
-from flightstack.params.vehicle import Vehicle, hidden_vehicle, load_vehicle
+from flightstack.params.vehicle import Vehicle, load_vehicle
 from flightstack.plan import POSITION_COMMANDS, Command, Plan, load_plan
-from flightstack.process.clock import nearest_outer_hz, rates
+from flightstack.process.assembly import check as check_stack
+from flightstack.process.clock import nearest_outer_hz
 from flightstack.process.console import complain
 from flightstack.process.signing_file import load_key
 from flightstack.transports.udp import PortBusyError, UdpSocket
@@ -29,31 +25,21 @@ from gcs_cli.link.endpoint import LOOPBACK
 from gcs_cli.report.run_directory import LOG_NAME
 from gcs_cli.transfers.plan_parts import plan_problem
 from gcs_cli.vehicle.param_info import load_parameters
+from sim_bridge.__main__ import check_arguments as check_simulator
+from sim_bridge.errors import UsageProblemError
 
-CONTROLLERS = "flightstack.attitude_controllers"
-PLANTS = ("rigid", "multibody", "paper")
-DEFAULT_HOME = GeoPoint(47.397742, 8.545594, 488.0)
 GCS_LOSS_S = 5.0
 _RETURN = Command.NAV_RETURN_TO_LAUNCH
 
 
 def checked_plan(options: FlyOptions) -> Plan:
     """Check the options before anything starts, and return the plan; raise CliError or ConfigError."""
-    _check_flags(options)
     plan = load_plan(options.plan_path)
-    flown_vehicle(options)
-    open_gains(options.gains)
-    for sentence in (hidden_vehicle(options.vehicle), hidden_gains(options.gains)):
-        if sentence is not None:
-            complain(f"gcs: {sentence}")
-    if options.params is not None and not options.params.is_file():
-        raise CliError(f"--params {options.params}: no such file", USAGE)
-    if options.signing_key is not None:
-        load_key(options.signing_key)
-    rates(options.inner_hz, outer_rate_hz(options))
+    home = home_of(options, plan)
+    _check_options(options, home)
     if not plan.items:
         raise CliError(f"{options.plan_path}: has no mission items", USAGE)
-    problem = plan_problem(plan, home_of(options, plan))
+    problem = plan_problem(plan, home)
     if problem is not None:
         raise CliError(f"{options.plan_path}: {problem}", USAGE)
     moving = (item.command for item in plan.items if item.command in POSITION_COMMANDS | {_RETURN})
@@ -74,16 +60,9 @@ def home_of(options: FlyOptions, plan: Plan) -> GeoPoint:
 
 
 def flown_vehicle(options: FlyOptions) -> Vehicle:
-    """Return the vehicle that the simulator flies; raise ConfigError, or CliError for wind that has no effect."""
+    """Return the vehicle that the simulator flies; raise ConfigError."""
     vehicle = load_vehicle(options.vehicle)
-    if options.drag:
-        vehicle = vehicle.with_drag(options.plant)
-    has_wind = options.wind is not None and any(float(part) for part in options.wind.split(","))
-    if has_wind or options.gust:
-        refusal = vehicle.wind_refusal(options.plant)
-        if refusal is not None:
-            raise CliError(f"{'--gust' if options.gust else '--wind'}: {refusal}", USAGE)
-    return vehicle
+    return vehicle.with_drag(options.plant) if options.drag else vehicle
 
 
 def longest_flight_s(options: FlyOptions, plan: Plan) -> float:
@@ -101,35 +80,33 @@ def longest_flight_s(options: FlyOptions, plan: Plan) -> float:
     return flight_limit_s(plan.items, home_of(options, plan), behaviour)
 
 
-def _check_flags(options: FlyOptions) -> None:
-    known = sorted(point.name for point in entry_points(group=CONTROLLERS))
-    if options.controller not in known:
-        raise CliError(
-            f"--controller {options.controller}: unknown controller; known are {', '.join(known)}", USAGE
-        )
-    if options.plant not in PLANTS:
-        raise CliError(f"--plant {options.plant}: expected {', '.join(PLANTS[:-1])} or {PLANTS[-1]}", USAGE)
-    if options.plant == "multibody" and find_spec("mujoco") is None:
-        raise CliError(f"--plant multibody needs MuJoCo: {INSTALL_MULTIBODY}", USAGE)
-    parse_loops(options.loops)
-    if options.speed != "max":
-        _number("--speed", options.speed, 0.001, 10_000.0)
-    if options.wind is not None:
-        parts = options.wind.split(",")
-        if len(parts) not in (2, 3):
-            raise CliError(f"--wind {options.wind}: expected N,E or N,E,D in m/s", USAGE)
-        for part in parts:
-            _number("--wind", part, -200.0, 200.0)
-    _number("--inner-hz", options.inner_hz, 1.0, 1e5)
-
-
-def _number(flag: str, value: str | float, low: float, high: float) -> None:
+def _check_options(options: FlyOptions, home: GeoPoint) -> None:
+    """Check the options as simulator and flight stack do at their start."""
     try:
-        number = float(value)
-    except ValueError:
-        number = math.nan
-    if not low <= number <= high:
-        raise CliError(f"{flag} {value}: expected a number from {low:.10g} to {high:.10g}", USAGE)
+        check_simulator(simulator_arguments(options, home))
+    except UsageProblemError as error:
+        raise CliError(str(error), USAGE) from None
+    if options.params is not None and not options.params.is_file():
+        raise CliError(f"--params {options.params}: no such file", USAGE)
+    check_stack(
+        StackConfig(
+            vehicle=options.vehicle,
+            controller=options.controller,
+            gains=options.gains,
+            loops=options.loops,
+            inner_hz=options.inner_hz,
+            outer_hz=outer_rate_hz(options),
+            ideal_rotors=options.ideal_rotors,
+            home=home,
+            system_id=system_id(options.instance),
+            params_file=None if options.params is None else str(options.params),
+            params=tuple(options.param or ()),
+        )
+    )
+    if (sentence := hidden_gains(options.gains)) is not None:
+        complain(f"gcs: {sentence}")
+    if options.signing_key is not None:
+        load_key(options.signing_key)
 
 
 def check_ports(options: FlyOptions) -> None:

@@ -277,6 +277,11 @@ def test_usage_errors(arguments: list[str], said: str) -> None:
     assert done.stderr.count("\n") == 1
 
 
+def test_check_ends_without_a_client() -> None:
+    done = sim_bridge_command("--check", "--fault", "rotor:1:off@3")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
 def test_battery_and_fault_options_act_in_a_process() -> None:
     bridge = SimBridge(
         "--speed", "max", "--battery-start", "40", "--fault", "rotor:2:off@0.1", "--fault", "battery:level=0.2@0.2"

@@ -19,12 +19,13 @@ from rich.console import Console
 
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import LocalFrame
+from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import Command, Frame, MissionItem, Plan, save_plan
 from flightstack.transports.udp import PortBusyError, UdpSocket
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.experiments.paper.flights.trajectory import Trajectory, load_trajectory, sample
 from gcs_cli.fly.fly_flags import FlyOptions
-from gcs_cli.fly.fly_options import DEFAULT_HOME, check_ports, checked_plan
+from gcs_cli.fly.fly_options import check_ports, checked_plan
 from gcs_cli.pil.run import JSON_NAME, Finished
 from gcs_cli.pil.run import run as run_pil
 from gcs_cli.pil.targets import check_there, checked_target, meaning
