@@ -35,7 +35,11 @@ class Upload(Operation):
         done, count = self.progress
         if not self._is_serving:
             return "did not answer the announcement of the upload"
-        return f"did not ask for item {done} of {count}" if done < count else "did not confirm the upload"
+        return (
+            f"did not ask for item {done} (last {count - 1})"
+            if done < count
+            else "did not confirm the upload"
+        )
 
     def receive(self, message: Message) -> list[Message]:
         """Process a message from the vehicle, and return the answers."""
@@ -55,7 +59,7 @@ class Upload(Operation):
             return [self._count_message]
         if seq >= len(self._items):
             if self.result is None:
-                reason = f"the vehicle asked for item {seq} of a mission of {len(self._items)}"
+                reason = f"the vehicle asked for item {seq} (last {len(self._items) - 1})"
                 self.result = Failed(reason, MissionResult.INVALID_SEQUENCE, seq)
             return [self.ack(MissionResult.INVALID_SEQUENCE)]
         self._is_serving = True
@@ -103,7 +107,7 @@ class Download(Operation):
         """Return a description of the missing answer."""
         if not self.waits_for_item:
             return "did not answer the request for its mission"
-        return f"did not send item {len(self._items)} of {self._count}"
+        return f"did not send item {len(self._items)} (last {self._count - 1})"
 
     def receive(self, message: Message) -> list[Message]:
         """Process a message from the vehicle, and return the answers."""

@@ -17,6 +17,7 @@ from gcs_cli.vehicle_link import connect_vehicle
 app = make_app(add_completion=False)
 
 _HOME_WAIT_S = 3.0
+_MODES = ", ".join(settable_modes())
 
 
 @app.command()
@@ -103,7 +104,7 @@ def hold(context: typer.Context, link: LinkOptions) -> None:
 def mode(
     context: typer.Context,
     link: LinkOptions,
-    name: Annotated[str, typer.Argument(help="hold, mission, takeoff, land, rtl …")],
+    name: Annotated[str, typer.Argument(metavar="MODE", help=f"{_MODES}.")],
 ) -> None:
     """Select a flight mode."""
     _select_mode(context, link, name)
@@ -112,8 +113,7 @@ def mode(
 def _select_mode(context: typer.Context, link: LinkOptions, name: str) -> None:
     numbers = mode_numbers(name)
     if numbers is None:
-        known = ", ".join(settable_modes()).lower()
-        raise CliError(f"mode {name}: unknown mode; known are {known}", USAGE)
+        raise CliError(f"mode {name}: the vehicle has no such mode; choose one of {_MODES}", USAGE)
     with connect_vehicle(context, link) as connection:
         connection.command(calls.mode_command(*numbers), f"mode {name.lower()}")
     typer.echo(f"mode {name.lower()}")

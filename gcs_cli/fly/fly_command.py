@@ -15,6 +15,7 @@ from gcs_cli.fly.fly_flags import FlyOptions, RunOptions
 from gcs_cli.fly.fly_options import checked_plan
 from gcs_cli.fly.fly_run import fly, write_results
 from gcs_cli.report.conditions import conditions
+from gcs_cli.report.flight_outcome import Code
 from gcs_cli.report.run_directory import REPORT_NAME
 from gcs_cli.report.summary import max_overshoot_m
 
@@ -41,10 +42,11 @@ def run_fly(options: FlyOptions, run: RunOptions, out: Path | None) -> None:
 
 
 def print_summary(console: Console, summary: dict[str, Any], folder: Path) -> None:
-    """Print the main figures of a flight."""
+    """Print the main figures of a flight; the reason of a failure is left to the error of the command."""
+    outcome = summary["outcome"]
     files = " ".join(sorted(path.name for path in folder.iterdir() if path.suffix != ".log"))
     lines = (
-        ("outcome", f"{summary['outcome']}: {summary['outcome_text']}"),
+        ("outcome", f"{outcome}: {summary['outcome_text']}" if outcome == Code.COMPLETED else outcome),
         ("flown in", ", ".join(conditions(summary))),
         ("time", _time(summary)),
         ("mission", _mission(summary)),

@@ -173,9 +173,9 @@ def phase_words(flight: Flight) -> str:
 def item_words(flight: Flight) -> str:
     """Return the current item."""
     mission = flight.view.mission
-    if flight.phase is not Phase.FLY or mission.current is None or not mission.total or mission.complete:
+    if flight.phase is not Phase.FLY or mission.complete or not mission.item_text:
         return ""
-    return f"  item {mission.current}/{mission.total - 1}"
+    return f"  {mission.item_text}"
 
 
 def place_words(flight: Flight) -> str:

@@ -91,8 +91,8 @@ def too_late(view: VehicleView, items: Sequence[MissionItem], limit_s: float) ->
 
 
 def _item(view: VehicleView, items: Sequence[MissionItem]) -> str:
-    current = view.mission.current
-    return "" if current is None else f" at item {current} of {len(items)}"
+    text = view.mission._replace(total=len(items)).item_text
+    return f" at {text}" if text else ""
 
 
 def _warnings(view: VehicleView) -> str:

@@ -152,8 +152,7 @@ def mission_panel(view: VehicleView) -> Panel:
     grid.add_column(no_wrap=True)
     grid.add_column(ratio=1)
     grid.add_column(no_wrap=True, justify="right")
-    label = Text("item ", style="bright_black")
-    label.append(f"{UNKNOWN if mission.current is None else mission.current} of {total - 1}", style="bold")
+    label = Text(mission.item_text or f"item {UNKNOWN}", style="bold")
     state = _MISSION_STATES.get(mission.state or 0, "")
     if mission.reached is not None and not mission.complete:
         state = f"reached {mission.reached}  {state}"

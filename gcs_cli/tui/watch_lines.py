@@ -26,8 +26,8 @@ def state_line(view: VehicleView, now_s: float) -> str:
     if view.attitude is not None:
         roll, pitch, yaw = (math.degrees(angle) for angle in view.attitude)
         parts.append(f"roll {roll:+.1f}° pitch {pitch:+.1f}° yaw {round(yaw) % 360:03d}°")
-    if view.mission.total:
-        parts.append(f"item {view.mission.current}/{view.mission.total - 1}")
+    if view.mission.item_text:
+        parts.append(view.mission.item_text)
     if view.battery is not None and view.battery.remaining is not None:
         parts.append(f"battery {view.battery.remaining:.0%}")
     if view.timing is not None and view.timing.real_time_factor is not None:

@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gcs_cli.tui.panels import (
+    UNKNOWN,
     attitude_panel,
     clock_text,
     framed,
@@ -153,7 +154,7 @@ def _compact(view: VehicleView, now_s: float, width: int, height: int) -> Render
         ned = (position.x, position.y, -position.z)
         place = " ".join(f"{round(value, 1) + 0.0:.1f}" for value in ned) + " m"  # no -0.0
     if mission.total:
-        item = f"item {mission.current} of {mission.total - 1}"
+        item = mission.item_text or f"item {UNKNOWN}"
     state = f"{view.mode}  {'ARMED' if view.armed else 'disarmed'}  t {clock_text(view.time_s)}"
     rows: list[RenderableType] = [
         Text(state, style="bold", no_wrap=True, overflow="ellipsis"),

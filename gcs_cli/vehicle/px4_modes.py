@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from flightstack.core.enums import CUSTOM_MODE, Mode
+
 _AUTO = 4
 
 _MAIN_NAMES = {
@@ -41,18 +43,14 @@ def mode_name(custom_mode: int) -> str:
     return f"mode {main}.{sub}"
 
 
+def settable_modes() -> dict[str, int]:
+    """Return the custom modes that a user may select on the flight stack, by name, the automatic ones first."""
+    settable = (CUSTOM_MODE[mode] for mode in Mode if mode is not Mode.TERMINATION)
+    return {mode_name(number).lower(): number for number in settable}
+
+
 def mode_numbers(name: str) -> tuple[int, int] | None:
-    """Return PX4's main and sub mode for a name, in any case; None for an unknown mode."""
-    wanted = _ALIASES.get(name.strip().upper(), name.strip().upper())
-    for sub, known in _AUTO_NAMES.items():
-        if known == wanted:
-            return _AUTO, sub
-    for main, known in _MAIN_NAMES.items():
-        if known == wanted and main != _AUTO:
-            return main, 0
-    return None
-
-
-def settable_modes() -> list[str]:
-    """Return the names for ``gcs mode``, the automatic modes first."""
-    return [*_AUTO_NAMES.values(), *(name for main, name in _MAIN_NAMES.items() if main != _AUTO)]
+    """Return PX4's main and sub mode for a name in any case; None for a mode that the flight stack does not have."""
+    wanted = name.strip().upper()
+    number = settable_modes().get(_ALIASES.get(wanted, wanted).lower())
+    return None if number is None else (number >> 16 & 255, number >> 24)

@@ -85,6 +85,13 @@ class Mission(NamedTuple):
         """True if the vehicle reports the mission as complete."""
         return self.state == MISSION_COMPLETE
 
+    @property
+    def item_text(self) -> str:
+        """The current item and the last one, numbered from 0 as in MAVLink; empty if unknown."""
+        if self.current is None or not self.total:
+            return ""
+        return f"item {self.current} (last {self.total - 1})"
+
 
 class Battery(NamedTuple):
     """State of the battery; None for values that the vehicle does not measure."""

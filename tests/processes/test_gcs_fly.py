@@ -264,6 +264,8 @@ def test_no_vehicle_in_time(tmp_path: Path) -> None:
     result = run(tmp_path / "run", "--timeout", "0.1")
     assert result.returncode == 3
     assert "within 0.1 s" in result.stderr
+    assert "outcome  no_vehicle\n" in result.stdout
+    assert "within 0.1 s" not in result.stdout  # each sentence is printed once
     assert summary_of(tmp_path / "run")["outcome"] == "no_vehicle"
     assert "within 0.1 s" in str(summary_of(tmp_path / "run")["outcome_text"])
     assert "within 0.1 s" in (tmp_path / "run" / "report.html").read_text()  # also without a log

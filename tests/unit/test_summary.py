@@ -352,7 +352,7 @@ def flown_with(*statuses: Status, landed: bool = True, mission: tuple[MissionPro
 
 ARMED = Status(0.0, NAVIGATION_STATE[Mode.MISSION], True)
 TERMINATION = Status(5.0, NAVIGATION_STATE[Mode.TERMINATION], False)
-EARLY = Outcome(Code.INCOMPLETE, "the vehicle disarmed at item 2 of 6, before the mission was done")
+EARLY = Outcome(Code.INCOMPLETE, "the vehicle disarmed at item 2 (last 5), before the mission was done")
 
 
 def test_the_log_tells_why_a_mission_ended_early() -> None:

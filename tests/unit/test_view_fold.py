@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from flightstack.core.enums import CUSTOM_MODE
 from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
 from flightstack.mavlink.link import Link
+from flightstack.services.telemetry.modes import MODES, NOT_SELECTABLE
 from gcs_cli.vehicle.px4_modes import mode_name, mode_numbers, settable_modes
 from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
 from gcs_cli.vehicle.vehicle_view import update
@@ -286,8 +288,16 @@ def test_modes_have_px4s_names_and_numbers() -> None:
     assert mode_name(3 << 16) == "POSITION"
     assert mode_name(77 << 16) == "mode 77.0"
     assert mode_numbers("loiter") == mode_numbers("Hold") == (4, 3)
-    assert mode_numbers("nonsense") is None
     for name in settable_modes():
         numbers = mode_numbers(name)
         assert numbers is not None
-        assert mode_name(numbers[0] << 16 | numbers[1] << 24) == name
+        assert mode_name(numbers[0] << 16 | numbers[1] << 24) == name.upper()
+
+
+def test_settable_modes_are_those_that_the_vehicle_announces() -> None:
+    announced = [entry.mode for entry in MODES if not entry.properties & NOT_SELECTABLE]
+    assert list(settable_modes().values()) == [CUSTOM_MODE[mode] for mode in announced]
+    assert list(settable_modes()) == [
+        "hold", "takeoff", "mission", "rtl", "land", "position", "altitude", "offboard"
+    ]  # fmt: skip
+    assert mode_numbers("stabilized") is mode_numbers("termination") is mode_numbers("nonsense") is None

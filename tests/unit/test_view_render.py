@@ -85,7 +85,7 @@ def test_it_shows_all_that_is_known(width: int, height: int) -> None:
     for part in (
         "MISSION", "ARMED", "in air", "0:41.3", "×52.3", "99.7%", "312 msg/s",  # header
         "+11.5°", "-5.7°", "074°", "3.21", "3.33", "-4.20", "5.00", "2.24", "47.397742°",
-        "0–3000 rpm", "2310", "2400", "51%", "item 3 of 6", "reached 2", "active",
+        "0–3000 rpm", "2310", "2400", "51%", "item 3 (last 6)", "reached 2", "active",
         "500/100 Hz", "lockstep", "130", "overruns 3", "text number 7",
     ):  # fmt: skip
         assert part in text
@@ -193,7 +193,7 @@ def test_heading_tape_has_the_heading_in_the_middle() -> None:
 def test_lines_for_pipes() -> None:
     assert state_line(FULL, 10.0) == (
         "0:41.3  MISSION  armed  N +3.21 E -4.20 up 5.00 m  2.24 m/s  roll +11.5° pitch -5.7° yaw 074°  "
-        "item 3/6  ×52.3"
+        "item 3 (last 6)  ×52.3"
     )
     assert state_line(VehicleView(), 0.0) == "waiting for a vehicle"
     assert state_line(FULL, 20.0) == "0:41.3 vehicle lost for 10 s"

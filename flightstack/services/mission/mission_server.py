@@ -97,7 +97,9 @@ class MissionServer:
             if now_s < upload.deadline_s:
                 continue
             if upload.is_silent(now_s):
-                reason = f"the upload stopped at item {len(upload.items)} of {upload.count}: no answer"
+                reason = (
+                    f"the upload stopped at item {len(upload.items)} (last {upload.count - 1}): no answer"
+                )
                 self._refuse_upload(upload, Rejection(MissionResult.OPERATION_CANCELLED, None, reason))
             else:
                 self._send(upload.client, upload.request(now_s))
