@@ -16,6 +16,7 @@ from flightstack.vehicle.flight_state import FlightState
 class Text(NamedTuple):
     """A text for the operator, sent as STATUSTEXT."""
 
+    time_us: int
     severity: int
     text: str
 
@@ -46,7 +47,7 @@ class Journal:
 
     def say(self, severity: int, text: str) -> None:
         """Send a text to the operator and record it."""
-        self._events.append(Text(severity, text))
+        self._events.append(Text(self._now.time_us, severity, text))
         self._recorder.text(self._now.time_us, severity, text)
 
     def item_reached(self, seq: int, progress: MissionProgress, count: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -20,6 +21,8 @@ from flightstack.process.signing_file import create_key
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.processes import Child, Children
+from gcs_cli.report.analysis import read_flight
+from gcs_cli.tui.panels import SEVERITIES, clock_text
 from tests.support.commands import Ended, gcs
 from tests.support.free_instance import free_instance
 from tests.support.process import children_of
@@ -111,6 +114,20 @@ def test_a_mission_is_flown_from_plan_to_report(
     results = {"flight.ulg", "gcs.tlog", "summary.json", "report.html"}
     assert set(files) == results | {"sim-bridge.log", "flightstack.log"}
     assert all(files.values())
+
+
+def text_lines(printed: str) -> list[str]:
+    return [line for line in printed.splitlines() if re.match(r"\d+:\d\d\.\d  [A-Z]+: ", line)]
+
+
+def test_equal_flights_print_equal_times_of_texts(tmp_path: Path) -> None:
+    one, other = (text_lines(run(tmp_path / name).stdout) for name in ("one", "other"))
+    assert one == other
+    logged = [
+        f"{clock_text(round(text.time_s, 6))}  {SEVERITIES[text.level]}: {text.text}"
+        for text in read_flight(tmp_path / "one" / "flight.ulg").texts
+    ]
+    assert [line for line in one if "Mission loaded" not in line] == logged  # the log begins after the upload
 
 
 def test_geofence_and_rally_points_of_the_plan_fly_along(tmp_path: Path) -> None:

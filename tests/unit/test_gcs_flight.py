@@ -142,7 +142,10 @@ def test_landing_at_the_last_item_counts_when_only_the_item_is_known() -> None:
 
 def test_disarming_on_the_way_is_a_failure_with_the_vehicles_last_warning() -> None:
     story = Story(FakeVehicle(stop_at_item=1)).run()
-    assert story.reason == "the vehicle disarmed at item 1 (last 2), before the mission was done: Rotor 3 is gone"
+    assert (
+        story.reason
+        == "the vehicle disarmed at item 1 (last 2), before the mission was done: Rotor 3 is gone"
+    )
     assert story.code == FAILED
     assert story.outcome is Code.INCOMPLETE
 
@@ -206,7 +209,9 @@ def test_a_vehicle_that_is_silent_in_the_first_step_for_too_long_is_lost() -> No
 
 def test_the_limit_counts_simulated_time() -> None:
     story = Story(FakeVehicle(stop_at_item=1, at_stop="hover"), limit_s=120.0).run()
-    assert story.reason == "the mission was not done after 120 s of simulated time (--limit) at item 1 (last 2)"
+    assert (
+        story.reason == "the mission was not done after 120 s of simulated time (--limit) at item 1 (last 2)"
+    )
     assert story.code == FAILED
     assert story.outcome is Code.TIMEOUT
     assert story.orders[-1] == SHUT_DOWN

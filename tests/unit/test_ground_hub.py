@@ -181,6 +181,23 @@ def test_texts_and_reached_items_go_to_all_who_listen(net: Net) -> None:
     assert alice.take("STATUSTEXT") == alice.take("MISSION_ITEM_REACHED") == []
 
 
+def test_system_time_before_a_text_is_the_time_of_its_event(net: Net) -> None:
+    alice = net.join(ALICE)
+    net.poll()
+    alice.inbox.clear()
+    for time_us, text in ((5_000_000, "one"), (5_000_000, "two"), (5_250_000, "three")):
+        net.stack.now.time_us = time_us
+        net.stack.journal.say(Severity.NOTICE, text)
+    net.stack.now.time_us = 6_000_000
+    net.poll()
+    shown = [
+        message.time_boot_ms if message.get_type() == "SYSTEM_TIME" else message.text
+        for message in alice.inbox
+        if message.get_type() in ("SYSTEM_TIME", "STATUSTEXT")
+    ]
+    assert shown[:5] == [5000, "one", "two", 5250, "three"]
+
+
 @pytest.mark.parametrize(("vehicle_rate", "expected"), [(1.0, 250), (50.0, 250), (0.1, 25), (0.0, 1)])
 def test_streams_count_the_slower_of_both_clocks(net: Net, vehicle_rate: float, expected: int) -> None:
     alice = net.join(ALICE)
@@ -280,7 +297,7 @@ def test_farewell_says_goodbye_to_all(net: Net) -> None:
         assert address == ALICE
         alice.inbox += alice.codec.decode(data)
     kinds = [message.get_type() for message in alice.inbox]
-    assert kinds == ["COMMAND_ACK", "STATUSTEXT", "STATUSTEXT", "HEARTBEAT"]
+    assert kinds == ["COMMAND_ACK", "SYSTEM_TIME", "STATUSTEXT", "STATUSTEXT", "HEARTBEAT"]
     assert alice.inbox[-1].system_status == mavlink.MAV_STATE_POWEROFF
 
 

@@ -24,7 +24,7 @@ from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_sig
 from flightstack.services.services import Service, make_services
 from flightstack.services.telemetry.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
 from flightstack.services.telemetry.telemetry import Telemetry
-from flightstack.services.telemetry.vehicle import status_texts
+from flightstack.services.telemetry.vehicle import status_texts, system_time_at
 from flightstack.vehicle.assembly import VehicleParts
 from flightstack.vehicle.journal import ItemReached, Text
 from flightstack.vehicle.status import VehicleInfo
@@ -269,13 +269,20 @@ class GroundHub:
         return reached
 
     def _send_texts(self) -> None:
-        """Send queued texts to the peers that were heard; keep the newest until there is one."""
+        """Send queued texts to the peers that were heard; keep the newest until there is one.
+
+        SYSTEM_TIME before a text carries its time, which STATUSTEXT does not.
+        """
         self._take_events()  # texts of the services in this poll
         if not any(peer.heard for peer in self._peers.values()):
             del self._texts[:-KEPT_TEXTS]
             return
-        for text in self._texts:
-            for message in status_texts(text.severity, text.text):
+        sent_us = None
+        for time_us, severity, text in self._texts:
+            if time_us != sent_us:
+                self._send_to_all(system_time_at(time_us))
+                sent_us = time_us
+            for message in status_texts(severity, text):
                 self._send_to_all(message)
         self._texts.clear()
 

@@ -14,7 +14,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.link import Message
 from flightstack.params.vehicle import system_type
-from flightstack.services.telemetry.fields import NAN, boot_ms
+from flightstack.services.telemetry.fields import NAN, boot_ms, wrapped
 from flightstack.vehicle.status import VehicleStatus
 
 MAVLINK_2 = 200
@@ -151,8 +151,13 @@ def battery_status(f: VehicleStatus) -> Message:
 
 
 def system_time(f: VehicleStatus) -> Message:
+    """SYSTEM_TIME, now."""
+    return system_time_at(f.time_us)
+
+
+def system_time_at(time_us: int) -> Message:
     """SYSTEM_TIME: time since boot. Simulated time has no date."""
-    return mavlink.MAVLink_system_time_message(0, boot_ms(f))
+    return mavlink.MAVLink_system_time_message(0, wrapped(time_us // 1000))
 
 
 def home_position(f: VehicleStatus) -> Message:
