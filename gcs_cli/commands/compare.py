@@ -27,6 +27,8 @@ from gcs_cli.report.compare import (
     read_runs,
     render_comparison,
 )
+from gcs_cli.report.replay import find_run
+from gcs_cli.report.run_directory import COMPARISON_NAME as PAGE_NAME
 from gcs_cli.settings import JsonOption, OverwriteOption
 
 app = make_app(add_completion=False)
@@ -38,7 +40,10 @@ def compare(
         list[Path],
         typer.Argument(metavar="RUN RUN...", help="Directories of flights, or logs.", show_default=False),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The page to write.")] = Path("compare.html"),
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help=f"The page to write.  [default: {PAGE_NAME} beside the first log]"),
+    ] = None,
     overwrite: OverwriteOption = False,
     open_page: Annotated[bool, typer.Option("--open", help="Open the page afterwards.")] = False,
     as_json: JsonOption = False,
@@ -49,33 +54,35 @@ def compare(
     """
     if len(runs) < 2:
         raise CliError("give two flights or more to compare", USAGE)
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise CliError(f"--out {out}: give the page a name that ends in .html", USAGE)
-    if not out.parent.is_dir():
-        raise CliError(f"--out {out}: there is no directory {out.parent}", USAGE)
-    check_new(out, overwrite)
-    read = read_runs(runs)
+    found = [find_run(path) for path in runs]
+    page = found[0].log.with_name(PAGE_NAME) if out is None else out
+    if page.suffix.lower() not in (".html", ".htm"):
+        raise CliError(f"--out {page}: give the page a name that ends in .html", USAGE)
+    if not page.parent.is_dir():
+        raise CliError(f"--out {page}: there is no directory {page.parent}", USAGE)
+    check_new(page, overwrite)
+    read = read_runs(found)
     for run in read:
         if run.flight.damaged:
             complain(f"gcs: warning: {run.log}: the log is damaged; read up to {run.flight.duration_s:.1f} s")
-    write_text_atomically(out, render_comparison(read))
+    write_text_atomically(page, render_comparison(read))
     if as_json:
-        print(json.dumps(comparison(read, out), allow_nan=False), flush=True)
+        print(json.dumps(comparison(read, page), allow_nan=False), flush=True)
     else:
         console = FlyConsole(highlight=False)
         console.print(comparison_table(read))
-        console.print(f"page written to {out}", markup=False, soft_wrap=True)
+        console.print(f"page written to {page}", markup=False, soft_wrap=True)
     if open_page:
-        webbrowser.open(out.resolve().as_uri())
+        webbrowser.open(page.resolve().as_uri())
 
 
 def comparison_table(runs: Sequence[ComparedRun]) -> Table:
     """Return conditions and figures, a column for each flight."""
     summaries = [run.summary for run in runs]
-    table = Table(box=box.SIMPLE_HEAD)
-    table.add_column("")
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("", no_wrap=True)
     for run in runs:
-        table.add_column(_plain(run.name), justify="right")
+        table.add_column(Text(run.name), justify="right", overflow="fold")
     for row in condition_rows(summaries):
         table.add_row(*_cells(row, "≠ " if row.differs else ""), style="yellow" if row.differs else None)
     table.add_section()
@@ -86,11 +93,7 @@ def comparison_table(runs: Sequence[ComparedRun]) -> Table:
 
 def _cells(row: Row, mark: str) -> list[Any]:
     cells = [
-        Text.assemble(text, (f"  {change}" if change else "", "bright_black"))
+        Text.assemble(text, (f" {change}" if change else "", "bright_black"))
         for text, change in zip(row.texts, row.changes, strict=True)
     ]
     return [Text(mark + row.title), *cells]
-
-
-def _plain(name: str) -> Any:
-    return Text(name)

@@ -14,13 +14,16 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.compare_charts import overlaid_figures
 from gcs_cli.report.flight_data import Flight, Series, empty_series
-from gcs_cli.report.replay import find_run
+from gcs_cli.report.replay import Run
 from gcs_cli.report.run_directory import LOG_NAME, SUMMARY_NAME, TLOG_NAME
 from gcs_cli.report.summary import RunInfo, max_overshoot_m, summarise
 from gcs_cli.report.telemetry import read_telemetry
 
 TEMPLATES = Path(__file__).parent / "templates"
 Summary = Mapping[str, Any]
+_LARGEST_PERCENT = 1000.0
+"""Larger changes are shown as factors."""
+_FILES = ("plan", "params")
 _ALWAYS = ("plan", "vehicle", "controller", "gains", "seed")
 
 
@@ -69,12 +72,12 @@ _CONDITIONS = (
     ("inner_hz", "inner loop [Hz]"),
     ("outer_hz", "outer loop [Hz]"),
     ("seed", "seed"),
-    ("wind_m_s", "wind north, east, down [m/s]"),
+    ("wind_m_s", "wind N, E, D [m/s]"),
     ("gust_m_s", "gusts [m/s]"),
     ("drag_n_s_m", "drag [N s/m]"),
     ("torque_gust_n_m", "gusty torque [N m]"),
-    ("force_n", "force north, east, down [N]"),
-    ("torque_n_m", "torque roll, pitch, yaw [N m]"),
+    ("force_n", "force N, E, D [N]"),
+    ("torque_n_m", "torque x, y, z [N m]"),
     ("battery_start_percent", "battery at the start [%]"),
     ("battery_capacity_mah", "battery capacity [mAh]"),
     ("battery_drain", "battery drain, times"),
@@ -108,25 +111,24 @@ def _torque(axis: int) -> Callable[[Summary], float | None]:
 _FIGURES = (
     _Figure("outcome", "outcome", "", ""),
     _Figure("items_reached", "items reached", "", "", _reached),
-    _Figure("flight_time_s", "time in flight", ".2f", " s"),
-    _Figure("sim_time_s", "simulated time", ".2f", " s"),
-    _Figure("rms_tracking_error_m", "tracking error, rms", ".4f", " m"),
-    _Figure("max_tracking_error_m", "tracking error, largest", ".4f", " m"),
-    _Figure("max_overshoot_m", "overshoot, largest", ".3f", " m", _overshoot_m),
-    _Figure("max_miss_distance_m", "miss distance, largest", ".3f", " m", _miss_m),
+    _Figure("flight_time_s", "time in flight", ".2f", "s"),
+    _Figure("sim_time_s", "simulated time", ".2f", "s"),
+    _Figure("rms_tracking_error_m", "tracking error, rms", ".4f", "m"),
+    _Figure("max_tracking_error_m", "tracking error, largest", ".4f", "m"),
+    _Figure("max_overshoot_m", "overshoot, largest", ".3f", "m", _overshoot_m),
+    _Figure("max_miss_distance_m", "miss distance, largest", ".3f", "m", _miss_m),
     _Figure("rms_attitude_error_deg", "attitude error, rms", ".3f", "°"),
     _Figure("max_attitude_error_deg", "attitude error, largest", ".2f", "°"),
-    _Figure("rms_torque_x_n_m", "torque about x, rms", ".4f", " N m", _torque(0)),
-    _Figure("rms_torque_y_n_m", "torque about y, rms", ".4f", " N m", _torque(1)),
-    _Figure("rms_torque_z_n_m", "torque about z, rms", ".4f", " N m", _torque(2)),
-    _Figure("rms_rotor_command_rate_rad_s2", "rotor command rate, rms", ".0f", " rad/s²"),
+    _Figure("rms_torque_x_n_m", "torque about x, rms", ".4f", "N m", _torque(0)),
+    _Figure("rms_torque_y_n_m", "torque about y, rms", ".4f", "N m", _torque(1)),
+    _Figure("rms_torque_z_n_m", "torque about z, rms", ".4f", "N m", _torque(2)),
+    _Figure("rms_rotor_command_rate_rad_s2", "rotor commands, rms", ".0f", "rad/s²"),
     _Figure("overruns", "overruns", "", ""),
 )
 
 
-def read_runs(paths: Sequence[Path]) -> list[ComparedRun]:
-    """Read run directories or logs; raise CliError (usage) or ConfigError."""
-    found = [find_run(path) for path in paths]
+def read_runs(found: Sequence[Run]) -> list[ComparedRun]:
+    """Read runs; raise CliError (usage) or ConfigError."""
     runs = []
     for name, run in zip(_names([run.log for run in found]), found, strict=True):
         flight = read_flight(run.log)
@@ -149,7 +151,7 @@ def _check_summary(summary: Summary, log: Path) -> None:
     """Raise CliError (usage) if a figure of a summary has another type than ``summarise`` gives it."""
     for figure in _FIGURES:
         try:
-            shown(figure.of(summary), figure.spec, figure.unit)
+            shown(figure.of(summary), figure.spec)
         except (KeyError, TypeError, ValueError, AttributeError, IndexError):
             path = log.with_name(SUMMARY_NAME)
             raise CliError(f"{path} is damaged: its figure {figure.key} cannot be read", USAGE) from None
@@ -179,9 +181,15 @@ def condition_rows(summaries: Sequence[Summary]) -> list[Row]:
     for key, title in _CONDITIONS:
         values = [summary.get(key) for summary in summaries]
         if key in _ALWAYS or any(value not in (None, [], False) for value in values):
-            texts = [_condition_text(value) for value in values]
+            texts = _file_names(values) if key in _FILES else [_condition_text(value) for value in values]
             rows.append(Row(key, title, values, texts, [""] * len(values), len(set(texts)) > 1))
     return rows
+
+
+def _file_names(paths: Sequence[Any]) -> list[str]:
+    """Return the names of files; with their paths where different files have the same name."""
+    names = [Path(path).name if isinstance(path, str) else UNKNOWN for path in paths]
+    return names if len(set(names)) == len(set(paths)) else [_condition_text(path) for path in paths]
 
 
 def _condition_text(value: Any) -> str:
@@ -199,9 +207,10 @@ def figure_rows(summaries: Sequence[Summary]) -> list[Row]:
     rows = []
     for figure in _FIGURES:
         values = [figure.of(summary) for summary in summaries]
-        texts = [shown(value, figure.spec, figure.unit) for value in values]
+        texts = [shown(value, figure.spec) for value in values]
         changes = [_change(values[0], value) for value in values]
-        rows.append(Row(figure.key, figure.title, values, texts, ["", *changes[1:]], len(set(texts)) > 1))
+        title = f"{figure.title} [{figure.unit}]" if figure.unit else figure.title
+        rows.append(Row(figure.key, title, values, texts, ["", *changes[1:]], len(set(texts)) > 1))
     return rows
 
 
@@ -209,7 +218,8 @@ def _change(first: Any, value: Any) -> str:
     numbers = [number for number in (first, value) if isinstance(number, float) and math.isfinite(number)]
     if len(numbers) < 2 or first in (0.0, value):
         return ""
-    return f"{100.0 * (value / first - 1.0):+.1f} %".replace("-", "−")
+    percent = 100.0 * (value / first - 1.0)
+    return f"{percent:+.1f}%".replace("-", "−") if percent < _LARGEST_PERCENT else f"×{value / first:.3g}"
 
 
 def comparison(runs: Sequence[ComparedRun], page: Path) -> dict[str, Any]:

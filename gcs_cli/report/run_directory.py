@@ -14,10 +14,11 @@ from gcs_cli.errors import USAGE, CliError
 RUNS = Path("runs")
 LOG_NAME, TLOG_NAME, SUMMARY_NAME, REPORT_NAME = "flight.ulg", "gcs.tlog", "summary.json", "report.html"
 FILM_NAME = "replay.mp4"
+COMPARISON_NAME = "compare.html"
 SIMULATOR, STACK = "sim-bridge", "flightstack"
 """The children of a flight; the output of each goes to ``<name>.log``."""
 _LEFT_OVER = (
-    LOG_NAME, TLOG_NAME, SUMMARY_NAME, REPORT_NAME, FILM_NAME, LINK_FILE, STEPS_FILE,
+    LOG_NAME, TLOG_NAME, SUMMARY_NAME, REPORT_NAME, FILM_NAME, COMPARISON_NAME, LINK_FILE, STEPS_FILE,
     f"{SIMULATOR}.log", f"{STACK}.log",
 )  # fmt: skip
 

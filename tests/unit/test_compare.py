@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import io
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from flightstack.core.errors import ConfigError
 from gcs_cli.__main__ import main
+from gcs_cli.commands.compare import comparison_table
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.report.analysis import read_flight
-from gcs_cli.report.compare import condition_rows, figure_rows, read_runs, render_comparison
+from gcs_cli.report.compare import (
+    ComparedRun,
+    condition_rows,
+    figure_rows,
+    read_runs,
+    render_comparison,
+)
+from gcs_cli.report.replay import find_run
 from gcs_cli.report.summary import RunInfo, summarise, write_summary
 from tests.support.parsed_page import own_part, parsed
 from tests.support.square_plan import square_plan
@@ -36,6 +47,10 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [make_run(base / "calm", seed=1), make_run(base / "windy", 20.0, seed=1, wind="5,0")]
 
 
+def read(paths: Sequence[Path]) -> list[ComparedRun]:
+    return read_runs([find_run(path) for path in paths])
+
+
 def gcs(*words: object) -> int:
     return main([str(word) for word in words])
 
@@ -49,14 +64,39 @@ def test_differing_conditions_are_marked() -> None:
 
 
 def test_figures_show_their_change_relative_to_the_first_run() -> None:
-    summaries = [{"rms_tracking_error_m": value} for value in (0.1, 0.15, None)]
+    summaries = [{"rms_tracking_error_m": value} for value in (0.1, 0.15, None, 1.5)]
     [row] = [row for row in figure_rows(summaries) if row.key == "rms_tracking_error_m"]
-    assert row.texts == ["0.1000 m", "0.1500 m", "–"]
-    assert row.changes == ["", "+50.0 %", ""]
+    assert row.title == "tracking error, rms [m]"
+    assert row.texts == ["0.1000", "0.1500", "–", "1.5000"]
+    assert row.changes == ["", "+50.0%", "", "×15"]
+
+
+def test_plan_is_shown_by_its_name() -> None:
+    def texts(*plans: str | None) -> list[str]:
+        return next(
+            row.texts for row in condition_rows([{"plan": plan} for plan in plans]) if row.key == "plan"
+        )
+
+    assert texts("/home/a/square.plan", "/home/a/hop.plan", None) == ["square.plan", "hop.plan", "–"]
+    assert texts("/home/a/square.plan", "/home/b/square.plan") == [
+        "/home/a/square.plan",
+        "/home/b/square.plan",
+    ]
+
+
+def test_table_keeps_titles_whole_at_80_columns(runs: list[Path]) -> None:
+    console = Console(file=io.StringIO(), width=80)
+    console.print(comparison_table(read([runs[0], runs[1], runs[0]])))
+    assert isinstance(console.file, io.StringIO)
+    lines = console.file.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    for title in ("≠ wind N, E, D [m/s]", "rotor commands, rms [rad/s²]", "attitude error, largest [°]"):
+        assert any(line.strip().startswith(title) for line in lines)
+    assert not any("…" in line or line.rstrip().endswith(" %") for line in lines)
 
 
 def test_runs_of_different_length_are_overlaid_from_arming(runs: list[Path]) -> None:
-    page = parsed(render_comparison(read_runs(runs)))
+    page = parsed(render_comparison(read(runs)))
     position = page.charts["position"]
     by_name = {trace["name"]: trace for trace in position["data"] if trace["yaxis"] == "y"}
     assert list(by_name) == ["calm: setpoint", "calm", "windy: setpoint", "windy"]
@@ -71,7 +111,7 @@ def test_runs_of_different_length_are_overlaid_from_arming(runs: list[Path]) -> 
 
 
 def test_the_page_holds_all_it_needs_and_repeats(runs: list[Path]) -> None:
-    first, second = (render_comparison(read_runs(runs)) for _ in range(2))
+    first, second = (render_comparison(read(runs)) for _ in range(2))
     assert first == second
     assert "http" not in own_part(first)
 
@@ -79,7 +119,7 @@ def test_the_page_holds_all_it_needs_and_repeats(runs: list[Path]) -> None:
 def test_bare_log_without_summary_has_figures(runs: list[Path], tmp_path: Path) -> None:
     log = tmp_path / "downloaded.ulg"
     log.write_bytes((runs[0] / "flight.ulg").read_bytes())
-    named, bare = read_runs([runs[0], log])
+    named, bare = read([runs[0], log])
     assert (named.name, bare.name) == ("calm", "downloaded")
     assert bare.summary["outcome"] is None
     assert bare.summary["rms_tracking_error_m"] == named.summary["rms_tracking_error_m"]
@@ -87,25 +127,30 @@ def test_bare_log_without_summary_has_figures(runs: list[Path], tmp_path: Path) 
 
 
 def test_runs_of_one_name_are_numbered(runs: list[Path]) -> None:
-    assert [run.name for run in read_runs([runs[0], runs[1], runs[0]])] == ["calm (1)", "windy", "calm (2)"]
+    assert [run.name for run in read([runs[0], runs[1], runs[0]])] == ["calm (1)", "windy", "calm (2)"]
 
 
 def test_command_writes_the_page_once(
     runs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    page = runs[0] / "compare.html"
     assert gcs("compare", *runs, "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert [run["name"] for run in told["runs"]] == ["calm", "windy"]
     assert told["conditions"]["wind_m_s"] == {"values": [None, [5.0, 0.0]], "differs": True}
     assert told["figures"]["items_reached"] == ["6 of 6", "4 of 6"]
-    assert Path(told["page"]).exists()
+    assert told["page"] == str(page)
+    assert page.exists()
+    assert list(tmp_path.iterdir()) == []
     assert gcs("compare", *runs) == USAGE
     assert "compare.html: exists already" in capsys.readouterr().err
     assert gcs("compare", *runs, "--overwrite") == 0
     printed = capsys.readouterr().out
+    assert f"page written to {page}" in printed
     assert "≠ wind" in printed
     assert "tracking error, rms" in printed
+    page.unlink()
 
 
 def test_bad_runs_are_one_sentence_and_write_nothing(
@@ -124,9 +169,10 @@ def test_bad_runs_are_one_sentence_and_write_nothing(
         error = capsys.readouterr().err
         assert sentence in error
         assert error.count("\n") == 1
-    assert not Path("compare.html").exists()
+    assert not (tmp_path / "compare.html").exists()
+    assert not (runs[0] / "compare.html").exists()
     with pytest.raises((CliError, ConfigError)):
-        read_runs([runs[0], text])
+        read([runs[0], text])
 
 
 @pytest.mark.parametrize(
@@ -144,8 +190,8 @@ def test_damaged_summary_is_one_sentence(tmp_path: Path, capfd: Any, key: str, v
 
 def test_name_that_is_not_utf_8_is_shown(tmp_path: Path) -> None:
     runs = [make_run(tmp_path / "good", 20.0), make_run(Path(f"{tmp_path}/bad\udcff"), 20.0)]
-    assert [run.name for run in read_runs(runs)] == ["good", "bad?"]
-    render_comparison(read_runs(runs)).encode("utf-8")
+    assert [run.name for run in read(runs)] == ["good", "bad?"]
+    render_comparison(read(runs)).encode("utf-8")
 
 
 @pytest.mark.parametrize("name", ["calm/flight.ulg", "nowhere/page.html"])
