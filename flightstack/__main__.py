@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flightstack.process import console, options
-from flightstack.process.command_line import UsageError, Version, expand_options, make_app
+from flightstack.process.command_line import PanelCommand, UsageError, Version, expand_options, make_app
 from flightstack.process.console import say
 
 if TYPE_CHECKING:  # heavy modules are imported when they are needed, so that --help is fast
@@ -61,7 +61,7 @@ class RunOptions:
         return None if self.params in (None, "none") else Path(str(self.params))
 
 
-@app.command()
+@app.command(cls=PanelCommand)
 @expand_options
 def run(given: RunOptions) -> None:
     """Connect to a simulator, run the control loops, and serve ground stations over MAVLink."""

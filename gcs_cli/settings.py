@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from flightstack.core.port_numbers import INSTANCES, system_id
+from flightstack.process.command_line import IN_LINKS, IN_OUTPUT
 from gcs_cli.link.endpoint import (
     DEFAULT_CONNECTION,
     VEHICLE_CONNECTION,
@@ -22,15 +23,16 @@ _TIMEOUT: dict[str, Any] = {"metavar": "SECONDS", "min": 0.1, "max": 86_400.0}
 _INSTANCE: dict[str, Any] = {"metavar": "N", "min": 0, "max": INSTANCES - 1, "show_default": False}
 
 FlownInstanceOption = Annotated[
-    int | None, typer.Option("--instance", help="Shifts all ports, to fly beside another one.", **_INSTANCE)
+    int | None,
+    typer.Option("--instance", help="Shifts all ports, to fly beside another one.", **_INSTANCE, **IN_LINKS),
 ]
 FlownTimeoutOption = Annotated[
     float | None,
-    typer.Option("--timeout", help="Wait for the vehicle, s.  [default: 180]", **_TIMEOUT),
+    typer.Option("--timeout", help="Wait for the vehicle.  [default: 180]", **_TIMEOUT, **IN_LINKS),
 ]
-OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
-OpenOption = Annotated[bool, typer.Option("--open", help="Open the report afterwards.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.", **IN_OUTPUT)]
+OpenOption = Annotated[bool, typer.Option("--open", help="Open the report afterwards.", **IN_OUTPUT)]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.", **IN_OUTPUT)]
 SigningKeyOption = Annotated[
     Path | None,
     typer.Option(

@@ -16,7 +16,14 @@ from flightstack.core.contract import Vector3
 from flightstack.core.errors import ConfigError
 from flightstack.core.port_numbers import simulator_port, system_id
 from flightstack.process import console
-from flightstack.process.command_line import Overwrite, UsageError, Version, make_app
+from flightstack.process.command_line import (
+    Overwrite,
+    PanelCommand,
+    PanelGroup,
+    UsageError,
+    Version,
+    make_app,
+)
 from sim_bridge import arguments, options
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
 from sim_bridge.output import complain, load_named_vehicle, print_result
@@ -28,7 +35,7 @@ if TYPE_CHECKING:
     from sim_bridge.plant.plant import InitialState
     from sim_bridge.server.server import ServerOptions
 
-app = make_app(name="sim-bridge")
+app = make_app(name="sim-bridge", cls=PanelGroup)
 
 _ZERO = "0,0,0"
 
@@ -136,7 +143,7 @@ def _serve(served: ServerOptions, viewed: str | None) -> int:
         window.close()
 
 
-@app.command("open-loop")
+@app.command("open-loop", cls=PanelCommand)
 def open_loop(
     rotors: options.Rotors,
     seconds: options.Seconds,

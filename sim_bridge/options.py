@@ -21,20 +21,32 @@ Seed = Annotated[int, shared.SEED]
 
 # of the simulator
 Speed = Annotated[str, shared.SPEED]
-Host = Annotated[str, typer.Option(help="Address to listen on.")]
-Port = Annotated[int | None, typer.Option(help="TCP port; 0 picks a free one.  [default: 4560 + instance]")]
-Instance = Annotated[int, typer.Option(help="Number of the vehicle, from 0.")]
+Host = Annotated[str, typer.Option(metavar="HOST", help="Address to listen on.", **shared.IN_LINKS)]
+Port = Annotated[
+    int | None,
+    typer.Option(
+        metavar="PORT", help="TCP port; 0 picks a free one.  [default: 4560 + instance]", **shared.IN_LINKS
+    ),
+]
+Instance = Annotated[int, typer.Option(metavar="N", help="Number of the vehicle, from 0.", **shared.IN_LINKS)]
 IdealRotors = Annotated[bool, shared.IDEAL_ROTORS]
 PhysicsHz = Annotated[float, shared.PHYSICS_HZ]
 BatteryStart = Annotated[float | None, shared.BATTERY_START]
 BatteryCapacity = Annotated[float | None, shared.BATTERY_CAPACITY]
 BatteryDrain = Annotated[float | None, shared.BATTERY_DRAIN]
 Faults = Annotated[list[str] | None, shared.FAULTS]
-Home = Annotated[str, typer.Option(metavar="LAT,LON,ALT", help="Start position, degrees and m.")]
+Home = Annotated[
+    str,
+    typer.Option(metavar="LAT,LON,ALT", help="Start position, degrees and m.", **shared.IN_VEHICLE),
+]
 View = Annotated[bool, shared.VIEW]
 Timeout = Annotated[
     float | None,
-    typer.Option(help="Timeout of the flight stack, s.  [default: none to connect, then 30]"),
+    typer.Option(
+        metavar="SECONDS",
+        help="Timeout of the flight stack.  [default: none to connect, then 30]",
+        **shared.IN_LINKS,
+    ),
 ]
 Check = Annotated[bool, typer.Option("--check", help="Check the options and exit.")]
 

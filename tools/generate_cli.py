@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_args, get_type_hints
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 from typer.models import ArgumentInfo, CommandInfo, OptionInfo
 
 import flightstack.__main__
 import gcs_cli.__main__
 import sim_bridge.__main__
+from flightstack.process.command_line import PANELS, PanelCommand, PanelGroup
 from tools.generated import ROOT, write_or_check
 
 FOLDER = ROOT / "docs" / "reference"
@@ -37,6 +39,8 @@ class Parameter(NamedTuple):
     names: str
     meaning: str
     default: str
+    panel: str = ""
+    """Title of its group in the help."""
 
 
 def parameters(function: Callable[..., Any]) -> Iterator[Parameter]:
@@ -55,11 +59,19 @@ def parameters(function: Callable[..., Any]) -> Iterator[Parameter]:
         if info.envvar:
             text += f" Environment variable: `{info.envvar}`."
         if info.min is not None:
-            text += f" {info.min:g} to {info.max:g}." if info.max is not None else f" At least {info.min:g}."
+            text += (
+                f" {info.min:.10g} to {info.max:.10g}."
+                if info.max is not None
+                else f" At least {info.min:g}."
+            )
         argument = isinstance(info, ArgumentInfo)
         names = argument_name(name, info, required) if argument else option_names(name, info, kind)
         yield Parameter(
-            argument, names, text, default.removesuffix("]") or shown or ("required" if required else "")
+            argument,
+            names,
+            text,
+            default.removesuffix("]") or shown or ("required" if required else ""),
+            "" if argument else info.rich_help_panel or "",
         )
 
 
@@ -92,6 +104,16 @@ def value_name(kind: object) -> str:
     return {int: "N", float: "X", Path: "FILE"}.get(kind, "TEXT")  # type: ignore[call-overload, no-any-return]
 
 
+def table(rows: Sequence[Parameter]) -> str:
+    """Return a table of parameters."""
+    lines = ["\n| | meaning | default |", "|---|---|---|"]
+    for each in rows:
+        names = f"`{each.names}`" if each.is_argument else each.names
+        meaning = each.meaning.replace("|", "\\|").replace("<", "&lt;")
+        lines.append(f"| {names} | {meaning} | {each.default.replace('<', '&lt;')} |")
+    return "\n".join(lines) + "\n"
+
+
 def section(
     heading: str,
     name: str,
@@ -100,6 +122,7 @@ def section(
     shared: Sequence[Parameter] = (),
     *,
     is_group: bool = False,
+    has_panels: bool = False,
 ) -> str:
     """Return the section of one command; options of the program's own that it repeats are only named."""
     found = list(parameters(function)) if function is not None else []
@@ -111,12 +134,16 @@ def section(
     )
     parts = [f"\n{heading} {name}\n\n" if heading else "\n", f"{text}\n\n", f"```text\n{usage}\n```\n"]
     rows = [each for each in found if each not in shared]
-    if rows:
-        parts.append("\n| | meaning | default |\n|---|---|---|\n")
-    for each in rows:
-        names = f"`{each.names}`" if each.is_argument else each.names
-        meaning = each.meaning.replace("|", "\\|").replace("<", "&lt;")
-        parts.append(f"| {names} | {meaning} | {each.default.replace('<', '&lt;')} |\n")
+    if has_panels:
+        rest = [each for each in rows if each.is_argument or not each.panel]
+        panels = [(title, [each for each in rows if each.panel == title]) for title in PANELS]
+        parts += [
+            (f"\n**{title}**\n" if title else "") + table(found)
+            for title, found in [("", rest), *panels]
+            if found
+        ]
+    elif rows:
+        parts.append(table(rows))
     if repeated:
         parts.append(f"\nAlso {', '.join(repeated)}, as [above](#{name.split(maxsplit=1)[0]}).\n")
     return "".join(parts)
@@ -136,7 +163,8 @@ def commands_of(app: typer.Typer) -> Iterator[tuple[str, CommandInfo]]:
 def sections(app: typer.Typer, path: str, heading: str, shared: Sequence[Parameter]) -> Iterator[str]:
     """Yield the sections of a group's commands, depth first."""
     for name, command in commands_of(app):
-        yield section(heading, f"{path} {name}", command.callback, command.help, shared)
+        panels = issubclass(command.cls or TyperCommand, PanelCommand)
+        yield section(heading, f"{path} {name}", command.callback, command.help, shared, has_panels=panels)
     for group in app.registered_groups:
         inner = group.typer_instance
         if inner is None:
@@ -153,10 +181,11 @@ def page(name: str, app: typer.Typer) -> str:
     text = HEAD.format(name=name)
     own = app.registered_callback.callback if app.registered_callback else None
     if own is None:  # a program of one command
-        return text + section("", name, app.registered_commands[0].callback, None)
+        return text + section("", name, app.registered_commands[0].callback, None, has_panels=True)
     summary = app.info.help if isinstance(app.info.help, str) else None
     parts = sections(app, name, "##", [each for each in parameters(own) if name == "gcs"])
-    return text + section("", name, own, summary, is_group=True) + "".join(parts)
+    panels = issubclass(app.info.cls or TyperGroup, PanelGroup)
+    return text + section("", name, own, summary, is_group=True, has_panels=panels) + "".join(parts)
 
 
 if __name__ == "__main__":

@@ -11,12 +11,58 @@ from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 UsageError: Any = typer.BadParameter.__mro__[1]
 """Base class of usage errors: typer has its own copy of click in some versions."""
 
 HELP_FLAGS = ("-h", "--help")
+
+PANELS = (
+    "Vehicle and parameters",
+    "Loops and timing",
+    "Simulation",
+    "Disturbances and faults",
+    "Links",
+    "Output",
+)
+"""Titles of the groups of options, in the order of the help."""
+_IN_PANEL: Any = [{"rich_help_panel": title} for title in PANELS]
+IN_VEHICLE, IN_LOOPS, IN_SIMULATION, IN_DISTURBANCES, IN_LINKS, IN_OUTPUT = _IN_PANEL
 _ROOT = Path(__file__).resolve().parents[2]
+
+
+class _Panels:
+    """Lists the options of a command under the titles of their panels, those without one at the end.
+
+    Typer does so with markup only.
+    """
+
+    def format_options(self: Any, ctx: Any, formatter: Any) -> None:
+        titles = ("Arguments", *PANELS, "Options")
+        sections: dict[str, list[tuple[str, str]]] = {title: [] for title in titles}
+        for param in self.get_params(ctx):
+            title = "Arguments" if param.param_type_name == "argument" else param.rich_help_panel or "Options"
+            record = param.get_help_record(ctx)
+            if record is not None:
+                sections[title].append(record)
+        for title, records in sections.items():
+            if records:
+                with formatter.section(title):
+                    formatter.write_dl(records)
+
+
+class PanelCommand(_Panels, TyperCommand):
+    """A command with many options."""
+
+
+class PanelGroup(_Panels, TyperGroup):
+    """A group with many options of its own."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """List options, then commands."""
+        super().format_options(ctx, formatter)
+        self.format_commands(ctx, formatter)
 
 
 def make_app(**settings: Any) -> typer.Typer:
@@ -89,7 +135,7 @@ Version = Annotated[
     bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
 ]
 
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.", **IN_OUTPUT)]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,25 +193,38 @@ class PictureOptions:
 
 
 # options of ``sim-bridge`` that ``gcs fly`` and ``gcs pil`` offer too
-VEHICLE = typer.Option(help="Built-in vehicle (paper_quad, x_quad) or a TOML file.")
-PLANT = typer.Option(help="rigid, multibody (MuJoCo), or paper (small angles).")
-WIND = typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.")
-GUST = typer.Option(help="Standard deviation of the gusts, m/s.")
-DRAG = typer.Option("--drag", help="Use the optional drag of the vehicle file, so that wind acts.")
-FORCE = typer.Option(metavar="N,E,D", help="Constant external force, N.")
-TORQUE = typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.")
-TORQUE_GUST = typer.Option(help="Standard deviation of a gusty torque about roll and pitch, N m.")
-SEED = typer.Option(help="Seed of the gusts.")
-SPEED = typer.Option(metavar="max|N", help="N times real time, or max: as fast as possible.")
-IDEAL_ROTORS = typer.Option("--ideal-rotors", help="Rotors without limits, lag and spin-up torque.")
-PHYSICS_HZ = typer.Option(help="Lowest integration rate, Hz.")
-BATTERY_START = typer.Option(metavar="PERCENT", help="Initial charge.  [default: 100]")
-BATTERY_CAPACITY = typer.Option(metavar="MAH", help="Battery capacity.  [default: the vehicle's]")
-BATTERY_DRAIN = typer.Option(metavar="FACTOR", help="Factor on the discharge.  [default: 1]")
+VEHICLE = typer.Option(
+    metavar="NAME|FILE", help="Built-in vehicle (paper_quad, x_quad) or a TOML file.", **IN_VEHICLE
+)
+PLANT = typer.Option(
+    metavar="PLANT", help="rigid, multibody (MuJoCo), or paper (small angles).", **IN_SIMULATION
+)
+WIND = typer.Option(metavar="N,E[,D]", help="Steady wind, m/s.", **IN_DISTURBANCES)
+GUST = typer.Option(metavar="SIGMA", help="Standard deviation of the gusts, m/s.", **IN_DISTURBANCES)
+DRAG = typer.Option(
+    "--drag", help="Use the optional drag of the vehicle file, so that wind acts.", **IN_DISTURBANCES
+)
+FORCE = typer.Option(metavar="N,E,D", help="Constant external force, N.", **IN_DISTURBANCES)
+TORQUE = typer.Option(metavar="X,Y,Z", help="Constant external torque, body FRD, N m.", **IN_DISTURBANCES)
+TORQUE_GUST = typer.Option(
+    metavar="SIGMA", help="Standard deviation of a gusty torque about roll and pitch, N m.", **IN_DISTURBANCES
+)
+SEED = typer.Option(metavar="N", help="Seed of the gusts, a whole number.", **IN_DISTURBANCES)
+SPEED = typer.Option(metavar="max|N", help="N times real time, or max: as fast as possible.", **IN_SIMULATION)
+IDEAL_ROTORS = typer.Option(
+    "--ideal-rotors", help="Rotors without limits, lag and spin-up torque.", **IN_VEHICLE
+)
+PHYSICS_HZ = typer.Option(metavar="HZ", help="Lowest integration rate.", **IN_SIMULATION)
+BATTERY_START = typer.Option(metavar="PERCENT", help="Initial charge.  [default: 100]", **IN_VEHICLE)
+BATTERY_CAPACITY = typer.Option(
+    metavar="MAH", help="Battery capacity.  [default: the vehicle's]", **IN_VEHICLE
+)
+BATTERY_DRAIN = typer.Option(metavar="FACTOR", help="Factor on the discharge.  [default: 1]", **IN_VEHICLE)
 FAULTS = typer.Option(
     "--fault",
-    metavar="SPEC",
+    metavar="FAULT[@BEGIN[-END]]",
     help="Fault or disturbance, such as rotor:2:off@10-20 or 'payload 0.3 at 0.1,0,0.05 @12'; may be repeated. "
     "All of them: docs/reference/faults.md.",
+    **IN_DISTURBANCES,
 )
-VIEW = typer.Option("--view", help="Show the vehicle in a window.")
+VIEW = typer.Option("--view", help="Show the vehicle in a window.", **IN_SIMULATION)

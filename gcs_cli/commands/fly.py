@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process.command_line import expand_options, make_app
+from flightstack.process.command_line import IN_OUTPUT, PanelCommand, expand_options, make_app
 from gcs_cli.fly.fly_flags import FlyOptions, RunOptions, complete_options
 
 app = make_app(add_completion=False)
 
 
-@app.command()
+@app.command(cls=PanelCommand)
 @expand_options
 def fly(
     context: typer.Context,
@@ -21,7 +21,13 @@ def fly(
     run: RunOptions,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Directory of the results.  [default: runs/<stamp>-<plan>]"),
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="DIR",
+            help="Directory of the results.  [default: runs/<stamp>-<plan>]",
+            **IN_OUTPUT,
+        ),
     ] = None,
 ) -> None:
     """Fly a mission in simulation and write log, summary and report."""

@@ -8,29 +8,35 @@ from typing import Annotated
 
 import typer
 
-from flightstack.process.command_line import expand_options, make_app
+from flightstack.process.command_line import IN_LOOPS, IN_OUTPUT, PanelCommand, expand_options, make_app
 from gcs_cli.fly.fly_flags import FlyOptions, ResultOptions, RunOptions, complete_options
 from gcs_cli.settings import JsonOption
 
 app = make_app(add_completion=False)
 
 FailOverOption = Annotated[
-    bool, typer.Option("--fail-over", help="Exit with 1 when a difference is over its limit.")
+    bool, typer.Option("--fail-over", help="Exit with 1 when a difference is over its limit.", **IN_OUTPUT)
 ]
 OutOption = Annotated[
     Path | None,
-    typer.Option("--out", "-o", help="Directory of the results.  [default: runs/<stamp>-<name>-pil]"),
+    typer.Option(
+        "--out",
+        "-o",
+        metavar="DIR",
+        help="Directory of the results.  [default: runs/<stamp>-<name>-pil]",
+        **IN_OUTPUT,
+    ),
 ]
 
 
-@app.command()
+@app.command(cls=PanelCommand)
 @partial(expand_options, without=("loops", "speed"))
 def fly(
     context: typer.Context,
     options: FlyOptions,
     run: RunOptions,
     target: Annotated[
-        str, typer.Option(metavar="TARGET", help="emulated, host, or serial:DEVICE[:BAUD].")
+        str, typer.Option(metavar="TARGET", help="emulated, host, or serial:DEVICE[:BAUD].", **IN_LOOPS)
     ] = "emulated",
     out: OutOption = None,
     fail_over: FailOverOption = False,

@@ -65,16 +65,21 @@ class FlyOptions:
         float | None,
         typer.Option(
             "--limit",
+            metavar="SECONDS",
             min=1.0,
             max=LONGEST_S,
-            help="Longest flight, s of simulated time.  [default: 60 s more than three times the plan's]",
+            help="Longest flight, in simulated time.  [default: 60 s more than three times the plan's]",
+            **world.IN_SIMULATION,
         ),
     ] = None
     battery_start: Annotated[float | None, _ranged(world.BATTERY_START, 0.0, 100.0)] = None
     battery_capacity: Annotated[float | None, _ranged(world.BATTERY_CAPACITY, 1.0, 1e6)] = None
     battery_drain: Annotated[float | None, _ranged(world.BATTERY_DRAIN, 0.0, 1e4)] = None
     faults: Annotated[list[str] | None, world.FAULTS] = None
-    params: Annotated[Path | None, typer.Option(help="Parameter file to fly with.  [default: none]")] = None
+    params: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Parameter file to fly with.  [default: none]", **world.IN_VEHICLE),
+    ] = None
     loops: stack.Loops = "python"
     force: Annotated[str | None, world.FORCE] = None
     torque: Annotated[str | None, world.TORQUE] = None
@@ -82,7 +87,9 @@ class FlyOptions:
     home: Annotated[
         str | None,
         typer.Option(
-            metavar="LAT,LON,ALT", help="Start position of the vehicle.  [default: the plan's home]"
+            metavar="LAT,LON,ALT",
+            help="Start position of the vehicle, degrees and m.  [default: the plan's home]",
+            **world.IN_VEHICLE,
         ),
     ] = None
     param: stack.Assignments = None

@@ -13,6 +13,7 @@ import typer
 
 import flightstack
 from flightstack.__main__ import app as flightstack_app
+from flightstack.process.command_line import PANELS
 from gcs_cli.__main__ import app as gcs_app
 from gcs_cli.lazy_group import LazyGroup
 from sim_bridge.__main__ import app as sim_bridge_app
@@ -79,6 +80,24 @@ def test_help_is_plain_text(words: str) -> None:
     assert command.rich_markup_mode is None
     assert not set(command.get_help(context)) & set("╭│╰")
     assert list(context.help_option_names) == ["-h", "--help"]
+
+
+@pytest.mark.parametrize("words", ["gcs fly", "gcs pil fly", "flightstack", "sim-bridge"])
+def test_help_of_many_options_is_grouped(words: str) -> None:
+    command, context = PAGES[words]
+    sections: dict[str, list[str]] = {}
+    for line in command.get_help(context).splitlines():
+        if re.fullmatch(r"\S.*:", line):
+            flags = sections.setdefault(line.rstrip(":"), [])
+        elif line.startswith("  -"):
+            flags.append(line.split()[0])
+    assert [title for title in sections if title in PANELS] == [
+        title for title in PANELS if title in sections
+    ]
+    assert len(sections.keys() & set(PANELS)) >= 4
+    assert max(map(len, sections.values())) <= 12
+    common = {"-h,", "--version", "--install-completion", "--show-completion", "--check"}
+    assert set(sections["Options"]) <= common
 
 
 def run(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
