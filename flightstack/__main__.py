@@ -9,7 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flightstack.process import console, options
-from flightstack.process.command_line import PanelCommand, UsageError, Version, expand_options, make_app
+from flightstack.process.command_line import (
+    PanelCommand,
+    UsageError,
+    Version,
+    expand_options,
+    make_app,
+    usage_sentence,
+)
 from flightstack.process.console import say
 
 if TYPE_CHECKING:  # heavy modules are imported when they are needed, so that --help is fast
@@ -270,7 +277,7 @@ def main() -> None:
     try:
         sys.exit(app(prog_name="flightstack", standalone_mode=False))
     except UsageError as error:
-        console.complain(f"flightstack: {error.format_message()}")
+        console.complain(f"flightstack: {usage_sentence(error)}")
         sys.exit(2)
     except OSError as error:
         sys.exit(console.report_os_error("flightstack", error))

@@ -8,7 +8,7 @@ import sys
 import typer
 
 from flightstack.core.errors import ConfigError
-from flightstack.process.command_line import UsageError, Version, expand_options, make_app
+from flightstack.process.command_line import UsageError, Version, expand_options, make_app, usage_sentence
 from flightstack.process.console import complain, drop, replace_unencodable
 from gcs_cli.commands import GcsGroup, add_groups
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
@@ -62,7 +62,7 @@ def main(argv: list[str] | None = None) -> int:
         if type(error).__name__ == "NoArgsIsHelpError":  # `gcs` and `gcs mission`: its message is the help
             complain(error.format_message())
             return USAGE
-        sentence, code = error.format_message(), USAGE
+        sentence, code = usage_sentence(error), USAGE
     except CliError as error:
         sentence, code = str(error), error.exit_code
     except ConfigError as error:

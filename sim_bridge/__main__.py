@@ -23,6 +23,7 @@ from flightstack.process.command_line import (
     UsageError,
     Version,
     make_app,
+    usage_sentence,
 )
 from sim_bridge import arguments, options
 from sim_bridge.errors import PlantDivergedError, UsageProblemError
@@ -255,8 +256,7 @@ def main(argv: list[str] | None = None) -> int:
         complain(error)
         return 1
     except UsageError as error:
-        message: str = getattr(error, "format_message", error.__str__)()
-        complain(message)
+        complain(usage_sentence(error))
     except (UsageProblemError, ConfigError) as error:
         complain(error)
     except OSError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 
@@ -99,7 +100,9 @@ def apply_assignments(store: ParamStore, assignments: Iterable[str]) -> None:
     for text in assignments:
         name, value = read_assignment(text)
         if name not in store.specs:
-            raise ConfigError("parameter", name, "is not known")
+            near = difflib.get_close_matches(name, store.specs, n=1)
+            hint = f"; did you mean {near[0]}?" if near else "; `gcs param list` shows them"
+            raise ConfigError("--param", name, f"the vehicle has no such parameter{hint}")
         refusal = store.override(name, value)
         if refusal is not None:
-            raise ConfigError("parameter", name, refusal)
+            raise ConfigError("--param", text, refusal)

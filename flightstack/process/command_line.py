@@ -16,6 +16,9 @@ from typer.core import TyperCommand, TyperGroup
 UsageError: Any = typer.BadParameter.__mro__[1]
 """Base class of usage errors: typer has its own copy of click in some versions."""
 
+_NUMBERS = {"int": "a whole number", "float": "a number", "finite": "a finite number"}
+"""Pydantic's error types for values that are no number, by their first word."""
+
 HELP_FLAGS = ("-h", "--help")
 
 PANELS = (
@@ -30,6 +33,27 @@ PANELS = (
 _IN_PANEL: Any = [{"rich_help_panel": title} for title in PANELS]
 IN_VEHICLE, IN_LOOPS, IN_SIMULATION, IN_DISTURBANCES, IN_LINKS, IN_OUTPUT = _IN_PANEL
 _ROOT = Path(__file__).resolve().parents[2]
+
+
+def usage_sentence(error: Any) -> str:
+    """Return the sentence of a usage error; for a wrong number it names option, value and range.
+
+    Typer checks numbers with Pydantic, whose messages have neither value nor range.
+    """
+    problems: list[Any] = getattr(error.__cause__, "errors", list)()
+    if not problems or getattr(error, "param", None) is None:
+        return str(error.format_message())
+    kind, value = problems[0]["type"], problems[0]["input"]
+    name = max(getattr(error.param, "opts", None) or [error.param.name], key=len)
+    info = error.param.type_descriptor.parameter_info
+    ends = (info.min, info.max)
+    limits = f"{ends[0]:.10g} to {ends[1]:.10g}" if None not in ends else f"at least {ends[0]}"
+    if kind in ("greater_than_equal", "less_than_equal"):
+        return f"{name}: {value} is outside the allowed range {limits}"
+    wanted = _NUMBERS.get(kind.split("_")[0])
+    if wanted is None:
+        return str(error.format_message())
+    return f"{name}: {value!r} is not {wanted}" + (f"; give {limits}" if ends != (None, None) else "")
 
 
 class _Panels:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,14 +42,21 @@ def find_run(path: Path) -> Run:
         log = path / LOG_NAME
         if log not in logs:
             if len(logs) != 1:
-                found = "has no log of a flight" if not logs else f"has {len(logs)} logs: name one of them"
-                raise CliError(f"{path} {found}", USAGE)
+                raise CliError(_no_single_log(path, logs), USAGE)
             log = logs[0]
     elif path.exists():
         log = path
     else:
         raise CliError(f"{path}: there is no such directory or log", USAGE)
     return Run(log, _summary(log))
+
+
+def _no_single_log(folder: Path, logs: Sequence[Path]) -> str:
+    if logs:
+        return f"{folder}: this directory has {len(logs)} logs; name one, for example {logs[-1]}"
+    flights = sorted(log.parent for log in folder.glob(f"*/{LOG_NAME}"))
+    example = f", for example {flights[-1]}" if flights else ""
+    return f"{folder}: there is no log in this directory; name the directory of a flight{example}, or a .ulg file"
 
 
 def _summary(log: Path) -> dict[str, Any]:
@@ -70,17 +78,17 @@ def _refuse(constant: str) -> float:
 def poses_of(flight: Flight, run: Run, vehicle: str | None) -> Poses:
     """Return the poses of a flight; ``vehicle`` overrides the one that the log names. Raise CliError (usage)."""
     if flight.damaged and not len(flight.position.time_s):
-        raise CliError(f"{run.log}: no readable flight in it", USAGE)
+        raise CliError(f"{run.log}: the log is damaged before its first position; it cannot be drawn", USAGE)
     name = vehicle or _vehicle_name(flight, run)
     _check_vehicle(name, flight, run, given=vehicle is not None)
     time_s, position = flight.position
     if not len(time_s) or not len(flight.attitude.time_s):
-        raise CliError(f"{run.log} holds no positions and attitudes to show", USAGE)
+        raise CliError(f"{run.log}: the log has no positions and attitudes; name the log of a flight", USAGE)
     euler = _latest(flight.attitude, time_s)
     good = np.isfinite(position).all(axis=1) & np.isfinite(euler).all(axis=1)
     good &= np.concatenate(([True], np.diff(np.maximum.accumulate(time_s)) > 0.0))
     if not good.any():
-        raise CliError(f"{run.log} holds no positions and attitudes to show", USAGE)
+        raise CliError(f"{run.log}: the log has no positions and attitudes; name the log of a flight", USAGE)
     plan = run.summary.get("plan")
     numbers, places = _waypoints(flight, plan)
     title = [

@@ -164,7 +164,7 @@ def test_a_busy_port_is_named(start: Start) -> None:
         (["--outer-hz", "333"], "does not divide the inner rate"),
         (["--home", "95,0,0"], "is not a place on earth"),
         (["--param", "MPC_XY_CRUISE=-3"], "is outside 0.1 to 20 m/s"),
-        (["--param", "NO_SUCH=1"], "is not known"),
+        (["--param", "NO_SUCH=1"], "the vehicle has no such parameter"),
         (["--clock", "sundial"], "is not one of lockstep, realtime"),
         (["--loops", "fortran"], "is not one of python, c, host"),
     ],

@@ -129,8 +129,8 @@ def test_override_lasts_until_parameter_is_set() -> None:
 
 def test_assignments_that_cannot_be() -> None:
     for text, sentence in (
-        ("COUNT=1.5", "parameter: COUNT: 1.5 is not a whole number"),
-        ("NONE=1", "parameter: NONE: is not known"),
+        ("COUNT=1.5", "--param: COUNT=1.5: 1.5 is not a whole number"),
+        ("NONE=1", "--param: NONE: the vehicle has no such parameter; `gcs param list` shows them"),
         ("ANY=x", "--param: ANY=x: must be NAME=VALUE with a number"),
     ):
         with pytest.raises(ConfigError) as error:
