@@ -16,7 +16,25 @@
     return Object.fromEntries(Object.entries(value).map(([key, part]) => [key, painted(part)]));
   }
 
-  const draw = chart => Plotly.react(chart.plot, painted(chart.data), painted(chart.layout), chart.layout.scene ? space : flat);
+  const NARROW_PX = 560, TOOLBAR_PX = 28, LABEL_PX = 18; // below this width the legend stands under the toolbar
+
+  // Draw a chart with as much room above it as toolbar and legend need.
+  async function draw(chart) {
+    const layout = painted(chart.layout), bar = chart.plot.clientWidth < NARROW_PX ? TOOLBAR_PX : 0;
+    if (bar && layout.scene) { // a narrow scene shows less to both sides
+      for (const axis of ["x", "y", "z"]) layout.scene.camera.eye[axis] *= 2.1;
+    }
+    const show = above => {
+      const height = chart.layout.height + above, margin = {...layout.margin, t: layout.margin.t + above};
+      chart.plot.style.height = `${height}px`;
+      const fitted = {...layout, height, margin, legend: {...layout.legend, y: 1 - bar / height}};
+      return Plotly.react(chart.plot, painted(chart.data), fitted, chart.layout.scene ? space : flat);
+    };
+    await show(bar);
+    const legend = chart.plot.querySelector(".legend");
+    const needed = bar + (legend ? legend.getBBox().height : 0) - layout.margin.t + LABEL_PX;
+    if (needed > bar) await show(Math.ceil(needed));
+  }
 
   // A chart whose time axis is zoomed or reset takes the others along.
   function link(chart) {
@@ -112,7 +130,6 @@
   async function start() {
     for (const card of document.querySelectorAll("[data-chart]")) {
       const chart = {...JSON.parse(card.querySelector("script").textContent), card, plot: card.querySelector(".plot")};
-      chart.plot.style.height = `${chart.layout.height}px`;
       charts.push(chart);
     }
     charts.sort((a, b) => Boolean(a.layout.scene) - Boolean(b.layout.scene)); // without a graphics card these take seconds
