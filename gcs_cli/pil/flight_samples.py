@@ -16,6 +16,7 @@ from flightstack.core.contract import LoopStatus
 from flightstack.core.errors import ConfigError
 from gcs_cli.pil.signals import SIGNALS
 from gcs_cli.pil.ulps import Float32Array
+from gcs_cli.report.analysis import LogBytes
 
 TimeArray: TypeAlias = np.ndarray[Any, np.dtype[np.int64]]
 StatusArray: TypeAlias = np.ndarray[Any, np.dtype[np.uint16]]
@@ -73,8 +74,8 @@ def read_samples(path: Path) -> FlightSamples:
     """Read a flight log; raise ConfigError if it is not readable, or has no loops."""
     try:
         # pyulog reports damage on stdout, where it would mix with the output of the command
-        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):
-            log = ULog(file, _TOPICS)
+        with contextlib.redirect_stdout(io.StringIO()):
+            log = ULog(LogBytes(path.read_bytes()), _TOPICS)
             return _samples(path, log)
     except OSError as error:
         raise ConfigError(path, "", f"cannot be read: {error.strerror}") from error

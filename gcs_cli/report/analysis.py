@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+import os
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -51,6 +52,27 @@ _TOPICS = [
 ]
 
 
+class LogBytes(io.BytesIO):
+    """A log in memory for pyulog, which seeks back by a message's size even where the file ended before.
+
+    It would go back further each time, and never end. ``seek`` goes back by no more than the last ``read`` has read.
+    """
+
+    _missing = 0
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Return up to ``size`` bytes."""
+        data = super().read(size)
+        self._missing = max(0, (size or 0) - len(data))
+        return data
+
+    def seek(self, offset: int, whence: int = 0, /) -> int:
+        """Move; return the position."""
+        if whence == os.SEEK_CUR and offset < 0:
+            offset = min(0, offset + self._missing)
+        return super().seek(offset, whence)
+
+
 def read_flight(path: Path) -> Flight:
     """Read a ULog file, complete or cut off; raise ConfigError when it is none."""
     try:
@@ -75,7 +97,7 @@ def parse_ulog(content: bytes, source: object, topics: list[str] | None = None) 
     try:
         # pyulog reports damage on stdout, which belongs to the command's own output
         with contextlib.redirect_stdout(io.StringIO()):
-            return ULog(io.BytesIO(content), topics)
+            return ULog(LogBytes(content), topics)
     except _DAMAGE as error:
         raise ConfigError(source, "", f"is not a readable flight log: {error}") from error
 

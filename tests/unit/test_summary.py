@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import re
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -447,6 +448,15 @@ def test_a_log_cut_anywhere_is_read_as_far_as_it_goes(log_path: Path, tmp_path: 
         durations.append(read_flight(path).duration_s)
     assert durations == sorted(durations)
     assert durations[-1] == pytest.approx(35.99)
+
+
+def test_unknown_message_longer_than_its_log_ends_the_reading(log_path: Path, tmp_path: Path) -> None:
+    content = bytearray(log_path.read_bytes()[:20_000])
+    size, _ = struct.unpack_from("<HB", content, 16)
+    struct.pack_into("<HB", content, 16 + 3 + size, 0xFFFF, 0)  # the second definition
+    path = tmp_path / "damaged.ulg"
+    path.write_bytes(content)
+    assert read_flight(path).damaged
 
 
 def test_damage_is_never_printed_or_raised_as_anything_else(
