@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 from benchmarks.measure import Figure, figure
 from flightstack.flight_log.flight_log import FlightLog
-from flightstack.mavlink.dialect import mavlink
-from gcs_cli.clients.mission_client import Done
-from tests.support.world import World
+from flightstack.testing import World
+from flightstack.testing.engine import Engine
 
 PLAN = "square.plan"
 
@@ -23,29 +22,35 @@ class Station(Enum):
     IS_GONE = "is not there"
 
 
-class BenchWorld(World):
-    """A world that flies its mission, with or without a log and a ground station."""
-
-    def __init__(self, log: bool, station: Station, inner_hz: float = 500.0) -> None:
-        self._with_log = log
-        self._station = Station.READS
-        super().__init__(inner_hz=inner_hz, outer_hz=inner_hz / 5.0)
-        assert isinstance(self.upload(PLAN), Done)
-        assert self.start_mission() == 0
-        self._station = station
+class UnloggedEngine(Engine):
+    """Writes no log."""
 
     def _open_log(self) -> FlightLog | None:  # type: ignore[override]
-        return super()._open_log() if self._with_log else None
+        return None
 
-    def exchange_with_ground(self) -> None:
-        if self._station is Station.READS:
-            super().exchange_with_ground()
-        elif self._station is Station.HEARS:
-            if self.time_s >= self._heartbeat_due_s:
-                self._heartbeat_due_s = self.time_s + 1.0
-                self.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-            for _ in self.stack.ground.poll(self.link_now_s()):
-                pass
+
+def flying(log: bool, station: Station, inner_hz: float = 500.0) -> World:
+    """Return a world that flies its mission, with or without a log and a ground station."""
+    world = World(
+        telemetry=True,
+        make_engine=Engine if log else UnloggedEngine,
+        inner_hz=inner_hz,
+        outer_hz=inner_hz / 5.0,
+    )
+    world.upload(PLAN)
+    world.arm()
+    world.start_mission()
+    if station is not Station.READS:
+        leave(world, station)
+    return world
+
+
+def leave(world: World, station: Station) -> None:
+    """Leave the telemetry unread from now on, or disconnect the ground station."""
+    world.link.from_vehicle.cut()
+    if station is Station.IS_GONE:
+        world.link.to_vehicle.cut()
+        world.engine.stack.ground.drop_peer(world.gcs.address)
 
 
 class Variant(NamedTuple):
@@ -66,12 +71,12 @@ VARIANTS = (
 
 def _fly(variant: Variant) -> tuple[float, float]:
     """Return the real-time factor and the time of a step [µs]."""
-    world = BenchWorld(variant.log, variant.station)
+    world = flying(variant.log, variant.station)
     began_s, simulated_s = time.perf_counter(), world.time_s
-    world.until_disarmed()
+    world.run_until("not armed")
     wall_s = time.perf_counter() - began_s
     simulated_s = world.time_s - simulated_s
-    return simulated_s / wall_s, wall_s / simulated_s / world.config.inner_hz * 1e6
+    return simulated_s / wall_s, wall_s / simulated_s / world.setup.inner_hz * 1e6
 
 
 def flights(rounds: int) -> dict[str, tuple[Figure, Figure]]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.measure import Figure, interleaved_us
-from benchmarks.one_process import BenchWorld, Station
+from benchmarks.one_process import Station, flying
 from flightstack.core.contract import MAX_ROTORS, LoopRow, Vector3
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
 from flightstack.mavlink.link import Link
@@ -17,6 +17,7 @@ from flightstack.params.vehicle import Vehicle
 from flightstack.services.telemetry.streams import GROUND_RATES_HZ
 from flightstack.services.telemetry.telemetry import MAKERS
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
+from flightstack.testing import World
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.server.endpoint import FlightStackEndpoint
@@ -35,22 +36,27 @@ class Part(NamedTuple):
     """Whether no flight can do without it: the others hold parts of these, or are for comparison."""
 
 
-def _flying() -> BenchWorld:
-    world = BenchWorld(True, Station.READS)
-    world.run(6.0)
+def _flying() -> World:
+    world = flying(True, Station.READS)
+    world.run_for(6.0)
     return world
 
 
-def _holding() -> BenchWorld:
-    """Return a world in which the vehicle holds its place for as long as it is ticked, without a ground station.
+def _holding() -> Call:
+    """Return a tick of a vehicle that holds its place for as long as it is ticked, without a ground station.
 
     A tick on a state that stays the same would be another one: the rotors would be held.
     """
-    world = BenchWorld(True, Station.READS)
-    world.run(6.0)
-    assert world.hold() == 0
-    world._station = Station.IS_GONE
-    return world
+    world = flying(True, Station.READS)
+    world.run_for(6.0)
+    world.set_mode("HOLD")
+    engine = world.engine
+
+    def tick() -> None:
+        engine.tick()
+        engine.advance()
+
+    return tick
 
 
 def _hover_rad_s(vehicle: Vehicle) -> float:
@@ -94,9 +100,9 @@ def _pymavlink_codec() -> Call:
     return exchange
 
 
-def _telemetry(world: BenchWorld) -> tuple[Call, Call, Call]:
+def _telemetry(world: World) -> tuple[Call, Call, Call]:
     """Make, encode and decode the mix of messages of one second, message by message in turns."""
-    status = world.stack.status()
+    status = world.engine.stack.status()
     turns = [number for number, rate in GROUND_RATES_HZ.items() for _ in range(max(1, round(rate)))]
     makers = [MAKERS[number] for number in turns]
     messages = [make(status) for make in makers]
@@ -115,9 +121,9 @@ def _telemetry(world: BenchWorld) -> tuple[Call, Call, Call]:
     )
 
 
-def _log(world: BenchWorld) -> Call:
+def _log(world: World) -> Call:
     """Write five inner rows and one outer row, with their share of making bytes of them."""
-    recorder, now = world.stack.recorder, world.stack.now
+    recorder, now = world.engine.stack.recorder, world.engine.stack.now
     state, target = np.ones(13), np.ones(5)
     setpoint, times = now.setpoint, [now.time_us]
 
@@ -133,7 +139,7 @@ def _log(world: BenchWorld) -> Call:
 def parts() -> list[Part]:
     """Return the parts of a step, simulator first."""
     world = _flying()
-    stack, simulator = world.stack, world.simulator
+    stack, simulator = world.engine.stack, world.engine.simulator
     link, backend, navigator, now = stack.simulator, stack.loops, stack.parts.navigator, stack.now
     state, speeds = now.state.copy(), now.rotor_speed.copy()
     row = np.zeros(LoopRow.SIZE)
@@ -182,7 +188,7 @@ def parts() -> list[Part]:
         Part("log: rows, and bytes of them", _log(world), 0.2, True),
         Part("simulator, without its socket", simulator_side, 1.0, False),
         Part("flight stack's end of the simulator link", stack_side, 1.0, False),
-        Part("both and the autopilot's tick with its log, holding", _holding().tick, 1.0, False),
+        Part("both and the autopilot's tick with its log, holding", _holding(), 1.0, False),
         Part("telemetry: make a message", make, messages_per_step, False),
         Part("telemetry: encode it (pymavlink)", encode, messages_per_step, False),
         Part("ground station: decode it (pymavlink)", decode, messages_per_step, False),

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
-from tests.support.world import World
+from flightstack.testing import World
 
 GUSTY: dict[str, Any] = {"vehicle": "x_quad", "wind": (4.0, -2.0, 0.0), "gust": 1.0, "seed": 3}
 FLIGHTS: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -31,7 +31,7 @@ FLIGHTS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("hop.plan", {"inner_hz": 250.0, "outer_hz": 50.0}),
     ("hop.plan", {"loops": "host"}),
     ("hop.plan", {"loops": "emulated"}),
-    ("square.plan", {"force": (0.3, 0.1, 0.0), "params": ("MIS_TAKEOFF_ALT=4",)}),
+    ("square.plan", {"force": (0.3, 0.1, 0.0), "params": {"MIS_TAKEOFF_ALT": 4.0}}),
     ("fenced_square.plan", {**GUSTY, "loops": "c"}),
     ("triangle.waypoints", {"vehicle": "x_quad"}),
     ("every_item.plan", {**GUSTY, "seed": 5}),
@@ -42,14 +42,13 @@ LIMIT_S = 400.0
 
 def fly(plan: str, options: dict[str, Any]) -> str:
     """Return the SHA-256 of the log without the version of the loops, which hashes C sources with their comments."""
-    world = World(**options)
-    try:
+    with World(**options) as world:
         world.upload(plan)
+        world.arm()
         world.start_mission()
-        world.until_disarmed(LIMIT_S)
-    finally:
-        world.stack.loops.close()
-    return hashlib.sha256(world.log.replace(world.stack.loops.version.encode(), b"")).hexdigest()
+        world.run_until("not armed", LIMIT_S)
+        version = world.engine.stack.loops.version.encode()
+        return hashlib.sha256(world.engine.newest_log().replace(version, b"")).hexdigest()
 
 
 def main() -> None:

@@ -29,6 +29,8 @@ class RefusedError(AssertionError):
         super().__init__(f"{what} {'not answered' if answer.silent else 'refused'}: {answer.reason}")
         self.reason = answer.reason
         self.is_silent = answer.silent
+        self.result = answer.result
+        """The MAV_RESULT of a command, or the MAV_MISSION_RESULT of a transfer."""
 
 
 class Client:

@@ -18,12 +18,10 @@ from types import TracebackType
 from typing import Any
 
 from flightstack.commander.failsafe import Failsafe
-from flightstack.control.backend import ControlBackend
 from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import MissionItem, MissionType, Plan
-from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.testing.client import Client, RefusedError
 from flightstack.testing.engine import Engine
 from flightstack.testing.expression import Expression
@@ -61,8 +59,7 @@ class World:
         setup: Setup | None = None,
         *,
         telemetry: bool = False,
-        flight_logs: LogStore = NO_LOGS,
-        wrap_loops: Callable[[ControlBackend], ControlBackend] = lambda loops: loops,
+        make_engine: Callable[[Setup], Engine] = Engine,
         **conditions: Any,
     ) -> None:
         """Build the world of ``setup``, or of ``conditions`` with the names of ``Setup``; raise ConfigError.
@@ -71,7 +68,7 @@ class World:
         """
         self.setup = setup or Setup(**conditions)
         self._telemetry = telemetry
-        self.engine = Engine(self.setup, flight_logs, wrap_loops)
+        self.engine = make_engine(self.setup)
         """Flight stack and simulator; not part of the public interface."""
         self.events: list[Event] = []
         """Faults and changes of links, oldest first."""
@@ -83,6 +80,8 @@ class World:
         self._timers: list[tuple[float, Callable[[], None]]] = []
         self.gcs: Client = self.add_client(GROUND)
         """The ground station."""
+        self.sender = self.gcs
+        """The client that sends requests without another one, such as a companion while the ground station is cut."""
 
     # ------------------------------------------------------------------ parts
 
@@ -208,14 +207,21 @@ class World:
         """Send a MAV_CMD as COMMAND_LONG; raise RefusedError with the vehicle's reason."""
         self.request(f"command {number}", (number, params), client)
 
+    def command_int(
+        self, number: int, params: Sequence[float], x: int, y: int, z: float, *, frame: int
+    ) -> None:
+        """Send a MAV_CMD as COMMAND_INT: four parameters and a position, x and y in 1e-7 degrees."""
+        call = calls.command_int(self._connected().session, number, params, x, y, z, frame, self.time_s)
+        self.wait_for(call, f"command {number}")
+
     def request(self, what: str, command: calls.Command, client: Client | None = None) -> None:
         """Send a MAV_CMD with its parameters; ``what`` names it in the RefusedError."""
         sender = self._connected(client)
         self.wait_for(sender.command(*command, self.time_s), what)
 
     def _connected(self, client: Client | None = None) -> Client:
-        """Return a client, by default the ground station, once it knows the vehicle."""
-        client = client or self.gcs
+        """Return a client, by default ``sender``, once it knows the vehicle."""
+        client = client or self.sender
         if client.session.view.identity is None:
             self._network.settle(self.engine.stack.ground, self.time_s)
         return client
@@ -224,16 +230,16 @@ class World:
         self, plan: str | Path | Plan | Sequence[MissionItem], kind: MissionType = MissionType.MISSION
     ) -> None:
         """Upload a plan: a file, the name of a bundled one, a Plan, or items of one ``kind``; raise RefusedError."""
-        gcs = self._connected()
+        sender = self._connected()
         if isinstance(plan, (str, Path)):
             plan = self.setup.load_plan(plan)
         if isinstance(plan, Plan):
             self.plan = plan
-            self.wait_for(gcs.upload(plan), "the plan")
+            self.wait_for(sender.upload(plan), "the plan")
         else:
             if kind is MissionType.MISSION:
                 self.plan = Plan(tuple(plan))
-            self.wait_for(gcs.upload_items(plan, kind), f"the {kind.name.lower()}")
+            self.wait_for(sender.upload_items(plan, kind), f"the {kind.name.lower()}")
 
     def download(self, kind: MissionType = MissionType.MISSION) -> tuple[MissionItem, ...]:
         """Download a plan of one kind; raise RefusedError."""

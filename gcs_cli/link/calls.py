@@ -38,8 +38,8 @@ class Answer(NamedTuple):
     """True if the ground station ended the request."""
     items: tuple[MissionItem, ...] = ()
     """The plan, of a download."""
-    result: int = MissionResult.ACCEPTED
-    """The MAV_MISSION_RESULT of a transfer."""
+    result: int = 0
+    """The MAV_RESULT of a command, or the MAV_MISSION_RESULT of a transfer; 0: accepted."""
 
 
 class Request(Protocol):
@@ -78,7 +78,7 @@ class Call:
         )
         if silent:
             return Answer(False, result.reason, silent=True)
-        code = result.result if isinstance(result, Failed) else MissionResult.ACCEPTED
+        code = result.result or 0
         text = self._explanation()
         if text:
             return Answer(False, text, result=code)
@@ -102,6 +102,15 @@ def command(session: Session, number: int, params: Sequence[float], now_s: float
     """Begin a command; omitted parameters are zero."""
     client = CommandClient(vehicle_address(session), OWN_ADDRESS)
     client.send(number, params, now_s)
+    return Call(session, client)
+
+
+def command_int(
+    session: Session, number: int, params: Sequence[float], x: int, y: int, z: float, frame: int, now_s: float
+) -> Call:
+    """Begin a COMMAND_INT of four parameters and a position in ``frame``; x and y in 1e-7 degrees."""
+    client = CommandClient(vehicle_address(session), OWN_ADDRESS)
+    client.send_int(number, params, x, y, z, frame=frame, now_s=now_s)
     return Call(session, client)
 
 

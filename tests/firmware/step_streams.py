@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from fastcrc import crc16
 
 from flightstack.core.contract import ATTITUDE_TARGET_SIZE, SETPOINT_SIZE, STATE_SIZE, FloatArray
 from flightstack.mavlink.dialect import mavlink
-from tests.support.world import World
+from flightstack.testing import World
+from flightstack.testing.engine import Engine
 
 OUTER_DUE, SET_TARGET, RESET = 1, 2, 4
 OUTER_DIVISOR = 5
@@ -102,9 +104,10 @@ GUSTY: dict[str, Any] = {"wind": (4.0, 2.0, 0.0), "gust": 2.0, "drag": True}
 
 def flown_steps(plan: str = "hop.plan", air: Mapping[str, Any] = GUSTY) -> list[bytes]:
     """Fly a mission and return the steps of its loops."""
-    flight = World(wrap_loops=Recorder, **air)
-    recorder = flight.stack.loops
+    flight = World(make_engine=partial(Engine, wrap_loops=Recorder), **air)
+    recorder = flight.engine.stack.loops
     flight.upload(plan)
+    flight.arm()
     flight.start_mission()
-    flight.until_disarmed()
+    flight.run_until("not armed")
     return recorder.frames

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.support.world import World
+from flightstack.testing import World
 
 
 def flight(loops: str) -> np.ndarray:
     """Fly in gusts and return the plant's state of every tenth tick, shape (n, 13)."""
     world = World(loops=loops, wind=(4.0, 2.0, 0.0), gust=2.0, drag=True)
     world.upload("hop.plan")
+    world.arm()
     world.start_mission()
     states = []
-    while world.armed:
-        states.append(world.simulator.frame.state.copy())
-        world.run(0.02)
+    while world.state.armed:
+        states.append(world.engine.simulator.frame.state.copy())
+        world.run_for(0.02)
     return np.array(states)
 
 

@@ -10,7 +10,7 @@ from gcs_cli.clients.log_client import LogClient, LogEntry
 from gcs_cli.clients.mission_client import MissionClient
 from gcs_cli.clients.param_client import ParamClient
 from gcs_cli.link.session import Service
-from tests.support.world import item
+from tests.support.plan_items import item
 
 VEHICLE, OWN = Address(1, 1), Address(255, 190)
 

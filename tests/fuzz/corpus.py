@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
 from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
+from flightstack.testing import World
+from flightstack.testing.engine import Engine
 from gcs_cli.link.session import Service, Session
 from tests.fuzz.clients import SERVICES
 from tests.fuzz.inputs import KINDS
 from tests.fuzz.memory_logs import MemoryLogs
 from tests.fuzz.script import Style, of_frames, restyled, written
-from tests.support.world import PEER, World
 
 _HERE = ("192.0.2.1", 18570)
 
 
 def conversation(make: Callable[[], Service]) -> tuple[list[bytes], list[bytes]]:
     """Let a client do its work with a vehicle; return the frames of the client and of the vehicle."""
-    world, session = World(flight_logs=MemoryLogs(0, 300, 5_000)), Session()
+    world, session = World(make_engine=partial(Engine, flight_logs=MemoryLogs(0, 300, 5_000))), Session()
     session.receive(Link(1, 1).encode(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)), _HERE, 0.0)
     service = make()
     session.use(service)
@@ -31,8 +33,8 @@ def conversation(make: Callable[[], Service]) -> tuple[list[bytes], list[bytes]]
         now_s = moment * 0.01
         for frame in session.poll(now_s):
             said.append(frame)
-            world.stack.ground.receive(PEER, frame, now_s)
-        for _, frame in world.stack.ground.poll(now_s):
+            world.engine.stack.ground.receive(world.gcs.address, frame, now_s)
+        for _, frame in world.engine.stack.ground.poll(now_s):
             answered.append(frame)
             session.receive(frame, _HERE, now_s)
         if getattr(service, "result", None) is not None:
@@ -100,14 +102,14 @@ def simulator_scripts() -> list[bytes]:
     world = World()
     frames = []
     for _ in range(20):
-        frames.append(bytes(world.simulator.outgoing()))
+        frames.append(bytes(world.engine.simulator.outgoing()))
         world.tick()
     return [of_frames(_cut(frames)), *every_message()]
 
 
 def bridge_scripts() -> list[bytes]:
     """Return scripts for the simulator's end."""
-    stack = SimulatorEndpoint(load_vehicle("x_quad"), World().config.home, lockstep=True)
+    stack = SimulatorEndpoint(load_vehicle("x_quad"), World().engine.config.home, lockstep=True)
     actuators = ActuatorsFrame()
     actuators.set_rotor_count(4)
     actuators.rotor_speed_rad_s[:4] = 200.0

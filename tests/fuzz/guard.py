@@ -5,7 +5,7 @@ from __future__ import annotations
 from flightstack.mavlink.frames import FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.services.routing.peer import PeerAddress
-from tests.support.world import World
+from flightstack.testing import World
 
 _CHANGES_PARAMETERS = {"PARAM_SET", "COMMAND_LONG", "COMMAND_INT"}
 _CHANGES_LOOPS = {*_CHANGES_PARAMETERS, "SET_MODE"}  # arming resets them
@@ -16,7 +16,7 @@ class Guard:
     """Watches plans, parameters and the control loops' memory of one vehicle."""
 
     def __init__(self, world: World) -> None:
-        self._world, self._stack = world, world.stack
+        self._world, self._stack = world, world.engine.stack
         self.plan_changes = self.parameter_changes = 0
         self.after_tick()
 
@@ -49,7 +49,7 @@ class Guard:
 
     def _answers(self, peer: PeerAddress) -> list[Message]:
         """Return what is sent to ``peer`` now."""
-        polled = self._world.stack.ground.poll(self._world.link_now_s())
+        polled = self._stack.ground.poll(self._world.time_s)
         return [message for address, data in polled if address == peer for message in messages_in(data)]
 
 

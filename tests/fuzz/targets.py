@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from flightstack.params.vehicle import load_vehicle
 from flightstack.services.routing.hub import MAX_TO_FORWARD
 from flightstack.services.routing.peer import PeerAddress
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
+from flightstack.testing import World
+from flightstack.testing.engine import Engine
 from gcs_cli.link.session import Session
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.plant.plant import PlantOptions
@@ -29,7 +32,6 @@ from sim_bridge.simulator import Simulator
 from tests.fuzz.clients import SERVICES
 from tests.fuzz.memory_logs import MemoryLogs
 from tests.fuzz.script import KEY, MOST_STEPS, steps
-from tests.support.world import World
 
 SIGNED, FLYING = 1, 2
 """Bits of a hub script's first octet."""
@@ -48,17 +50,17 @@ HEARTBEAT = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)
 def hub(script: bytes) -> int:
     """The vehicle's ground links and all services; the first octet says which vehicle it is."""
     options = script[0] if script else 0
-    world = World(flight_logs=MemoryLogs(0, 300, 5_000))
-    ground = world.stack.ground
+    world = World(make_engine=partial(Engine, flight_logs=MemoryLogs(0, 300, 5_000)))
+    ground = world.engine.stack.ground
     link = Link(250, 190)
     keys = [KEY]
     if options & FLYING:
-        assert world.arm() == 0
-        assert world.takeoff(5.0) == 0
+        world.arm()
+        world.takeoff(5.0)
     if options & SIGNED:
         ground.use_signing(Signing(KEY, lambda: 1.75e9), keys.append)
         link = Link(250, 190, signing=LinkSigning(Signing(KEY, lambda: 1.75e9), 9))
-    now_s, sent, arrivals = world.link_now_s(), 0, 0
+    now_s, sent, arrivals = world.time_s, 0, 0
     for step in steps(script[1:]):
         now_s += step.pause_s
         for piece in step.pieces:
@@ -66,42 +68,41 @@ def hub(script: bytes) -> int:
             arrivals += 1
         sent += sum(1 for _ in ground.poll(now_s))
     assert sent < MOST_SENT
-    world.held_s = now_s - world.time_s
-    world.sends_heartbeats = False
-    world.tick()
+    world.engine.tick()
+    world.engine.advance()
     check_vehicle(world)
     # whoever is left in charge of the key, a client that has it gets its answer
     if keys[-1] != KEY:
         return arrivals
-    assert "AUTOPILOT_VERSION" in answers(world, link)
+    assert "AUTOPILOT_VERSION" in answers(world, link, now_s)
     return arrivals
 
 
 def check_vehicle(world: World) -> None:
     """What holds of a vehicle, whatever it was told."""
-    stack, params = world.stack, world.stack.params
-    assert np.isfinite(world.simulator.frame.state).all()
+    stack, params = world.engine.stack, world.engine.stack.params
+    assert np.isfinite(world.engine.simulator.frame.state).all()
     assert np.isfinite(stack.now.setpoint).all()
     for name, value in params.values().items():
         assert params.specs[name].accepted(value) == value
-    assert world.stack.ground.forward_backlog <= MAX_TO_FORWARD
+    assert world.engine.stack.ground.forward_backlog <= MAX_TO_FORWARD
     places = stack.places
     assert all(math.isfinite(number) for number in places.home_point)
     assert stack.now.progress.current <= len(stack.parts.mission.items)
 
 
-def answers(world: World, link: Link) -> set[str]:
-    """Return what a proper client is sent when it asks for AUTOPILOT_VERSION."""
+def answers(world: World, link: Link, now_s: float) -> set[str]:
+    """Return the types of messages that a client receives which requests AUTOPILOT_VERSION."""
     request = mavlink.MAVLink_command_long_message(
-        world.config.system_id, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 148, 0, 0, 0, 0, 0, 0
+        world.engine.config.system_id, 1, mavlink.MAV_CMD_REQUEST_MESSAGE, 0, 148, 0, 0, 0, 0, 0, 0
     )
     address = PeerAddress(GROUND, "192.0.2.99", 99)
-    now_s = world.link_now_s() + 100.0  # transactions of others have timed out
+    now_s += 100.0  # transactions of others have timed out
     kinds: set[str] = set()
     for _ in range(20):
         for message in (mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), request):
-            world.stack.ground.receive(address, link.encode(message), now_s)
-        for peer, frame in world.stack.ground.poll(now_s):
+            world.engine.stack.ground.receive(address, link.encode(message), now_s)
+        for peer, frame in world.engine.stack.ground.poll(now_s):
             if peer == address:
                 kinds.update(message.get_type() for message in link.decode(frame))
         if "AUTOPILOT_VERSION" in kinds:

@@ -6,6 +6,7 @@ A guard stands behind every single one: see ``tests.fuzz.guard``. The vehicle ha
 from __future__ import annotations
 
 import random
+from functools import partial
 
 import pytest
 
@@ -16,14 +17,16 @@ from flightstack.mavlink.link import Link
 from flightstack.mavlink.signing import MAX_STREAMS, LinkSigning, Signing
 from flightstack.services.routing.hub import MAX_PEERS, MAX_TO_FORWARD
 from flightstack.services.routing.peer import PeerAddress
+from flightstack.testing import World
+from flightstack.testing.engine import Engine
 from tests.fuzz.guard import Guard
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import held
 from tests.fuzz.memory_logs import MemoryLogs
 from tests.fuzz.script import KEY
 from tests.fuzz.targets import answers, check_vehicle
+from tests.support.plan_items import item
 from tests.support.tools import NIGHTLY
-from tests.support.world import World, item
 
 INPUTS = (
     {"plain": 80_000, "signed": 60_000, "stream": 60_000}
@@ -78,24 +81,24 @@ def sane(link: Link, number: int) -> list[bytes]:
 
 def make_world(name: str, number: int) -> tuple[World, Link]:
     """Return a vehicle, flying in every second turn, and the link of somebody who may speak to it."""
-    world = World(flight_logs=MemoryLogs(0, 300, 5_000))
-    world.sends_heartbeats = False
+    world = World(make_engine=partial(Engine, flight_logs=MemoryLogs(0, 300, 5_000)))
     if number % 2:
-        assert world.arm() == 0
-        assert world.takeoff(5.0) == 0
-        world.run(0.5)
+        world.arm()
+        world.takeoff(5.0)
+        world.run_for(0.5)
+    world.link.cut()
     if name == "stream":
         for peer in PEERS:
-            world.stack.ground.add_peer(peer)  # as the process does when a TCP client connects
+            world.engine.stack.ground.add_peer(peer)  # as the process does when a TCP client connects
     if name != "signed":
         return world, Link(250, 190)
-    world.stack.ground.use_signing(Signing(KEY, lambda: 1.75e9), lambda _key: None)
+    world.engine.stack.ground.use_signing(Signing(KEY, lambda: 1.75e9), lambda _key: None)
     return world, Link(250, 190, signing=LinkSigning(Signing(KEY, lambda: 1.75e9), 9))
 
 
 def throw(name: str, world: World, inputs: Inputs, signatures: Signatures) -> tuple[int, Guard]:
     """Let a world's inputs arrive, with a look behind each; return how many there were, and the guard."""
-    hub, guard, draw = world.stack.ground, Guard(world), inputs.random
+    hub, guard, draw = world.engine.stack.ground, Guard(world), inputs.random
     last = dict.fromkeys(PEERS, b"")
     proper = Link(250, 191)
     for count in range(0, A_WORLD, A_TICK):
@@ -110,14 +113,13 @@ def throw(name: str, world: World, inputs: Inputs, signatures: Signatures) -> tu
                 data, may_change = signatures.signed(data)
             cuts = sorted(draw.randrange(len(data) + 1) for _ in range(3)) if name == "stream" else []
             for start, end in zip([0, *cuts], [*cuts, len(data)], strict=True):
-                hub.receive(peer, data[start:end], world.link_now_s())
+                hub.receive(peer, data[start:end], world.time_s)
             guard.after(last[peer] + data, peer, may_change)
             last[peer] = (last[peer] + data)[
                 -LARGEST_FRAME:
             ]  # a beginning is held until it is whole, or too long
-        world.held_s += 0.02
-        world.tick()
-        assert sum(1 for _ in hub.poll(world.link_now_s())) < MOST_OF_A_POLL
+        world.run_for(0.02)
+        assert sum(1 for _ in hub.poll(world.time_s)) < MOST_OF_A_POLL
         guard.after_tick()
     return A_WORLD, guard
 
@@ -131,7 +133,7 @@ def test_inputs_leave_the_vehicle_sound(name: str) -> None:
     for number in range(INPUTS[name] // A_WORLD):
         world, client = make_world(name, number)
         count, guard = throw(name, world, inputs, signatures)
-        hub = world.stack.ground
+        hub = world.engine.stack.ground
         tried += count
         plans += guard.plan_changes
         parameters += guard.parameter_changes
@@ -143,7 +145,7 @@ def test_inputs_leave_the_vehicle_sound(name: str) -> None:
             counts = hub.signing.counts
             assert min(counts.good, counts.unsigned_refused, counts.bad_signature) > 100
         check_vehicle(world)
-        assert "AUTOPILOT_VERSION" in answers(world, client)
+        assert "AUTOPILOT_VERSION" in answers(world, client, world.time_s)
     print(f"{name}: {tried} inputs, {plans} plans and {parameters} parameters changed, {most_held} held")
     assert tried == INPUTS[name]
     assert len(inputs.drawn) == len(KINDS)

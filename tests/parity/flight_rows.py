@@ -9,7 +9,8 @@ import sys
 
 import numpy as np
 
-from tests.support.world import World, item
+from flightstack.testing import World
+from tests.support.plan_items import item
 
 
 def flight_rows(vehicle: str, controller: str, ticks: int) -> np.ndarray:
@@ -17,12 +18,15 @@ def flight_rows(vehicle: str, controller: str, ticks: int) -> np.ndarray:
     drag = vehicle == "paper_quad"
     world = World(vehicle=vehicle, controller=controller, wind=(1.0, -2.0, 0.0), gust=0.5, drag=drag)
     world.upload([item(115, p1=30.0), item(22, z=1.0), item(16, north=3.0, east=-2.0, z=1.5), item(20)])
+    world.arm()
     world.start_mission()
-    now = world.stack.now
+    now = world.engine.stack.now
     rows = []
     for _ in range(ticks):
         world.tick()
-        rows.append(np.concatenate([now.row, now.setpoint, now.attitude_target, world.simulator.frame.state]))
+        rows.append(
+            np.concatenate([now.row, now.setpoint, now.attitude_target, world.engine.simulator.frame.state])
+        )
     return np.array(rows)
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from tests.support.world import World
+from flightstack.testing import World
 
 CONTROLLERS = ("pid", "backstepping")
 
@@ -41,9 +41,10 @@ def log_digest(plan: str, controller: str) -> str:
         vehicle="x_quad", controller=controller, wind=(3.0, -1.0, 0.0), gust=1.0, torque_gust=0.002, seed=7
     )
     world.upload(plan)
+    world.arm()
     world.start_mission()
-    world.until_disarmed()
-    return digest([world.log])
+    world.run_until("not armed")
+    return digest([world.flight().log.content])
 
 
 if __name__ == "__main__":

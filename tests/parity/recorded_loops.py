@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,8 @@ from flightstack.control.loops import PythonLoops
 from flightstack.core.contract import FloatArray, LoopRow
 from flightstack.firmware.numbers import target_numbers
 from flightstack.params.gains_file import open_gains
-from tests.support.world import World
+from flightstack.testing import World
+from flightstack.testing.engine import Engine
 
 OUTER_DUE, SET_TARGET, RESET = 1, 2, 4
 
@@ -83,18 +85,19 @@ class RecordingLoops:
 
 def record(plan: str, **config: Any) -> Recording:
     """Fly a plan of ``missions/`` to its end with Python's loops."""
-    world = World(wrap_loops=RecordingLoops, **config)
-    stack = world.stack
+    world = World(make_engine=partial(Engine, wrap_loops=RecordingLoops), **config)
+    stack = world.engine.stack
     recorder = stack.loops
     assert isinstance(recorder, RecordingLoops)
     world.upload(plan)
+    world.arm()
     world.start_mission()
-    world.until_disarmed()
+    world.run_until("not armed")
     numbers = target_numbers(
         stack.vehicle,
-        load_controller(world.config.controller),
-        open_gains(world.config.gains),
-        np.radians(world.config.behaviour.max_tilt_deg),
+        load_controller(world.engine.config.controller),
+        open_gains(world.engine.config.gains),
+        np.radians(world.engine.config.behaviour.max_tilt_deg),
         stack.rates.inner_hz,
         stack.rates.divisor,
     )

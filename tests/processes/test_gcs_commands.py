@@ -26,7 +26,7 @@ from gcs_cli.link.connection import Connection
 from gcs_cli.transfers import log_calls
 from tests.support.commands import Ended, gcs
 from tests.support.fake_vehicle import ARM, FakeVehicle, serve
-from tests.support.fences import circle
+from tests.support.plan_items import circle
 from tests.support.vehicle_processes import vehicle
 
 LONG_S = 30  # a bound for a machine that is busy; nothing is expected to take a second

@@ -14,11 +14,11 @@ import pytest
 from pyulog import ULog
 
 from flightstack.core.port_numbers import ground_station_port
+from flightstack.testing import World
 from tests.support.commands import flightstack_command, gcs
 from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process
 from tests.support.vehicle_processes import wait_until_healthy
-from tests.support.world import World
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 
@@ -57,11 +57,12 @@ def test_the_same_flight_gives_the_same_log_at_any_speed_and_in_one_process(tmp_
         logs.append(log)
     assert logs[0] == logs[1]
     system_id = instance + 1  # a parameter, and so in the log
-    world = World(vehicle="x_quad", gust=1.0, torque_gust=0.1, seed=7, system_id=system_id)
+    world = World(vehicle="x_quad", gust=1.0, torque_gust=0.1, seed=7, params={"MAV_SYS_ID": system_id})
     world.upload("hop.plan")
+    world.arm()
     world.start_mission()
-    world.until_disarmed()
-    assert world.log == logs[0]
+    world.run_until("not armed")
+    assert world.flight().log.content == logs[0]
 
 
 GCS_LOSS_S = 5

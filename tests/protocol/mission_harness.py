@@ -10,7 +10,7 @@ from flightstack.services.mission.mission_server import MissionServer
 from flightstack.services.mission.mission_store import MissionEvent
 from flightstack.transports.memory import LOSSLESS, Conditions, LossyLink
 from gcs_cli.clients.mission_client import Done, MissionClient
-from tests.support.fences import HOME
+from tests.support.plan_items import HOME
 
 VEHICLE = Address(1, 1)
 LOSSY = Conditions(loss=0.2, duplication=0.2, reordering=0.2, delay_s=0.02, jitter_s=0.03)

@@ -12,7 +12,7 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Link
 from flightstack.process.log_files import FileTail
 from flightstack.services.logs.log_stream import CHUNK, GIVE_UP_S, NO_MESSAGE_BEGINS, LogStream
-from tests.support.world import World
+from flightstack.testing import World
 
 VEHICLE, CLIENT = Address(1, 1), Address(255, 190)
 PEER, OTHER = "peer", "other"
@@ -80,9 +80,9 @@ def log() -> bytes:
     world = World()
     world.takeoff(2.0)
     world.arm()
-    world.run(3.0)
+    world.run_for(3.0)
     world.disarm(force=True)
-    return world.log
+    return world.flight().log.content
 
 
 def streamed(content: bytes, reader: Reader, step: int = 1 << 30) -> Growing:

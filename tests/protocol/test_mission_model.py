@@ -13,7 +13,7 @@ from flightstack.plan import MissionItem, MissionResult, MissionType
 from flightstack.services.mission.mission_store import MissionCleared, MissionRefused, MissionReplaced
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from tests.protocol.mission_harness import LOSSY, GroundStation, World, mission
-from tests.support.fences import circle, polygon, rally_point, square
+from tests.support.plan_items import circle, polygon, rally_point, square
 from tests.support.tools import NIGHTLY
 
 KINDS = (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)

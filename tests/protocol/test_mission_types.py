@@ -10,7 +10,7 @@ from flightstack.services.mission.mission_server import MissionServer
 from flightstack.services.mission.mission_store import CurrentRequested, MissionCleared, MissionRefused
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from tests.protocol.mission_harness import CHECKS, VEHICLE, GroundStation, World, mission
-from tests.support.fences import circle, polygon, rally_point, square
+from tests.support.plan_items import circle, polygon, rally_point, square
 
 KINDS = (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)
 PLANS = {

@@ -25,7 +25,7 @@ from gcs_cli.link.calls import Answer
 from gcs_cli.link.session import Session
 from gcs_cli.transfers.plan_parts import Uploads
 from tests.protocol.mission_harness import LOSSY, VEHICLE, mission
-from tests.support.fences import HOME, circle, polygon, rally_point, square
+from tests.support.plan_items import HOME, circle, polygon, rally_point, square
 
 MISSION, FENCE, RALLY = MissionType.MISSION, MissionType.FENCE, MissionType.RALLY
 ALL = (MISSION, FENCE, RALLY)

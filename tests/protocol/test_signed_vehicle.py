@@ -11,7 +11,7 @@ from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.signing import NO_KEY, Signing, timestamp_of
 from flightstack.services.routing.hub import MAX_PEERS
 from flightstack.services.routing.peer import PeerAddress
-from tests.support.world import World
+from flightstack.testing import World
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))
 HERE, ELSEWHERE = "127.0.0.1", "192.0.2.7"
@@ -25,7 +25,7 @@ class Station:
     def __init__(
         self, vehicle: SignedVehicle, key: bytes | None, host: str = HERE, system: int = 255
     ) -> None:
-        self.hub, self.address = vehicle.world.stack.ground, PeerAddress(GROUND, host, 5000 + system)
+        self.hub, self.address = vehicle.world.engine.stack.ground, PeerAddress(GROUND, host, 5000 + system)
         self.codec = common.MAVLink(None, system, 190)
         self.codec.robust_parsing = True
         self.now_s = 0.0
@@ -73,16 +73,16 @@ def shared() -> World:
 @pytest.fixture
 def vehicle(shared: World) -> SignedVehicle:
     """The vehicle on the ground, with a key and no peers."""
-    for address, _ in shared.stack.ground.addresses():
-        shared.stack.ground.drop_peer(address)
-    signed = SignedVehicle(shared, Signing(KEY, lambda: NOW_S), [], shared.stack.ground.last_heard_s)
-    shared.stack.ground.use_signing(signed.signing, signed.stored.append)
+    for address, _ in shared.engine.stack.ground.addresses():
+        shared.engine.stack.ground.drop_peer(address)
+    signed = SignedVehicle(shared, Signing(KEY, lambda: NOW_S), [], shared.engine.stack.ground.last_heard_s)
+    shared.engine.stack.ground.use_signing(signed.signing, signed.stored.append)
     return signed
 
 
 def test_the_parameter_list_comes_signed_to_who_signs(vehicle: SignedVehicle) -> None:
     values = of_type(Station(vehicle, KEY).ask(REQUEST_LIST), "PARAM_VALUE")
-    store = vehicle.world.stack.params
+    store = vehicle.world.engine.stack.params
     assert [value.param_id for value in values] == ["_HASH_CHECK", *store.specs]
     assert all(value.get_signed() for value in values)
     assert {value.get_link_id() for value in values} == {0}
@@ -94,7 +94,7 @@ def test_who_does_not_sign_with_the_key_is_not_heard(vehicle: SignedVehicle, key
     assert station.ask(REQUEST_LIST) == []
     set_frame = station.frame(common.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 9.0, 9))
     station.send(set_frame)
-    assert vehicle.world.stack.params.value("MIS_TAKEOFF_ALT") != 9.0
+    assert vehicle.world.engine.stack.params.value("MIS_TAKEOFF_ALT") != 9.0
 
 
 RADIO_STATUS = common.MAVLink_radio_status_message(1, 2, 3, 4, 5, 6, 7)
@@ -103,8 +103,8 @@ RADIO_STATUS = common.MAVLink_radio_status_message(1, 2, 3, 4, 5, 6, 7)
 def test_an_unsigned_radio_status_admits_no_peer(vehicle: SignedVehicle) -> None:
     radio = Station(vehicle, None, ELSEWHERE, system=51)
     assert radio.ask(RADIO_STATUS) == []
-    assert vehicle.world.stack.ground.addresses() == []
-    assert vehicle.world.stack.ground.last_heard_s == vehicle.heard_before_s
+    assert vehicle.world.engine.stack.ground.addresses() == []
+    assert vehicle.world.engine.stack.ground.last_heard_s == vehicle.heard_before_s
 
 
 def test_an_unsigned_radio_status_does_not_keep_a_peer_alive(vehicle: SignedVehicle) -> None:
@@ -134,7 +134,7 @@ def test_unsigned_strangers_take_no_peer_slot(vehicle: SignedVehicle) -> None:
     for system in range(1, MAX_PEERS + 10):
         station = Station(vehicle, None, ELSEWHERE, system=system)
         station.send(station.frame(RADIO_STATUS), station.frame(REQUEST_LIST))
-    assert vehicle.world.stack.ground.addresses() == []
+    assert vehicle.world.engine.stack.ground.addresses() == []
     assert of_type(Station(vehicle, KEY).ask(REQUEST_LIST), "PARAM_VALUE") != []
 
 
@@ -143,7 +143,7 @@ def test_a_replay_from_another_address_takes_no_peer_slot(vehicle: SignedVehicle
     frame = station.frame(REQUEST_LIST)
     station.send(frame)
     Station(vehicle, KEY, ELSEWHERE, system=77).send(frame)
-    assert [address for address, _ in vehicle.world.stack.ground.addresses()] == [station.address]
+    assert [address for address, _ in vehicle.world.engine.stack.ground.addresses()] == [station.address]
 
 
 def test_where_unsigned_is_allowed_it_admits_a_peer(vehicle: SignedVehicle) -> None:
@@ -159,8 +159,8 @@ def test_a_heard_command_cannot_be_sent_again_from_another_port(vehicle: SignedV
     )
     station.send(first, second)
     Station(vehicle, KEY, system=77).send(first)  # another address: another link
-    assert vehicle.world.stack.params.value("MIS_TAKEOFF_ALT") == 8.0
-    vehicle.world.stack.params.reset()
+    assert vehicle.world.engine.stack.params.value("MIS_TAKEOFF_ALT") == 8.0
+    vehicle.world.engine.stack.params.reset()
 
 
 def test_a_key_from_this_machine_is_taken_and_kept(vehicle: SignedVehicle) -> None:
@@ -195,8 +195,8 @@ def test_a_router_on_this_machine_brings_no_key(vehicle: SignedVehicle) -> None:
 
 def test_a_vehicle_without_a_key_file_says_that_it_takes_none() -> None:
     world = World()
-    world.send(common.MAVLink_setup_signing_message(1, 1, list(KEY), 0))
-    world.run(0.1)
+    world.gcs.send(common.MAVLink_setup_signing_message(1, 1, list(KEY), 0))
+    world.run_for(0.1)
     assert world.texts == ["Signing key refused: flightstack was started without --signing-key"]
 
 
@@ -224,15 +224,15 @@ def test_a_refused_parameter_is_explained_in_a_text(vehicle: SignedVehicle) -> N
 
 
 def test_all_parameters_are_reset_by_command_but_not_while_armed(vehicle: SignedVehicle) -> None:
-    assert vehicle.world.stack.params.set("MIS_TAKEOFF_ALT", 9.0) is None
+    assert vehicle.world.engine.stack.params.set("MIS_TAKEOFF_ALT", 9.0) is None
     reset = common.MAVLink_command_long_message(1, 1, 245, 0, 2.0, 0, 0, 0, 0, 0, 0)
-    status = vehicle.world.stack.now.status
-    vehicle.world.stack.now.status = status._replace(armed=True)
+    status = vehicle.world.engine.stack.now.status
+    vehicle.world.engine.stack.now.status = status._replace(armed=True)
     try:
         station = Station(vehicle, KEY)
         assert [ack.result for ack in of_type(station.ask(reset), "COMMAND_ACK")] == [2]  # DENIED
-        assert vehicle.world.stack.params.value("MIS_TAKEOFF_ALT") == 9.0
+        assert vehicle.world.engine.stack.params.value("MIS_TAKEOFF_ALT") == 9.0
     finally:
-        vehicle.world.stack.now.status = status
+        vehicle.world.engine.stack.now.status = status
     assert [ack.result for ack in of_type(station.ask(reset), "COMMAND_ACK")] == [0]
-    assert vehicle.world.stack.params.is_default("MIS_TAKEOFF_ALT")
+    assert vehicle.world.engine.stack.params.is_default("MIS_TAKEOFF_ALT")

@@ -14,11 +14,12 @@ from flightstack.firmware.c_loops import CLoops, HostLoops
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import StackConfig
 from flightstack.process.assembly import build
+from flightstack.testing import World
 from gcs_cli.report.analysis import read_flight
 from tests.firmware.app_support import Target
 from tests.parity.recorded_loops import record
 from tests.support.lossy_line import LineFaults, LossyLine
-from tests.support.world import World, item
+from tests.support.plan_items import item
 
 SPEEDS = np.zeros(8, np.float32)
 
@@ -26,8 +27,9 @@ SPEEDS = np.zeros(8, np.float32)
 def flown(**config: object) -> World:
     world = World(**config)
     world.upload("square.plan")
+    world.arm()
     world.start_mission()
-    world.until_disarmed()
+    world.run_until("not armed")
     return world
 
 
@@ -36,17 +38,17 @@ def test_a_mission_in_c_is_the_mission_in_python(controller: str) -> None:
     in_c, in_python = (flown(loops=loops, controller=controller) for loops in ("c", "python"))
     assert in_c.reached == in_python.reached == [0, 1, 2, 3, 4, 5]
     assert in_c.time_s == pytest.approx(in_python.time_s, abs=0.1)
-    assert in_c.position == pytest.approx(in_python.position, abs=1e-4)
-    assert in_c.stack.loops.get_parameter("POS_XY_P") == pytest.approx(
-        in_python.stack.loops.get_parameter("POS_XY_P"), rel=1e-7
+    assert in_c.state.position_ned_m == pytest.approx(in_python.state.position_ned_m, abs=1e-4)
+    assert in_c.engine.stack.loops.get_parameter("POS_XY_P") == pytest.approx(
+        in_python.engine.stack.loops.get_parameter("POS_XY_P"), rel=1e-7
     )
 
 
 def test_two_flights_in_c_leave_the_same_log(tmp_path) -> None:
     one, other = flown(loops="c"), flown(loops="c")
-    assert one.log == other.log
+    assert one.flight().log.content == other.flight().log.content
     log = tmp_path / "flight.ulg"
-    log.write_bytes(one.log)
+    log.write_bytes(one.flight().log.content)
     info = read_flight(log).info
     assert info["loops"] == "c"
     assert str(info["ver_loops"]).startswith("C, float, sources ")
@@ -56,21 +58,21 @@ def test_the_log_tells_when_the_loops_begin_and_when_guidance_gives_the_target(t
     from pyulog import ULog  # noqa: PLC0415
 
     world = World(loops="c")
-    world.streams["offboard"] = lambda: mavlink.MAVLink_set_attitude_target_message(
+    world.gcs.streams["offboard"] = lambda: mavlink.MAVLink_set_attitude_target_message(
         0, 1, 1, 0b00000111, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 0.75
     )
     world.takeoff(3.0)
     world.arm()
     world.takeoff(3.0)
-    world.until(lambda: world.altitude > 2.9)
-    world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 6)
-    world.run(0.5)
-    world.hold()
-    world.run(0.5)
+    world.run_until("altitude_m > 2.9")
+    world.set_mode("OFFBOARD")
+    world.run_for(0.5)
+    world.set_mode("HOLD")
+    world.run_for(0.5)
     world.land()
-    world.until_disarmed()
+    world.run_until("not armed")
     log = tmp_path / "flight.ulg"
-    log.write_bytes(world.log)
+    log.write_bytes(world.flight().log.content)
     (data,) = (d for d in ULog(str(log)).data_list if d.name == "vehicle_attitude_setpoint")
     flags = data.data["loop_flags"]
     assert set(flags) >= {0, LoopFlags.OUTER_DUE, LoopFlags.SET_TARGET}
@@ -82,14 +84,14 @@ def test_the_log_tells_when_the_loops_begin_and_when_guidance_gives_the_target(t
 
 
 def test_parameters_reach_c_in_flight() -> None:
-    world = World(loops="c", params=("POS_XY_P=2.5",))
-    assert world.stack.loops.get_parameter("POS_XY_P") == 2.5
-    assert world.stack.params.set("POS_XY_P", 3.25) is None
-    assert world.stack.loops.get_parameter("POS_XY_P") == 3.25
+    world = World(loops="c", params={"POS_XY_P": 2.5})
+    assert world.engine.stack.loops.get_parameter("POS_XY_P") == 2.5
+    assert world.engine.stack.params.set("POS_XY_P", 3.25) is None
+    assert world.engine.stack.loops.get_parameter("POS_XY_P") == 3.25
     with pytest.raises(KeyError):
-        world.stack.loops.get_parameter("FS_MASS")
+        world.engine.stack.loops.get_parameter("FS_MASS")
     with pytest.raises(KeyError):
-        world.stack.loops.set_parameter("NO_SUCH", 1.0)
+        world.engine.stack.loops.set_parameter("NO_SUCH", 1.0)
 
 
 def test_c_with_double_computes_what_python_does_over_a_whole_mission() -> None:
@@ -187,9 +189,10 @@ def test_a_landing_and_a_second_flight_in_c() -> None:
     world = World(loops="c")
     world.upload([item(22, z=2.0), item(21)])
     for _ in range(2):
+        world.arm()
         world.start_mission()
-        world.until_disarmed()
-    assert len(world.logs) == 2
+        world.run_until("not armed")
+    assert len(world.engine.logs) == 2
 
 
 # ------------------------------------------------------------------ on a target
@@ -213,22 +216,21 @@ def on_a_bad_line(monkeypatch) -> Iterator[list[LossyLine]]:
 def story(loops: str) -> World:
     """Take off, go somewhere with other gains, fly by a given attitude, and land."""
     world = World(loops=loops)
-    world.streams["attitude"] = lambda: mavlink.MAVLink_set_attitude_target_message(
+    world.gcs.streams["attitude"] = lambda: mavlink.MAVLink_set_attitude_target_message(
         0, 1, 1, 0b00000111, [0.9997, 0.0247, 0.0, 0.0], 0.0, 0.0, 0.0, 0.5
     )
-    world.exchange_with_ground()
-    assert world.arm() == 0
-    assert world.takeoff(3.0) == 0
-    world.until(lambda: world.altitude > 2.9)
+    world.arm()
+    world.takeoff(3.0)
+    world.run_until("altitude_m > 2.9")
     for name, value in (("POS_XY_P", 2.2), ("PID_ROLL_I", 0.01), ("MPC_TILTMAX_AIR", 20.0)):
-        assert world.stack.params.set(name, value) is None
-    world.run(1.0)
-    assert world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 6) == 0
-    world.run(0.5)
-    world.hold()
-    world.run(1.0)
+        assert world.engine.stack.params.set(name, value) is None
+    world.run_for(1.0)
+    world.set_mode("OFFBOARD")
+    world.run_for(0.5)
+    world.set_mode("HOLD")
+    world.run_for(1.0)
     world.land()
-    world.until_disarmed()
+    world.run_until("not armed")
     return world
 
 
@@ -239,12 +241,12 @@ def test_a_flight_on_a_target_behind_a_bad_line_is_the_flight_in_c(on_a_bad_line
     for loops in ("host", "c"):
         world = story(loops)
         log = tmp_path / f"{loops}.ulg"
-        log.write_bytes(world.log)
+        log.write_bytes(world.flight().log.content)
         logs.append(ULog(str(log)))
         if loops == "host":
             (line,) = on_a_bad_line
-            executor = world.stack.loops.executor
-            world.stack.loops.close()
+            executor = world.engine.stack.loops.executor
+            world.engine.stack.loops.close()
             assert line.is_closed
             assert executor.record.status["repeats"] > 10
     for there, here in zip(*(log.data_list for log in logs), strict=True):
@@ -258,8 +260,9 @@ def test_a_flight_on_a_target_behind_a_bad_line_is_the_flight_in_c(on_a_bad_line
 def test_a_mission_ends_with_a_sentence_when_the_line_is_cut(on_a_bad_line) -> None:
     world = World(loops="host")
     world.upload("hop.plan")
+    world.arm()
     world.start_mission()
-    world.until(lambda: world.altitude > 0.3)
+    world.run_until("altitude_m > 0.3")
     on_a_bad_line[0].is_cut = True
     with pytest.raises(TargetError, match=r"did not answer step \d+, sent 20 times"):
-        world.run(0.1)
+        world.run_for(0.1)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from flightstack.commander.failsafe import Failsafe, Phase
-from flightstack.core.enums import Mode
+from flightstack.testing import RefusedError, World
 from tests.support.failsafe_faults import (
     begin_setpoints,
     begin_sticks,
@@ -23,7 +24,6 @@ from tests.support.failsafe_faults import (
     tip_over,
 )
 from tests.support.failsafe_phases import ENTER, MODE_IN, QUICK
-from tests.support.world import World
 
 F, P = Failsafe, Phase
 
@@ -33,7 +33,7 @@ F, P = Failsafe, Phase
 class Case(NamedTuple):
     """How a failsafe is provoked: parameters, what is done before the phase and in it, and what is said."""
 
-    params: tuple[str, ...]
+    params: Mapping[str, float]
     before: Callable[[World], None]
     fault: Callable[[World], None]
     says: str
@@ -42,56 +42,56 @@ class Case(NamedTuple):
 
 CASES: dict[Failsafe, Case] = {
     F.GCS_LOST: Case(
-        ("NAV_DLL_ACT=2", "COM_DL_LOSS_T=5"),
+        {"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 5},
         stop_heartbeats,
         nothing,
         "Ground station lost",
         "ground station",
     ),
     F.OFFBOARD_LOST: Case(
-        ("COM_OBL_RC_ACT=4", "COM_OF_LOSS_T=0.3"),
+        {"COM_OBL_RC_ACT": 4, "COM_OF_LOSS_T": 0.3},
         begin_setpoints,
         stop_stream("setpoint"),
         "Offboard setpoints lost",
         "no offboard setpoints",
     ),
     F.MANUAL_LOST: Case(
-        ("NAV_RCL_ACT=3",), begin_sticks, stop_stream("sticks"), "Manual control lost", "no manual control"
+        {"NAV_RCL_ACT": 3}, begin_sticks, stop_stream("sticks"), "Manual control lost", "no manual control"
     ),
-    F.BATTERY_LOW: Case((), nothing, inject("battery:level=0.13"), "Battery level is low", "battery is low"),
+    F.BATTERY_LOW: Case({}, nothing, inject("battery:level=0.13"), "Battery level is low", "battery is low"),
     F.BATTERY_CRITICAL: Case(
-        ("COM_LOW_BAT_ACT=3",),
+        {"COM_LOW_BAT_ACT": 3},
         nothing,
         inject("battery:level=0.068"),
         "Battery level is critical",
         "battery is low",
     ),
     F.BATTERY_EMERGENCY: Case(
-        ("COM_LOW_BAT_ACT=3",),
+        {"COM_LOW_BAT_ACT": 3},
         nothing,
         inject("battery:level=0.04"),
         "Battery level is dangerously low",
         "battery is low",
     ),
-    F.FENCE: Case(("GF_ACTION=3",), nothing, breach_fence, "Geofence breached", "outside the geofence"),
+    F.FENCE: Case({"GF_ACTION": 3}, nothing, breach_fence, "Geofence breached", "outside the geofence"),
     F.POSITION_ERROR: Case(
-        ("FS_POS_ERR_T=0.1",), nothing, blow_away, "Position is far from its setpoint", ""
+        {"FS_POS_ERR_T": 0.1}, nothing, blow_away, "Position is far from its setpoint", ""
     ),
     F.ATTITUDE: Case(
-        ("FD_FAIL_R_TTRI=0.02",), nothing, tip_over, "Attitude is beyond its limits", "tilted by more than"
+        {"FD_FAIL_R_TTRI": 0.02}, nothing, tip_over, "Attitude is beyond its limits", "tilted by more than"
     ),
     F.ROTOR: Case(
-        ("COM_ACT_FAIL_ACT=4",), nothing, inject("rotor:1:off"), "A rotor does not follow its command", ""
+        {"COM_ACT_FAIL_ACT": 4}, nothing, inject("rotor:1:off"), "A rotor does not follow its command", ""
     ),
     F.STATE_STALE: Case(
-        ("FS_STALE_T=0.05", "FS_BLIND_T=0.3"),
+        {"FS_STALE_T": 0.05, "FS_BLIND_T": 0.3},
         nothing,
         lose_states,
         "State is frozen or missing",
         "the state is frozen or missing",
     ),
     F.NOT_FINITE: Case(
-        ("FS_BLIND_T=0.3",),
+        {"FS_BLIND_T": 0.3},
         nothing,
         inject("state:nan"),
         "State or controller output",
@@ -104,61 +104,62 @@ CASES: dict[Failsafe, Case] = {
 
 def refused(world: World, case: Case, phase: Phase) -> None:
     """Arming is refused, with the reason."""
-    world.run(0.6)
-    assert world.arm() == 1
-    world.run(0.02)
-    assert any(case.refusal in text for text in world.texts), world.texts
-    assert not world.armed
+    world.run_for(0.6)
+    with pytest.raises(RefusedError, match=case.refusal):
+        world.arm()
+    assert not world.state.armed
 
 
 def arms(world: World, case: Case, phase: Phase) -> None:
     """There is nothing to see on the ground: the vehicle arms."""
-    assert world.arm() == 0, world.texts
+    world.arm()
 
 
 def disarms(world: World, case: Case, phase: Phase) -> None:
     """The vehicle never leaves the ground and disarms."""
-    world.until_disarmed(3.0)
-    assert world.altitude < 0.05
+    world.run_until("not armed", 3.0)
+    assert world.state.altitude_m < 0.05
     assert said(world, case)
 
 
 def returns(world: World, case: Case, phase: Phase) -> None:
     """Home, on the ground, disarmed."""
-    world.until(lambda: world.mode is Mode.RETURN, 5.0)
+    world.run_until("mode == 'RETURN'", 5.0)
     assert said(world, case)
-    world.until_disarmed(40.0)
-    assert world.altitude < 0.05
-    assert np.linalg.norm(world.position[:2]) < 0.6
+    world.run_until("not armed", 40.0)
+    assert world.state.altitude_m < 0.05
+    assert np.linalg.norm(world.state.position_ned_m[:2]) < 0.6
 
 
 def lands(world: World, case: Case, phase: Phase) -> None:
     """On the ground near where it was, disarmed."""
-    world.until(lambda: world.mode is Mode.LAND, 5.0)
+    world.run_until("mode == 'LAND'", 5.0)
     assert said(world, case)
-    here = world.position
-    world.until_disarmed(25.0)
-    assert world.altitude < 0.05
-    assert np.linalg.norm(world.position[:2] - here[:2]) < 3.0
+    here = world.state.position_ned_m
+    world.run_until("not armed", 25.0)
+    assert world.state.altitude_m < 0.05
+    assert math.dist(world.state.position_ned_m[:2], here[:2]) < 3.0
 
 
 def ends(world: World, case: Case, phase: Phase) -> None:
     """Rotors off for good."""
-    world.until(lambda: world.mode is Mode.TERMINATION, 3.0)
+    world.run_until("mode == 'TERMINATION'", 3.0)
     assert said(world, case)
-    assert not world.armed
-    assert float(np.abs(world.stack.now.row[31:39]).max()) == 0.0
-    assert world.arm() == 1
-    assert world.hold() == 1
+    assert not world.state.armed
+    assert float(np.abs(world.engine.stack.now.row[31:39]).max()) == 0.0
+    with pytest.raises(RefusedError):
+        world.arm()
+    with pytest.raises(RefusedError):
+        world.set_mode("HOLD")
 
 
 def goes_on(world: World, case: Case, phase: Phase) -> None:
     """A warning at most: the phase is not disturbed."""
-    before = world.mode
-    world.run(1.0)
-    assert world.armed
-    assert world.mode is before
-    assert phase is P.STANDING or world.mode is MODE_IN[phase]
+    before = world.state.mode
+    world.run_for(1.0)
+    assert world.state.armed
+    assert world.state.mode == before
+    assert phase is P.STANDING or world.state.mode == MODE_IN[phase].name
 
 
 def warns(world: World, case: Case, phase: Phase) -> None:
@@ -169,7 +170,7 @@ def warns(world: World, case: Case, phase: Phase) -> None:
 
 def said(world: World, case: Case) -> bool:
     """Tell whether the failsafe was announced, once."""
-    world.run(0.02)
+    world.run_for(0.02)
     return sum(case.says in text and "again" not in text for text in world.texts) == 1
 
 
@@ -214,7 +215,7 @@ def test_the_table_has_every_failsafe_in_every_phase() -> None:
 @pytest.mark.parametrize("failsafe", list(TABLE), ids=lambda failsafe: failsafe.name.lower())
 def test_each_failsafe_in_each_phase(failsafe: Failsafe, phase: Phase) -> None:
     case = CASES[failsafe]
-    world = World(vehicle="x_quad", params=[*QUICK, *case.params])
+    world = World(vehicle="x_quad", params={**QUICK, **case.params})
     ENTER[phase](world, lambda: case.before(world))
     case.fault(world)
     TABLE[failsafe][PHASES.index(phase)](world, case, phase)

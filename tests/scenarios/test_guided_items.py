@@ -7,12 +7,11 @@ import math
 import pytest
 
 from flightstack.core.contract import Vector3
-from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.params.config import DEFAULT_HOME
-from tests.support.world import World
+from flightstack.testing import World
 
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, DENIED = 0, 1, 2, 3, 14
 ABSOLUTE, RELATIVE, RELATIVE_INT, TERRAIN = 0, 3, 6, 10
@@ -24,8 +23,8 @@ def hovering() -> World:
     world = World()
     world.arm()
     world.takeoff(5.0)
-    world.until(lambda: world.mode is Mode.HOLD)
-    world.run(4.0)
+    world.run_until("mode == 'HOLD'")
+    world.run_for(4.0)
     return world
 
 
@@ -53,36 +52,36 @@ def item(
 
 def answer(world: World, message: Message) -> int:
     """Send an item; return the result of its MISSION_ACK."""
-    world.received.pop("MISSION_ACK", None)
-    world.send(message)
-    world.exchange_with_ground()
-    return int(world.received["MISSION_ACK"].type)
+    world.gcs.received.pop("MISSION_ACK", None)
+    world.gcs.send(message)
+    world.run_for(0.01)
+    return int(world.gcs.received["MISSION_ACK"].type)
 
 
 @pytest.mark.parametrize(("is_int", "frame"), [(False, RELATIVE), (True, RELATIVE_INT), (True, RELATIVE)])
 def test_the_vehicle_goes_to_the_place_of_an_item(hovering: World, is_int: bool, frame: int) -> None:
     world = hovering
     assert answer(world, item(12.0, -7.0, 8.0, is_int=is_int, frame=frame)) == ACCEPTED
-    assert world.mode is Mode.HOLD
-    world.run(14.0)
+    assert world.state.mode == "HOLD"
+    world.run_for(14.0)
     # a float of MISSION_ITEM holds a latitude to 2e-6 degrees (0.2 m) only
-    assert world.position[:2] == pytest.approx((12.0, -7.0), abs=0.1 if is_int else 0.4)
-    assert world.altitude == pytest.approx(8.0, abs=0.1)
+    assert world.state.position_ned_m[:2] == pytest.approx((12.0, -7.0), abs=0.1 if is_int else 0.4)
+    assert world.state.altitude_m == pytest.approx(8.0, abs=0.1)
 
 
 def test_an_altitude_above_the_sea(hovering: World) -> None:
     world = hovering
     assert answer(world, item(3.0, 0.0, DEFAULT_HOME.altitude_m + 7.0, frame=ABSOLUTE)) == ACCEPTED
-    world.run(10.0)
-    assert world.altitude == pytest.approx(7.0, abs=0.1)
+    world.run_for(10.0)
+    assert world.state.altitude_m == pytest.approx(7.0, abs=0.1)
 
 
 def test_current_3_changes_the_altitude_alone(hovering: World) -> None:
     world = hovering
     assert answer(world, item(30.0, 30.0, 9.0, current=3)) == ACCEPTED
-    world.run(10.0)
-    assert world.position[:2] == pytest.approx((0.0, 0.0), abs=0.1)
-    assert world.altitude == pytest.approx(9.0, abs=0.1)
+    world.run_for(10.0)
+    assert world.state.position_ned_m[:2] == pytest.approx((0.0, 0.0), abs=0.1)
+    assert world.state.altitude_m == pytest.approx(9.0, abs=0.1)
 
 
 def test_the_mission_stays_as_it_was(hovering: World) -> None:
@@ -95,11 +94,11 @@ def test_the_mission_stays_as_it_was(hovering: World) -> None:
 def test_an_upload_goes_on_when_an_item_to_fly_comes_between(hovering: World) -> None:
     """Nothing of it gets into the plan: the server still waits for item 0."""
     world = hovering
-    world.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0))
+    world.gcs.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0))
     assert answer(world, item(3.0, 0.0, 5.0)) == ACCEPTED
-    assert not world.stack.parts.mission.items
+    assert not world.engine.stack.parts.mission.items
     assert answer(world, item(4.0, 0.0, 5.0, current=0)) == ACCEPTED
-    assert len(world.stack.parts.mission.items) == 1
+    assert len(world.engine.stack.parts.mission.items) == 1
 
 
 @pytest.mark.parametrize(
@@ -122,22 +121,22 @@ def test_an_upload_goes_on_when_an_item_to_fly_comes_between(hovering: World) ->
 def test_an_item_that_cannot_be_flown_is_refused(hovering: World, message: Message, result: int) -> None:
     world = hovering
     assert answer(world, message) == result
-    world.run(3.0)
-    assert world.position[:2] == pytest.approx((0.0, 0.0), abs=0.1)
+    world.run_for(3.0)
+    assert world.state.position_ned_m[:2] == pytest.approx((0.0, 0.0), abs=0.1)
 
 
 def test_the_fence_holds_for_items_too(hovering: World) -> None:
     world = hovering
-    world.stack.params.set("GF_MAX_HOR_DIST", 30.0)
+    world.engine.stack.params.set("GF_MAX_HOR_DIST", 30.0)
     assert answer(world, item(50.0, 0.0, 5.0)) == DENIED
-    world.run(0.02)
+    world.run_for(0.02)
     assert "Goto refused: the place is more than 30 m from home (GF_MAX_HOR_DIST)" in world.texts, world.texts
 
 
 def test_a_standing_vehicle_goes_nowhere() -> None:
     world = World()
     assert answer(world, item(5.0, 0.0, 5.0)) == ERROR
-    world.run(0.02)
+    world.run_for(0.02)
     assert "Goto refused: the vehicle is on the ground" in world.texts, world.texts
 
 
@@ -145,8 +144,8 @@ def test_items_for_another_vehicle_are_none_of_ours(hovering: World) -> None:
     world = hovering
     message = item(5.0, 0.0, 5.0)
     message.target_system = 9
-    world.received.pop("MISSION_ACK", None)
-    world.send(message)
-    world.run(2.0)
-    assert "MISSION_ACK" not in world.received
-    assert world.position[:2] == pytest.approx((0.0, 0.0), abs=0.1)
+    world.gcs.received.pop("MISSION_ACK", None)
+    world.gcs.send(message)
+    world.run_for(2.0)
+    assert "MISSION_ACK" not in world.gcs.received
+    assert world.state.position_ned_m[:2] == pytest.approx((0.0, 0.0), abs=0.1)

@@ -6,10 +6,9 @@ import pytest
 
 from flightstack.commander.transitions import Event
 from flightstack.core.contract import Vector3
-from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
-from tests.support.world import World
+from flightstack.testing import World
 
 SYS_STATUS, GPS_RAW_INT, ESTIMATOR_STATUS, FENCE_STATUS, BATTERY_STATUS = (
     mavlink.MAVLINK_MSG_ID_SYS_STATUS,
@@ -19,20 +18,20 @@ SYS_STATUS, GPS_RAW_INT, ESTIMATOR_STATUS, FENCE_STATUS, BATTERY_STATUS = (
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS,
 )
 SENSORS = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_AHRS
-LASTING = ["FS_STALE_T=0.1", "FS_BLIND_T=5"]
+LASTING = {"FS_STALE_T": 0.1, "FS_BLIND_T": 5}
 
 
 def asked(world: World, message_id: int) -> Message:
     """The message as it is now."""
-    assert world.command(mavlink.MAV_CMD_REQUEST_MESSAGE, message_id) == 0
-    return world.received[mavlink.mavlink_map[message_id].msgname]
+    world.command(mavlink.MAV_CMD_REQUEST_MESSAGE, message_id)
+    return world.gcs.received[mavlink.mavlink_map[message_id].msgname]
 
 
-def flying(*params: str, height_m: float = 3.0) -> World:
+def flying(**params: float) -> World:
     world = World(vehicle="x_quad", params=params)
-    assert world.arm() == 0
-    assert world.takeoff(height_m) == 0
-    world.until(lambda: world.mode is Mode.HOLD, 20.0)
+    world.arm()
+    world.takeoff(3.0)
+    world.run_until("mode == 'HOLD'", 20.0)
     return world
 
 
@@ -46,46 +45,45 @@ def seems_healthy(world: World) -> bool:
 
 @pytest.mark.parametrize("fault", ["state:freeze", "state:nan"])
 def test_a_state_that_is_not_to_be_flown_by_is_ill_as_long_as_it_lasts(fault: str) -> None:
-    world = flying(*LASTING)
+    world = flying(**LASTING)
     assert seems_healthy(world)
-    now_s = world.simulator.time_us * 1e-6
-    world.inject(f"{fault}@{now_s:.3f}-{now_s + 0.4:.3f}")
-    world.run(0.3)
+    world.fault(fault, for_s=0.4)
+    world.run_for(0.3)
     assert not seems_healthy(world)
-    world.run(0.3)
+    world.run_for(0.3)
     assert seems_healthy(world)
 
 
 def test_a_simulator_that_is_silent_is_ill_on_the_ground_too() -> None:
     world = World(vehicle="x_quad", params=LASTING)
-    world.run(0.1)
+    world.run_for(0.1)
     assert seems_healthy(world)
-    world.loses_states = True
-    world.run(0.3)
+    world.engine.loses_states = True
+    world.run_for(0.3)
     assert not seems_healthy(world)
 
 
 def test_each_breach_of_the_fence_is_told_with_its_kind_and_time() -> None:
-    world = flying("GF_ACTION=1", "GF_PREDICT=0", "GF_MAX_VER_DIST=3.5")
+    world = flying(GF_ACTION=1, GF_PREDICT=0, GF_MAX_VER_DIST=3.5)
     before = asked(world, FENCE_STATUS)
     assert (before.breach_status, before.breach_count, before.breach_type) == (0, 0, 0)
-    assert world.stack.params.set("GF_MAX_VER_DIST", 2.0) is None
+    assert world.engine.stack.params.set("GF_MAX_VER_DIST", 2.0) is None
     began_ms = world.time_s * 1e3
-    world.run(0.1)
+    world.run_for(0.1)
     high = asked(world, FENCE_STATUS)
     assert (high.breach_status, high.breach_count, high.breach_type) == (1, 1, mavlink.FENCE_BREACH_MAXALT)
     assert began_ms <= high.breach_time <= began_ms + 20.0
-    assert world.stack.params.set("GF_MAX_VER_DIST", 0.0) is None
-    world.run(0.5)
+    assert world.engine.stack.params.set("GF_MAX_VER_DIST", 0.0) is None
+    world.run_for(0.5)
     over = asked(world, FENCE_STATUS)
     assert (over.breach_status, over.breach_count, over.breach_time) == (0, 1, high.breach_time)
-    assert world.stack.params.set("GF_MAX_HOR_DIST", 1.0) is None
+    assert world.engine.stack.params.set("GF_MAX_HOR_DIST", 1.0) is None
     velocity = mavlink.MAVLink_set_position_target_local_ned_message
-    world.streams["setpoint"] = lambda: velocity(0, 1, 1, 1, 0xDC7, 0, 0, 0, 2.0, 0, 0, 0, 0, 0, 0, 0)
-    world.run(0.2)
-    assert world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 6) == 0
-    world.until(lambda: asked(world, FENCE_STATUS).breach_status == 1, 5.0)
-    assert world.position[0] > 1.0
+    world.gcs.streams["setpoint"] = lambda: velocity(0, 1, 1, 1, 0xDC7, 0, 0, 0, 2.0, 0, 0, 0, 0, 0, 0, 0)
+    world.run_for(0.2)
+    world.set_mode("OFFBOARD")
+    world.run_until(lambda _: asked(world, FENCE_STATUS).breach_status == 1, 5.0)
+    assert world.state.north_m > 1.0
     far = asked(world, FENCE_STATUS)
     assert (far.breach_count, far.breach_type) == (2, mavlink.FENCE_BREACH_BOUNDARY)
 
@@ -94,29 +92,29 @@ def test_the_battery_has_the_state_that_the_failsafes_go_by() -> None:
     world = World(vehicle="x_quad")
     told = []
     for level in (0.5, 0.13, 0.06, 0.04):
-        world.inject(f"battery:level={level}")
-        world.run(0.3)
+        world.fault(f"battery:level={level}")
+        world.run_for(0.3)
         told.append(asked(world, BATTERY_STATUS).charge_state)
     assert told == [1, 2, 3, 4]
 
 
 def test_fence_status_counts_a_breach_before_arming() -> None:
-    world = World(vehicle="x_quad", params=["GF_ACTION=0", "GF_MAX_HOR_DIST=50"])
-    world.run(0.1)
-    far = world.stack.places.frame.to_geo(Vector3(200.0, 0.0, 0.0))
-    assert world.stack.area.set_home(far) is None
-    assert world.arm() == 0  # its checks evaluate the fence too
-    world.run(0.1)
+    world = World(vehicle="x_quad", params={"GF_ACTION": 0, "GF_MAX_HOR_DIST": 50})
+    world.run_for(0.1)
+    far = world.engine.stack.places.frame.to_geo(Vector3(200.0, 0.0, 0.0))
+    assert world.engine.stack.area.set_home(far) is None
+    world.arm()  # its checks evaluate the fence too
+    world.run_for(0.1)
     status = asked(world, FENCE_STATUS)
     assert (status.breach_status, status.breach_count) == (1, 1)
     assert status.breach_type == mavlink.FENCE_BREACH_BOUNDARY
 
 
 def test_fence_status_counts_a_breach_beside_a_mode_request() -> None:
-    world = flying("GF_ACTION=1", "GF_PREDICT=0")
-    world.stack.params.set("GF_MAX_VER_DIST", 2.0)
-    assert world.stack.parts.requests.request(Event.SELECT_HOLD) is None
-    world.run(0.1)
+    world = flying(GF_ACTION=1, GF_PREDICT=0)
+    world.engine.stack.params.set("GF_MAX_VER_DIST", 2.0)
+    assert world.engine.stack.parts.requests.request(Event.SELECT_HOLD) is None
+    world.run_for(0.1)
     status = asked(world, FENCE_STATUS)
     assert (status.breach_status, status.breach_count) == (1, 1)
     assert status.breach_type == mavlink.FENCE_BREACH_MAXALT

@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import Vector3
-from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import MissionItem
-from gcs_cli.clients.mission_client import Failed
+from flightstack.testing import RefusedError, World
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.summary import item_ned_m
-from tests.support.fences import polygon
-from tests.support.world import World, item
+from tests.support.plan_items import item, polygon
 
 ACCEPTED = 0
 FRAME = LocalFrame(DEFAULT_HOME)
@@ -28,76 +26,77 @@ def square(half_m: float) -> list[MissionItem]:
     return polygon([(half_m, half_m), (half_m, -half_m), (-half_m, -half_m), (-half_m, half_m)])
 
 
-def landed_away(*params: str) -> World:
+def landed_away(**params: float) -> World:
     """A vehicle that flew 20 m north, landed there and disarmed itself."""
     world = World(params=params)
     world.upload([item(22, z=3.0), item(16, north=20.0, z=3.0), item(21, north=20.0)])
+    world.arm()
     world.start_mission()
-    world.until_disarmed()
-    assert abs(world.position[0] - 20.0) < 0.1
+    world.run_until("not armed")
+    assert abs(world.state.north_m - 20.0) < 0.1
     return world
 
 
 def fly_and_return(world: World) -> None:
     """Arm where it stands, go 15 m east and return."""
-    assert world.arm() == ACCEPTED
+    world.arm()
     world.takeoff(3.0)
-    world.until(lambda: world.mode is Mode.HOLD)
-    north_m, east_m = world.position[:2]
-    world.stack.parts.requests.go_to(north_m, east_m + 15.0, math.nan, math.nan, math.nan)
-    world.run(10.0)
-    assert world.return_home() == ACCEPTED
-    world.until_disarmed()
+    world.run_until("mode == 'HOLD'")
+    north_m, east_m = world.state.position_ned_m[:2]
+    world.engine.stack.parts.requests.go_to(north_m, east_m + 15.0, math.nan, math.nan, math.nan)
+    world.run_for(10.0)
+    world.rtl()
+    world.run_until("not armed")
 
 
 def told_home(world: World) -> Vector3:
     """Where the vehicle last said that home is."""
-    said = world.received["HOME_POSITION"]
+    said = world.gcs.received["HOME_POSITION"]
     return FRAME.to_ned(GeoPoint(said.latitude / 1e7, said.longitude / 1e7, said.altitude / 1e3))
 
 
 def test_home_moves_to_where_the_vehicle_arms_and_a_return_ends_there() -> None:
     world = landed_away()
-    assert world.stack.area.home == DEFAULT_HOME  # not by landing: by arming
-    north_m = world.position[0]
+    assert world.engine.stack.area.home == DEFAULT_HOME  # not by landing: by arming
+    north_m = world.state.north_m
     fly_and_return(world)
-    assert abs(world.position[0] - north_m) < 0.1
-    assert abs(world.position[1]) < 0.1
+    assert abs(world.state.north_m - north_m) < 0.1
+    assert abs(world.state.east_m) < 0.1
     assert told_home(world).x == pytest.approx(north_m, abs=0.02)
 
 
 def test_everybody_is_told_at_once() -> None:
     world = landed_away()
-    world.run(0.02)
-    before = world.counts["HOME_POSITION"]
+    world.run_for(0.02)
+    before = world.gcs.counts["HOME_POSITION"]
     world.arm()
-    assert world.counts["HOME_POSITION"] == before + 1  # the stream sends one every two seconds
-    assert told_home(world).x == pytest.approx(world.position[0], abs=0.02)
+    assert world.gcs.counts["HOME_POSITION"] == before + 1  # the stream sends one every two seconds
+    assert told_home(world).x == pytest.approx(world.state.north_m, abs=0.02)
 
 
 def test_the_first_flight_leaves_home_exactly_where_it_was_configured() -> None:
     world = World()
     world.arm()
-    assert world.stack.area.home == DEFAULT_HOME
+    assert world.engine.stack.area.home == DEFAULT_HOME
 
 
 def test_com_home_en_off_keeps_home() -> None:
-    world = landed_away("COM_HOME_EN=0")
+    world = landed_away(COM_HOME_EN=0)
     fly_and_return(world)
-    assert np.linalg.norm(world.position[:2]) < 0.1
+    assert np.linalg.norm(world.state.position_ned_m[:2]) < 0.1
 
 
 def test_a_home_that_was_chosen_stays_and_the_present_place_does_not() -> None:
     world = landed_away()
     here = FRAME.to_geo(Vector3(5.0, 0.0, 0.0))
     numbers = (0, 0, 0, math.nan, here.latitude_deg, here.longitude_deg, here.altitude_m)
-    assert world.command(mavlink.MAV_CMD_DO_SET_HOME, *numbers) == ACCEPTED
+    world.command(mavlink.MAV_CMD_DO_SET_HOME, *numbers)
     fly_and_return(world)
-    home = world.stack.places.home
+    home = world.engine.stack.places.home
     assert (home.north_m, home.east_m) == pytest.approx((5.0, 0.0), abs=0.5)  # degrees in a float32
-    assert world.position[:2] == pytest.approx([home.north_m, home.east_m], abs=0.1)
-    assert world.command(mavlink.MAV_CMD_DO_SET_HOME, 1) == ACCEPTED
-    assert not world.stack.places.home_is_chosen
+    assert world.state.position_ned_m[:2] == pytest.approx([home.north_m, home.east_m], abs=0.1)
+    world.command(mavlink.MAV_CMD_DO_SET_HOME, 1)
+    assert not world.engine.stack.places.home_is_chosen
 
 
 def test_a_takeoff_selected_before_home_rose_ends_above_the_new_one() -> None:
@@ -111,38 +110,36 @@ def test_a_takeoff_to_an_altitude_above_the_sea_ends_there_though_home_rose() ->
 def altitude_of_takeoff(altitude_m: float) -> float:
     """Select a takeoff while home is a metre below the vehicle, arm, and return where it ends."""
     world = World()
-    world.stack.area.set_home(FRAME.to_geo(Vector3(0.0, 0.0, 1.0)), chosen=False)
-    world.takeoff(altitude_m)
+    world.engine.stack.area.set_home(FRAME.to_geo(Vector3(0.0, 0.0, 1.0)), chosen=False)
+    world.command(mavlink.MAV_CMD_NAV_TAKEOFF, *[math.nan] * 6, DEFAULT_HOME.altitude_m + altitude_m)
     world.arm()
-    world.until(lambda: world.mode is Mode.HOLD)
-    world.run(3.0)
-    return world.altitude
+    world.run_until("mode == 'HOLD'")
+    world.run_for(3.0)
+    return world.state.altitude_m
 
 
 def test_a_geofence_is_judged_where_it_lies_after_home_has_moved() -> None:
     world = landed_away()
     world.arm()
     world.disarm()
-    assert world.stack.places.home.north_m == pytest.approx(20.0, abs=0.1)
-    area = world.stack.area
+    assert world.engine.stack.places.home.north_m == pytest.approx(20.0, abs=0.1)
+    area = world.engine.stack.area
     around_old_home = square(10.0)
     rejection = area.check_fence(around_old_home)
     assert rejection is not None
     assert "leaves out the home position" in rejection.reason
     area.set_fence(polygon([(5, 9), (5, -9), (15, -9), (15, 9)], inclusion=False))
-    beyond = world.upload([item(16, north=-5.0, z=3.0)])  # from here, not from where home was
-    assert isinstance(beyond, Failed)
-    world.run(0.02)
-    assert any("the way from home to it leaves the geofence" in text for text in world.texts), world.texts
-    assert not isinstance(world.upload([item(16, north=25.0, z=3.0)]), Failed)
+    with pytest.raises(RefusedError, match="the way from home to it leaves the geofence"):
+        world.upload([item(16, north=-5.0, z=3.0)])  # from here, not from where home was
+    world.upload([item(16, north=25.0, z=3.0)])
 
 
 def test_the_log_knows_home_and_origin(tmp_path) -> None:  # type: ignore[no-untyped-def]
     world = landed_away()
-    north_m = float(world.position[0])
+    north_m = float(world.state.north_m)
     fly_and_return(world)
     path = tmp_path / "flight.ulg"
-    path.write_bytes(world.log)
+    path.write_bytes(world.flight().log.content)
     flight = read_flight(path)
     assert flight.origin == DEFAULT_HOME
     assert flight.home_ne_m() == pytest.approx((north_m, 0.0), abs=0.01)

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from flightstack.core.contract import Vector3
-from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.params.config import DEFAULT_HOME
 from flightstack.plan import MissionItem, MissionType
-from gcs_cli.clients.mission_client import Done
-from tests.support.fences import polygon, rally_point, square
-from tests.support.streams import select, sticks
-from tests.support.world import World, item
+from flightstack.testing import World
+from tests.support.plan_items import item, polygon, rally_point, square
+from tests.support.refusals import refused
+from tests.support.streams import sticks
 
 ACCEPTED, DENIED, UNSUPPORTED_FRAME = 0, 2, 9
 FRAME = LocalFrame(DEFAULT_HOME)
@@ -26,42 +25,35 @@ POSITION = 3
 
 def upload(world: World, kind: MissionType, items: list[MissionItem]) -> None:
     """Upload a plan of any type."""
-    assert isinstance(world.upload(items, kind), Done)
+    world.upload(items, kind)
 
 
-def hover(altitude_m: float = 5.0, params: tuple[str, ...] = ()) -> World:
+def hover(altitude_m: float = 5.0, **params: float) -> World:
     """A vehicle that hovers above home."""
     world = World(params=params)
     world.arm()
     world.takeoff(altitude_m)
-    world.until(lambda: world.mode is Mode.HOLD)
-    world.run(4.0)
+    world.run_until("mode == 'HOLD'")
+    world.run_for(4.0)
     return world
 
 
-def set_home(
-    world: World, north_m: float, east_m: float = 0.0, up_m: float = 0.0, frame: int = 0
-) -> int | None:
-    """DO_SET_HOME as a COMMAND_INT: a place seen from where the vehicle started."""
+def set_home(world: World, north_m: float, east_m: float = 0.0, up_m: float = 0.0, frame: int = 0) -> None:
+    """Send DO_SET_HOME as a COMMAND_INT: a place seen from where the vehicle started."""
     place = FRAME.to_geo(Vector3(north_m, east_m, -up_m))
     x, y = round(place.latitude_deg * 1e7), round(place.longitude_deg * 1e7)
-    zeros = (0.0, 0.0, 0.0, 0.0)
-    world.send(
-        mavlink.MAVLink_command_int_message(1, 1, frame, SET_HOME, 0, 0, *zeros, x, y, place.altitude_m)
-    )
-    world.run(0.02)
-    return int(world.received["COMMAND_ACK"].result)
+    world.command_int(SET_HOME, (0.0, 0.0, 0.0, 0.0), x, y, place.altitude_m, frame=frame)
 
 
 def go_north(world: World, north_m: float, seconds: float) -> None:
     """Fly to a place to the north of the origin."""
-    assert world.stack.parts.requests.go_to(north_m, 0.0, math.nan, math.nan, math.nan) is None
-    world.run(seconds)
+    assert world.engine.stack.parts.requests.go_to(north_m, 0.0, math.nan, math.nan, math.nan) is None
+    world.run_for(seconds)
 
 
 def margin(world: World) -> float:
     """Distance to the nearest limit of the fence, as the vehicle sees it."""
-    return world.stack.area.fence.margin_m
+    return world.engine.stack.area.fence.margin_m
 
 
 # ---------------------------------------------------------------------- home and the geofence
@@ -70,54 +62,55 @@ def margin(world: World) -> float:
 def test_home_is_not_moved_out_of_the_geofence() -> None:
     world = hover()
     upload(world, MissionType.FENCE, polygon(square(20.0)))
-    assert set_home(world, 40.0) == DENIED
-    assert any("outside the geofence" in text for text in world.texts), world.texts
-    assert world.stack.area.home == DEFAULT_HOME
-    world.return_home()
-    world.until_disarmed()
-    assert np.linalg.norm(world.position[:2]) < 0.1
+    with refused(DENIED, "outside the geofence"):
+        set_home(world, 40.0)
+    assert world.engine.stack.area.home == DEFAULT_HOME
+    world.rtl()
+    world.run_until("not armed")
+    assert np.linalg.norm(world.state.position_ned_m[:2]) < 0.1
 
 
 def test_a_return_lands_where_it_is_if_no_place_to_return_to_is_inside_the_geofence() -> None:
     """The vehicle armed outside while the fence was switched off: home came along."""
-    world = World(params=["GF_ACTION=0"])
+    world = World(params={"GF_ACTION": 0})
     upload(world, MissionType.FENCE, polygon(square(20.0)))
     world.arm()
     world.takeoff(5.0)
-    world.until(lambda: world.mode is Mode.HOLD)
+    world.run_until("mode == 'HOLD'")
     go_north(world, 40.0, 18.0)
     world.land()
-    world.until_disarmed()
+    world.run_until("not armed")
     world.arm()
-    assert world.stack.places.home.north_m == pytest.approx(40.0, abs=0.1)
+    assert world.engine.stack.places.home.north_m == pytest.approx(40.0, abs=0.1)
     world.takeoff(5.0)
-    world.until(lambda: world.mode is Mode.HOLD)
+    world.run_until("mode == 'HOLD'")
     go_north(world, 5.0, 18.0)
-    assert world.stack.params.set("GF_ACTION", 3.0) is None
-    world.run(0.1)
-    assert world.return_home() == ACCEPTED
-    assert world.mode is Mode.LAND
-    world.run(0.02)
+    assert world.engine.stack.params.set("GF_ACTION", 3.0) is None
+    world.run_for(0.1)
+    world.rtl()
+    assert world.state.mode == "LAND"
+    world.run_for(0.02)
     assert sum("No place to return to" in text for text in world.texts) == 1
-    world.until_disarmed()
-    assert np.linalg.norm(world.position[:2] - (5.0, 0.0)) < 0.1
+    world.run_until("not armed")
+    assert math.dist(world.state.position_ned_m[:2], (5.0, 0.0)) < 0.1
 
 
 def test_a_return_to_an_outside_home_takes_a_rally_point_inside() -> None:
     world = hover()
     upload(world, MissionType.RALLY, [rally_point((0.0, 8.0))])
-    assert set_home(world, 40.0) == ACCEPTED  # and then a fence without it, from a reboot with other plans
-    world.stack.area.set_fence(polygon(square(20.0)))
-    world.return_home()
-    assert world.mode is Mode.RETURN
-    world.until_disarmed()
-    assert np.linalg.norm(world.position[:2] - (0.0, 8.0)) < 0.1
+    set_home(world, 40.0)  # and then a fence without it, from a reboot with other plans
+    world.engine.stack.area.set_fence(polygon(square(20.0)))
+    world.rtl()
+    assert world.state.mode == "RETURN"
+    world.run_until("not armed")
+    assert math.dist(world.state.position_ned_m[:2], (0.0, 8.0)) < 0.1
 
 
 def test_home_is_not_moved_so_far_that_a_flying_vehicle_would_break_the_limit() -> None:
-    world = hover(params=("GF_MAX_HOR_DIST=20",))
-    assert set_home(world, 30.0) == DENIED
-    assert set_home(world, 15.0) == ACCEPTED
+    world = hover(GF_MAX_HOR_DIST=20)
+    with refused(DENIED):
+        set_home(world, 30.0)
+    set_home(world, 15.0)
 
 
 # ---------------------------------------------------------------------- home and the mission in flight
@@ -126,99 +119,104 @@ def test_home_is_not_moved_so_far_that_a_flying_vehicle_would_break_the_limit() 
 def test_home_does_not_sink_under_a_mission_in_flight() -> None:
     world = World()
     world.upload([item(22, z=8.0), item(16, north=60.0, z=8.0), item(21, north=60.0)])
+    world.arm()
     world.start_mission()
-    world.until(lambda: world.position[0] > 10.0)
-    assert set_home(world, 0.0, up_m=-7.5) == DENIED
-    assert any("pause it first" in text for text in world.texts), world.texts
-    world.run(3.0)
-    assert world.altitude == pytest.approx(8.0, abs=0.1)
-    assert set_home(world, 5.0) == ACCEPTED  # its height stays
+    world.run_until("north_m > 10.0")
+    with refused(DENIED, "pause it first"):
+        set_home(world, 0.0, up_m=-7.5)
+    world.run_for(3.0)
+    assert world.state.altitude_m == pytest.approx(8.0, abs=0.1)
+    set_home(world, 5.0)  # its height stays
 
 
 def test_home_is_not_moved_where_the_mission_in_flight_would_be_refused() -> None:
-    world = World(params=["GF_MAX_HOR_DIST=70"])
+    world = World(params={"GF_MAX_HOR_DIST": 70})
     world.upload([item(22, z=8.0), item(16, north=60.0, z=8.0), item(21, north=60.0)])
+    world.arm()
     world.start_mission()
-    world.until(lambda: world.position[0] > 10.0)
-    assert set_home(world, -30.0) == DENIED
-    assert any("is 90 m from home" in text for text in world.texts), world.texts
+    world.run_until("north_m > 10.0")
+    with refused(DENIED, "is 90 m from home"):
+        set_home(world, -30.0)
 
 
 @pytest.mark.parametrize("up_m", [1_500.0, -1_500.0])
 def test_home_is_not_a_kilometre_above_or_below_the_ground(up_m: float) -> None:
     world = World()
-    assert set_home(world, 0.0, up_m=up_m) == DENIED
-    assert any("above or below" in text for text in world.texts), world.texts
+    with refused(DENIED, "above or below"):
+        set_home(world, 0.0, up_m=up_m)
 
 
 @pytest.mark.parametrize("frame", [1, 2, 8, 10, 11])
 def test_home_in_terrain_or_local_frames_is_not_supported(frame: int) -> None:
     world = World()
-    assert set_home(world, 0.0, frame=frame) == UNSUPPORTED_FRAME
-    assert world.stack.area.home == DEFAULT_HOME
+    with refused(UNSUPPORTED_FRAME):
+        set_home(world, 0.0, frame=frame)
+    assert world.engine.stack.area.home == DEFAULT_HOME
 
 
 def test_lower_limits_hold_a_mission_that_breaks_them() -> None:
     world = World()
     world.upload([item(22, z=8.0), item(16, north=60.0, z=20.0), item(21, north=60.0)])
+    world.arm()
     world.start_mission()
-    world.until(lambda: world.position[0] > 5.0)
-    assert world.stack.params.set("GF_MAX_VER_DIST", 19.0) is None
-    world.run(0.02)
-    assert world.mode is Mode.HOLD
+    world.run_until("north_m > 5.0")
+    assert world.engine.stack.params.set("GF_MAX_VER_DIST", 19.0) is None
+    world.run_for(0.02)
+    assert world.state.mode == "HOLD"
     assert any(text.startswith("Mission held: item 1 (NAV_WAYPOINT)") for text in world.texts), world.texts
-    world.resume_mission()
-    assert world.mode is Mode.HOLD
-    world.stack.params.set("GF_MAX_VER_DIST", 25.0)
-    assert world.resume_mission() == ACCEPTED
+    with refused(reason="altitude 20 m above home is outside 0 to 19 m"):
+        world.set_mode("MISSION")
+    assert world.state.mode == "HOLD"
+    world.engine.stack.params.set("GF_MAX_VER_DIST", 25.0)
+    world.set_mode("MISSION")
 
 
 def test_a_mission_is_checked_whole_when_it_is_selected_from_another_home() -> None:
     world = hover()
     world.upload([item(16, north=60.0, z=8.0), item(21, north=60.0)])
-    assert world.stack.params.set("GF_MAX_HOR_DIST", 70.0) is None
-    assert set_home(world, -30.0) == ACCEPTED
-    world.resume_mission()
-    world.run(0.02)
-    assert world.mode is Mode.HOLD
-    assert any("is 90 m from home" in text for text in world.texts), world.texts
+    assert world.engine.stack.params.set("GF_MAX_HOR_DIST", 70.0) is None
+    set_home(world, -30.0)
+    with refused(reason="is 90 m from home"):
+        world.set_mode("MISSION")
+    assert world.state.mode == "HOLD"
 
 
 # ---------------------------------------------------------------------- altitudes
 
 
 def test_a_return_stays_below_the_highest_altitude_of_the_fence() -> None:
-    world = hover(params=("GF_MAX_VER_DIST=12", "RTL_RETURN_ALT=30", "GF_ACTION=3"))
+    world = hover(GF_MAX_VER_DIST=12, RTL_RETURN_ALT=30, GF_ACTION=3)
     go_north(world, 25.0, 12.0)
-    world.return_home()
+    world.rtl()
     highest_m = 0.0
-    while world.armed:
-        world.run(0.1)
-        highest_m = max(highest_m, world.altitude)
+    while world.state.armed:
+        world.run_for(0.1)
+        highest_m = max(highest_m, world.state.altitude_m)
         assert margin(world) > 0.0
         assert world.time_s < 120.0
     assert 10.5 < highest_m < 11.1  # a metre below the limit
-    assert np.linalg.norm(world.position[:2]) < 0.1
+    assert np.linalg.norm(world.state.position_ned_m[:2]) < 0.1
 
 
 def test_a_return_from_above_the_limit_comes_down_first() -> None:
     world = hover(20.0)
     go_north(world, 25.0, 12.0)
-    assert world.stack.params.set("GF_ACTION", 0.0) is None
-    world.stack.params.set("GF_MAX_VER_DIST", 12.0)
-    world.return_home()
-    world.until(lambda: world.position[0] < 22.0)
-    assert world.altitude < 11.5
+    assert world.engine.stack.params.set("GF_ACTION", 0.0) is None
+    world.engine.stack.params.set("GF_MAX_VER_DIST", 12.0)
+    world.rtl()
+    world.run_until("north_m < 22.0")
+    assert world.state.altitude_m < 11.5
 
 
 def test_a_mission_that_begins_with_a_waypoint_rises_no_higher_than_the_fence() -> None:
-    world = World(params=["GF_MAX_VER_DIST=6", "MIS_TAKEOFF_ALT=10", "GF_ACTION=3"])
+    world = World(params={"GF_MAX_VER_DIST": 6, "MIS_TAKEOFF_ALT": 10, "GF_ACTION": 3})
     world.upload([item(16, north=8.0, z=3.0), item(21, north=8.0)])
+    world.arm()
     world.start_mission()
     highest_m = 0.0
-    while world.armed:
-        world.run(0.1)
-        highest_m = max(highest_m, world.altitude)
+    while world.state.armed:
+        world.run_for(0.1)
+        highest_m = max(highest_m, world.state.altitude_m)
         assert world.time_s < 60.0, world.texts
     assert world.reached == [0, 1]
     assert highest_m < 5.2
@@ -227,11 +225,11 @@ def test_a_mission_that_begins_with_a_waypoint_rises_no_higher_than_the_fence() 
 def test_a_rally_points_altitude_counts_from_a_moved_home() -> None:
     world = hover(10.0)
     upload(world, MissionType.RALLY, [rally_point((30.0, 0.0), 2.0)])
-    assert set_home(world, 0.0, up_m=4.0) == ACCEPTED
-    (point,) = world.stack.places.points
+    set_home(world, 0.0, up_m=4.0)
+    (point,) = world.engine.stack.places.points
     assert point.altitude_m == pytest.approx(6.0, abs=1e-3)
     upload(world, MissionType.RALLY, [rally_point((30.0, 0.0), 3.0)])
-    (point,) = world.stack.places.points
+    (point,) = world.engine.stack.places.points
     assert point.altitude_m == pytest.approx(7.0, abs=1e-3)
 
 
@@ -240,9 +238,9 @@ def test_a_rally_points_altitude_counts_from_a_moved_home() -> None:
 
 def slow_from(world: World) -> float:
     """Descend; return the altitude at which the vehicle has become slow: the last 0.6 m of it were for that."""
-    world.until(lambda: world.velocity[2] > 1.3)
-    world.until(lambda: world.velocity[2] < 0.8)
-    return world.altitude
+    world.run_until(lambda s: s.velocity_ned_m_s.z > 1.3)
+    world.run_until(lambda s: s.velocity_ned_m_s.z < 0.8)
+    return world.state.altitude_m
 
 
 def begin_landing(world: World) -> None:
@@ -250,31 +248,31 @@ def begin_landing(world: World) -> None:
 
 
 def begin_return(world: World) -> None:
-    world.return_home()
+    world.rtl()
 
 
 def begin_mission(world: World) -> None:
     world.upload([item(21)])
-    world.resume_mission()
+    world.set_mode("MISSION")
 
 
 def begin_sticks(world: World) -> None:
-    world.streams["sticks"] = lambda: sticks(up=-1.0)
-    world.run(0.1)
-    assert select(world, POSITION) == ACCEPTED
+    world.gcs.streams["sticks"] = lambda: sticks(up=-1.0)
+    world.run_for(0.1)
+    world.set_mode("POSITION")
 
 
 @pytest.mark.parametrize("begin", [begin_landing, begin_return, begin_mission, begin_sticks])
 @pytest.mark.parametrize("home_up_m", [0.0, 4.0])
 def test_every_descent_slows_down_at_the_same_height_above_home(begin, home_up_m: float) -> None:  # type: ignore[no-untyped-def]
-    world = hover(16.0, ("MPC_LAND_ALT2=5", "MPC_LAND_SPEED=0.7"))
-    assert set_home(world, 0.0, up_m=home_up_m) == ACCEPTED
+    world = hover(16.0, MPC_LAND_ALT2=5, MPC_LAND_SPEED=0.7)
+    set_home(world, 0.0, up_m=home_up_m)
     begin(world)
     assert slow_from(world) == pytest.approx(4.4 + home_up_m, abs=0.4)
 
 
 def test_a_landing_beside_a_rally_point_takes_its_ground() -> None:
-    world = hover(16.0, ("MPC_LAND_ALT2=5", "MPC_LAND_SPEED=0.7"))
+    world = hover(16.0, MPC_LAND_ALT2=5, MPC_LAND_SPEED=0.7)
     upload(world, MissionType.RALLY, [rally_point((30.0, 0.0), 3.0)])
     go_north(world, 29.0, 15.0)
     world.land()

@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-import random
-
 import pytest
 
-from flightstack.core.port_numbers import GROUND
 from flightstack.mavlink.files import FileTree
-from flightstack.mavlink.link import Address, Link
 from flightstack.services.files.ftp_server import FtpServer
 from flightstack.services.logs.log_server import LogServer
 from flightstack.services.logs.log_store import FlatLogs
-from flightstack.services.routing.peer import PeerAddress
+from flightstack.testing import World
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.log_client import LogClient, LogDone
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station
-from tests.support.world import World
 
 
 @pytest.fixture(scope="module")
 def flight_log() -> bytes:
     world = World()
-    assert world.takeoff(3.0) == 0
+    world.takeoff(3.0)
     world.arm()
-    world.run(3.0)
-    assert world.disarm(force=True) == 0
-    assert len(world.log) > 100_000
-    return world.log
+    world.run_for(3.0)
+    world.disarm(force=True)
+    content = world.flight().log.content
+    assert len(content) > 100_000
+    return content
 
 
 def test_over_mavlink_ftp_and_a_link_that_loses_a_third(flight_log: bytes) -> None:
@@ -55,21 +51,12 @@ def test_over_the_log_protocol_and_a_link_that_loses_a_third(flight_log: bytes) 
 
 def test_the_vehicle_shows_its_parameters_as_a_file_to_a_second_ground_station() -> None:
     world = World()
-    other, link = PeerAddress(GROUND, "second", 1), Link(250, 190)
-    client = FtpClient(Address(world.config.system_id, 1), Address(250, 190))
+    second = world.add_client("second")
+    second.link.loss(0.3)
+    world.run_until(lambda _: second.session.view.identity, 10.0)
+    client = FtpClient(VEHICLE, GCS)
     client.start_download("@PARAM/param.pck")
-    chance = random.Random(1)
-    for _ in range(2000):
-        world.held_s += 0.01
-        now_s = world.link_now_s()
-        for message in client.poll(now_s):
-            if chance.random() > 0.3:
-                world.stack.ground.receive(other, link.encode(message), now_s)
-        for address, data in list(world.stack.ground.poll(now_s)):
-            if address == other and chance.random() > 0.3:
-                for message in link.decode(data):
-                    client.receive(message, now_s)
-        if client.result is not None:
-            break
+    second.session.use(client)
+    world.run_until(lambda _: client.result, 20.0)
     assert isinstance(client.result, FtpDone), client.result
     assert client.result.content[:2] == b"\x1b\x67"

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from flightstack.commander.transitions import Event
-from flightstack.core.enums import Mode
 from flightstack.mavlink.dialect import mavlink
-from gcs_cli.clients.mission_client import Failed
-from tests.support.world import World, item
+from flightstack.testing import RefusedError, World
+from tests.support.plan_items import item
+from tests.support.refusals import refused
 
-ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
+REJECTED, DENIED, UNSUPPORTED = 1, 2, 3
 
 
 @pytest.fixture
@@ -21,87 +21,89 @@ def hovering() -> World:
     world = World()
     world.arm()
     world.takeoff(4.0)
-    world.until(lambda: world.mode is Mode.HOLD)
+    world.run_until("mode == 'HOLD'")
     return world
 
 
 def test_takeoff_climbs_to_the_altitude_and_holds(hovering: World) -> None:
-    hovering.run(5.0)
-    assert np.linalg.norm(hovering.position - (0.0, 0.0, -4.0)) < 0.02
-    assert np.linalg.norm(hovering.velocity) < 0.02
+    hovering.run_for(5.0)
+    assert math.dist(hovering.state.position_ned_m, (0.0, 0.0, -4.0)) < 0.02
+    assert np.linalg.norm(hovering.state.velocity_ned_m_s) < 0.02
 
 
 def test_takeoff_without_altitude_uses_the_parameter() -> None:
-    world = World(params=["MIS_TAKEOFF_ALT=1.5"])
+    world = World(params={"MIS_TAKEOFF_ALT": 1.5})
     world.takeoff()
     world.arm()
-    world.until(lambda: world.mode is Mode.HOLD)
-    world.run(4.0)
-    assert world.altitude == pytest.approx(1.5, abs=0.02)
+    world.run_until("mode == 'HOLD'")
+    world.run_for(4.0)
+    assert world.state.altitude_m == pytest.approx(1.5, abs=0.02)
 
 
 def test_land_ends_on_the_ground_and_disarms(hovering: World) -> None:
-    assert hovering.land() == ACCEPTED
-    hovering.until_disarmed()
-    assert abs(hovering.altitude) < 0.01
-    assert hovering.mode is Mode.HOLD
+    hovering.land()
+    hovering.run_until("not armed")
+    assert abs(hovering.state.altitude_m) < 0.01
+    assert hovering.state.mode == "HOLD"
 
 
 def test_return_climbs_comes_home_and_lands() -> None:
-    world = World(params=["RTL_RETURN_ALT=8"])
+    world = World(params={"RTL_RETURN_ALT": 8})
     world.upload([item(22, z=3.0), item(16, north=30.0, z=3.0), item(19, north=30.0, z=3.0, p1=60.0)])
+    world.arm()
     world.start_mission()
-    world.until(lambda: world.reached[-1:] == [1])
-    assert world.return_home() == ACCEPTED
+    world.run_until(lambda _: world.reached[-1:] == [1])
+    world.rtl()
     highest = 0.0
-    while world.armed:
-        world.run(0.1)
-        highest = max(highest, world.altitude)
+    while world.state.armed:
+        world.run_for(0.1)
+        highest = max(highest, world.state.altitude_m)
     assert highest == pytest.approx(8.0, abs=0.1)
-    assert np.linalg.norm(world.position[:2]) < 0.1
+    assert np.linalg.norm(world.state.position_ned_m[:2]) < 0.1
 
 
 def test_hold_stops_ahead_and_the_mission_goes_on_where_it_was(hovering: World) -> None:
     hovering.upload("square.plan")
-    assert hovering.resume_mission() == ACCEPTED
-    hovering.until(lambda: 1 in hovering.reached)
-    hovering.run(1.0)
-    fast = hovering.velocity
+    hovering.set_mode("MISSION")
+    hovering.run_until(lambda _: 1 in hovering.reached)
+    hovering.run_for(1.0)
+    fast = hovering.state.velocity_ned_m_s
     assert np.linalg.norm(fast) > 1.0
-    assert hovering.hold() == ACCEPTED
-    before = hovering.position
-    hovering.run(6.0)
-    assert np.linalg.norm(hovering.velocity) < 0.02
+    hovering.set_mode("HOLD")
+    before = hovering.state.position_ned_m
+    hovering.run_for(6.0)
+    assert np.linalg.norm(hovering.state.velocity_ned_m_s) < 0.02
     # it stops ahead and does not come back: the way it went on is along its velocity
-    assert np.dot(hovering.position - before, fast) > 0.0
-    assert hovering.resume_mission() == ACCEPTED
-    hovering.until_disarmed()
+    assert np.dot(np.subtract(hovering.state.position_ned_m, before), fast) > 0.0
+    hovering.set_mode("MISSION")
+    hovering.run_until("not armed")
     assert hovering.reached == [0, 1, 2, 3, 4, 5]
 
 
 def test_a_finished_mission_holds_where_it_ends() -> None:
     world = World()
     world.upload([item(22, z=2.0), item(16, north=5.0, z=2.0)])
+    world.arm()
     world.start_mission()
-    world.until(lambda: world.mode is Mode.HOLD)
-    world.run(5.0)
-    assert world.armed
-    assert np.linalg.norm(world.position - (5.0, 0.0, -2.0)) < 0.05
+    world.run_until("mode == 'HOLD'")
+    world.run_for(5.0)
+    assert world.state.armed
+    assert math.dist(world.state.position_ned_m, (5.0, 0.0, -2.0)) < 0.05
 
 
 def test_without_takeoff_the_vehicle_disarms_itself() -> None:
-    world = World(params=["COM_DISARM_PRFLT=5"])
+    world = World(params={"COM_DISARM_PRFLT": 5})
     world.arm()
-    world.run(4.9)
-    assert world.armed
-    world.until_disarmed(1.0)
+    world.run_for(4.9)
+    assert world.state.armed
+    world.run_until("not armed", 1.0)
 
 
 @pytest.mark.parametrize(
     ("story", "result", "reason"),
     [
         (lambda w: w.land(), REJECTED, "the vehicle is disarmed"),
-        (lambda w: w.return_home(), REJECTED, "the vehicle is disarmed"),
+        (lambda w: w.rtl(), REJECTED, "the vehicle is disarmed"),
         (lambda w: w.command(mavlink.MAV_CMD_MISSION_START), REJECTED, "no mission is loaded"),
         (lambda w: w.takeoff(0.1), REJECTED, "is too low"),
         (lambda w: w.takeoff(math.inf), DENIED, "not a number"),
@@ -113,70 +115,71 @@ def test_without_takeoff_the_vehicle_disarms_itself() -> None:
 )
 def test_refusals_say_why(story, result: int, reason: str) -> None:  # type: ignore[no-untyped-def]
     world = World()
-    assert story(world) == result
-    world.run(0.02)
-    assert any(reason in text for text in world.texts), world.texts
-    assert not world.armed
+    with refused(result, reason):
+        story(world)
+    assert not world.state.armed
 
 
 def test_a_command_that_is_not_known_is_unsupported() -> None:
-    assert World().command(31010, 1, 2, 3) == UNSUPPORTED
+    with refused(UNSUPPORTED):
+        World().command(31010, 1, 2, 3)
 
 
 def test_disarming_in_the_air_needs_force(hovering: World) -> None:
-    assert hovering.disarm() == REJECTED
-    assert hovering.armed
-    assert hovering.disarm(force=True) == ACCEPTED
-    assert not hovering.armed
-    hovering.run(0.2)
-    assert float(np.abs(hovering.stack.now.row[31:39]).max()) == 0.0
+    with refused(REJECTED):
+        hovering.disarm()
+    assert hovering.state.armed
+    hovering.disarm(force=True)
+    assert not hovering.state.armed
+    hovering.run_for(0.2)
+    assert float(np.abs(hovering.engine.stack.now.row[31:39]).max()) == 0.0
 
 
 def test_a_second_takeoff_in_the_air_is_refused(hovering: World) -> None:
-    assert hovering.takeoff(10.0) == REJECTED
+    with refused(REJECTED):
+        hovering.takeoff(10.0)
 
 
 def test_a_mission_that_begins_with_a_landing_does_not_start_on_the_ground() -> None:
     world = World()
     world.upload([item(21, z=0.0), item(16, north=5.0, z=3.0)])
-    assert world.command(mavlink.MAV_CMD_MISSION_START) == REJECTED
-    world.run(0.02)
-    assert any("begins with a landing" in text for text in world.texts)
+    with refused(REJECTED, "begins with a landing"):
+        world.command(mavlink.MAV_CMD_MISSION_START)
 
 
 def test_a_tilted_vehicle_does_not_arm() -> None:
     world = World()
-    world.simulator.frame.state[6:10] = (math.cos(0.4), math.sin(0.4), 0.0, 0.0)
-    world.stack.simulator.state[:] = world.simulator.frame.state
-    assert world.arm() == REJECTED
+    world.engine.simulator.frame.state[6:10] = (math.cos(0.4), math.sin(0.4), 0.0, 0.0)
+    world.engine.stack.simulator.state[:] = world.engine.simulator.frame.state
+    with refused(REJECTED):
+        world.arm()
 
 
 def test_a_refused_upload_leaves_the_mission_and_names_the_item() -> None:
     world = World()
     world.upload("square.plan")
     before = world.download()
-    failed = world.upload([item(22, z=3.0), item(16, north=20_000.0, z=3.0)])
-    assert isinstance(failed, Failed)
-    world.run(0.02)
-    assert any("Mission refused" in text and "1" in text for text in world.texts), world.texts
+    with pytest.raises(RefusedError, match="item 1"):
+        world.upload([item(22, z=3.0), item(16, north=20_000.0, z=3.0)])
     assert world.download() == before
 
 
 def test_a_state_that_is_not_finite_holds_the_rotors_and_is_reported(hovering: World) -> None:
-    row = hovering.stack.now.row.copy()
+    row = hovering.engine.stack.now.row.copy()
     for _ in range(10):  # two outer ticks: one sees the status of the loops of the one before
-        hovering.stack.simulator.state[11] = math.nan
-        commands = hovering.stack.autopilot.tick(hovering.stack.simulator.time_us)
+        hovering.engine.stack.simulator.state[11] = math.nan
+        commands = hovering.engine.stack.autopilot.tick(hovering.engine.stack.simulator.time_us)
         assert np.array_equal(commands, row[31:39])
-    hovering.run(0.05)
+    hovering.run_for(0.05)
     assert any("not finite" in text for text in hovering.texts)
 
 
 def test_reboot_is_denied_from_the_start_of_a_takeoff() -> None:
     world = World()
-    assert world.arm() == 0
-    assert world.stack.parts.requests.request(Event.SELECT_TAKEOFF) is None
+    world.arm()
+    assert world.engine.stack.parts.requests.request(Event.SELECT_TAKEOFF) is None
     reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
-    assert world.stack.now.landed
-    assert world.command(reboot, 1.0) == mavlink.MAV_RESULT_DENIED
-    assert not world.stack.ground.vehicle.reboot_requested
+    assert world.engine.stack.now.landed
+    with refused(mavlink.MAV_RESULT_DENIED):
+        world.command(reboot, 1.0)
+    assert not world.engine.stack.ground.vehicle.reboot_requested

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from tests.support.world import World
+from flightstack.testing import World
 
 OUTER_TICKS = 5
 """Inner ticks between two outer ones: an event that one plant has just before such a tick, the other may have after."""
@@ -26,13 +26,16 @@ class Flown(NamedTuple):
 def fly(plant: str, vehicle: str, wind: tuple[float, float, float]) -> Flown:
     world = World(plant=plant, vehicle=vehicle, wind=wind)
     world.upload("square.plan")
-    assert world.start_mission() == 0
+    world.arm()
+    world.start_mission()
     rows: list[list[float]] = []
     reached_at: list[int] = []
-    while world.armed:
+    while world.state.armed:
         world.tick()
         reached_at += [len(rows)] * (len(world.reached) - len(reached_at))
-        rows.append([*world.simulator.frame.state[[0, 1, 2, 6, 7, 8, 9]], world.simulator.on_ground])
+        rows.append(
+            [*world.engine.simulator.frame.state[[0, 1, 2, 6, 7, 8, 9]], world.engine.simulator.on_ground]
+        )
     table = np.array(rows)
     off = np.flatnonzero(table[:, 7] == 0.0)
     last = off[0] + int(np.argmax(table[off[0] :, 7] != 0.0))  # first touch after the takeoff
@@ -79,8 +82,8 @@ def test_the_square_as_on_the_rigid_plant(vehicle: str, wind: tuple[float, float
     rigid, multibody = (fly(plant, vehicle, wind) for plant in ("rigid", "multibody"))
     for flown in (rigid, multibody):
         assert flown.world.reached == [0, 1, 2, 3, 4, 5]
-        assert flown.world.landed
-        assert abs(flown.world.altitude) < 0.001
+        assert flown.world.state.landed
+        assert abs(flown.world.state.altitude_m) < 0.001
     found = legs(rigid, multibody)
     for leg in found:
         print(f"{leg.ticks} ticks, {leg.late} late: {leg.distance_m * 1e3:.4f} mm, {leg.angle_deg:.4f}°")
@@ -104,11 +107,12 @@ def test_the_same_seed_gives_the_same_log() -> None:
             plant="multibody", vehicle="x_quad", wind=(3.0, 2.0, 0.0), gust=1.0, torque_gust=0.02, seed=7
         )
         world.upload("square.plan")
-        assert world.start_mission() == 0
-        world.run(6.0)
+        world.arm()
+        world.start_mission()
+        world.run_for(6.0)
         world.disarm(force=True)
-        world.run(3.0)
-        logs.append(world.log)
+        world.run_for(3.0)
+        logs.append(world.flight().log.content)
     assert len(logs[0]) > 100_000
     assert logs[0] == logs[1]
 
@@ -116,11 +120,12 @@ def test_the_same_seed_gives_the_same_log() -> None:
 def test_a_lost_rotor_ends_on_the_ground() -> None:
     world = World(plant="multibody")
     world.upload("square.plan")
-    assert world.start_mission() == 0
-    world.until(lambda: world.altitude > 3.0, 20.0)
-    world.inject("rotor:2:off")
-    world.until(lambda: world.simulator.on_ground, 20.0)
-    world.run(5.0)
-    assert world.simulator.on_ground
-    assert np.isfinite(world.simulator.frame.state).all()
-    assert world.altitude < 0.3
+    world.arm()
+    world.start_mission()
+    world.run_until("altitude_m > 3.0", 20.0)
+    world.fault("rotor:2:off")
+    world.run_until(lambda _: world.engine.simulator.on_ground, 20.0)
+    world.run_for(5.0)
+    assert world.engine.simulator.on_ground
+    assert np.isfinite(world.engine.simulator.frame.state).all()
+    assert world.state.altitude_m < 0.3

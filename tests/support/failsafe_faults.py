@@ -9,67 +9,76 @@ from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.guidance.fence import Fence
 from flightstack.mavlink.dialect import mavlink
+from flightstack.testing import World
 from tests.support.failsafe_phases import select_mode, setpoint
+from tests.support.plan_items import item
 from tests.support.streams import sticks
-from tests.support.world import World, item
 
 
 def nothing(world: World) -> None:
     """Do nothing."""
 
 
+def cut_ground_station(world: World) -> None:
+    """Cut the ground station's link to the vehicle; a companion sends the requests and streams from now on."""
+    companion = world.add_client("companion", is_companion=True)
+    companion.streams = world.gcs.streams
+    world.sender = companion
+    world.fault("link gcs to_vehicle cut")
+
+
 def stop_heartbeats(world: World) -> None:
-    world.run(0.1)
-    world.sends_heartbeats = False
-    world.run(4.5)  # of the 5 s that a ground station may be silent
+    world.run_for(0.1)
+    cut_ground_station(world)
+    world.run_for(4.5)  # of the 5 s that a ground station may be silent
 
 
 def stop_stream(name: str) -> Callable[[World], None]:
-    return lambda world: world.streams.pop(name) and None
+    return lambda world: world.sender.streams.pop(name) and None
 
 
 def begin_setpoints(world: World) -> None:
     """Stream setpoints; on the ground also select OFFBOARD, without which their loss has no effect."""
-    world.streams["setpoint"] = setpoint(world)
-    world.run(0.1)
-    if world.altitude < 0.1:
+    world.sender.streams["setpoint"] = setpoint(world)
+    world.run_for(0.1)
+    if world.state.altitude_m < 0.1:
         select_mode(world, Mode.OFFBOARD)
 
 
 def begin_sticks(world: World) -> None:
-    world.streams["sticks"] = sticks
-    world.run(0.1)
-    if world.altitude < 0.1:
+    world.sender.streams["sticks"] = sticks
+    world.run_for(0.1)
+    if world.state.altitude_m < 0.1:
         select_mode(world, Mode.POSITION)
 
 
 def breach_fence(world: World) -> None:
     """Set a fence that the vehicle is outside of; home is inside, unless the vehicle is at home."""
-    north = float(world.position[0]) - 20.5 if world.position[0] > 0.9 else -100.0
+    north = world.state.north_m - 20.5 if world.state.north_m > 0.9 else -100.0
     far = item(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, north=north, p1=20.0)
-    frame = LocalFrame(world.config.home)
-    world.stack.area.fence.set_fence(Fence.from_items([far], frame))
+    frame = LocalFrame(world.engine.config.home)
+    world.engine.stack.area.fence.set_fence(Fence.from_items([far], frame))
 
 
 def lose_states(world: World) -> None:
-    world.loses_states = True
-    world.run(0.1)
+    world.engine.loses_states = True
+    world.run_for(0.1)
 
 
 def tip_over(world: World) -> None:
     """Rotate the vehicle instantly by 100° about its roll axis."""
-    world.simulator.plant.memory[0]["body"][6:10] = math.cos(0.87), math.sin(0.87), 0.0, 0.0  # type: ignore[attr-defined]
-    world.run(0.004)
+    world.engine.simulator.plant.memory[0]["body"][6:10] = math.cos(0.87), math.sin(0.87), 0.0, 0.0  # type: ignore[attr-defined]
+    world.run_for(0.004)
 
 
 def blow_away(world: World) -> None:
     """Move the vehicle instantly by 30 m to the east."""
-    world.simulator.plant.memory[0]["body"][1] += 30.0  # type: ignore[attr-defined]
+    world.engine.simulator.plant.memory[0]["body"][1] += 30.0  # type: ignore[attr-defined]
 
 
 def inject(fault: str) -> Callable[[World], None]:
     def begin(world: World) -> None:
-        world.inject(fault)
-        world.run(0.2)
+        world.fault(fault)
+        world.run_for(0.2)
 
     return begin

@@ -7,44 +7,44 @@ from collections.abc import Callable
 
 from flightstack.commander.failsafe import Phase
 from flightstack.core.contract import Vector3
-from flightstack.core.enums import CUSTOM_MODE, Mode
+from flightstack.core.enums import Mode
 from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
+from flightstack.testing import World
+from tests.support.plan_items import item
 from tests.support.streams import sticks
-from tests.support.world import World, item
 
-QUICK = (
-    "MPC_Z_VEL_MAX_UP=5",
-    "MPC_Z_VEL_MAX_DN=3",
-    "MPC_LAND_SPEED=1.5",
-    "MPC_LAND_ALT2=2",
-    "MPC_TKO_SPEED=3",
-    "RTL_RETURN_ALT=8",
-    "RTL_MIN_DIST=1",
-    "COM_FAIL_ACT_T=0.5",
-)
+QUICK = {
+    "MPC_Z_VEL_MAX_UP": 5,
+    "MPC_Z_VEL_MAX_DN": 3,
+    "MPC_LAND_SPEED": 1.5,
+    "MPC_LAND_ALT2": 2,
+    "MPC_TKO_SPEED": 3,
+    "RTL_RETURN_ALT": 8,
+    "RTL_MIN_DIST": 1,
+    "COM_FAIL_ACT_T": 0.5,
+}
 HEIGHT = 6.0
 
 
 def select_mode(world: World, mode: Mode) -> None:
     """Select a mode; fail if the vehicle does not enter it."""
-    number = CUSTOM_MODE[mode]
-    result = world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, number >> 16 & 0xFF, number >> 24)
-    assert result == 0, (mode, world.texts)
-    assert world.mode is mode
+    world.set_mode(mode)
+    assert world.state.mode == mode.name
 
 
 def _hover(world: World) -> None:
     """Hover at ``HEIGHT``, 8 m north of home."""
     world.upload([item(22, z=HEIGHT), item(16, north=8.0, z=HEIGHT)])
-    assert world.start_mission() == 0, world.texts
-    world.until(lambda: world.mode is Mode.HOLD, 30.0)
+    world.arm()
+    world.start_mission()
+    world.run_until("mode == 'HOLD'", 30.0)
 
 
 def setpoint(world: World) -> Callable[[], Message]:
     """Return the constructor of a setpoint at the vehicle's current position."""
-    north, east, down = world.position.tolist()
+    north, east, down = world.state.position_ned_m
     message = mavlink.MAVLink_set_position_target_local_ned_message(
         0, 1, 1, 1, 0b110111111000, north, east, down, 0, 0, 0, 0, 0, 0, 0, 0
     )
@@ -52,76 +52,77 @@ def setpoint(world: World) -> Callable[[], Message]:
 
 
 def disarmed(world: World, before: Callable[[], None]) -> None:
-    world.run(0.1)
+    world.run_for(0.1)
     before()
 
 
 def standing(world: World, before: Callable[[], None]) -> None:
     before()
-    assert world.arm() == 0, world.texts
-    world.run(0.1)
+    world.arm()
+    world.run_for(0.1)
 
 
 def takeoff(world: World, before: Callable[[], None]) -> None:
-    assert world.arm() == 0, world.texts
-    assert world.takeoff(30.0) == 0
-    world.until(lambda: world.altitude > 1.0, 5.0)
+    world.arm()
+    world.takeoff(30.0)
+    world.run_until("altitude_m > 1.0", 5.0)
     before()
 
 
 def mission(world: World, before: Callable[[], None]) -> None:
     world.upload([item(22, z=HEIGHT), item(16, north=200.0, z=HEIGHT)])
-    assert world.start_mission() == 0, world.texts
-    world.until(lambda: world.position[0] > 1.0, 20.0)
+    world.arm()
+    world.start_mission()
+    world.run_until("north_m > 1.0", 20.0)
     before()
 
 
 def hold(world: World, before: Callable[[], None]) -> None:
     _hover(world)
     before()
-    world.run(0.2)
+    world.run_for(0.2)
 
 
 def goto(world: World, before: Callable[[], None]) -> None:
     _hover(world)
     before()
-    place = LocalFrame(world.config.home).to_geo(Vector3(200.0, 0.0, -HEIGHT))
+    place = LocalFrame(world.engine.config.home).to_geo(Vector3(200.0, 0.0, -HEIGHT))
     reposition = mavlink.MAV_CMD_DO_REPOSITION
-    assert world.command(reposition, -1, 1, 0, math.nan, *place) == 0, world.texts
-    world.run(0.3)
-    assert world.velocity[0] > 0.1
+    world.command(reposition, -1, 1, 0, math.nan, *place)
+    world.run_for(0.3)
+    assert world.state.velocity_ned_m_s.x > 0.1
 
 
 def manual(world: World, before: Callable[[], None]) -> None:
     _hover(world)
-    world.streams["sticks"] = sticks
-    world.run(0.1)
+    world.sender.streams["sticks"] = sticks
+    world.run_for(0.1)
     before()
     select_mode(world, Mode.POSITION)
-    world.run(0.3)
+    world.run_for(0.3)
 
 
 def offboard(world: World, before: Callable[[], None]) -> None:
     _hover(world)
-    world.streams["setpoint"] = setpoint(world)
-    world.run(0.1)
+    world.sender.streams["setpoint"] = setpoint(world)
+    world.run_for(0.1)
     before()
     select_mode(world, Mode.OFFBOARD)
-    world.run(0.3)
+    world.run_for(0.3)
 
 
 def returning(world: World, before: Callable[[], None]) -> None:
     _hover(world)
     before()
-    assert world.return_home() == 0
-    world.run(0.3)
+    world.rtl()
+    world.run_for(0.3)
 
 
 def landing(world: World, before: Callable[[], None]) -> None:
     _hover(world)
     before()
-    assert world.land() == 0
-    world.run(0.3)
+    world.land()
+    world.run_for(0.3)
 
 
 ENTER: dict[Phase, Callable[[World, Callable[[], None]], None]] = {

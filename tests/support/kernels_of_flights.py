@@ -6,9 +6,8 @@ import gc
 
 from numba.core.dispatcher import Dispatcher
 
-from flightstack.core.enums import Mode
-from tests.support.streams import attitude, hover_thrust, level, local_point, select, sticks, stream
-from tests.support.world import World
+from flightstack.testing import World
+from tests.support.streams import attitude, hover_thrust, level, local_point, sticks, stream
 
 
 def kernels() -> set[tuple[str, int]]:
@@ -23,33 +22,35 @@ def fly_streams(world: World) -> None:
     """Fly in OFFBOARD and POSITION mode, and land."""
     world.arm()
     world.takeoff(3.0)
-    world.until(lambda: world.mode is Mode.HOLD, 30.0)
+    world.run_until("mode == 'HOLD'", 30.0)
     point = local_point(position=(1.0, 0.0, -3.0))
     turned = attitude(level(0.3), hover_thrust(world))
     for message in (point, turned):
         stream(world, message, 0.5)
-        assert select(world, 6) == 0
+        world.set_mode("OFFBOARD")
         stream(world, message, 1.0)
     stream(world, sticks(forward=0.5), 0.5)
-    assert select(world, 3) == 0
+    world.set_mode("POSITION")
     stream(world, sticks(forward=0.5, yaw=0.5), 1.0)
     world.land()
-    world.until_disarmed()
+    world.run_until("not armed")
 
 
 def fly_mission(world: World) -> None:
     """Fly half of a mission and return."""
     world.upload("square.plan")
     world.arm()
+    world.arm()
     world.start_mission()
-    world.until(lambda: world.reached == [0, 1], 30.0)
-    world.return_home()
-    world.until_disarmed()
+    world.run_until(lambda _: world.reached == [0, 1], 30.0)
+    world.rtl()
+    world.run_until("not armed")
 
 
 def main() -> None:
     """Fly in wind, so that the vehicle is tilted at touchdown."""
     world = World(vehicle="x_quad", wind=(5.0, 0.0, 0.0), gust=1.0)
+    world.run_until("not armed")  # loads the kernel of ``State``
     before = kernels()
     fly_streams(world)
     fly_mission(world)

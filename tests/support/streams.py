@@ -10,7 +10,7 @@ from flightstack.core.geodesy import LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 from flightstack.params.config import DEFAULT_HOME
-from tests.support.world import World
+from flightstack.testing import World
 
 IGNORE_ALL = 0b1101_1111_1111
 """Type mask that ignores all fields."""
@@ -66,13 +66,8 @@ def stream(world: World, message: Message | Callable[[float], Message], seconds:
     """Send a message, or the result of a function of the time since the start, at 50 Hz."""
     began_s = world.time_s
     for _ in range(round(seconds / INTERVAL_S)):
-        world.send(message(world.time_s - began_s) if callable(message) else message)
-        world.run(INTERVAL_S)
-
-
-def select(world: World, main: int) -> int | None:
-    """Select PX4's main mode: 2 altitude, 3 position, 6 offboard."""
-    return world.command(mavlink.MAV_CMD_DO_SET_MODE, 1, main, 0)
+        world.sender.send(message(world.time_s - began_s) if callable(message) else message)
+        world.run_for(INTERVAL_S)
 
 
 def go_to(
@@ -83,12 +78,12 @@ def go_to(
     yaw: float = math.nan,
     speed: float = -1.0,
     flags: float = CHANGE_MODE,
-) -> int | None:
-    """Send DO_REPOSITION as a COMMAND_LONG; ``altitude`` is above home [m]. Return its MAV_RESULT."""
+) -> None:
+    """Send DO_REPOSITION as a COMMAND_LONG; ``altitude`` is above home [m]."""
     place = LocalFrame(DEFAULT_HOME).to_geo(Vector3(north, east, 0.0))
     latitude, longitude = place.latitude_deg, place.longitude_deg
     altitude += DEFAULT_HOME.altitude_m
-    return world.command(mavlink.MAV_CMD_DO_REPOSITION, speed, flags, 0.0, yaw, latitude, longitude, altitude)
+    world.command(mavlink.MAV_CMD_DO_REPOSITION, speed, flags, 0.0, yaw, latitude, longitude, altitude)
 
 
 def level(yaw_rad: float = 0.0) -> tuple[float, float, float, float]:
@@ -98,4 +93,5 @@ def level(yaw_rad: float = 0.0) -> tuple[float, float, float, float]:
 
 def hover_thrust(world: World) -> float:
     """Return hover thrust as a fraction of the maximum thrust."""
-    return world.stack.vehicle.weight_n / world.stack.vehicle.max_thrust_n
+    vehicle = world.engine.stack.vehicle
+    return vehicle.weight_n / vehicle.max_thrust_n

@@ -28,9 +28,9 @@ from flightstack.params.config import StackConfig
 from flightstack.params.gains_file import BUILT_IN
 from flightstack.params.tunable import Tunable, undeclared
 from flightstack.process.assembly import build
+from flightstack.testing import World
 from tests.support.commands import flightstack_command
 from tests.support.console_blocks import File, steps
-from tests.support.world import World
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / "tests" / "support" / "example_controller"
@@ -99,10 +99,11 @@ def test_its_gains_solve_the_riccati_equation(installed: Path) -> None:
 def test_it_flies_the_square(installed: Path, vehicle: str) -> None:
     world = World(controller="lqr", vehicle=vehicle)
     world.upload("square.plan")
+    world.arm()
     world.start_mission()
-    world.until_disarmed(60.0)
+    world.run_until("not armed", 60.0)
     assert world.reached == [0, 1, 2, 3, 4, 5]
-    assert np.linalg.norm(world.position[:2]) < 0.05  # 13 mm seen
+    assert np.linalg.norm(world.state.position_ned_m[:2]) < 0.05  # 13 mm seen
 
 
 def test_its_own_table_in_a_gains_file_is_read_and_checked(installed: Path, tmp_path: Path) -> None:
@@ -155,8 +156,8 @@ def test_an_edit_is_noticed(site: Path) -> None:
 
 
 def test_without_a_declaration_every_field_is_a_parameter(installed: Path) -> None:
-    world = World(controller="lqr", force=(0.0, 0.3, 0.0), params=["LQR_ANGLE_ROLL=250"])
-    params = world.stack.params
+    world = World(controller="lqr", force=(0.0, 0.3, 0.0), params={"LQR_ANGLE_ROLL": 250})
+    params = world.engine.stack.params
     assert [name for name in params.specs if name.startswith("LQR_")] == [
         "LQR_ANGLE_PITCH", "LQR_ANGLE_ROLL", "LQR_ANGLE_YAW", "LQR_IX_KG_M2", "LQR_IY_KG_M2", "LQR_IZ_KG_M2",
         "LQR_RATE_PITCH", "LQR_RATE_ROLL", "LQR_RATE_YAW",
@@ -165,15 +166,15 @@ def test_without_a_declaration_every_field_is_a_parameter(installed: Path) -> No
     assert (spec.default, spec.low, spec.high, spec.group) == (
         pytest.approx(200.0), -1e6, 1e6, "Attitude Controller lqr",
     )  # fmt: skip
-    assert world.stack.loops.get_parameter("LQR_ANGLE_ROLL") == 250.0
+    assert world.engine.stack.loops.get_parameter("LQR_ANGLE_ROLL") == 250.0
     world.arm()
     world.takeoff(2.0)
-    world.run(1.0)
-    before = world.stack.now.row.copy()
+    world.run_for(1.0)
+    before = world.engine.stack.now.row.copy()
     params.set("LQR_IX_KG_M2", 0.0)
     world.tick()
     assert before[LoopRow.WRENCH][1] != 0.0
-    assert world.stack.now.row[LoopRow.WRENCH][1] == 0.0, "no inertia, no torque, in the next tick"
+    assert world.engine.stack.now.row[LoopRow.WRENCH][1] == 0.0, "no inertia, no torque, in the next tick"
 
 
 def test_a_declaration_chooses_names_and_ranges(site: Path) -> None:

@@ -15,7 +15,7 @@ from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceEvaluator
 from flightstack.plan import FenceCommand, FenceShape, fence_shape
 from flightstack.plan.fence_shape import Area, edges_that_cross
-from tests.support.fences import HOME, circle, polygon, square, vertex_items
+from tests.support.plan_items import HOME, circle, polygon, square, vertex_items
 
 FRAME = LocalFrame(HOME)
 Point = tuple[float, float]

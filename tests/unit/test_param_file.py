@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from flightstack.core import atomic_file
 from flightstack.core.errors import ConfigError
+from flightstack.core.port_numbers import GROUND
 from flightstack.params.config import StackConfig
 from flightstack.params.param_file import (
     NOTHING_LOADED,
@@ -29,8 +30,8 @@ from flightstack.params.spec import ParamSpec
 from flightstack.params.store import ParamStore
 from flightstack.process.assembly import build
 from flightstack.process.state_directory import FileSaver
+from flightstack.services.routing.peer import PeerAddress
 from tests.support.commands import flightstack_command
-from tests.support.world import PEER
 
 ROOT = Path(__file__).resolve().parents[2]
 SPECS = (
@@ -279,7 +280,7 @@ def test_order_of_precedence(tmp_path: Path) -> None:
     assert stack.now.behaviour.cruise_speed_m_s == 3.0
     assert stack.parts.navigator.params.cruise_speed_m_s == 3.0
     assert stack.now.behaviour.climb_speed_m_s == 2.5
-    stack.ground.add_peer(PEER, permanent=True)
+    stack.ground.add_peer(PeerAddress(GROUND, "memory", 0), permanent=True)
     frames = [data for _, data in stack.ground.poll(0.0)]
     assert {frame[5] for frame in frames} == {42}, "the system id in MAVLink 2's header"
 

@@ -17,13 +17,13 @@ from rich.console import Console
 
 from flightstack.core.contract import FloatArray, LoopFlags
 from flightstack.core.errors import ConfigError
+from flightstack.testing import World
 from gcs_cli.errors import CliError
 from gcs_cli.pil.flight_samples import FlightSamples, read_samples
 from gcs_cli.pil.replay import UnfitLogError, recording
 from gcs_cli.pil.replay_run import Replay, fed, judged, prepared
 from gcs_cli.pil.result import Outcome
 from tests.support.synthetic_flight import synthetic_flight_bytes
-from tests.support.world import World
 
 FACTS: dict[str, Any] = {"title": "", "about": "", "meaning": "", "conditions": {}}
 
@@ -32,20 +32,22 @@ FACTS: dict[str, Any] = {"title": "", "about": "", "meaning": "", "conditions": 
 def flown(loops: str, **config: Any) -> bytes:
     world = World(loops=loops, **config)
     world.upload("square.plan")
+    world.arm()
     world.start_mission()
-    world.stack.params.set("PID_ROLL_P", 7.0) if config.get("controller") != "backstepping" else None
-    world.until_disarmed()
-    return world.logs[-1].content
+    world.engine.stack.params.set("PID_ROLL_P", 7.0) if config.get("controller") != "backstepping" else None
+    world.run_until("not armed")
+    return world.engine.logs[-1].content
 
 
 def flown_in_the_air() -> bytes:
     """A log that ends in flight: a landing resets the loops, of which only ``loop_flags`` tells."""
     world = World(loops="c")
     world.upload("square.plan")
+    world.arm()
     world.start_mission()
-    world.run(15.0)
+    world.run_for(15.0)
     world.disarm(force=True)
-    return world.logs[-1].content
+    return world.engine.logs[-1].content
 
 
 @pytest.fixture

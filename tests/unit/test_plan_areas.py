@@ -31,7 +31,7 @@ from flightstack.plan import (
     load_plan,
     save_plan,
 )
-from tests.support.fences import HOME, circle, degrees, polygon, rally_point, return_point, square
+from tests.support.plan_items import HOME, circle, degrees, polygon, rally_point, return_point, square
 
 NAN = math.nan
 SQUARE = polygon(square(50.0))

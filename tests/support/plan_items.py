@@ -1,21 +1,31 @@
-"""Geofences and rally points for tests, in metres from a home position."""
+"""Items of missions, geofences and rally points for tests, in metres from a home position."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
-from flightstack.plan import RALLY_POINT, FenceCommand, Frame, MissionItem
+from flightstack.plan import RALLY_POINT, Command, FenceCommand, Frame, MissionItem
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 Place = tuple[float, float]
+_WITHOUT_POSITION = (Command.NAV_DELAY, Command.CONDITION_YAW, Command.DO_JUMP, Command.DO_CHANGE_SPEED)
 
 
 def degrees(place: Place, home: GeoPoint = HOME) -> tuple[float, float]:
     """Return latitude and longitude [deg] of a place north and east of home [m]."""
     point = LocalFrame(home).to_geo(Vector3(place[0], place[1], 0.0))
     return point.latitude_deg, point.longitude_deg
+
+
+def item(command: int, north: float = 0.0, east: float = 0.0, z: float = 0.0, p1: float = 0.0) -> MissionItem:
+    """Return a mission item at a position north and east of ``HOME`` and at an altitude above it [m]."""
+    if command in _WITHOUT_POSITION:
+        return MissionItem(command, Frame.MISSION, p1)
+    x, y = (round(angle * 1e7) for angle in degrees((north, east)))
+    return MissionItem(command, Frame.GLOBAL_RELATIVE_ALT_INT, p1, 0.0, 0.0, math.nan, x, y, z)
 
 
 def _item(
