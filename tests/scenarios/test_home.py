@@ -17,7 +17,6 @@ from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.summary import item_ned_m
 from tests.support.plan_items import item, polygon
 
-ACCEPTED = 0
 FRAME = LocalFrame(DEFAULT_HOME)
 
 

@@ -17,10 +17,9 @@ from tests.support.plan_items import item, polygon, rally_point, square
 from tests.support.refusals import refused
 from tests.support.streams import sticks
 
-ACCEPTED, DENIED, UNSUPPORTED_FRAME = 0, 2, 9
+DENIED, UNSUPPORTED_FRAME = 2, 9
 FRAME = LocalFrame(DEFAULT_HOME)
 SET_HOME = mavlink.MAV_CMD_DO_SET_HOME
-POSITION = 3
 
 
 def upload(world: World, kind: MissionType, items: list[MissionItem]) -> None:

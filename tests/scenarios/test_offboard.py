@@ -12,8 +12,7 @@ from flightstack.testing import World
 from tests.support.refusals import refused
 from tests.support.streams import attitude, body_rates, hover_thrust, level, local_point, stream
 
-ACCEPTED, REJECTED = 0, 1
-OFFBOARD = 6
+REJECTED = 1
 CORNERS = ((6.0, 0.0), (6.0, 6.0), (0.0, 6.0), (0.0, 0.0))
 
 
