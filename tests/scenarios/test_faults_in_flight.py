@@ -63,7 +63,7 @@ def test_hover_leans_against_a_wind_that_begins() -> None:
     pitch_rad = 2.0 * np.arcsin(world.engine.simulator.frame.state[8])
     lean = 0.30 * 5.0 / world.engine.stack.vehicle.weight_n
     assert np.tan(pitch_rad) == pytest.approx(lean, rel=1e-3)  # measured: 2e-5
-    assert np.abs(world.state.position_ned_m - place).max() < 0.05  # measured: 0.007
+    assert np.abs(np.subtract(world.state.position_ned_m, place)).max() < 0.05  # measured: 0.007
     world.engine.simulator.clear_faults()
     world.run_for(10.0)
     assert abs(world.engine.simulator.frame.state[8]) < 1e-3
@@ -99,7 +99,6 @@ def test_long_stall_of_the_clock_leads_to_the_failsafe() -> None:
     world = hovering()
     world.fault("clock stalled")
     for _ in range(1000):  # two seconds of the machine's clock
-        world.engine.machine_ns += 2_000_000
         world.tick()
     assert told(world, "Simulator clock stands still")
     assert told(world, "State is frozen or missing: rotors hold their speeds")
