@@ -85,11 +85,11 @@ def offboard(world: World, **setpoint: float) -> None:
 @pytest.mark.parametrize("below_m", [0.1, 50.0, 1e6, 1e30])
 def test_a_goto_below_the_ground_is_refused_in_every_frame(hovering: World, below_m: float) -> None:
     sea_m = DEFAULT_HOME.altitude_m
-    with refused(DENIED):
-        reposition(hovering, GLOBAL, sea_m - below_m)
-    with refused(DENIED):
-        reposition(hovering, RELATIVE, -below_m)
     with refused(DENIED, "is below the ground"):
+        reposition(hovering, GLOBAL, sea_m - below_m)
+    with refused(DENIED, "is below the ground"):
+        reposition(hovering, RELATIVE, -below_m)
+    with refused(DENIED, "is below the ground, which is at 0 m"):
         hovering.command(192, -1, 1, 0, NAN, NAN, NAN, sea_m - below_m)
     hovering.run_for(2.0)
     assert hovering.state.altitude_m == pytest.approx(8.0, abs=0.05)
@@ -108,14 +108,14 @@ def test_a_goto_to_the_ground_itself_touches_down_at_rest(hovering: World) -> No
 
 def test_a_home_that_sank_opens_no_way_below_the_ground(hovering: World) -> None:
     set_home(hovering, -30.0)
-    with refused(DENIED):
+    with refused(DENIED, "is below the ground"):
         reposition(hovering, RELATIVE, 10.0)
     reposition(hovering, RELATIVE, 36.0)
 
 
 def test_a_goto_at_present_altitude_into_a_hill_is_refused(hovering: World) -> None:
     hovering.engine.stack.area.set_rally([rally_point((40.0, 0.0), 20.0)])
-    with refused(DENIED):
+    with refused(DENIED, "is below the ground"):
         reposition(hovering, RELATIVE, 8.0, north=38.0)
     reposition(hovering, RELATIVE, 25.0, north=38.0)
 

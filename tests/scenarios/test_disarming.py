@@ -164,7 +164,7 @@ def test_a_mission_that_waits_for_ever_does_not_start() -> None:
     loop = replace(item(177, p1=0.0), param2=-1.0)
     world.upload([item(93, p1=5.0), loop, item(22, z=3.0)])
     world.arm()
-    with pytest.raises(RefusedError):
+    with pytest.raises(RefusedError, match="begins with a landing or a return"):
         world.start_mission()
     world.run_until("not armed", 31.0)
 

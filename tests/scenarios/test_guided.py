@@ -109,13 +109,13 @@ def test_a_goto_needs_the_air_a_known_frame_and_a_mode() -> None:
     with refused(REJECTED, "on the ground"):
         go_to(world, 5.0, 5.0, 5.0)
     command = mavlink.MAV_CMD_DO_REPOSITION
-    with refused(UNSUPPORTED_FRAME):
+    with refused(UNSUPPORTED_FRAME, "frame 1 is not supported"):
         world.command_int(command, (-1.0, 1, 0, NAN), 0, 0, 7.0, frame=1)
     world.upload("square.plan")
     world.arm()
     world.start_mission()
     world.run_until("not landed")
-    with refused(REJECTED):
+    with refused(REJECTED, "not in hold mode"):
         go_to(world, 5.0, 5.0, 5.0, flags=0.0)
     assert world.state.mode == "MISSION"
 
@@ -150,7 +150,7 @@ def test_a_mission_flies_at_a_changed_speed_pauses_and_goes_on(hovering: World) 
     assert hovering.state.mode == "HOLD"
     hovering.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 1)
     assert hovering.state.mode == "MISSION"
-    with refused(DENIED):
+    with refused(DENIED, "must be 0 (pause) or 1 (continue)"):
         hovering.command(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 2)
     hovering.run_until("not armed")
     assert hovering.reached == [0, 1, 2, 3, 4, 5]
@@ -193,7 +193,7 @@ def test_a_generic_autopilot_takes_an_altitude_as_its_frame_says(frame: int, alt
 def test_a_takeoff_in_terrain_or_local_frames_is_not_supported(frame: int, generic: int) -> None:
     world = World(params={"FS_AUTOPILOT": generic})
     world.arm()
-    with refused(UNSUPPORTED_FRAME):
+    with refused(UNSUPPORTED_FRAME, f"frame {frame} is not supported"):
         take_off_int(world, frame, 6.0)
     assert world.state.mode == "HOLD"
 
@@ -205,7 +205,7 @@ def test_a_goto_out_of_the_geofence_is_refused() -> None:
     world.run_until("mode == 'HOLD'")
     with refused(DENIED, "the place is more than 20 m from home"):
         go_to(world, 30.0, 0.0)
-    with refused(DENIED):
+    with refused(DENIED, "is above 15 m"):
         go_to(world, altitude=16.0)
     go_to(world, 15.0, 0.0, 12.0)
 
@@ -224,9 +224,9 @@ def test_who_is_outside_the_geofence_may_pause_and_come_nearer_but_not_go_farthe
     assert world.engine.stack.area.fence.refusal(*world.state.position_ned_m[:2]) is not None
     go_to(world)
     assert world.state.mode == "HOLD"
-    with refused(DENIED):
+    with refused(DENIED, "more than 20 m from home"):
         go_to(world, 35.0, 0.0)
-    with refused(DENIED):
+    with refused(DENIED, "is above 15 m"):
         go_to(world, 25.0, 0.0, 16.0)  # no farther, but too high
     go_to(world, 25.0, 0.0)
     world.run_for(6.0)

@@ -107,7 +107,7 @@ def test_a_return_to_an_outside_home_takes_a_rally_point_inside() -> None:
 
 def test_home_is_not_moved_so_far_that_a_flying_vehicle_would_break_the_limit() -> None:
     world = hover(GF_MAX_HOR_DIST=20)
-    with refused(DENIED):
+    with refused(DENIED, "more than 20 m from the vehicle (GF_MAX_HOR_DIST)"):
         set_home(world, 30.0)
     set_home(world, 15.0)
 
@@ -148,7 +148,7 @@ def test_home_is_not_a_kilometre_above_or_below_the_ground(up_m: float) -> None:
 @pytest.mark.parametrize("frame", [1, 2, 8, 10, 11])
 def test_home_in_terrain_or_local_frames_is_not_supported(frame: int) -> None:
     world = World()
-    with refused(UNSUPPORTED_FRAME):
+    with refused(UNSUPPORTED_FRAME, f"frame {frame} is not supported"):
         set_home(world, 0.0, frame=frame)
     assert world.engine.stack.area.home == DEFAULT_HOME
 

@@ -199,7 +199,7 @@ def test_a_vehicle_that_tips_over_on_the_ground_is_disarmed_and_does_not_arm() -
     stream(world, attitude((math.cos(0.35), 0.0, math.sin(0.35), 0.0), 0.24), 3.0)  # 40°, half the weight
     assert "Attitude is beyond its limits: disarming" in world.texts
     assert not world.state.armed
-    with refused(mavlink.MAV_RESULT_TEMPORARILY_REJECTED):
+    with refused(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "tilted by more than 30 degrees"):
         world.arm()
 
 

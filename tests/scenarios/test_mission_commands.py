@@ -48,7 +48,7 @@ def test_a_start_that_may_not_arm_leaves_mode_and_item() -> None:
     world.upload("square.plan")
     world.engine.stack.parts.failsafes.links.gcs_lost = True
     assert world.engine.stack.parts.readiness.arming_refusals()
-    with refused(REJECTED):
+    with refused(REJECTED, "the ground station is lost"):
         world.command(START, 2)
     assert world.state.mode == "HOLD"
     assert current(world) == 0
@@ -58,7 +58,7 @@ def test_a_start_that_may_not_arm_leaves_mode_and_item() -> None:
 def test_a_start_at_no_item_leaves_mode_and_item() -> None:
     world = World()
     world.upload("square.plan")
-    with refused(DENIED):
+    with refused(DENIED, "there is no mission item 77"):
         world.command(START, 77)
     assert world.state.mode == "HOLD"
     assert not world.state.armed
@@ -70,11 +70,11 @@ def test_a_start_at_no_item_leaves_mode_and_item() -> None:
 def test_a_start_at_an_item_that_stays_on_the_ground_is_refused() -> None:
     world = World()
     world.upload([item(22, z=3.0), item(16, north=5.0, z=3.0), item(21)])
-    with refused(REJECTED):
+    with refused(REJECTED, "the mission begins with a landing or a return"):
         world.command(START, 2)
     assert (world.state.mode, world.state.armed, current(world)) == ("HOLD", False, 0)
     world.arm()
-    with refused(REJECTED):
+    with refused(REJECTED, "the mission begins with a landing or a return"):
         world.command(START, 2)
     assert (world.state.mode, current(world)) == ("HOLD", 0)
     world.command(START, 1)
@@ -85,7 +85,7 @@ def test_a_current_item_that_stays_on_the_ground_keeps_it_from_arming() -> None:
     world.upload([item(22, z=3.0), item(16, north=5.0, z=3.0), item(21)])
     world.command(SET_CURRENT, 2)
     world.set_mode("MISSION")
-    with refused(REJECTED):
+    with refused(REJECTED, "the mission begins with a landing or a return"):
         world.arm()
     world.command(SET_CURRENT, 0)
     world.arm()

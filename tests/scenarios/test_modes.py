@@ -126,7 +126,7 @@ def test_a_command_that_is_not_known_is_unsupported() -> None:
 
 
 def test_disarming_in_the_air_needs_force(hovering: World) -> None:
-    with refused(REJECTED):
+    with refused(REJECTED, "the vehicle is in the air"):
         hovering.disarm()
     assert hovering.state.armed
     hovering.disarm(force=True)
@@ -136,7 +136,7 @@ def test_disarming_in_the_air_needs_force(hovering: World) -> None:
 
 
 def test_a_second_takeoff_in_the_air_is_refused(hovering: World) -> None:
-    with refused(REJECTED):
+    with refused(REJECTED, "the vehicle is in the air"):
         hovering.takeoff(10.0)
 
 
@@ -151,7 +151,7 @@ def test_a_tilted_vehicle_does_not_arm() -> None:
     world = World()
     world.engine.simulator.frame.state[6:10] = (math.cos(0.4), math.sin(0.4), 0.0, 0.0)
     world.engine.stack.simulator.state[:] = world.engine.simulator.frame.state
-    with refused(REJECTED):
+    with refused(REJECTED, "tilted by more than 30 degrees"):
         world.arm()
 
 
@@ -180,6 +180,6 @@ def test_reboot_is_denied_from_the_start_of_a_takeoff() -> None:
     assert world.engine.stack.parts.requests.request(Event.SELECT_TAKEOFF) is None
     reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
     assert world.engine.stack.now.landed
-    with refused(mavlink.MAV_RESULT_DENIED):
+    with refused(mavlink.MAV_RESULT_DENIED, "the vehicle is taking off"):
         world.command(reboot, 1.0)
     assert not world.engine.stack.ground.vehicle.reboot_requested

@@ -68,14 +68,14 @@ def test_a_mode_may_be_selected_before_there_is_a_state(mode: Mode) -> None:
     world.engine.stack.simulator.state[:] = math.nan
     world.set_mode(mode)
     assert world.state.mode == mode.name
-    with refused(REJECTED):
+    with refused(REJECTED, "no valid position and attitude yet"):
         world.arm()
 
 
 def test_a_mode_arms_as_soon_as_its_stream_is_there() -> None:
     world = World(vehicle="x_quad")
     world.set_mode("POSITION")
-    with refused(REJECTED):
+    with refused(REJECTED, "no manual control"):
         world.arm()
     world.gcs.streams["sticks"] = lambda: mavlink.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0)
     world.run_for(0.2)
@@ -86,7 +86,7 @@ def test_a_mode_arms_as_soon_as_its_stream_is_there() -> None:
 def test_a_mission_may_come_after_its_mode() -> None:
     world = World()
     world.set_mode("MISSION")
-    with refused(REJECTED):
+    with refused(REJECTED, "no mission is loaded"):
         world.arm()
     world.upload([item(22, z=2.0), item(21)])
     world.arm()
@@ -120,5 +120,5 @@ def test_a_failsafe_of_the_last_flight_denies_no_mode() -> None:
 
 
 def test_termination_is_no_mode_to_select() -> None:
-    with refused(mavlink.MAV_RESULT_DENIED):
+    with refused(mavlink.MAV_RESULT_DENIED, "no such mode"):
         World().set_mode("TERMINATION")

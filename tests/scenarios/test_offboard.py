@@ -40,7 +40,7 @@ def test_offboard_needs_a_stream_in_flight() -> None:
     assert world.state.mode == "OFFBOARD"
     world.set_mode("HOLD")
     world.run_for(2.0)  # the stream was there, and is no more
-    with refused(REJECTED):
+    with refused(REJECTED, "no offboard setpoints"):
         world.set_mode("OFFBOARD")
 
 

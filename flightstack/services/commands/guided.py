@@ -144,7 +144,7 @@ def _position_refusal(
     ground_m = area.ground_m(north_m, east_m) - home_m
     below_m = max(0.0, area.ground_m(x, y) - home_m - here[2])  # of the vehicle, under the estimated ground
     if altitude_m < ground_m - below_m - GROUND_TOLERANCE_M:
-        return f"altitude {altitude_m:.6g} m above home is below the ground, which is at {ground_m:.4g} m"
+        return f"altitude {altitude_m:.6g} m above home is below the ground, which is at {ground_m:z.4g} m"
     refusal = area.way_refusal(here, (north_m, east_m, altitude_m))
     return None if refusal is None else f"the place {refusal}"
 
