@@ -19,18 +19,26 @@ def nothing(world: World) -> None:
     """Do nothing."""
 
 
+def use_companion(world: World) -> None:
+    """Send requests and streams from a companion from now on."""
+    world.sender = world.add_client("companion", is_companion=True)
+    world.sender.streams, world.gcs.streams = world.gcs.streams, {}
+
+
 def cut_ground_station(world: World) -> None:
-    """Cut the ground station's link to the vehicle; a companion sends the requests and streams from now on."""
-    companion = world.add_client("companion", is_companion=True)
-    companion.streams = world.gcs.streams
-    world.sender = companion
+    """Cut the ground station's link to the vehicle; a companion sends requests and streams from now on."""
+    use_companion(world)
     world.fault("link gcs to_vehicle cut")
 
 
 def stop_heartbeats(world: World) -> None:
-    world.run_for(0.1)
-    cut_ground_station(world)
-    world.run_for(4.5)  # of the 5 s that a ground station may be silent
+    """Leave 0.5 s of the 5 s for which a ground station may be silent."""
+    use_companion(world)
+    link = world.link.to_vehicle
+    sent = link.sent
+    world.run_until(lambda _: link.sent > sent, 2.0)  # a heartbeat, which is all that it sends now
+    link.cut()
+    world.run_for(4.5)
 
 
 def stop_stream(name: str) -> Callable[[World], None]:
