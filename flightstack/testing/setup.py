@@ -69,8 +69,8 @@ class Setup:
     """Parameters of the vehicle that differ from their defaults."""
     seed: int = 1
     """Seed of gusts and of the faults of links."""
-    folder: Path = Path()
-    """Where plans are looked for; a name that is not there is that of an example plan."""
+    folder: Path | Sequence[Path] = Path()
+    """One or more directories of plans; a name that is in none of them is that of an example plan."""
 
     def changed(self) -> dict[str, Any]:
         """Return the fields that differ from their defaults."""
@@ -83,7 +83,8 @@ class Setup:
 
     def load_plan(self, plan: str | Path) -> Plan:
         """Read a plan file: of ``folder``, else an example of the installation; raise ConfigError."""
-        path = self.folder / plan
+        folders = (self.folder,) if isinstance(self.folder, Path) else self.folder
+        path = next((path for folder in folders if (path := folder / plan).exists()), folders[0] / plan)
         example = example_plans().get(Path(plan).stem)
         return load_plan(example if example is not None and not path.exists() else path)
 

@@ -146,6 +146,7 @@ class World:
         ``condition`` is a function, or an expression such as ``"altitude_m > 2.5"``. Raise ConditionTimeoutError with
         the state after ``timeout_s`` of simulated time.
         """
+        __tracebackhide__ = True
         is_true = Expression(condition).of_state if isinstance(condition, str) else condition
         rates = self.engine.stack.rates
         for _ in range(round(timeout_s * rates.outer_hz) + 1):
@@ -188,6 +189,7 @@ class World:
 
     def wait_for(self, request: Request, what: str) -> None:
         """Wait for the answer of a request; raise RefusedError."""
+        __tracebackhide__ = True
         hub, end_s = self.engine.stack.ground, self.time_s + _REQUEST_LIMIT_S
         while True:
             self._network.settle(hub, self.time_s)

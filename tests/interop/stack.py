@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flightstack.core.port_numbers import api_client_port, ground_station_port, tcp_port
-from tests.support.free_instance import free_instance
+from flightstack.testing.instances import free_instance
 from tests.support.process import Process
 
 HOST = "127.0.0.1"

@@ -12,9 +12,9 @@ from typing import IO, Any
 import pytest
 
 import gcs_cli.fly.processes
+from flightstack.testing.instances import free_instance
 from tests.support import commands
 from tests.support.console_blocks import Command, File, Skipped, shows, steps
-from tests.support.free_instance import free_instance
 from tests.support.programs import Program
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"

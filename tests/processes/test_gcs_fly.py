@@ -18,13 +18,13 @@ import pytest
 
 from flightstack.core.port_numbers import simulator_port, vehicle_ground_port
 from flightstack.process.signing_file import create_key
+from flightstack.testing.instances import free_instance
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.fly.processes import Child, Children
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.tui.panels import SEVERITIES, clock_text
 from tests.support.commands import Ended, gcs
-from tests.support.free_instance import free_instance
 from tests.support.process import children_of
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds

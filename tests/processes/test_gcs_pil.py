@@ -17,13 +17,13 @@ from typing import Any
 import pytest
 
 from flightstack.firmware.build import host_program
+from flightstack.testing.instances import free_instance
 from gcs_cli.errors import DONE, FAILED, NO_ANSWER, USAGE, CliError
 from gcs_cli.fly.fly_flags import FlyOptions
 from gcs_cli.pil import run as pil_run
 from gcs_cli.pil.flight_samples import read_samples
 from gcs_cli.pil.result import Flown
 from tests.support.commands import Ended, gcs
-from tests.support.free_instance import free_instance
 from tests.support.process import children_of
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew

@@ -11,7 +11,7 @@ import pytest
 from flightstack.core.port_numbers import tcp_port
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from tests.support.free_instance import free_instance
+from flightstack.testing.instances import free_instance
 from tests.support.process import BOUND_S, Process
 
 Start = Callable[..., Process]

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+from flightstack.testing.instances import free_instance
 from tests.support.commands import flightstack_command, gcs
-from tests.support.free_instance import free_instance
 
 LONG_S = 180.0  # a bound for a busy machine that compiles kernels and firmware anew
 HOP = Path(__file__).parents[2] / "missions" / "hop.plan"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from flightstack.testing.instances import free_instance
 from gcs_cli.experiments.paper import pil_section
-from tests.support.free_instance import free_instance
 
 emulation = pytest.mark.skipif(
     not all(map(importlib.util.find_spec, ("unicorn", "ziglang"))), reason="unicorn and ziglang are extras"

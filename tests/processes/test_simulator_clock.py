@@ -10,8 +10,8 @@ from threading import Thread
 import pytest
 
 from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
+from flightstack.testing.instances import free_instance
 from tests.support.commands import gcs
-from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process
 from tests.support.vehicle_processes import wait_until_healthy
 

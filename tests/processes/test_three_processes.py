@@ -15,8 +15,8 @@ from pyulog import ULog
 
 from flightstack.core.port_numbers import ground_station_port
 from flightstack.testing import World
+from flightstack.testing.instances import free_instance
 from tests.support.commands import flightstack_command, gcs
-from tests.support.free_instance import free_instance
 from tests.support.process import BOUND_S, Process
 from tests.support.vehicle_processes import wait_until_healthy
 

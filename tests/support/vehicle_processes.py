@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.testing.instances import free_instance
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import parse_endpoint, vehicle_connection
-from tests.support.free_instance import free_instance
 from tests.support.programs import Program
 
 LONG_S = 60.0

@@ -19,6 +19,7 @@ from rich.text import Text
 
 from flightstack.__main__ import run as flightstack_run
 from flightstack.core.geodesy import GeoPoint
+from flightstack.testing.instances import free_instance
 from gcs_cli.__main__ import main
 from gcs_cli.errors import DONE, USAGE, CliError
 from gcs_cli.fly.flight import Phase
@@ -40,7 +41,6 @@ from gcs_cli.report.run_directory import LOG_NAME, make_run_directory
 from sim_bridge.__main__ import run as sim_bridge_run
 from tests.support.fake_vehicle import SHUT_DOWN, FakeVehicle
 from tests.support.flight_story import Story
-from tests.support.free_instance import free_instance
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 HOP = MISSIONS / "hop.plan"

@@ -1,0 +1,199 @@
+"""pytest plugin: the fixtures ``sitl`` and ``sitl_server``, reports of failed flights, and scenario files as tests.
+
+Every run of pytest in the environment loads this module: it imports nothing heavy before a fixture is used.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Generator, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from flightstack.testing.owners import Owners
+
+if TYPE_CHECKING:
+    from flightstack.testing.artifacts import Artifacts, Evidence
+    from flightstack.testing.scenario_items import ScenarioFile
+    from flightstack.testing.sitl import Sitl, SitlServer
+
+_OWNERS = pytest.StashKey[Owners]()
+_ARTIFACTS = pytest.StashKey["Artifacts"]()
+_SITL = pytest.StashKey["Sitl"]()
+_SERVERS = pytest.StashKey["SitlServer"]()
+_SECTION = "flightstack"
+"""Title of the section in the report of a failed test."""
+
+
+# ---------------------------------------------------------------------- fixtures
+
+
+@pytest.fixture(scope="session")
+def sitl(request: pytest.FixtureRequest) -> Sitl:
+    """Vehicles in simulated worlds, in this process and in simulated time.
+
+    ``sitl(vehicle="x_quad", wind=(5.0, 0.0), seed=3)`` returns a World, which is closed after the test or with the
+    fixture that made it. ``sitl.fly("square.plan", ...)`` flies a plan in a world of its own and returns the Flight.
+    """
+    from flightstack.testing.sitl import Sitl  # noqa: PLC0415
+
+    config = request.config
+    config.stash[_SITL] = Sitl(config.stash[_OWNERS], config.rootpath)
+    return config.stash[_SITL]
+
+
+@pytest.fixture(scope="session")
+def sitl_server(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[SitlServer]:
+    """Vehicles as processes with real sockets, for MAVSDK, pymavlink and other clients.
+
+    ``sitl_server(vehicle="x_quad", speed=5.0)`` returns a Server with free ports, which is stopped after the test or
+    with the fixture that started it.
+    """
+    from flightstack.testing.sitl import SitlServer  # noqa: PLC0415
+
+    config = request.config
+    servers = SitlServer(config.stash[_OWNERS], lambda: tmp_path_factory.mktemp("sitl-server"))
+    config.stash[_SERVERS] = servers
+    yield servers
+    servers.stop_all()
+
+
+# ---------------------------------------------------------------------- configuration
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option of the plugin."""
+    parser.getgroup("flightstack").addoption(
+        "--sitl-artifacts",
+        metavar="DIR",
+        help="Directory for logs and reports of failed flights, a folder for each test. "
+        "[default: flightstack in pytest's cache]",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Begin to track the owners of worlds."""
+    config.stash[_OWNERS] = Owners()
+    given = config.getoption("--sitl-artifacts", None)
+    if given is not None:  # workers of pytest-xdist get an absolute path
+        config.option.sitl_artifacts = str(config.invocation_params.dir / given)
+
+
+def _artifacts(config: pytest.Config) -> Artifacts:
+    if _ARTIFACTS not in config.stash:
+        from flightstack.testing.artifacts import Artifacts  # noqa: PLC0415
+
+        given = config.getoption("--sitl-artifacts", None)
+        if given is not None:
+            folder = Path(given)
+        elif hasattr(config, "cache"):
+            folder = config.cache.mkdir("flightstack")
+        else:
+            folder = Path(tempfile.mkdtemp(prefix="flightstack-"))
+        config.stash[_ARTIFACTS] = Artifacts(folder)
+    return config.stash[_ARTIFACTS]
+
+
+# ---------------------------------------------------------------------- owners of worlds
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
+    """Track the running test."""
+    with item.config.stash[_OWNERS].running(item):
+        return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(request: pytest.FixtureRequest) -> Generator[None, Any, Any]:
+    """Track the fixture that is set up."""
+    with request.config.stash[_OWNERS].setting_up(request):
+        return (yield)
+
+
+# ---------------------------------------------------------------------- reports
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Add state, setup, files and the command that repeats the test to the report of a failed test."""
+    report = yield
+    if report.failed and call.when != "teardown":
+        reason = str(call.excinfo.value) if call.excinfo is not None else ""
+        try:
+            _report_failure(item, report, reason)
+        except Exception as error:  # the test's own failure must be reported in any case
+            report.sections.append((_SECTION, f"no report of the flight: {error!r}"))
+    return report
+
+
+def _report_failure(item: pytest.Item, report: pytest.TestReport, reason: str) -> None:
+    evidence = _evidence(item)
+    servers = item.config.stash.get(_SERVERS, None) if "sitl_server" in _fixtures(item) else None
+    running = servers.running if servers is not None else []
+    if evidence is None and not running:
+        return
+    artifacts = _artifacts(item.config)
+    lines: list[str] = []
+    if evidence is not None:
+        kept = artifacts.keep(item.nodeid, evidence, reason.partition("\n")[0])
+        lines += [*evidence.lines, *kept.lines]
+        item.user_properties += kept.properties  # of the JUnit file, which has those of the test
+        report.user_properties += kept.properties
+        _attach(item.config, report, kept.properties)
+    for server in running:
+        folder = artifacts.folder(item.nodeid) / f"instance-{server.instance}"
+        server.keep_in(folder)
+        lines += [*server.lines(), f"files:   {folder} (after the test)"]
+    lines.append(f"repeat:  {_command(item)}")
+    report.sections.append((_SECTION, "\n".join(lines)))
+
+
+def _fixtures(item: pytest.Item) -> Sequence[str]:
+    return getattr(item, "fixturenames", ())
+
+
+def _evidence(item: pytest.Item) -> Evidence | None:
+    """Return what a failed test leaves, or None if it has flown nothing in this process."""
+    of_scenario: Evidence | None = getattr(item, "flightstack_evidence", None)
+    if of_scenario is not None:
+        return of_scenario
+    sitl = item.config.stash.get(_SITL, None) if "sitl" in _fixtures(item) else None
+    flown = sitl.latest(item) if sitl is not None else None
+    return None if flown is None else flown.evidence()
+
+
+def _command(item: pytest.Item) -> str:
+    from flightstack.testing.artifacts import repeat_command  # noqa: PLC0415
+
+    return repeat_command(item.nodeid, item.config.rootpath, item.config.invocation_params.dir)
+
+
+def _attach(config: pytest.Config, report: pytest.TestReport, files: list[tuple[str, object]]) -> None:
+    """Add links to the report of pytest-html, if it is installed."""
+    if config.pluginmanager.hasplugin("html"):
+        from pytest_html import extras  # noqa: PLC0415
+
+        links = [
+            extras.url(Path(str(path)).as_uri(), name=name.removeprefix("flightstack_"))
+            for name, path in files
+        ]
+        report.__dict__.setdefault("extras", []).extend(links)
+
+
+# ---------------------------------------------------------------------- scenario files
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ScenarioFile | None:
+    """Collect scenario files: a test for each seed."""
+    if file_path.suffix != ".toml" or b"expect" not in file_path.read_bytes():
+        return None
+    from flightstack.testing.scenario_items import ScenarioFile  # noqa: PLC0415
+
+    return ScenarioFile.of(file_path, parent)

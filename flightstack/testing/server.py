@@ -1,0 +1,208 @@
+"""A vehicle as processes: simulator and flight stack with real sockets on free ports."""
+
+from __future__ import annotations
+
+import json
+import math
+import select
+import shutil
+import subprocess
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import NoReturn
+
+from flightstack.core.port_numbers import api_client_port, ground_station_port
+from flightstack.process.command_line import own_program
+from flightstack.testing.instances import ServerError, free_instance
+from flightstack.testing.setup import Setup
+from gcs_cli.fly.fly_flags import TO_SIMULATOR, TO_STACK, FlyOptions, passed
+from gcs_cli.fly.fly_options import outer_rate_hz
+from gcs_cli.link import calls
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.endpoint import LOOPBACK, parse_endpoint, vehicle_connection
+from gcs_cli.report.run_directory import LOG_NAME, SIMULATOR, STACK
+
+READY = b"ready\n"
+"""Line of the guard when both processes have their ports."""
+_STEP_S = 0.1
+_TAIL_LINES = 3
+
+
+class _BusyError(ServerError):
+    """Another program took a port of the instance."""
+
+
+class Server:
+    """Simulator and flight stack of one vehicle. They end with ``stop``, or with this process, however it ends."""
+
+    def __init__(self, setup: Setup, folder: Path, *, speed: float = 1.0, timeout_s: float = 180.0) -> None:
+        """Start both at ``speed`` times real time, with their files in ``folder``, and wait until the vehicle can arm.
+
+        Raise ServerError if a process ends, or after ``timeout_s`` of wall time. Kernels that are not compiled yet
+        take a minute.
+        """
+        self.setup = setup
+        self.folder = folder
+        """Directory of the flight logs and the output of the processes."""
+        self.instance = 0
+        """Number from which the ports derive."""
+        self._kept_in: Path | None = None
+        self._guard: subprocess.Popen[bytes] | None = None
+        end_s = time.monotonic() + timeout_s
+        taken: set[int] = set()
+        while self._guard is None:
+            self.instance = free_instance(taken)
+            taken.add(self.instance)
+            try:
+                self._guard = self._start(speed)
+                self._await_ports(end_s)
+                self._await_health(end_s)
+            except _BusyError:  # another program took a port since: try the next instance
+                self._guard = None
+            except BaseException:
+                self.stop()
+                raise
+
+    @property
+    def mavsdk_url(self) -> str:
+        """Connection of MAVSDK: ``udpin://127.0.0.1:PORT``."""
+        return f"udpin://{LOOPBACK}:{api_client_port(self.instance)}"
+
+    @property
+    def mavlink_url(self) -> str:
+        """Connection of pymavlink and MAVProxy: ``udpin:127.0.0.1:PORT``."""
+        return f"udpin:{LOOPBACK}:{ground_station_port(self.instance)}"
+
+    @property
+    def gcs_url(self) -> str:
+        """Argument of ``gcs --connect``: ``udpout:127.0.0.1:PORT``."""
+        return vehicle_connection(self.instance)
+
+    @property
+    def log(self) -> Path:
+        """The log of the first flight, complete after it."""
+        return self.folder / LOG_NAME
+
+    @property
+    def output(self) -> str:
+        """Output of both processes."""
+        files = [self.folder / f"{name}.log" for name in (SIMULATOR, STACK)]
+        return "".join(path.read_text(errors="replace") for path in files if path.exists())
+
+    def stop(self) -> None:
+        """End both processes in order, and wait for their end; a second call does nothing."""
+        if self._guard is None:
+            return
+        guard, self._guard = self._guard, None
+        guard.communicate()  # closes its standard input
+        if self._kept_in is not None:
+            shutil.copytree(self.folder, self._kept_in, dirs_exist_ok=True)
+
+    def keep_in(self, folder: Path) -> None:
+        """Copy the files to ``folder`` after the processes have ended."""
+        self._kept_in = folder
+
+    def lines(self) -> list[str]:
+        """Return links and last output, for the report of a failed test."""
+        return [f"server:  instance {self.instance}, {self.mavsdk_url}, {self.mavlink_url}", self._tail()]
+
+    def __enter__(self) -> Server:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def _start(self, speed: float) -> subprocess.Popen[bytes]:
+        options = fly_options(self.setup, self.instance, speed)
+        home = self.setup.home
+        at = f"--home={home.latitude_deg!r},{home.longitude_deg!r},{home.altitude_m!r}"
+        simulator = [*passed(options, TO_SIMULATOR), at]
+        stack = [
+            *passed(options, TO_STACK), at, f"--outer-hz={outer_rate_hz(options)!r}", f"--log={self.log}",
+            "--params=none", "--state=none", "--overwrite",
+        ]  # fmt: skip
+        command = own_program(
+            "flightstack.testing.server_guard", str(self.folder), json.dumps(simulator), json.dumps(stack)
+        )
+        with (self.folder / "guard.log").open("wb") as errors:
+            return subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, start_new_session=True
+            )
+
+    def _await_ports(self, end_s: float) -> None:
+        """Wait until both processes have their ports."""
+        assert self._guard is not None
+        assert self._guard.stdout is not None
+        while not select.select([self._guard.stdout], [], [], _STEP_S)[0]:
+            self._check_time(end_s)
+        line = self._guard.stdout.readline()
+        if line != READY:
+            self._raise_end(line)
+
+    def _await_health(self, end_s: float) -> None:
+        """Wait until the vehicle reports that it can arm."""
+        assert self._guard is not None
+        assert self._guard.stdout is not None
+        with Connection(parse_endpoint(self.gcs_url)) as connection:
+            session, request = connection.session, None
+            while not session.view.healthy:
+                now_s = connection.now_s
+                if session.view.identity is not None and (
+                    request is None or request.answer(now_s) is not None
+                ):
+                    # before the first state of the simulator, SYS_STATUS is sent on request only
+                    request = calls.command(session, *calls.REQUEST_SYS_STATUS, now_s)
+                connection.step(now_s + _STEP_S)
+                if select.select([self._guard.stdout], [], [], 0.0)[0]:
+                    self._raise_end(b"")
+                self._check_time(end_s)
+
+    def _check_time(self, end_s: float) -> None:
+        if time.monotonic() > end_s:
+            raise ServerError(f"the vehicle was not ready in time\n{self._tail()}")
+
+    def _raise_end(self, line: bytes) -> NoReturn:
+        """Raise the error of processes that have ended, for the reason that the guard gives."""
+        assert self._guard is not None
+        reason = (line + self._guard.communicate()[0]).decode(errors="replace").strip()
+        kind = _BusyError if "in use" in reason else ServerError
+        raise kind(f"{reason or 'the processes ended'}\n{self._tail()}")
+
+    def _tail(self) -> str:
+        lines = self.output.splitlines()[-_TAIL_LINES:]
+        return "\n".join(f"{'' if index else 'output:':8} {line}" for index, line in enumerate(lines))
+
+
+def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:
+    """Return ``setup`` as options of the processes."""
+
+    def numbers(values: Sequence[float]) -> str | None:
+        return ",".join(repr(float(value)) for value in values) if any(values) else None
+
+    return FlyOptions(
+        vehicle=setup.vehicle,
+        controller=setup.controller,
+        gains=setup.gains,
+        plant=setup.plant,
+        loops=setup.loops,
+        speed="max" if math.isinf(speed) else repr(float(speed)),
+        instance=instance,
+        seed=setup.seed,
+        wind=numbers(setup.wind),
+        gust=setup.gust or None,
+        drag=setup.drag,
+        force=numbers(setup.force),
+        torque=numbers(setup.torque),
+        torque_gust=setup.torque_gust or None,
+        battery_start=setup.battery_percent,
+        battery_capacity=setup.battery_capacity_mah,
+        battery_drain=setup.battery_drain,
+        ideal_rotors=setup.ideal_rotors,
+        inner_hz=setup.inner_hz,
+        outer_hz=setup.outer_hz,
+        param=[f"{name}={value!r}" for name, value in setup.params.items()],
+    )
