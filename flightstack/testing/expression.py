@@ -2,7 +2,8 @@
 
 The margin is the robustness of signal temporal logic: how far the values are from making the expression false (or
 true, if it is negative), in the unit of the compared values. ``a < b`` has the margin b − a, ``and`` the smaller one,
-``or`` the larger one, ``not`` the negative one; a mode or a flag has an infinite margin.
+``or`` the larger one, ``not`` the negative one; a mode or a flag has an infinite margin. The sign is the truth: equal
+values have the smallest positive margin where the comparison is true, else the smallest negative one.
 A. Donzé and O. Maler, "Robust Satisfaction of Temporal Logic over Real-Valued Signals", FORMATS 2010.
 """
 
@@ -10,7 +11,8 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -18,7 +20,6 @@ import numpy as np
 from flightstack.core.contract import FloatArray
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
-from flightstack.core.portable_math import distance
 
 SIGNALS: dict[str, str] = {
     "time_s": "simulated time",
@@ -42,124 +43,174 @@ SIGNALS: dict[str, str] = {
 """Names in expressions; each is an attribute of ``State`` too."""
 
 Values: TypeAlias = Mapping[str, Any]
-_FUNCTIONS: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
-    "abs": (abs, np.abs),
-    "sqrt": (math.sqrt, np.sqrt),
-    "hypot": (distance, np.hypot),
-    "min": (min, np.minimum),
-    "max": (max, np.maximum),
+SMALLEST = 5e-324
+"""The smallest positive number: the margin of equal values."""
+_LARGEST = 1e300
+NUMBER, TEXT, CONDITION = "a number", "a mode", "a condition"
+_KINDS = {"mode": TEXT, "armed": CONDITION, "landed": CONDITION, "failsafe": CONDITION}
+"""What a signal is; the others are numbers."""
+_FUNCTIONS: dict[str, tuple[Callable[..., Any], int, float]] = {
+    "abs": (np.abs, 1, 1),
+    "sqrt": (np.sqrt, 1, 1),
+    "hypot": (np.hypot, 2, math.inf),
+    "min": (np.minimum, 2, math.inf),
+    "max": (np.maximum, 2, math.inf),
 }
-"""For one state, and for arrays."""
+"""Function, and the smallest and largest number of arguments."""
 _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: np.add,
     ast.Sub: np.subtract,
     ast.Mult: np.multiply,
     ast.Div: np.divide,
 }
-_COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
-_ALLOWED = (
-    ast.Expression, ast.BoolOp, ast.And, ast.Or, ast.UnaryOp, ast.Not, ast.USub, ast.BinOp, ast.Compare, ast.Call,
-    ast.Name, ast.Load, ast.Constant, *_OPERATORS, *_COMPARISONS,
-)  # fmt: skip
+_ORDER, _EQUALITY = (ast.Lt, ast.LtE, ast.Gt, ast.GtE), (ast.Eq, ast.NotEq)
+_STRICT = (ast.Lt, ast.Gt, ast.NotEq)
 
 
 class Expression:
-    """A checked expression. Raise ConfigError for one that is not allowed, with what is.
+    """A checked condition. Raise ConfigError for one that is not allowed, with what is.
 
-    >>> Expression("abs(roll_deg) < 35").text
-    'abs(roll_deg) < 35'
+    >>> Expression("abs(roll_deg) < 35").margin({"roll_deg": np.array([5.0, -40.0])}).tolist()
+    [30.0, -5.0]
     """
 
     def __init__(self, text: str) -> None:
         self.text = text.strip()
         try:
-            tree = ast.parse(self.text, mode="eval")
-        except (SyntaxError, ValueError) as error:
+            self._tree = ast.parse(self.text, mode="eval").body
+            kind = _kind(self._tree, text)
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             raise ConfigError("expression", text, f"is not valid: {getattr(error, 'msg', error)}") from None
-        _check(tree, text)
-        self._tree = tree.body
-        self._code = compile(tree, "<expression>", "eval")
+        if kind != CONDITION:
+            raise ConfigError("expression", text, f"is {kind}, not a condition such as altitude_m < 12")
         self.names = tuple(
-            sorted({node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in SIGNALS})
+            sorted({node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name)} & SIGNALS.keys())
         )
 
     def of_state(self, state: object) -> bool:
         """Return True if the expression holds for one ``State``."""
-        values: dict[str, Any] = {name: getattr(state, name) for name in self.names}
-        functions = {name: scalar for name, (scalar, _) in _FUNCTIONS.items()}
-        return bool(
-            eval(self._code, {"__builtins__": {}}, functions | values)
-        )  # checked: names and functions above
+        return bool(self.margin({name: getattr(state, name) for name in self.names}) > 0.0)
 
     def margin(self, signals: Values) -> FloatArray:
         """Return the margin at each sample; ``signals`` are arrays of one length. NaN counts as a violation."""
-        margin = np.asarray(_margin(self._tree, signals), dtype=float)
+        with np.errstate(all="ignore"):
+            margin = np.asarray(_margin(self._tree, signals), dtype=float)
         return np.where(np.isnan(margin), -math.inf, margin)
 
 
-def _check(tree: ast.Expression, text: str) -> None:
-    for node in ast.walk(tree):
-        if not isinstance(node, _ALLOWED):
-            raise ConfigError("expression", text, f"has {type(node).__name__}, which is not allowed")
-        if isinstance(node, ast.Call) and (
-            not isinstance(node.func, ast.Name) or node.func.id not in _FUNCTIONS or node.keywords
-        ):
-            raise ConfigError("expression", text, f"may call {', '.join(_FUNCTIONS)} only")
-        if isinstance(node, ast.Name) and node.id not in SIGNALS and node.id not in _FUNCTIONS:
+def _kind(node: ast.expr, text: str) -> str:
+    """Return what a node is, after a check of it and its parts; raise ConfigError."""
+    if isinstance(node, ast.Name):
+        if node.id not in SIGNALS:
             raise ConfigError(
                 "expression", text, f"has an unknown name {node.id}; known are {', '.join(SIGNALS)}"
             )
-        if isinstance(node, ast.Constant) and not isinstance(node.value, (int, float, str)):
-            raise ConfigError("expression", text, f"has {node.value!r}, which is neither a number nor a text")
-        if (
-            isinstance(node, ast.Constant)
-            and isinstance(node.value, str)
-            and node.value not in Mode.__members__
-        ):
+        return _KINDS.get(node.id, NUMBER)
+    if isinstance(node, ast.Constant):
+        return _constant_kind(node.value, text)
+    if isinstance(node, ast.Compare) and all(isinstance(op, _ORDER + _EQUALITY) for op in node.ops):
+        orders = any(isinstance(op, _ORDER) for op in node.ops)
+        _all([node.left, *node.comparators], NUMBER if orders else _kind(node.left, text), text)
+        return CONDITION
+    if isinstance(node, ast.Call):
+        return _call_kind(node, text)
+    operands, kind = _operands(node)
+    if not operands:
+        raise ConfigError("expression", text, f"has {type(node).__name__}, which is not allowed")
+    return _all(operands, kind, text)
+
+
+def _operands(node: ast.expr) -> tuple[Sequence[ast.expr], str]:
+    """Return the operands of an operator and what they must be; none for a node that is no allowed operator."""
+    if isinstance(node, ast.BoolOp):
+        return node.values, CONDITION
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        return (node.left, node.right), NUMBER
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.Not, ast.USub)):
+        return (node.operand,), CONDITION if isinstance(node.op, ast.Not) else NUMBER
+    return (), ""
+
+
+def _all(nodes: Sequence[ast.expr], kind: str, text: str) -> str:
+    for node in nodes:
+        found = _kind(node, text)
+        if found != kind:
+            raise ConfigError("expression", text, f"has {found} ({ast.unparse(node)}) instead of {kind}")
+    return kind
+
+
+def _constant_kind(value: object, text: str) -> str:
+    if isinstance(value, str):
+        if value not in Mode.__members__:
             raise ConfigError(
-                "expression", text, f"has no mode {node.value!r}; modes are {', '.join(Mode.__members__)}"
+                "expression", text, f"has no mode {value!r}; modes are {', '.join(Mode.__members__)}"
             )
+        return TEXT
+    if not isinstance(value, (int, float)) or not abs(value) < _LARGEST:
+        raise ConfigError("expression", text, f"has {value!r}, which is neither a number nor a text")
+    return CONDITION if isinstance(value, bool) else NUMBER
+
+
+def _call_kind(node: ast.Call, text: str) -> str:
+    name = node.func.id if isinstance(node.func, ast.Name) else ""
+    if name not in _FUNCTIONS or node.keywords:
+        raise ConfigError("expression", text, f"may call {', '.join(_FUNCTIONS)} only")
+    _, fewest, most = _FUNCTIONS[name]
+    if not fewest <= len(node.args) <= most:
+        wanted = f"{fewest}" if most == fewest else f"{fewest} or more"
+        raise ConfigError(
+            "expression", text, f"has {name} with {len(node.args)} arguments instead of {wanted}"
+        )
+    return _all(node.args, NUMBER, text)
 
 
 def _margin(node: ast.expr, signals: Values) -> Any:
+    """Return the margin of a condition; NaN where it is unknown."""
     if isinstance(node, ast.BoolOp):
-        parts = [_margin(part, signals) for part in node.values]
-        joined = np.minimum if isinstance(node.op, ast.And) else np.maximum
-        return joined.reduce(np.broadcast_arrays(*parts))
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        parts = np.broadcast_arrays(*(_margin(part, signals) for part in node.values))
+        return _all_of(parts) if isinstance(node.op, ast.And) else -_all_of([-part for part in parts])
+    if isinstance(node, ast.UnaryOp):
         return -_margin(node.operand, signals)
     if isinstance(node, ast.Compare):
         values = [_value(part, signals) for part in (node.left, *node.comparators)]
         margins = [
             _compared(operator, a, b) for operator, a, b in zip(node.ops, values, values[1:], strict=False)
         ]
-        return np.minimum.reduce(np.broadcast_arrays(*margins))
+        return _all_of(np.broadcast_arrays(*margins))
     return np.where(np.asarray(_value(node, signals), dtype=bool), math.inf, -math.inf)
 
 
+def _all_of(parts: Sequence[Any]) -> Any:
+    """Return the smallest margin: unknown if a part is and no other one is violated."""
+    known = np.fmin.reduce(parts)
+    return np.where(known < 0.0, known, np.minimum.reduce(parts))
+
+
 def _compared(operator: ast.cmpop, a: Any, b: Any) -> Any:
-    if isinstance(operator, (ast.Eq, ast.NotEq)):
+    if isinstance(operator, _EQUALITY):
         sign = 1.0 if isinstance(operator, ast.Eq) else -1.0
-        if np.asarray(a).dtype.kind in "fi" and np.asarray(b).dtype.kind in "fi":
-            return -sign * np.abs(np.subtract(a, b))
-        return sign * np.where(np.asarray(a) == np.asarray(b), math.inf, -math.inf)
-    return np.subtract(b, a) if isinstance(operator, (ast.Lt, ast.LtE)) else np.subtract(a, b)
+        if np.asarray(a).dtype.kind not in "fiu":
+            return sign * np.where(np.asarray(a) == np.asarray(b), math.inf, -math.inf)
+        margin = np.asarray(-sign * np.abs(np.subtract(a, b)))
+    else:
+        less = isinstance(operator, (ast.Lt, ast.LtE))
+        margin = np.asarray(np.subtract(b, a) if less else np.subtract(a, b))
+    return np.where(margin == 0.0, -SMALLEST if isinstance(operator, _STRICT) else SMALLEST, margin)
 
 
 def _value(node: ast.expr, signals: Values) -> Any:
     if isinstance(node, ast.Name):
         return signals[node.id]
     if isinstance(node, ast.Constant):
-        return node.value
+        is_number = isinstance(node.value, (int, float)) and not isinstance(node.value, bool)
+        return float(node.value) if is_number else node.value  # type: ignore[arg-type]
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        return -_value(node.operand, signals)
+        return np.negative(_value(node.operand, signals))
     if isinstance(node, ast.BinOp):
         return _OPERATORS[type(node.op)](_value(node.left, signals), _value(node.right, signals))
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+    if isinstance(node, ast.Call):
+        assert isinstance(node.func, ast.Name)
+        function, fewest, _ = _FUNCTIONS[node.func.id]
         arguments = [_value(argument, signals) for argument in node.args]
-        function = _FUNCTIONS[node.func.id][1]
-        result = arguments[0] if len(arguments) > 1 else function(*arguments)
-        for argument in arguments[1:]:  # of two and more
-            result = function(result, argument)
-        return result
-    return _margin(node, signals) >= 0.0
+        return function(*arguments) if fewest == 1 else reduce(function, arguments)
+    return _margin(node, signals) > 0.0

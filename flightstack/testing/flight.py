@@ -12,6 +12,7 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.enums import NAVIGATION_STATE
+from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import LocalFrame
 from flightstack.plan import Command, Plan
 from flightstack.testing import properties
@@ -79,8 +80,8 @@ class Flight:
 
     @cached_property
     def data(self) -> FlightData:
-        """The flight as ``gcs`` reads it from its log."""
-        return flight_of(self.log.content, "the flight log")
+        """The flight as ``gcs`` reads it from its log; empty if the vehicle was never armed."""
+        return FlightData() if not self.log.content else flight_of(self.log.content, "the flight log")
 
     # ------------------------------------------------------------------ outcome
 
@@ -200,7 +201,11 @@ class Flight:
 
     @cached_property
     def signals(self) -> Signals:
-        """All signals at the rate of the outer loop."""
+        """All signals at the rate of the outer loop; raise ConfigError for a flight without samples."""
+        if not len(self.data.position.time_s):
+            raise ConfigError(
+                "flight", "", f"has no samples: {self.outcome_text or 'the vehicle was not armed'}"
+            )
         return signals_of(self)
 
     def at(self, time_s: float) -> Sample:

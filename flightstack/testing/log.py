@@ -77,14 +77,22 @@ class Log(Mapping[str, Topic]):
     """Topics by name; docs/reference/log-topics.md lists them."""
 
     def __init__(self, content: bytes) -> None:
-        """Read the bytes of a ULog file; raise ConfigError if they are none."""
+        """Read the bytes of a ULog file, empty for a vehicle that was never armed; raise ConfigError."""
         self.content = content
         """The bytes of the file."""
+        self._data: dict[str, dict[str, Array]] = {}
+        self._topics: dict[str, Topic] = {}
+        self.parameters: dict[str, float] = {}
+        """Parameters at the start of the flight."""
+        self.texts: tuple[LoggedText, ...] = ()
+        """Status texts, oldest first."""
+        if content:
+            self._read(content)
+
+    def _read(self, content: bytes) -> None:
         log = parse_ulog(content, "the flight log")
         self._data = {item.name: item.data for item in log.data_list}
-        self._topics: dict[str, Topic] = {}
-        self.parameters: dict[str, float] = dict(log.initial_parameters)
-        """Parameters at the start of the flight."""
+        self.parameters = dict(log.initial_parameters)
         self.texts = tuple(
             LoggedText(item.timestamp * 1e-6, item.log_level - ord("0"), item.message)
             for item in log.logged_messages

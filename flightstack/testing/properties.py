@@ -12,12 +12,12 @@ from scipy.ndimage import maximum_filter1d
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError
-from flightstack.testing.expression import Expression
+from flightstack.testing.expression import SMALLEST, Expression
 
 _AROUND = (-0.2, -0.1, -0.02, 0.0, 0.02, 0.1, 0.2)
 """Times of the values that a failure shows, relative to the violation [s]."""
 _TEXT = re.compile(
-    r"(?P<what>.*?)(?:\s+within\s+(?P<within>[0-9.]+)\s*s)?(?:\s+(?:of|after)\s+(?P<event>[a-z_0-9]+))?",
+    r"(?P<what>.*?)(?:\s+within\s+(?P<within>\d+\.?\d*|\.\d+)\s*s)?(?:\s+(?:of|after)\s+(?P<event>\w+))?",
     re.DOTALL,
 )
 
@@ -52,7 +52,8 @@ class PropertyViolationError(AssertionError):
     """A property does not hold; the message has the first violation and the values around it."""
 
     def __init__(self, margin: Margin) -> None:
-        amount = "" if math.isinf(margin.margin) else f" by {-margin.margin:.3g}"
+        size = -margin.margin
+        amount = "" if math.isinf(size) else f" by {size:.3g}" if size > SMALLEST else ", at the limit"
         super().__init__(
             f"{margin.prop}: violated at t = {margin.time_s:.2f} s{amount}\n{margin.detail}".rstrip()
         )
@@ -103,7 +104,7 @@ def eventually(signals: Signals, text: str, window: Window = Window()) -> Margin
             last = int(inside[-1]) if len(inside) else len(signals.time_s) - 1
             at = last if best is None or found == -math.inf else int(best)
             detail = "" if found >= 0.0 else values_around(signals, expression.names, at)
-            worst = Margin(name, found, float(signals.time_s[at]), detail)
+            worst = Margin(name, _plain(found), float(signals.time_s[at]), detail)
     return worst
 
 
@@ -120,7 +121,7 @@ def until(signals: Signals, text: str, end: str) -> Margin:
     at = best if margin >= 0.0 else int(bad[0]) if len(bad) else len(first) - 1
     names = tuple(sorted({*expression.names, *ending.names}))
     detail = "" if margin >= 0.0 else values_around(signals, names, at)
-    return Margin(name, margin, float(signals.time_s[at]), detail)
+    return Margin(name, _plain(margin), float(signals.time_s[at]), detail)
 
 
 def within(signals: Signals, trigger: str, reaction: str, limit_s: float) -> Margin:
@@ -128,7 +129,7 @@ def within(signals: Signals, trigger: str, reaction: str, limit_s: float) -> Mar
     name = f"{reaction} within {limit_s:g} s of {trigger}"
     cause, effect = Expression(trigger), Expression(reaction)
     step_s = float(np.median(np.diff(signals.time_s))) if len(signals.time_s) > 1 else 1.0
-    samples = min(round(limit_s / step_s), len(signals.time_s)) + 1
+    samples = round(min(limit_s / step_s, len(signals.time_s))) + 1
     reached = effect.margin(signals.values)
     best = maximum_filter1d(reached, samples, origin=-(samples // 2), mode="constant", cval=-math.inf)
     margin = np.maximum(-cause.margin(signals.values), best)
@@ -158,7 +159,12 @@ def _worst(name: str, signals: Signals, names: Expression | tuple[str, ...], mar
     at = int(violated[0]) if len(violated) else int(np.argmin(margin))
     shown = names.names if isinstance(names, Expression) else names
     detail = values_around(signals, shown, at) if len(violated) else ""
-    return Margin(name, float(margin.min()), float(signals.time_s[at]), detail)
+    return Margin(name, _plain(float(margin.min())), float(signals.time_s[at]), detail)
+
+
+def _plain(margin: float) -> float:
+    """Return 0 for the margin of equal values where the comparison is true."""
+    return 0.0 if margin == SMALLEST else margin
 
 
 def values_around(signals: Signals, names: Sequence[str], at: int) -> str:
