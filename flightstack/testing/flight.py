@@ -169,7 +169,7 @@ class Flight:
             (start_s + s.time_s, _MODES.get(s.nav_state, str(s.nav_state))) for s in self.data.statuses
         ]
         spans: list[ModeSpan] = []
-        ends = [*(begin_s for begin_s, _ in changes[1:]), start_s + self.data.duration_s]
+        ends = [*(begin_s for begin_s, _ in changes), start_s + self.data.duration_s][1:]
         for (begin_s, mode), end_s in zip(changes, ends, strict=True):
             if spans and spans[-1].mode == mode:
                 spans[-1] = spans[-1]._replace(end_s=end_s)

@@ -41,6 +41,8 @@ from gcs_cli.vehicle.view_types import MISSION_COMPLETE, Mission, VehicleView
 GROUND = "gcs"
 """Name of the ground station that each world has."""
 _REQUEST_LIMIT_S = 120.0
+_CONNECT_LIMIT_S = 10.0
+"""Longest wait for the first heartbeat, which a bad link may delay or lose."""
 
 
 class ConditionTimeoutError(AssertionError):
@@ -223,9 +225,11 @@ class World:
 
     def _connected(self, client: Client | None = None) -> Client:
         """Return a client, by default ``sender``, once it knows the vehicle."""
-        client = client or self.sender
+        client, end_s = client or self.sender, self.time_s + _CONNECT_LIMIT_S
         if client.session.view.identity is None:
             self._network.settle(self.engine.stack.ground, self.time_s)
+        while client.session.view.identity is None and self.time_s < end_s:
+            self.step()
         return client
 
     def upload(
@@ -314,7 +318,7 @@ class World:
     # ------------------------------------------------------------------ faults
 
     def fault(self, text: str, *, for_s: float | None = None) -> None:
-        """Begin a fault now, such as ``"rotor 2 dead"`` or ``"link loss 0.3"``; docs/how-to/faults.md lists them.
+        """Begin a fault now, such as ``"rotor:2:off"`` or ``"link loss 0.3"``; docs/how-to/faults.md lists them.
 
         With ``for_s`` it ends after that simulated time. Raise ConfigError for an unknown fault.
         """

@@ -36,7 +36,7 @@ def margin(text: str, **signals: object) -> list[float]:
         ("altitude_m != 10", [-SMALLEST, 5.0]),
         ("abs(climb_m_s - 2) + 1 < 2", [-SMALLEST, 1.0]),
         ("min(altitude_m, 12, 11) > max(1, climb_m_s) * 2", [8.0, 7.0]),
-        ("hypot(climb_m_s * 3, 4 * climb_m_s) <= sqrt(100) / 2 ** 1", [SMALLEST, -5.0]),
+        ("hypot(climb_m_s * 3, 4 * climb_m_s) <= sqrt(100)  / 2", [SMALLEST, -5.0]),
         ("-altitude_m < -1", [9.0, 14.0]),
     ],
 )

@@ -1,0 +1,344 @@
+"""The world: requests and refusals, time limits, clients and their links, repeatability, power."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pyulog import ULog
+
+from flightstack.core.enums import Mode
+from flightstack.core.errors import ConfigError
+from flightstack.plan import MissionType
+from flightstack.testing import ConditionTimeoutError, Flight, PropertyViolationError, RefusedError, Setup, World
+from flightstack.testing.log import unit_of
+from gcs_cli.report.analysis import flight_of
+from gcs_cli.report.summary import RunInfo, summarise
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    with World(vehicle="x_quad") as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def flight() -> Flight:
+    """One flight of the square in gusts, for all that only reads it."""
+    with World(vehicle="x_quad", wind=(3.0, 1.0), gust=1.0, seed=5) as made:
+        return made.fly("square")
+
+
+# ---------------------------------------------------------------------- requests
+
+
+def test_requests_change_the_state(world: World) -> None:
+    world.takeoff(3.0)
+    assert world.state.armed
+    world.run_until("altitude_m > 2.9 and mode == 'HOLD'", timeout_s=20.0)
+    world.goto(4.0, -3.0)
+    state = world.run_until(lambda s: math.hypot(s.north_m - 4.0, s.east_m + 3.0) < 0.3, timeout_s=20.0)
+    assert state.distance_to_home_m == pytest.approx(5.0, abs=0.5)
+    world.set_mode("RETURN")
+    assert world.state.mode == "RETURN"
+    assert not world.run_until("landed and not armed", timeout_s=60.0).failsafe
+    assert world.texts[-1] == "Disarmed"
+
+
+def test_refusal_has_the_reason_of_the_vehicle(world: World) -> None:
+    with pytest.raises(RefusedError, match="^the start of the mission refused: ") as caught:
+        world.start_mission()
+    assert caught.value.reason
+    assert not caught.value.is_silent
+
+
+def test_unknown_mode_names_the_modes(world: World) -> None:
+    with pytest.raises(ValueError, match=f"no mode 'FLY'; the modes are {', '.join(Mode.__members__)}"):
+        world.set_mode("FLY")
+
+
+def test_parameters_are_read_and_set(world: World) -> None:
+    world.param_set("MIS_TAKEOFF_ALT", 4.0)
+    assert world.param_get("MIS_TAKEOFF_ALT") == 4.0
+    with pytest.raises(RefusedError, match="NO_SUCH"):
+        world.param_get("NO_SUCH")
+
+
+def test_plan_comes_back_as_it_was_uploaded(world: World) -> None:
+    world.upload("fenced_square")
+    assert [item.command for item in world.download()] == [item.command for item in world.plan.items]
+    assert world.download(MissionType.FENCE)
+
+
+def test_missing_plan_is_an_error(world: World, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no_such"):
+        world.upload("no_such.plan")
+
+
+# ---------------------------------------------------------------------- time
+
+
+def test_request_over_a_perfect_link_takes_no_time(world: World) -> None:
+    before_s = world.time_s
+    world.arm()
+    world.param_get("MIS_TAKEOFF_ALT")
+    assert world.time_s == before_s
+
+
+def test_request_over_a_slow_link_takes_the_time_of_both_ways(world: World) -> None:
+    world.param_get("MIS_TAKEOFF_ALT")
+    world.link.delay_s(0.2)
+    before_s = world.time_s
+    world.arm()
+    assert 0.4 <= world.time_s - before_s <= 0.43  # and one period of the outer loop each way
+
+
+def test_first_request_waits_for_the_heartbeat_of_a_slow_link(world: World) -> None:
+    world.link.delay_s(0.2)
+    world.arm()
+    assert world.state.armed
+    assert 0.6 <= world.time_s <= 0.65
+
+
+def test_condition_that_stays_false_ends_with_the_state(world: World) -> None:
+    before_s = world.time_s
+    with pytest.raises(ConditionTimeoutError) as caught:
+        world.run_until("altitude_m > 2", timeout_s=0.5)
+    assert str(caught.value).startswith("'altitude_m > 2' did not come true within 0.5 s of simulated time; t = ")
+    assert 0.5 <= world.time_s - before_s <= 0.515  # one more period: the limit itself counts
+
+
+def test_timers_and_watches_follow_simulated_time(world: World) -> None:
+    at: list[float] = []
+    ticks: list[float] = []
+    world.after(0.3, lambda: at.append(world.time_s))
+    world.watch(lambda: ticks.append(world.time_s))
+    world.run_for(1.0)
+    assert at == [pytest.approx(0.3, abs=0.011)]
+    assert len(ticks) == 100
+
+
+# ---------------------------------------------------------------------- clients and links
+
+
+def test_clients_have_names_and_links_of_their_own(world: World) -> None:
+    other = world.add_client("tablet")
+    with pytest.raises(ValueError, match="tablet"):
+        world.add_client("tablet")
+    world.run_for(1.0)
+    other.link.cut()
+    before = dict(other.counts)
+    world.run_for(2.0)
+    assert other.counts == before
+    assert world.gcs.counts["HEARTBEAT"] > before["HEARTBEAT"]
+
+
+def test_request_over_a_cut_link_is_not_answered(world: World) -> None:
+    world.run_for(0.5)
+    world.link.cut()
+    with pytest.raises(RefusedError, match="arming not answered") as caught:
+        world.arm()
+    assert caught.value.is_silent
+
+
+@pytest.mark.parametrize("inner_hz", [250.0, 500.0, 1000.0])
+def test_cut_link_fails_safe_after_the_same_time_at_any_rate(inner_hz: float) -> None:
+    with World(vehicle="x_quad", inner_hz=inner_hz) as world:
+        world.takeoff(3.0)
+        world.run_until("altitude_m > 2.5", timeout_s=20.0)
+        world.link.cut()
+        cut_s = world.time_s
+        lost_s = world.run_until("failsafe", timeout_s=60.0).time_s - cut_s
+        assert world.state.failsafes == ("GCS_LOST",)
+        assert 8.9 <= lost_s <= 10.1  # COM_DL_LOSS_T after the last heartbeat, up to 1 s before the cut
+
+
+def test_companion_does_not_count_as_data_link(world: World) -> None:
+    world.add_client("companion", is_companion=True)
+    world.takeoff(3.0)
+    world.run_until("altitude_m > 2.5", timeout_s=20.0)
+    world.link.cut()
+    assert "GCS_LOST" in world.run_until("failsafe", timeout_s=60.0).failsafes
+
+
+def test_request_before_any_contact_is_not_answered(world: World) -> None:
+    world.link.cut()
+    with pytest.raises(RefusedError, match="arming not answered"):
+        world.arm()
+
+
+def test_fault_of_a_link_ends_after_its_time(world: World) -> None:
+    world.link.loss(0.25)
+    world.fault("link to_vehicle cut", for_s=0.5)
+    assert world.link.to_vehicle.conditions.is_cut
+    assert not world.link.from_vehicle.conditions.is_cut
+    world.run_for(0.6)
+    assert world.link.to_vehicle.conditions.loss == 0.25
+    assert not world.link.to_vehicle.conditions.is_cut
+
+
+# ---------------------------------------------------------------------- repeatability
+
+
+def flown_bytes(seed: int, *, lossy: bool = True) -> bytes:
+    with World(vehicle="x_quad", gust=2.0, wind=(2.0, 0.0), seed=seed, telemetry=True) as world:
+        if lossy:
+            world.link.loss(0.2)
+            world.link.garbage(0.05)
+            world.link.reordering(0.2)
+        world.takeoff(2.0)
+        world.run_for(3.0)
+        world.fault("rotor:1:weak=0.9", for_s=0.5)
+        world.run_for(1.0)
+        return world.flight().log.content
+
+
+def test_equal_calls_give_equal_logs() -> None:
+    assert flown_bytes(3) == flown_bytes(3)
+
+
+def test_another_seed_gives_another_flight() -> None:
+    assert flown_bytes(3, lossy=False) != flown_bytes(4, lossy=False)
+
+
+# ---------------------------------------------------------------------- power
+
+
+def test_power_cycle_keeps_parameters_and_plans(world: World) -> None:
+    world.param_set("MIS_TAKEOFF_ALT", 4.0)
+    world.upload("square")
+    items = world.download()
+    before_s = world.time_s
+    world.power_cycle(off_s=2.0)
+    assert world.time_s >= before_s
+    assert world.param_get("MIS_TAKEOFF_ALT") == 4.0
+    assert world.download() == items
+    assert world.fly("hop").completed
+
+
+def test_power_cycle_in_the_air_drops_the_vehicle(world: World) -> None:
+    world.takeoff(5.0)
+    world.run_until("altitude_m > 4.5", timeout_s=20.0)
+    before = world.flight().log.content
+    world.power_cycle(off_s=3.0)
+    world.run_for(0.1)
+    assert not world.state.armed
+    assert world.state.altitude_m < 0.1
+    assert len(before) > 1000
+
+
+# ---------------------------------------------------------------------- flights
+
+
+def test_refused_flight_has_its_outcome_and_no_samples() -> None:
+    with World(vehicle="x_quad", battery_percent=1.0) as world:
+        flight = world.fly("square")
+    assert flight.outcome == "refused"
+    assert not flight.completed
+    assert (flight.reached, flight.modes, flight.texts, dict(flight.log)) == ([], (), [], {})
+    assert math.isnan(flight.max_error_m)
+    assert math.isnan(flight.rms_error_m)
+    assert math.isnan(flight.landing_error_m)
+    assert "refused" in str(flight)
+    with pytest.raises(ConfigError, match="has no samples: arming refused"):
+        flight.always("altitude_m < 2")
+
+
+def test_flight_of_a_vehicle_that_was_never_armed_is_empty(world: World) -> None:
+    flight = world.flight()
+    assert not flight.log
+    with pytest.raises(ConfigError, match="the vehicle was not armed"):
+        flight.at(0.0)
+
+
+def test_figures_equal_those_of_the_summary(flight: Flight) -> None:
+    summary = summarise(flight_of(flight.log.content, "log"), flight.plan, RunInfo(flight.outcome, "square"))
+    assert flight.completed
+    assert flight.reached == [row["seq"] for row in summary["waypoints"] if row["reached"]]
+    assert flight.max_error_m == pytest.approx(summary["max_tracking_error_m"], abs=1e-6)
+    assert flight.rms_error_m == pytest.approx(summary["rms_tracking_error_m"], abs=1e-6)
+    assert flight.duration_s == pytest.approx(summary["sim_time_s"], abs=1e-6)
+
+
+def test_signals_agree_with_the_log(flight: Flight) -> None:
+    position = flight.log["vehicle_local_position"]
+    signals = flight.signals
+    assert np.array_equal(signals.values["altitude_m"], -position["z"])
+    assert np.array_equal(signals.time_s, position.time_s)
+    assert np.all(np.diff(signals.time_s) > 0.0)
+    sample = flight.at(float(signals.time_s[100]))
+    assert sample.altitude_m == signals.values["altitude_m"][100]
+    part = flight.between(5.0, 6.0)
+    assert part.time_s[0] >= 5.0
+    assert part.time_s[-1] <= 6.0
+    assert len(part.values["mode"]) == len(part.time_s)
+
+
+def test_modes_and_events_are_in_order(flight: Flight) -> None:
+    assert [span.mode for span in flight.modes][:2] == ["HOLD", "MISSION"]
+    assert all(one.end_s == two.begin_s for one, two in zip(flight.modes, flight.modes[1:], strict=False))
+    names = [event.name for event in flight.events]
+    assert names.index("takeoff") < names.index("item_1") < names.index("landing")
+    times_s = [event.time_s for event in flight.events]
+    assert times_s == sorted(times_s)
+
+
+def test_violation_is_an_assertion_with_the_values(flight: Flight) -> None:
+    assert flight.always("altitude_m < 50").margin > 0.0
+    assert flight.eventually("landed within 120 s of takeoff").holds
+    assert flight.until("armed", "landed").holds
+    assert flight.within("altitude_m > 2", "landed", limit_s=120.0).holds
+    with pytest.raises(PropertyViolationError, match=r"violated at t = .*\n.*altitude_m = "):
+        flight.always("altitude_m < 1 after takeoff")
+
+
+def test_sample_before_the_flight_is_an_error(flight: Flight) -> None:
+    with pytest.raises(IndexError, match="the flight begins at"):
+        flight.at(-1.0)
+
+
+# ---------------------------------------------------------------------- log
+
+
+def test_topics_equal_those_of_pyulog(flight: Flight, tmp_path: Path) -> None:
+    path = tmp_path / "flight.ulg"
+    path.write_bytes(flight.log.content)
+    reference = ULog(str(path))
+    assert set(flight.log) == {item.name for item in reference.data_list}
+    for item in reference.data_list:
+        topic = flight.log[item.name]
+        assert np.array_equal(topic.time_s, item.data["timestamp"] * 1e-6)
+        for key, values in item.data.items():
+            name, bracket, index = key.partition("[")
+            if bracket:
+                np.testing.assert_array_equal(topic[name][:, int(index.rstrip("]"))], values)
+            elif key != "timestamp":
+                np.testing.assert_array_equal(topic[name], values)
+    assert flight.log.parameters == reference.initial_parameters
+    assert flight.texts == [text.message for text in reference.logged_messages]
+
+
+def test_unknown_names_list_what_there_is(flight: Flight) -> None:
+    with pytest.raises(KeyError, match="no topic speed; it has .*vehicle_local_position"):
+        flight.log["speed"]
+    with pytest.raises(KeyError, match="topic vehicle_local_position has no field speed; it has .*vz"):
+        flight.log["vehicle_local_position"]["speed"]
+
+
+@pytest.mark.parametrize(
+    ("field", "unit"),
+    [
+        ("vx", "m/s"), ("z", "m"), ("torque_n_m", "N m"), ("thrust_n", "N"), ("rotor_rad_s", "rad/s"),
+        ("accel_rad_s2", "rad/s²"), ("voltage_v", "V"), ("wait_us", "µs"), ("q", ""), ("nav_state", ""),
+        ("distance_m", "m"), ("lat", "°"), ("alt", "m"),
+    ],
+)  # fmt: skip
+def test_units_follow_from_the_names(field: str, unit: str) -> None:
+    assert unit_of(field) == unit
+
+
+def test_setup_text_is_what_was_changed() -> None:
+    assert Setup(seed=2, params={"A": 1.0}).changed() == {"seed": 2, "params": {"A": 1.0}}
