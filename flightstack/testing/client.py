@@ -23,7 +23,15 @@ STREAM_STEP_S = 0.05
 
 
 class RefusedError(AssertionError):
-    """The vehicle refused a request, or did not answer it."""
+    """The vehicle refused a request, or did not answer it.
+
+    >>> from flightstack.testing import RefusedError, World
+    >>> try:
+    ...     World().start_mission()
+    ... except RefusedError as error:
+    ...     print(error.is_silent, error.reason)
+    False no mission is loaded
+    """
 
     def __init__(self, what: str, answer: Answer) -> None:
         super().__init__(f"{what} {'not answered' if answer.silent else 'refused'}: {answer.reason}")
@@ -34,7 +42,15 @@ class RefusedError(AssertionError):
 
 
 class Client:
-    """One client of the vehicle. ``name`` also names its link in scenario files."""
+    """One client of the vehicle. ``name`` also names its link in scenario files.
+
+    >>> from flightstack.testing import World
+    >>> world = World(telemetry=True)
+    >>> tablet = world.add_client("tablet")
+    >>> world.run_for(1.0)
+    >>> tablet.received["ATTITUDE"].roll, tablet.counts["ATTITUDE"] > 10
+    (0.0, True)
+    """
 
     def __init__(self, name: str, address: PeerAddress, link: Link, is_companion: bool) -> None:
         self.name = name

@@ -68,7 +68,36 @@ class Sample(NamedTuple):
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight from arming to disarming. Times are simulated seconds since the start of the world."""
+    """A flight from arming to disarming. Times are simulated seconds since the start of the world.
+
+    >>> from flightstack.testing import World
+    >>> with World(vehicle="x_quad") as world:
+    ...     flight = world.fly("hop")
+    >>> flight.outcome, flight.reached, flight.max_error_m < 0.1, flight.landing_error_m < 0.1
+    ('completed', [0, 1], True, True)
+    >>> flight.modes[0].mode, flight.texts[0], flight.texts_above(4)
+    ('HOLD', 'Armed', [])
+
+    The log, and the signals at one time:
+
+    >>> flight.log["vehicle_local_position"].units["vx"], flight.log["vehicle_local_position"]["vx"].shape[0] > 100
+    ('m/s', True)
+    >>> flight.at(1.0).armed, flight.between(1.0, 2.0).values["armed"].tolist()[:2]
+    (True, [True, True])
+
+    Properties:
+
+    >>> flight.always("altitude_m < 2").holds, flight.eventually("landed within 20 s of takeoff").holds
+    (True, True)
+    >>> flight.until("armed", "landed").holds, flight.within("altitude_m > 0.3", "landed", limit_s=20.0).holds
+    (True, True)
+    >>> from flightstack.testing import PropertyViolationError
+    >>> try:
+    ...     flight.always("climb_m_s < 0.3")
+    ... except PropertyViolationError as error:
+    ...     print(error.margin.prop, error.margin.holds)
+    always climb_m_s < 0.3 False
+    """
 
     log: Log
     """Every topic as arrays; ``log.content`` are the bytes of the ULog file."""

@@ -102,9 +102,14 @@ class Link:
 
     >>> link = Link(seed=1)
     >>> link.loss(0.3)
+    >>> link.duplication(0.1)
+    >>> link.reordering(0.1)
+    >>> link.garbage(0.01)
+    >>> link.delay_s(0.05)
     >>> link.from_vehicle.cut()
     >>> link.from_vehicle.conditions.is_cut, link.to_vehicle.conditions.is_cut
     (True, False)
+    >>> link.restore()
     """
 
     def __init__(self, seed: int) -> None:

@@ -52,7 +52,17 @@ class Verdict:
 
 
 def run_scenario(scenario: Scenario, seed: int | None = None) -> Verdict:
-    """Fly a scenario with a seed, by default its first; raise ConfigError if it cannot begin."""
+    """Fly a scenario with a seed, by default its first; raise ConfigError if it cannot begin.
+
+    >>> from pathlib import Path
+    >>> from flightstack.testing import is_scenario, load_scenario
+    >>> path = Path("low.toml")
+    >>> size = path.write_text('plan = "hop"\\n[expect]\\nalways = ["altitude_m < 2"]\\n')
+    >>> is_scenario(path), load_scenario(path).seeds
+    (True, (1,))
+    >>> run_scenario(load_scenario(path)).passed
+    True
+    """
     seed = scenario.seed if seed is None else seed
     with World(scenario.setup(seed)) as world:
         for client in scenario.client:

@@ -46,7 +46,14 @@ _CONNECT_LIMIT_S = 10.0
 
 
 class ConditionTimeoutError(AssertionError):
-    """A condition did not come true within its limit of simulated time."""
+    """A condition did not come true within its limit of simulated time.
+
+    >>> try:
+    ...     World().run_until("armed", timeout_s=1.0)
+    ... except ConditionTimeoutError as error:
+    ...     print(str(error).partition(";")[0])
+    'armed' did not come true within 1 s of simulated time
+    """
 
 
 class World:
@@ -54,6 +61,39 @@ class World:
 
     Time is simulated everywhere, links and telemetry included: no call waits for the machine's clock. A request such
     as ``arm`` advances time only if its answer needs time, as over a link with a delay.
+
+    Requests and time:
+
+    >>> world = World(vehicle="x_quad", seed=2)
+    >>> world.param_set("MIS_TAKEOFF_ALT", 3.0)
+    >>> world.takeoff()
+    >>> world.run_until("altitude_m > 2.5", timeout_s=10.0).armed
+    True
+    >>> world.goto(2.0, 0.0)
+    >>> world.run_for(3.0)
+    >>> round(world.state.north_m), world.state.mode, world.texts
+    (2, 'HOLD', ['Armed', 'Takeoff detected'])
+
+    Links, faults and other clients:
+
+    >>> tablet = world.add_client("tablet")
+    >>> world.link.delay_s(0.1)
+    >>> world.fault("link loss 0.3", for_s=1.0)
+    >>> world.rtl()
+    >>> world.run_until("not armed").landed, tablet.texts[-1]
+    (True, 'Disarmed')
+    >>> [event.name for event in world.events]
+    ['link_loss', 'link_loss_end']
+
+    Missions:
+
+    >>> world.link.restore()
+    >>> world.upload("hop")
+    >>> len(world.download())
+    2
+    >>> world.fly().completed
+    True
+    >>> world.close()
     """
 
     def __init__(

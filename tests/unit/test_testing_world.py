@@ -13,7 +13,14 @@ from pyulog import ULog
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
 from flightstack.plan import MissionType
-from flightstack.testing import ConditionTimeoutError, Flight, PropertyViolationError, RefusedError, Setup, World
+from flightstack.testing import (
+    ConditionTimeoutError,
+    Flight,
+    PropertyViolationError,
+    RefusedError,
+    Setup,
+    World,
+)
 from flightstack.testing.log import unit_of
 from gcs_cli.report.analysis import flight_of
 from gcs_cli.report.summary import RunInfo, summarise
@@ -49,7 +56,7 @@ def test_requests_change_the_state(world: World) -> None:
 
 
 def test_refusal_has_the_reason_of_the_vehicle(world: World) -> None:
-    with pytest.raises(RefusedError, match="^the start of the mission refused: ") as caught:
+    with pytest.raises(RefusedError, match=r"^the start of the mission refused: ") as caught:
         world.start_mission()
     assert caught.value.reason
     assert not caught.value.is_silent
@@ -107,7 +114,9 @@ def test_condition_that_stays_false_ends_with_the_state(world: World) -> None:
     before_s = world.time_s
     with pytest.raises(ConditionTimeoutError) as caught:
         world.run_until("altitude_m > 2", timeout_s=0.5)
-    assert str(caught.value).startswith("'altitude_m > 2' did not come true within 0.5 s of simulated time; t = ")
+    assert str(caught.value).startswith(
+        "'altitude_m > 2' did not come true within 0.5 s of simulated time; t = "
+    )
     assert 0.5 <= world.time_s - before_s <= 0.515  # one more period: the limit itself counts
 
 
@@ -322,9 +331,9 @@ def test_topics_equal_those_of_pyulog(flight: Flight, tmp_path: Path) -> None:
 
 
 def test_unknown_names_list_what_there_is(flight: Flight) -> None:
-    with pytest.raises(KeyError, match="no topic speed; it has .*vehicle_local_position"):
+    with pytest.raises(KeyError, match=r"no topic speed; it has .*vehicle_local_position"):
         flight.log["speed"]
-    with pytest.raises(KeyError, match="topic vehicle_local_position has no field speed; it has .*vz"):
+    with pytest.raises(KeyError, match=r"topic vehicle_local_position has no field speed; it has .*vz"):
         flight.log["vehicle_local_position"]["speed"]
 
 
