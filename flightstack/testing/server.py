@@ -26,6 +26,7 @@ from gcs_cli.report.run_directory import LOG_NAME, SIMULATOR, STACK
 
 READY = b"ready\n"
 """Line of the guard when both processes have their ports."""
+_GUARD_LOG = "guard.log"
 _STEP_S = 0.1
 _TAIL_LINES = 3
 
@@ -48,7 +49,7 @@ class Server:
         """Directory of the flight logs and the output of the processes."""
         self.instance = 0
         """Number from which the ports derive."""
-        self._kept_in: Path | None = None
+        self._kept_in: list[Path] = []
         self._guard: subprocess.Popen[bytes] | None = None
         end_s = time.monotonic() + timeout_s
         taken: set[int] = set()
@@ -88,7 +89,7 @@ class Server:
     @property
     def output(self) -> str:
         """Output of both processes."""
-        files = [self.folder / f"{name}.log" for name in (SIMULATOR, STACK)]
+        files = [self.folder / name for name in (f"{SIMULATOR}.log", f"{STACK}.log", _GUARD_LOG)]
         return "".join(path.read_text(errors="replace") for path in files if path.exists())
 
     def stop(self) -> None:
@@ -97,12 +98,12 @@ class Server:
             return
         guard, self._guard = self._guard, None
         guard.communicate()  # closes its standard input
-        if self._kept_in is not None:
-            shutil.copytree(self.folder, self._kept_in, dirs_exist_ok=True)
+        for folder in self._kept_in:
+            shutil.copytree(self.folder, folder, dirs_exist_ok=True)
 
     def keep_in(self, folder: Path) -> None:
         """Copy the files to ``folder`` after the processes have ended."""
-        self._kept_in = folder
+        self._kept_in.append(folder)
 
     def lines(self) -> list[str]:
         """Return links and last output, for the report of a failed test."""
@@ -128,7 +129,7 @@ class Server:
         command = own_program(
             "flightstack.testing.server_guard", str(self.folder), json.dumps(simulator), json.dumps(stack)
         )
-        with (self.folder / "guard.log").open("wb") as errors:
+        with (self.folder / _GUARD_LOG).open("wb") as errors:
             return subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, start_new_session=True
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import shlex
 import subprocess
@@ -14,6 +15,7 @@ from pyulog import ULog
 
 from gcs_cli.link.tlog import decode_records
 from gcs_cli.transfers.plan_files import example_plans
+from tests.support.console_blocks import File, steps
 from tests.support.plugin_run import PLUGIN, load, prepare, run, section
 
 pytest_plugins = ["pytester"]
@@ -358,3 +360,17 @@ def test_world_options_reach_the_world(outside: pytest.Pytester) -> None:
             assert fast.gcs.counts["ATTITUDE"] > 5 * slow.gcs.counts["ATTITUDE"]
     """)
     run(outside).assert_outcomes(passed=1)
+
+
+def test_examples_of_the_page_pass(outside: pytest.Pytester) -> None:
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "pytest.md"
+    for step in steps(page):
+        assert isinstance(step, File)
+        (outside.path / step.name).write_text(step.text)
+    run(outside).assert_outcomes(passed=5)
+
+
+@pytest.mark.parametrize("name", ["flightstack", "sim_bridge", "gcs_cli"])
+def test_package_may_be_imported_before_pytest(name: str) -> None:
+    """pytest marks all packages of a plugin's distribution for rewriting, and warns of those imported before."""
+    assert "PYTEST_DONT_REWRITE" in str(importlib.import_module(name).__doc__)
