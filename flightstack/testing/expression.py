@@ -49,10 +49,17 @@ _LARGEST = 1e300
 NUMBER, TEXT, CONDITION = "a number", "a mode", "a condition"
 _KINDS = {"mode": TEXT, "armed": CONDITION, "landed": CONDITION, "failsafe": CONDITION}
 """What a signal is; the others are numbers."""
+
+
+def _hypot(a: Any, b: Any) -> Any:
+    """Return √(a² + b²) with the same bits on every machine, which libm's hypot has not."""
+    return np.sqrt(np.multiply(a, a) + np.multiply(b, b))
+
+
 _FUNCTIONS: dict[str, tuple[Callable[..., Any], int, float]] = {
     "abs": (np.abs, 1, 1),
     "sqrt": (np.sqrt, 1, 1),
-    "hypot": (np.hypot, 2, math.inf),
+    "hypot": (_hypot, 2, math.inf),
     "min": (np.minimum, 2, math.inf),
     "max": (np.maximum, 2, math.inf),
 }

@@ -136,7 +136,6 @@ NOT_FLIGHT = (
 )
 ALLOWED = {
     ("flightstack/params/vehicle.py", "linalg"),  # whether a vehicle is accepted: the rank of its rotors
-    ("flightstack/testing/expression.py", "hypot"),  # margins of a flown flight
     ("sim_bridge/plant/turbulence.py", "random"),  # PCG64, integers alone
 }
 
