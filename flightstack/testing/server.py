@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import NoReturn
 
 from flightstack.core.port_numbers import api_client_port, ground_station_port
+from flightstack.params.behaviour import SPECS
 from flightstack.process.command_line import own_program
 from flightstack.testing.instances import ServerError, free_instance
 from flightstack.testing.setup import Setup
@@ -29,6 +30,7 @@ READY = b"ready\n"
 _GUARD_LOG = "guard.log"
 _STEP_S = 0.1
 _TAIL_LINES = 3
+_LOSS_TIMEOUTS = ("COM_DL_LOSS_T", "COM_OF_LOSS_T", "COM_RC_LOSS_T")
 
 
 class _BusyError(ServerError):
@@ -40,6 +42,8 @@ class Server:
 
     def __init__(self, setup: Setup, folder: Path, *, speed: float = 1.0, timeout_s: float = 180.0) -> None:
         """Start both at ``speed`` times real time, with their files in ``folder``, and wait until the vehicle can arm.
+
+        The vehicle's timeouts for lost links are those of ``client_timeouts``, unless ``setup`` has them.
 
         Raise ServerError if a process ends, or after ``timeout_s`` of wall time. Kernels that are not compiled yet
         take a minute.
@@ -205,5 +209,21 @@ def fly_options(setup: Setup, instance: int, speed: float) -> FlyOptions:
         ideal_rotors=setup.ideal_rotors,
         inner_hz=setup.inner_hz,
         outer_hz=setup.outer_hz,
-        param=[f"{name}={value!r}" for name, value in setup.params.items()],
+        param=[f"{name}={value!r}" for name, value in (client_timeouts(speed) | dict(setup.params)).items()],
     )
+
+
+def client_timeouts(speed: float) -> dict[str, float]:
+    """Return the loss timeouts that give a client on the wall clock the same time at any speed.
+
+    The vehicle counts simulated time: at 5 times real time, the timeout of setpoints, 1 s, is 0.2 s of wall time.
+
+    >>> client_timeouts(5.0)
+    {'COM_DL_LOSS_T': 50, 'COM_OF_LOSS_T': 5.0, 'COM_RC_LOSS_T': 2.5}
+    """
+    found: dict[str, float] = {}
+    for name in _LOSS_TIMEOUTS:
+        spec = SPECS[name]
+        value = min(spec.default * max(speed, 1.0), spec.high)
+        found[name] = int(value) if spec.is_integer else value
+    return found

@@ -6,19 +6,10 @@ from pathlib import Path
 
 from flightstack.core.port_numbers import api_client_port, ground_station_port, tcp_port
 from flightstack.testing.instances import free_instance
+from flightstack.testing.server import client_timeouts
 from tests.support.process import Process
 
 HOST = "127.0.0.1"
-
-
-def timeouts(speed: float) -> list[str]:
-    """Return options that give a client the same wall time at any speed: losses count simulated time."""
-    values = {
-        "COM_DL_LOSS_T": round(10 * speed),
-        "COM_OF_LOSS_T": 1.0 * speed,
-        "COM_RC_LOSS_T": 0.5 * speed,
-    }
-    return [f"--param={name}={value}" for name, value in values.items()] if speed > 1.0 else []
 
 
 class RealVehicle:
@@ -34,9 +25,10 @@ class RealVehicle:
         self.log = directory / "flight.ulg"
         number = ("--instance", str(self.instance))
         self.simulator = Process("sim_bridge", *number, "--speed", str(speed))
+        losses = [f"--param={name}={value}" for name, value in client_timeouts(speed).items()]
         self.stack = Process(
-            "flightstack", *number, "--log", str(self.log), "--state", str(directory), *timeouts(speed), *options,
-        )  # fmt: skip
+            "flightstack", *number, "--log", str(self.log), "--state", str(directory), *losses, *options
+        )
         try:
             self.stack.wait_for("flightstack: paper_quad")
         except AssertionError:
