@@ -83,8 +83,8 @@ class _Run:
             )
         end_s = scenario.duration_s or limit_s or _DEFAULT_LIMIT_S
         flew = False
-        while world.time_s < end_s and (world.state.armed or not flew):
-            flew = flew or world.state.armed
+        while world.time_s < end_s and (world.engine.stack.now.status.armed or not flew):
+            flew = flew or world.engine.stack.now.status.armed
             if self._step():
                 break
         return None
