@@ -15,6 +15,13 @@ class ConfigError(Exception):
         super().__init__(where + problem)
         self._parts = (str(file), key, problem)
 
+    def within(self, file: object) -> ConfigError:
+        """Return the error of an option that ``file`` gives: ``--inner-hz`` is its key ``inner_hz``."""
+        option, value, problem = self._parts
+        if not option.startswith("--"):
+            return ConfigError(file, "", str(self))
+        return ConfigError(file, option.removeprefix("--").replace("-", "_"), f"{value}: {problem}")
+
     def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
         """Support pickling: the default passes the text alone to a constructor with three arguments."""
         return type(self), self._parts
