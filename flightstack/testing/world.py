@@ -312,7 +312,7 @@ class World:
     # ------------------------------------------------------------------ faults
 
     def fault(self, text: str, *, for_s: float | None = None) -> None:
-        """Begin a fault now, such as ``"rotor 2 dead"`` or ``"link loss 0.3"``; docs/how-to/faults.md lists them.
+        """Begin a fault now, such as ``"rotor:2:off"`` or ``"link loss 0.3"``; docs/how-to/faults.md lists them.
 
         With ``for_s`` it ends after that simulated time. Raise ConfigError for an unknown fault.
         """
