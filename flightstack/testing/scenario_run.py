@@ -57,11 +57,12 @@ def run_scenario(scenario: Scenario, seed: int | None = None) -> Verdict:
     with World(scenario.setup(seed)) as world:
         for client in scenario.client:
             world.add_client(client.name, is_companion=client.companion)
-        outcome = _Run(world, scenario).fly()
-        flight = world.flight(outcome)
+        run = _Run(world, scenario)
+        flight = world.flight(run.fly())
         last = world.state
         checks = judge(scenario.expect, flight, last, world.events)
-        return Verdict(scenario, seed, flight, last, checks)
+        missed = run.missed() if scenario.expect.refusal is None else ()
+        return Verdict(scenario, seed, flight, last, (*checks, *missed))
 
 
 class _Run:
@@ -88,6 +89,12 @@ class _Run:
             if self._step():
                 break
         return None
+
+    def missed(self) -> tuple[Check, ...]:
+        """Return a failed check for each event that did not happen: what it was to test was not flown."""
+        pending = [event for event, _ in self._waiting] + [event for _, event in self._due]
+        missed = [index for index, event in enumerate(self._scenario.event) if event in pending]
+        return tuple(Check(f"event[{index}]", False, "did not happen in this flight") for index in missed)
 
     def _step(self) -> bool:
         """Fire the events that are due, and run one outer tick; return True at the end of the scenario's duration."""
