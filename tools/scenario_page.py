@@ -44,7 +44,7 @@ TABLES = (
     ("`[expect]`", Expect, ""),
 )
 EXPRESSIONS = """
-Expressions compare signals with numbers and modes: `<`, `<=`, `>`, `>=`, `==`, `!=`, `and`, `or`, `not`, `+ - * / **`,
+Expressions compare signals with numbers and modes: `<`, `<=`, `>`, `>=`, `==`, `!=`, `and`, `or`, `not`, `+ - * /`,
 and the functions `abs`, `sqrt`, `hypot`, `min`, `max`. In `always` and `eventually`, `after EVENT` and
 `within 20 s of EVENT` at the end restrict the time.
 

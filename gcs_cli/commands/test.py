@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from flightstack.process.command_line import make_app
-from gcs_cli.errors import USAGE, CliError
+from gcs_cli.errors import INTERRUPTED, USAGE, CliError
 from gcs_cli.settings import JsonOption, settings_of
 
 app = make_app(add_completion=False)
@@ -74,15 +74,27 @@ def fly_scenarios(
     _check_file("--junit", junit, (".xml",))
     _check_file("--report", report, (".html", ".htm"))
     jobs = jobs or default_jobs()
-    with Pool(jobs) as pool:  # its first worker imports while this process does
-        from gcs_cli.fly.fly_display import FlyConsole
-        from gcs_cli.scenarios.run import TestOptions, run_once, run_watching
+    try:
+        with Pool(jobs) as pool:  # its first worker imports while this process does
+            from gcs_cli.fly.fly_display import FlyConsole
+            from gcs_cli.scenarios.run import TestOptions, run_once, run_watching
 
-        options = TestOptions(
-            tuple(paths or [Path()]), jobs, expression, seed, repeat, junit, report, keep, as_json, exitfirst
-        )
-        run = run_watching if watch else run_once
-        code = run(pool, options, FlyConsole(stderr=as_json, highlight=False))
+            options = TestOptions(
+                tuple(paths or [Path()]),
+                jobs,
+                expression,
+                seed,
+                repeat,
+                junit,
+                report,
+                keep,
+                as_json,
+                exitfirst,
+            )
+            run = run_watching if watch else run_once
+            code = run(pool, options, FlyConsole(stderr=as_json, highlight=False))
+    except KeyboardInterrupt:  # not in flight
+        raise CliError("interrupted", INTERRUPTED) from None
     raise typer.Exit(code)
 
 

@@ -173,7 +173,11 @@ class _Collected:
         """Add a result, and write its files if it failed."""
         case = self._cases[message.case]
         result = message.result or not_flown(message.reason)
-        kept = self._keeper.keep(case, result)
+        kept = None
+        try:
+            kept = self._keeper.keep(case, result)
+        except (OSError, CliError) as error:
+            self._display.note(f"gcs: the log of {case.name} is not kept: {error}")
         self._rows[message.case] = Row(case, replace(result, log=b"", report=""), kept)
         self._display.end(case)
         while self._shown in self._rows:

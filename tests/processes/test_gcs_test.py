@@ -109,6 +109,15 @@ def test_exitfirst_ends_at_the_first_failure_in_order(folder: Path, jobs: int) -
     assert ended.returncode == 1
 
 
+def test_a_log_that_cannot_be_kept_does_not_end_the_run(folder: Path) -> None:
+    write(bad=BAD, good=GOOD)
+    Path("kept").touch()
+    ended = gcs("test", "-j", 1, "--keep", "kept")
+    assert "gcs: the log of bad-seed1 is not kept: " in ended.stdout
+    assert "PASS  good" in ended.stdout
+    assert ended.returncode == 1
+
+
 def has_ended(process: int) -> bool:
     """Wait for the end of a process that is not a child; BOUND_S is a hang guard."""
     try:
