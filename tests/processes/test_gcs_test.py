@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import pty
 import select
 import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -147,6 +150,35 @@ def test_ctrl_c_shows_the_flights_that_are_over(folder: Path) -> None:
     assert "interrupted: only the flights that were over are shown" in Path("r.html").read_text(
         encoding="utf-8"
     )
+
+
+def read_until(terminal: int, text: bytes) -> bytes:
+    """Read a terminal up to a text; BOUND_S is a hang guard."""
+    seen = b""
+    while text not in seen:
+        assert select.select([terminal], [], [], BOUND_S)[0], seen
+        seen += os.read(terminal, 4096)
+    return seen
+
+
+def test_ctrl_c_restores_the_terminal(folder: Path) -> None:
+    write(a=GOOD, b=ENDLESS)
+    terminal, inner = pty.openpty()
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "gcs_cli", "test", "-j", "1"],
+            stdin=inner, stdout=inner, stderr=inner,
+            env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"},
+        )  # fmt: skip
+        seen = read_until(terminal, b"b seed 1")  # under way
+        assert b"\x1b[?25l" in seen  # the cursor is hidden
+        process.send_signal(signal.SIGINT)
+        seen = read_until(terminal, b"of 2 flights were flown")
+        assert b"\x1b[?25h" in seen
+        assert process.wait(BOUND_S) == 130
+    finally:
+        os.close(inner)
+        os.close(terminal)
 
 
 def test_sigkill_leaves_no_process_and_no_file(folder: Path) -> None:
