@@ -224,7 +224,7 @@ def _check_texts(scenario: Scenario) -> None:
         setup = scenario.setup(scenario.seed)
         vehicle = setup.check()
     except ConfigError as error:
-        raise error.within(scenario.path) from None
+        raise error.within(scenario.path, {"--param": "params"}) from None
     expect = scenario.expect
     checks: list[tuple[str, str, Callable[[str], object]]] = [
         (f"expect.{name}[{index}]", text, check)
