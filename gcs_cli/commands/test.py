@@ -20,7 +20,7 @@ def fly_scenarios(
     paths: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[PATH]...",
+            metavar="PATH",
             help="Scenario files, and folders that are searched for them.  [default: the working directory]",
             show_default=False,
         ),
