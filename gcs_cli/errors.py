@@ -9,6 +9,8 @@ USAGE = 2
 """Wrong flag, bad file, busy port."""
 NO_ANSWER = 3
 """No vehicle, or no answer in time."""
+INTERRUPTED = 130
+"""``gcs test`` after Ctrl-C: the exit code of a shell for a command that SIGINT ended."""
 
 
 class CliError(Exception):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 # the packages of the extras by name: ``pip install 'flightstack[…]'`` needs a release on PyPI
 INSTALL_MULTIBODY = "pip install mujoco pillow imageio-ffmpeg"
 INSTALL_FIRMWARE = "pip install ziglang unicorn"
@@ -14,6 +16,17 @@ class ConfigError(Exception):
         where = f"{file}: {key}: " if key else f"{file}: "
         super().__init__(where + problem)
         self._parts = (str(file), key, problem)
+
+    def within(self, file: object, keys: Mapping[str, str]) -> ConfigError:
+        """Return the error of an option that ``file`` gives: ``--inner-hz`` is its key ``inner_hz``.
+
+        ``keys``: keys of options with another name.
+        """
+        option, value, problem = self._parts
+        if not option.startswith("--"):
+            return ConfigError(file, "", str(self))
+        key = keys.get(option, option.removeprefix("--").replace("-", "_"))
+        return ConfigError(file, key, f"{value}: {problem}")
 
     def __reduce__(self) -> tuple[type[ConfigError], tuple[str, str, str]]:
         """Support pickling: the default passes the text alone to a constructor with three arguments."""

@@ -20,7 +20,6 @@ from flightstack.testing.expression import SIGNALS
 from flightstack.testing.log import Log, LoggedText
 from flightstack.testing.properties import Margin, PropertyViolationError, Signals, parse_window
 from flightstack.testing.setup import Setup
-from gcs_cli.report.analysis import flight_of
 from gcs_cli.report.flight_data import Flight as FlightData
 from gcs_cli.report.flight_figures import rms
 from gcs_cli.report.flight_outcome import Outcome
@@ -107,10 +106,10 @@ class Flight:
     caused: tuple[Event, ...] = ()
     """Faults and changes of links that the test caused."""
 
-    @cached_property
+    @property
     def data(self) -> FlightData:
         """The flight as ``gcs`` reads it from its log; empty if the vehicle was never armed."""
-        return FlightData() if not self.log.content else flight_of(self.log.content, "the flight log")
+        return self.log.flight
 
     # ------------------------------------------------------------------ outcome
 

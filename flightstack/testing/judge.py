@@ -16,7 +16,7 @@ from flightstack.plan import NAV_COMMANDS
 from flightstack.testing import properties
 from flightstack.testing.expression import Expression
 from flightstack.testing.flight import Event, Flight
-from flightstack.testing.properties import Margin, parse_window
+from flightstack.testing.properties import Margin, parse_window, values_around
 from flightstack.testing.scenario import SEVERITIES, Expect
 from flightstack.testing.state import State
 from gcs_cli.report.flight_outcome import Code
@@ -97,7 +97,9 @@ def _limits(expect: Expect, flight: Flight) -> Iterator[Check]:
         limit = getattr(expect, name)
         if limit is not None:
             value = figure(flight)
-            yield Check(f"{name} ≤ {limit:g}", value <= limit, f"{value:.3f} m", limit - value, limit)
+            passed = value <= limit
+            where = "" if passed or name not in _DISTANCES else _farthest(flight, *_DISTANCES[name](flight))
+            yield Check(f"{name} ≤ {limit:g}", passed, f"{value:.3f} m{where}", limit - value, limit)
     if expect.duration_s is not None:
         low, high = expect.duration_s
         value = flight.duration_s
@@ -111,7 +113,8 @@ def _property(kind: str, text: str, flight: Flight) -> Check:
         margin: Margin = check(flight.signals, *parse_window(text))
     except ConfigError as error:
         return Check(f"{kind} {text}", False, str(error))
-    found = f"margin {margin.margin:.3g} at t = {margin.time_s:.2f} s"
+    amount = "holds" if math.isinf(margin.margin) else f"margin {margin.margin:.3g}"
+    found = f"{amount} at t = {margin.time_s:.2f} s"
     if not margin.holds:
         found = f"violated at t = {margin.time_s:.2f} s\n{margin.detail}"
     limit = _number_in(text)
@@ -132,7 +135,8 @@ def _number_in(text: str) -> float | None:
 def _texts(expect: Expect, flight: Flight) -> Iterator[Check]:
     if expect.no_text_above is not None:
         worse = flight.texts_above(SEVERITIES.index(expect.no_text_above))
-        found = "; ".join(f"{SEVERITIES[text.severity]}: {text.text}" for text in worse[:_SHOWN_EVENTS])
+        shown = (f"t = {text.time_s:.2f} s, {SEVERITIES[text.severity]}: {text.text}" for text in worse)
+        found = "; ".join(list(shown)[:_SHOWN_EVENTS])
         yield Check(f"no text above {expect.no_text_above}", not worse, found or "none")
     for text in expect.texts:
         yield Check(f"text {text!r}", any(text in said for said in flight.texts), "; ".join(flight.texts))
@@ -140,17 +144,39 @@ def _texts(expect: Expect, flight: Flight) -> Iterator[Check]:
 
 def corridor_m(flight: Flight) -> float:
     """Return the largest distance of the flight from the path of its plan: from home over its items; NaN of none."""
+    _, distance_m = _off_path(flight)
+    return float(distance_m.max()) if len(distance_m) else math.nan
+
+
+def _off_path(flight: Flight) -> tuple[FloatArray, FloatArray]:
+    """Return times and distances from the path of the plan in flight."""
     data = flight.data
     time_s, position = data.position
-    flown = position[data.flying(time_s)]
+    flying = data.flying(time_s)
     places = [np.zeros(3)]
     for item in flight.plan.items:
         place = item_ned_m(item, data) if item.command in NAV_COMMANDS else None
         if place is not None:
             places.append(place)
-    if len(places) < 2 or not len(flown):
-        return math.nan
-    return float(_distances_m(flown, np.array(places)).max())
+    if len(places) < 2:
+        return np.zeros(0), np.zeros(0)
+    return time_s[flying], _distances_m(position[flying], np.array(places))
+
+
+def _off_setpoint(flight: Flight) -> tuple[FloatArray, FloatArray]:
+    """Return times and distances from the position setpoint in flight."""
+    error = flight.data.tracking_error()
+    return error.time_s, error.values[:, 0]
+
+
+def _farthest(flight: Flight, time_s: FloatArray, distance_m: FloatArray) -> str:
+    """Return when a distance is largest, and the values around."""
+    if not len(time_s):
+        return ""
+    signals = flight.signals
+    at_s = flight.data.start_s + float(time_s[np.argmax(distance_m)])
+    at = min(int(np.searchsorted(signals.time_s, at_s - 1e-9)), len(signals.time_s) - 1)
+    return f" at t = {at_s:.2f} s\n{values_around(signals, _PLACE, at)}"
 
 
 def _distances_m(points: FloatArray, path: FloatArray) -> FloatArray:
@@ -170,3 +196,10 @@ _FIGURES: dict[str, Callable[[Flight], float]] = {
     "landing_error_m": lambda flight: flight.landing_error_m,
 }
 """Figures with a largest value."""
+_DISTANCES: dict[str, Callable[[Flight], tuple[FloatArray, FloatArray]]] = {
+    "corridor_m": _off_path,
+    "max_error_m": _off_setpoint,
+}
+"""Figures that are the largest of a distance over time."""
+_PLACE = ("mode", "north_m", "east_m", "altitude_m", "error_m")
+"""Signals that a failure of a distance shows."""

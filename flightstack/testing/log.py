@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from flightstack.core.contract import FloatArray
-from gcs_cli.report.analysis import parse_ulog
+from gcs_cli.report.analysis import flight_in, parse_ulog
+from gcs_cli.report.flight_data import Flight as FlightData
 
 Array: TypeAlias = np.ndarray[Any, np.dtype[Any]]
 
@@ -24,6 +26,8 @@ _ENDINGS = {
     "_rad_s2": "rad/s²", "_rad_s": "rad/s", "_m_s": "m/s", "_n_m": "N m", "_n": "N", "_us": "µs", "_hz": "Hz",
     "_v": "V", "_a": "A", "_mah": "mAh", "_m": "m", "_rad": "rad", "_s": "s",
 }  # fmt: skip
+_SOURCE = "the flight log"
+"""Name of the log in errors."""
 _ELEMENT = re.compile(r"(?P<name>\w+)\[(?P<index>\d+)\]")
 
 
@@ -90,13 +94,18 @@ class Log(Mapping[str, Topic]):
             self._read(content)
 
     def _read(self, content: bytes) -> None:
-        log = parse_ulog(content, "the flight log")
+        log = self._parsed = parse_ulog(content, _SOURCE)
         self._data = {item.name: item.data for item in log.data_list}
         self.parameters = dict(log.initial_parameters)
         self.texts = tuple(
             LoggedText(item.timestamp * 1e-6, item.log_level - ord("0"), item.message)
             for item in log.logged_messages
         )
+
+    @cached_property
+    def flight(self) -> FlightData:
+        """The flight as ``gcs`` reads it from its log; empty without one."""
+        return flight_in(self._parsed, self.content, _SOURCE) if self.content else FlightData()
 
     def __getitem__(self, name: str) -> Topic:
         if name not in self._data:

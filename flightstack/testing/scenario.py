@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+import shlex
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from flightstack.commander.failsafe import Failsafe
+from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
 from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, parse_home
 from flightstack.params.gains_file import DEFAULT_GAINS
 from flightstack.params.store import read_assignment
 from flightstack.params.toml_file import read_toml
-from flightstack.params.vehicle import DEFAULT_VEHICLE, load_vehicle
+from flightstack.params.vehicle import DEFAULT_VEHICLE
+from flightstack.testing.events import check_event
 from flightstack.testing.expression import Expression
 from flightstack.testing.faults import check_fault, check_link
 from flightstack.testing.orders import check_command
 from flightstack.testing.properties import parse_window
 from flightstack.testing.setup import Setup
 from flightstack.testing.toml_record import key, read_record
+from gcs_cli.report.flight_outcome import Code
 
 SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
+OUTCOMES = ("any", *Code, *Mode.__members__, *Failsafe.__members__)
 _TRIGGERS = ("at_s", "at_item", "when", "after")
 _EFFECTS = ("fault", "link", "command", "param", "upload", "power")
 
@@ -51,7 +57,7 @@ class Event:
     when: str | None = key(None, "trigger: an expression comes true")
     after: str | None = key(None, "trigger: an event of the world happens, such as `link_cut`")
     delay_s: float = key(0.0, "time from the trigger to the effect", low=0.0)
-    fault: str | None = key(None, "effect: a fault, such as `rotor 2 dead`")
+    fault: str | None = key(None, "effect: a fault, such as `rotor:2:off`")
     link: str | None = key(None, "effect: a change of a link, such as `cut` or `to_vehicle loss 0.3`")
     command: str | None = key(None, "effect: a request, such as `land`, `goto 5 0 10` or `mode HOLD`")
     param: str | None = key(None, "effect: a parameter, `NAME=VALUE`")
@@ -67,7 +73,7 @@ class Expect:
     """``[expect]``."""
 
     outcome: str = key("", "a code of summary.json, a flight mode in which it lands, or an active failsafe; "
-                           "`any` for none")  # fmt: skip
+                           "`any` for none", choices=OUTCOMES)  # fmt: skip
     refusal: str | None = key(None, "text of the reason with which the vehicle refuses to start")
     reached: tuple[int, ...] | None = key(None, "mission items in the order in which they are reached", low=0)
     corridor_m: float | None = key(None, "largest distance from the path of the plan", low=0.0)
@@ -127,6 +133,17 @@ class Scenario:
         """A seed for each flight."""
         return tuple(range(self.seed, self.seed + self.repeat))
 
+    def files(self) -> tuple[Path, ...]:
+        """Return the files on which the flights depend: scenario, plans, and those of vehicle and gains."""
+        setup = Setup(folder=self.path.parent)
+        plans = (self.plan, *(event.upload for event in self.event))
+        records = (_beside(name, self.path.parent) for name in (self.vehicle, self.gains))
+        return (
+            self.path,
+            *(setup.plan_path(plan) for plan in plans if plan is not None),
+            *(Path(name) for name in records if name.endswith(".toml")),
+        )
+
     def setup(self, seed: int) -> Setup:
         """Return the vehicle and conditions of the flight with ``seed``."""
         same = (
@@ -161,11 +178,17 @@ def _beside(name: str, folder: Path) -> str:
 
 
 def is_scenario(path: Path) -> bool:
-    """Return True for a TOML file with a table ``[expect]``."""
-    try:
-        return path.suffix == ".toml" and "expect" in tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+    """Return True for a TOML file with a table ``[expect]``, also for one that has errors in its syntax."""
+    if path.suffix != ".toml":
         return False
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return False
+    try:
+        return "expect" in tomllib.loads(text)
+    except (ValueError, RecursionError):
+        return any(line.strip() == "[expect]" for line in text.splitlines())
 
 
 def load_scenario(path: Path) -> Scenario:
@@ -197,13 +220,24 @@ def _check_event(path: Path, name: str, event: Event, clients: set[str]) -> None
 
 def _check_texts(scenario: Scenario) -> None:
     """Check everything that can be checked before a flight: plan, conditions, expressions, requests, faults."""
-    setup = scenario.setup(scenario.seed)
-    vehicle = load_vehicle(setup.vehicle)
-    setup.plant_options(vehicle)
+    try:
+        setup = scenario.setup(scenario.seed)
+        vehicle = setup.check()
+    except ConfigError as error:
+        raise error.within(scenario.path, {"--param": "params"}) from None
+    expect = scenario.expect
     checks: list[tuple[str, str, Callable[[str], object]]] = [
-        (name, text, Expression) for name, text in _expressions(scenario)
+        (f"expect.{name}[{index}]", text, check)
+        for name, check in (
+            ("always", _check_property),
+            ("eventually", _check_property),
+            ("at_end", Expression),
+        )
+        for index, text in enumerate(getattr(expect, name))
     ]
     by_key: dict[str, Callable[[str], object]] = {
+        "when": Expression,
+        "after": lambda text: check_event(text, is_live=True),
         "command": check_command,
         "fault": lambda text: check_fault(text, len(vehicle.rotors)),
         "link": check_link,
@@ -220,17 +254,14 @@ def _check_texts(scenario: Scenario) -> None:
             raise ConfigError(scenario.path, name, str(error).partition(": ")[2]) from None
 
 
-def _expressions(scenario: Scenario) -> Iterator[tuple[str, str]]:
-    """Yield the key and text of each expression."""
-    for index, event in enumerate(scenario.event):
-        if event.when is not None:
-            yield f"event[{index}].when", event.when
-    for name in ("always", "eventually", "at_end"):
-        for index, text in enumerate(getattr(scenario.expect, name)):
-            yield f"expect.{name}[{index}]", parse_window(text)[0]
+def _check_property(text: str) -> None:
+    expression, window = parse_window(text)
+    Expression(expression)
+    if window.event is not None:
+        check_event(window.event)
 
 
 def repeat_command(scenario: Scenario, seed: int) -> str:
     """Return the command that flies this scenario alone with this seed."""
     seeds = "" if scenario.repeat == 1 and seed == scenario.seed else f" --seed {seed} --repeat 1"
-    return f"gcs test {scenario.path}{seeds}"
+    return f"gcs test {shlex.quote(str(scenario.path))}{seeds}"

@@ -67,11 +67,12 @@ def run_scenario(scenario: Scenario, seed: int | None = None) -> Verdict:
     with World(scenario.setup(seed)) as world:
         for client in scenario.client:
             world.add_client(client.name, is_companion=client.companion)
-        outcome = _Run(world, scenario).fly()
-        flight = world.flight(outcome)
+        run = _Run(world, scenario)
+        flight = world.flight(run.fly())
         last = world.state
         checks = judge(scenario.expect, flight, last, world.events)
-        return Verdict(scenario, seed, flight, last, checks)
+        missed = run.missed() if scenario.expect.refusal is None else ()
+        return Verdict(scenario, seed, flight, last, (*checks, *missed))
 
 
 class _Run:
@@ -93,11 +94,17 @@ class _Run:
             )
         end_s = scenario.duration_s or limit_s or _DEFAULT_LIMIT_S
         flew = False
-        while world.time_s < end_s and (world.state.armed or not flew):
-            flew = flew or world.state.armed
+        while world.time_s < end_s and (world.engine.stack.now.status.armed or not flew):
+            flew = flew or world.engine.stack.now.status.armed
             if self._step():
                 break
         return None
+
+    def missed(self) -> tuple[Check, ...]:
+        """Return a failed check for each event that did not happen: what it was to test was not flown."""
+        pending = [event for event, _ in self._waiting] + [event for _, event in self._due]
+        missed = [index for index, event in enumerate(self._scenario.event) if event in pending]
+        return tuple(Check(f"event[{index}]", False, "did not happen in this flight") for index in missed)
 
     def _step(self) -> bool:
         """Fire the events that are due, and run one outer tick; return True at the end of the scenario's duration."""

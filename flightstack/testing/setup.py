@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from flightstack.control.controller_loading import load_controller
 from flightstack.core.contract import Vector3
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
+from flightstack.firmware.c_loops import LoopsSetup
+from flightstack.firmware.choice import PYTHON, parse_loops
+from flightstack.firmware.targets import make_loops
 from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, DEFAULT_INNER_HZ, StackConfig
-from flightstack.params.gains_file import DEFAULT_GAINS
+from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import DEFAULT_VEHICLE, Vehicle
 from flightstack.plan import Plan, load_plan
-from flightstack.process.clock import nearest_outer_hz
+from flightstack.process.assembly import vehicle_of
+from flightstack.process.clock import nearest_outer_hz, rates
+from flightstack.vehicle.parameters import load_parameters
 from gcs_cli.transfers.plan_files import example_plans
 from sim_bridge.arguments import check_battery, check_plant, check_range
 from sim_bridge.errors import UsageProblemError
@@ -81,12 +88,16 @@ class Setup:
             if (value := getattr(self, item.name)) != getattr(default, item.name)
         }
 
-    def load_plan(self, plan: str | Path) -> Plan:
-        """Read a plan file: of ``folder``, else an example of the installation; raise ConfigError."""
+    def plan_path(self, plan: str | Path) -> Path:
+        """Return the file of a plan: in ``folder``, else an example of the installation."""
         folders = (self.folder,) if isinstance(self.folder, Path) else self.folder
         path = next((path for folder in folders if (path := folder / plan).exists()), folders[0] / plan)
         example = example_plans().get(Path(plan).stem)
-        return load_plan(example if example is not None and not path.exists() else path)
+        return example if example is not None and not path.exists() else path
+
+    def load_plan(self, plan: str | Path) -> Plan:
+        """Read a plan file, as ``plan_path`` finds it; raise ConfigError."""
+        return load_plan(self.plan_path(plan))
 
     def stack_config(self) -> StackConfig:
         """Return the configuration of the flight stack."""
@@ -101,6 +112,25 @@ class Setup:
             home=self.home,
             params=tuple(f"{name}={value!r}" for name, value in self.params.items()),
         )
+
+    def check(self) -> Vehicle:
+        """Check vehicle, controller, gains, loops, rates, parameters and conditions; return the vehicle.
+
+        Raise ConfigError. Loops on a target are not connected.
+        """
+        config = self.stack_config()
+        parse_loops(config.loops)
+        vehicle, loop_rates = vehicle_of(config), rates(config.inner_hz, config.outer_hz)
+        self.plant_options(vehicle)
+        parts = LoopsSetup(
+            vehicle,
+            load_controller(config.controller),
+            open_gains(config.gains),
+            math.radians(config.behaviour.max_tilt_deg),
+            *loop_rates[:3],
+        )
+        load_parameters(config, make_loops(PYTHON, parts))
+        return vehicle
 
     def plant_options(self, vehicle: Vehicle) -> tuple[Vehicle, PlantOptions]:
         """Return the vehicle that is simulated and its conditions; raise ConfigError for those without effect."""

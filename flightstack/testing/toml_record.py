@@ -117,6 +117,9 @@ def json_schema(kind: Any, title: str) -> dict[str, Any]:
     return head | _schema(kind, Key(""))
 
 
+_SCALARS = {str: "text", bool: "true or false", int: "whole number", float: "number"}
+_MOST_CHOICES = 10
+"""Longest list of choices in a cell of the reference."""
 _NAMES = {str: "string", bool: "boolean", int: "integer", float: "number"}
 
 
@@ -150,14 +153,30 @@ def _list_schema(kind: Any, limits: Key) -> dict[str, Any]:
     return {"oneOf": [found, found["items"]]} if kind is str else found
 
 
-def key_rows(kind: Any) -> Sequence[tuple[str, str, str]]:
-    """Return name, type and description of each key, for the reference."""
+def key_rows(kind: Any) -> Sequence[tuple[str, str, str, str]]:
+    """Return name, type, description and default of each key, for the reference."""
     types = get_type_hints(kind)
     return [
-        (field.name, _type_text(types[field.name], field.metadata["key"]), field.metadata["key"].help)
+        (
+            field.name,
+            _type_text(types[field.name], field.metadata["key"]),
+            field.metadata["key"].help,
+            _default_text(field.default),
+        )
         for field in dataclasses.fields(kind)
         if "key" in field.metadata
     ]
+
+
+def _default_text(value: Any) -> str:
+    """Return a default as TOML; empty for none."""
+    if value in (None, "", ()) or dataclasses.is_dataclass(value):
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_default_text, value))}]"
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}"
 
 
 def _type_text(kind: Any, limits: Key) -> str:
@@ -167,10 +186,23 @@ def _type_text(kind: Any, limits: Key) -> str:
     if get_origin(kind) is dict:
         return "table of numbers"
     if get_origin(kind) is tuple:
-        inner = get_args(kind)[0]
-        return "tables" if dataclasses.is_dataclass(inner) else f"list of {_type_text(inner, limits)}s"
+        return _list_text(get_args(kind)[0], limits)
     if limits.choices:
-        return " \\| ".join(f"`{choice}`" for choice in limits.choices)
-    name = {str: "text", bool: "true or false", int: "whole number", float: "number"}[kind]
-    ranged = kind in (int, float) and (limits.low, limits.high) != (-_DEEP, _DEEP)
-    return f"{name}, {limits.low:g} to {limits.high:g}" if ranged else name
+        names = ", ".join(f"`{choice}`" for choice in limits.choices)
+        return names if len(limits.choices) <= _MOST_CHOICES else "text, see below"
+    return f"{_SCALARS[kind]}{_range_text(kind, limits)}"
+
+
+def _list_text(kind: Any, limits: Key) -> str:
+    if dataclasses.is_dataclass(kind):
+        return "tables"
+    counts = f"{' or '.join(map(str, limits.lengths))} " if limits.lengths else ""
+    return f"list of {counts}{_SCALARS[kind]}s{_range_text(kind, limits)}"
+
+
+def _range_text(kind: Any, limits: Key) -> str:
+    if kind not in (int, float) or (limits.low, limits.high) == (-_DEEP, _DEEP):
+        return ""
+    return (
+        f", at least {limits.low:g}" if limits.high == _DEEP else f", {limits.low:.10g} to {limits.high:.10g}"
+    )

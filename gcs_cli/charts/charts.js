@@ -127,6 +127,13 @@
     show(0);
   }
 
+  async function show(chart) {
+    if (chart.playback) playback(chart);
+    await draw(chart);
+    exports(chart);
+    if (chart.linked) link(chart);
+  }
+
   async function start() {
     for (const card of document.querySelectorAll("[data-chart]")) {
       const chart = {...JSON.parse(card.querySelector("script").textContent), card, plot: card.querySelector(".plot")};
@@ -134,13 +141,12 @@
     }
     charts.sort((a, b) => Boolean(a.layout.scene) - Boolean(b.layout.scene)); // without a graphics card these take seconds
     for (const chart of charts) {
-      if (chart.playback) playback(chart);
-      await draw(chart);
-      exports(chart);
-      if (chart.linked) link(chart);
+      const fold = chart.card.closest("details:not([open])"); // has no width yet
+      if (fold) fold.addEventListener("toggle", () => show(chart), {once: true});
+      else await show(chart);
       await new Promise(resolve => setTimeout(resolve));
     }
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charts.forEach(draw));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charts.filter(chart => chart.plot.data).forEach(draw));
     document.documentElement.dataset.charts = "drawn";
   }
   start();

@@ -27,6 +27,7 @@ class GcsGroup(LazyGroup):
         "paper": LazyCommand(
             "gcs_cli.commands.paper", "Fly every experiment of the paper and report the results."
         ),
+        "test": LazyCommand("gcs_cli.commands.test", "Fly scenario files and judge the flights."),
         "arm": LazyCommand(_ACTIONS, "Arm the vehicle."),
         "disarm": LazyCommand(_ACTIONS, "Disarm the vehicle."),
         "takeoff": LazyCommand(_ACTIONS, "Take off; arm first if disarmed."),

@@ -32,7 +32,7 @@ from gcs_cli.report.flight_data import (
     series,
 )
 
-__all__ = ["Flight", "flight_of", "parse_ulog", "read_flight"]
+__all__ = ["Flight", "flight_in", "flight_of", "parse_ulog", "read_flight"]
 
 _ARMED = 2  # vehicle_status.arming_state
 _TIMING_FIELDS = LoopTiming._fields[2:8]  # execution and lateness
@@ -84,7 +84,11 @@ def read_flight(path: Path) -> Flight:
 
 def flight_of(content: bytes, source: object) -> Flight:
     """Read the bytes of a ULog file, complete or cut off; raise ConfigError, which names ``source``."""
-    log = parse_ulog(content, source, _TOPICS)
+    return flight_in(parse_ulog(content, source, _TOPICS), content, source)
+
+
+def flight_in(log: Any, content: bytes, source: object) -> Flight:
+    """Read the flight of a log that ``parse_ulog`` made of ``content``; raise ConfigError, which names ``source``."""
     try:
         flight = _Reader(log).flight()
     except _DAMAGE as error:

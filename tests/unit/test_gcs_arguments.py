@@ -38,6 +38,7 @@ from gcs_cli.link.endpoint import DEFAULT_CONNECTION, VehicleEndpoint, parse_end
 from gcs_cli.report.flight_outcome import Code, Outcome
 from gcs_cli.report.replay import Run
 from gcs_cli.report.run_directory import LOG_NAME, make_run_directory
+from gcs_cli.transfers.plan_files import example_plans
 from sim_bridge.__main__ import run as sim_bridge_run
 from tests.support.fake_vehicle import SHUT_DOWN, FakeVehicle
 from tests.support.flight_story import Story
@@ -244,7 +245,7 @@ def test_the_outer_rate_follows_the_inner_one(inner_hz: float, outer_hz: float) 
     assert checked_plan(options).items
 
 
-@pytest.mark.parametrize("mission", sorted(MISSIONS.glob("*.*")), ids=lambda path: path.name)
+@pytest.mark.parametrize("mission", sorted(example_plans().values()), ids=lambda path: path.name)
 def test_our_missions_pass_the_check(mission: Path) -> None:
     assert checked_plan(FlyOptions(mission)).items
 

@@ -19,9 +19,10 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import UNSET_E7, Command, Frame, MissionItem, Plan, check_mission, load_plan, save_plan
 from flightstack.plan.qgc_plan import plan_to_json, read_plan
 from flightstack.plan.waypoints import plan_to_waypoints, read_waypoints
+from gcs_cli.transfers.plan_files import example_plans
 
 NAN = float("nan")
-MISSIONS = sorted(Path("missions").iterdir())
+MISSIONS = sorted(example_plans().values())
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 
 FLOATS = st.floats(width=32, allow_infinity=False)

@@ -1,0 +1,1 @@
+"""Scenario files in parallel: select, fly, show and report them."""

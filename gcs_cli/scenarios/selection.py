@@ -1,0 +1,116 @@
+"""Which flights a run of scenarios has: files, names, seeds."""
+
+from __future__ import annotations
+
+import ast
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from flightstack.core.errors import ConfigError
+from flightstack.testing.scenario import Scenario, is_scenario, load_scenario, repeat_command
+from gcs_cli.errors import USAGE, CliError
+
+_SKIPPED = frozenset({"__pycache__", "build", "dist", "node_modules", "site-packages"})
+"""Folders without scenarios, besides hidden ones."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One flight: a scenario with a seed."""
+
+    scenario: Scenario
+    seed: int
+    label: str
+    """Name of the scenario, with its folder where another one has the same name."""
+    command: str
+    """The command that repeats this flight alone."""
+
+    @property
+    def name(self) -> str:
+        """Scenario and seed, unique in a run; also the name of a folder."""
+        return f"{self.label}-seed{self.seed}".replace(os.sep, "-")
+
+
+def find_scenarios(paths: Sequence[Path]) -> list[Path]:
+    """Return the files among ``paths`` and the scenario files of the folders, in order; raise ConfigError, CliError."""
+    found: dict[Path, Path] = {}
+    for path in paths:
+        if not path.exists():
+            raise ConfigError(path, "", "there is no such file or folder")
+        for file in _in_folder(path) if path.is_dir() else (path,):
+            found.setdefault(file.resolve(), file)
+    if not found:
+        where = ", ".join(map(str, paths))
+        raise CliError(f"{where}: no scenario here: a scenario is a TOML file with a table [expect]", USAGE)
+    return list(found.values())
+
+
+def _in_folder(folder: Path) -> Iterator[Path]:
+    for here, folders, files in os.walk(folder):
+        folders[:] = sorted(name for name in folders if name not in _SKIPPED and not name.startswith("."))
+        yield from (path for name in sorted(files) if is_scenario(path := Path(here, name)))
+
+
+def select(
+    files: Sequence[Path], expression: str | None = None, seed: int | None = None, repeat: int | None = None
+) -> list[Case]:
+    """Read every file and return the flights, by file and seed; raise ConfigError, CliError.
+
+    ``expression`` selects by name; ``seed`` and ``repeat`` replace those of the files.
+    """
+    labels = _labels(files)
+    is_selected = Selector(expression or "")
+    cases = []
+    for scenario, label in ((load_scenario(file), labels[file]) for file in files):
+        if is_selected(label):
+            first = scenario.seed if seed is None else seed
+            count = scenario.repeat if repeat is None else repeat
+            cases += [
+                Case(scenario, number, label, repeat_command(scenario, number))
+                for number in range(first, first + count)
+            ]
+    if not cases:
+        raise CliError(f"-k {expression}: matches none of {', '.join(labels.values())}", USAGE)
+    return cases
+
+
+def _labels(files: Sequence[Path]) -> dict[Path, str]:
+    counts = Counter(file.stem for file in files)
+    return {file: file.stem if counts[file.stem] == 1 else str(file.with_suffix("")) for file in files}
+
+
+class Selector:
+    """An expression over names as that of pytest's ``-k``: parts of names with ``and``, ``or``, ``not`` and brackets.
+
+    >>> Selector("square and not wind")("square_in_rain"), Selector("square and not wind")("square_in_wind")
+    (True, False)
+    """
+
+    def __init__(self, text: str) -> None:
+        """Raise CliError (usage) for an expression with an error."""
+        try:
+            self._tree = ast.parse(text.strip(), mode="eval").body if text.strip() else None
+            self("")
+        except (SyntaxError, ValueError):
+            problem = "must be parts of names, joined by and, or, not and brackets"
+            raise CliError(f"-k {text}: {problem}", USAGE) from None
+
+    def __call__(self, name: str) -> bool:
+        """Return True if the expression selects a name."""
+        return self._tree is None or _matches(self._tree, name.lower())
+
+
+def _matches(node: ast.expr, name: str) -> bool:
+    if isinstance(node, ast.Name):
+        return node.id.lower() in name
+    if isinstance(node, ast.Constant):  # a quoted name, or a number
+        return str(node.value).lower() in name
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        return not _matches(node.operand, name)
+    if isinstance(node, ast.BoolOp):
+        found = [_matches(part, name) for part in node.values]
+        return all(found) if isinstance(node.op, ast.And) else any(found)
+    raise ValueError("-k")
