@@ -62,6 +62,7 @@ TOPICS = {
     "home_position": "home",
     "vehicle_command": "each command received",
     "vehicle_command_ack": "each acknowledgement sent",
+    "battery_status": "voltage [V], current [A] and remaining charge, 0 to 1; twice a second; NaN where unknown",
     "loop_timing": "rates, lateness and overruns of the loops; times of the wall clock are NaN in lockstep",
 }
 

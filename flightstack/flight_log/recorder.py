@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,7 +25,11 @@ from flightstack.flight_log.flight_log import FlightLog
 from flightstack.flight_log.topics import ARMING_STATE_ARMED, ARMING_STATE_DISARMED, OUTER, outer_heading
 from flightstack.guidance.navigator import MissionProgress
 
+if TYPE_CHECKING:
+    from flightstack.simulator_link.endpoint import Battery
+
 OpenLog = Callable[[], FlightLog | None]
+_BATTERY_INTERVAL_US = 500_000
 
 
 class FlightRecorder:
@@ -35,12 +41,17 @@ class FlightRecorder:
         info: Mapping[str, str | int | float],
         parameters: Callable[[], Mapping[str, float]],
         home: GeoPoint,
+        battery: Callable[[], Battery],
     ) -> None:
-        """``parameters`` returns the values at the start of a log; ``home`` is the origin of the local frame."""
+        """``parameters`` returns the values at the start of a log; ``home`` is the origin of the local frame.
+
+        ``battery`` returns the newest report.
+        """
         self._open_log = open_log
         self._info = info
         self._parameters = parameters
         self._origin = home
+        self._battery, self._battery_due_us = battery, 0
         self._home = (home, Vector3(0.0, 0.0, 0.0))
         self._log: FlightLog | None = None
         scratch = np.zeros(LoopRow.SIZE)
@@ -78,6 +89,18 @@ class FlightRecorder:
             return
         row = self._log.outer.append(time_us)
         self._store_outer(row, state, setpoint, attitude_target, loop_flags)
+        if time_us >= self._battery_due_us:
+            self._battery_due_us = time_us + _BATTERY_INTERVAL_US
+            self._write_battery(time_us)
+
+    def _write_battery(self, time_us: int) -> None:
+        battery = self._battery()
+        if self._log is None or (math.isnan(battery.voltage_v) and not battery.valid):
+            return
+        voltage_v, current_a, remaining = battery[:3]
+        self._log.event(
+            "battery_status", time_us, voltage_v=voltage_v, current_a=current_a, remaining=remaining
+        )
 
     def status(self, time_us: int, status: Status, failsafe: bool = False) -> None:
         """Record mode, arming state and active failsafe; arming starts a log and disarming ends it."""
@@ -103,6 +126,7 @@ class FlightRecorder:
         if self._log is None:
             return
         self.inner_row = self._log.inner.append
+        self._battery_due_us = time_us
         self._log.start(time_us, self._info, self._parameters(), self._origin)
         self._write_home(time_us)
         self.landed(time_us, True)

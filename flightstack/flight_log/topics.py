@@ -232,6 +232,15 @@ EVENT_TOPICS = (
             Field("bool", "from_external"),
         ),
     ),
+    Topic(
+        "battery_status",
+        (
+            Field("float", "voltage_v", default=nan),
+            Field("float", "current_a", default=nan),
+            Field("float", "remaining", default=nan),
+            Field("bool", "connected", default=1),
+        ),
+    ),
     # wall clock figures are NaN in lockstep, where the log must be deterministic
     Topic(
         "loop_timing",

@@ -159,8 +159,8 @@ def _join(
     params, loaded = load_parameters(config, backend)
     behaviour, system_id = behaviour_of(params), int(params.value(SYSTEM_ID))
     info = _log_info(config, vehicle, loop_rates, backend.version)
-    recorder = FlightRecorder(open_log, info, params.values, config.home)
     simulator = SimulatorEndpoint(vehicle, config.home, config.lockstep, system_id, loop_rates.interval_us)
+    recorder = FlightRecorder(open_log, info, params.values, config.home, lambda: simulator.battery)
     parts = assemble(
         vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
         simulator.state, simulator.rotor_speed_rad_s, simulator,

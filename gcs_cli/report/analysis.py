@@ -48,6 +48,7 @@ _TOPICS = [
     "vehicle_land_detected",
     "mission_result",
     "home_position",
+    "battery_status",
     "loop_timing",
 ]
 
@@ -133,6 +134,7 @@ class _Reader:
             rotor_speed=self._series("rotor_speeds", _elements("speed_rad_s", rotors)),
             rotor_command=self._series("rotor_speeds", _elements("command_rad_s", rotors)),
             torque=self._series("wrench", _elements("torque_n_m", 3)),
+            battery=self._series("battery_status", ["remaining", "voltage_v"]),
             statuses=tuple(
                 Status(time_s, int(state), arming == _ARMED, bool(failsafe))
                 for time_s, state, arming, failsafe in self._rows(

@@ -13,11 +13,10 @@ from gcs_cli.charts.pages import UNKNOWN, render_page, shown
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.compare_charts import overlaid_figures
-from gcs_cli.report.flight_data import Flight, Series, empty_series
+from gcs_cli.report.flight_data import Flight
 from gcs_cli.report.replay import Run
-from gcs_cli.report.run_directory import LOG_NAME, SUMMARY_NAME, TLOG_NAME
+from gcs_cli.report.run_directory import LOG_NAME, SUMMARY_NAME
 from gcs_cli.report.summary import RunInfo, max_overshoot_m, summarise
-from gcs_cli.report.telemetry import read_telemetry
 
 TEMPLATES = Path(__file__).parent / "templates"
 Summary = Mapping[str, Any]
@@ -35,7 +34,6 @@ class ComparedRun(NamedTuple):
     flight: Flight
     plan: Plan
     summary: Summary
-    battery: Series
 
 
 class Row(NamedTuple):
@@ -137,13 +135,7 @@ def read_runs(found: Sequence[Run]) -> list[ComparedRun]:
             **summarise(flight, Plan(()), RunInfo(outcome="", plan="")), "outcome": None, "plan": None,
         }  # fmt: skip
         _check_summary(summary, run.log)
-        of_run = run.log.name == LOG_NAME
-        battery = (
-            read_telemetry(run.log.with_name(TLOG_NAME), flight.start_s).battery
-            if of_run
-            else empty_series(2)
-        )
-        runs.append(ComparedRun(name, run.log, flight, plan, summary, battery))
+        runs.append(ComparedRun(name, run.log, flight, plan, summary))
     return runs
 
 
@@ -250,5 +242,5 @@ def render_comparison(runs: Sequence[ComparedRun]) -> str:
         names=[run.name for run in runs],
         conditions=condition_rows(summaries),
         rows=figure_rows(summaries),
-        figures=list(overlaid_figures([(run.name, run.flight, run.plan, run.battery) for run in runs])),
+        figures=list(overlaid_figures([(run.name, run.flight, run.plan) for run in runs])),
     )

@@ -14,11 +14,10 @@ from gcs_cli.charts.colours import nth_colour
 from gcs_cli.charts.figure import AnyFigure, Axis, Figure, Panel, SpaceFigure, SpacePath
 from gcs_cli.charts.figure import Series as Curve
 from gcs_cli.report.flight_charts import SETPOINT, mode_bands, shown_span, time_figures
-from gcs_cli.report.flight_data import Flight, Series
+from gcs_cli.report.flight_data import Flight
 from gcs_cli.report.path_charts import flown_path, map_curves, plan_paths
 
-NamedFlight: TypeAlias = tuple[str, Flight, Plan, Series]
-"""Name, flight, plan and battery."""
+NamedFlight: TypeAlias = tuple[str, Flight, Plan]
 
 
 def overlaid_figures(flights: Sequence[NamedFlight]) -> Iterator[AnyFigure]:
@@ -26,10 +25,9 @@ def overlaid_figures(flights: Sequence[NamedFlight]) -> Iterator[AnyFigure]:
     yield _space(flights)
     yield _map(flights)
     of_each = [
-        (name, _arming_s(flight), time_figures(flight, battery, rotors_apart=True))
-        for name, flight, _, battery in flights
+        (name, _arming_s(flight), time_figures(flight, rotors_apart=True)) for name, flight, _ in flights
     ]
-    spans = [np.subtract(shown_span(flight), _arming_s(flight)) for _, flight, _, _ in flights]
+    spans = [np.subtract(shown_span(flight), _arming_s(flight)) for _, flight, _ in flights]
     x = Axis("time since arming", "s", float(np.min(spans)), float(np.max(spans)))
     for index, figure in enumerate(of_each[0][2]):
         merged = _overlaid(
@@ -76,17 +74,17 @@ def _renamed(curve: Curve, name: str, arming_s: float, colour: str) -> Curve:
 
 def _shared_plan(flights: Sequence[NamedFlight]) -> bool:
     """True if all flew the same plan, or none is known: it is drawn once then."""
-    plans = [(plan.items, plan.fence, plan.rally) for _, _, plan, _ in flights]
+    plans = [(plan.items, plan.fence, plan.rally) for _, _, plan in flights]
     return all(plan == plans[0] for plan in plans)
 
 
 def _space(flights: Sequence[NamedFlight]) -> SpaceFigure:
     paths = [
         SpacePath(name, flown_path(flight, shown_span(flight)), nth_colour(index))
-        for index, (name, flight, _, _) in enumerate(flights)
+        for index, (name, flight, _) in enumerate(flights)
     ]
     shared = _shared_plan(flights)
-    for index, (name, flight, plan, _) in enumerate(flights[:1] if shared else flights):
+    for index, (name, flight, plan) in enumerate(flights[:1] if shared else flights):
         for path in plan_paths(flight, plan) if plan.items else ():
             if shared:
                 paths.append(replace(path, colour="soft"))
@@ -101,7 +99,7 @@ def _space(flights: Sequence[NamedFlight]) -> SpaceFigure:
 def _map(flights: Sequence[NamedFlight]) -> Figure:
     curves: list[Curve] = []
     shared = _shared_plan(flights)
-    for index, (name, flight, plan, _) in enumerate(flights):
+    for index, (name, flight, plan) in enumerate(flights):
         for curve in map_curves(flight, plan, shown_span(flight)):
             if curve.name == "flown":
                 curves.append(replace(curve, name=name, colour=nth_colour(index), width=1.5))

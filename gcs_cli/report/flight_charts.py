@@ -49,8 +49,8 @@ def shown_span(flight: Flight) -> tuple[float, float]:
     return max(0.0, bands[0].start - margin_s), min(flight.duration_s, bands[-1].end + margin_s)
 
 
-def time_figures(flight: Flight, battery: Series, rotors_apart: bool = False) -> list[Figure]:
-    """Return what the vehicle did over time, from arming to disarming; ``battery`` is that of ``Telemetry``.
+def time_figures(flight: Flight, rotors_apart: bool = False) -> list[Figure]:
+    """Return what the vehicle did over time, from arming to disarming.
 
     ``rotors_apart``: a panel for each rotor, in place of one for all.
     """
@@ -62,7 +62,7 @@ def time_figures(flight: Flight, battery: Series, rotors_apart: bool = False) ->
         _attitude(flight, span),
         _attitude_error(flight),
         _rotors(flight, span, rotors_apart),
-        _battery(_within(battery, span)),
+        _battery(_within(flight.battery, span)),
     ]
     return [_noted(figure) for figure in figures]
 
@@ -228,12 +228,12 @@ def _rotor_limits(flight: Flight) -> Iterator[Level]:
 
 def _battery(battery: Series) -> Figure:
     panels = [
-        Panel(Axis(name, unit), _alone(battery.time_s, battery.values[:, index]))
-        for index, (name, unit) in enumerate((("remaining", "%"), ("voltage", "V")))
+        Panel(Axis(name, unit), _alone(battery.time_s, factor * battery.values[:, index]))
+        for index, (name, unit, factor) in enumerate((("remaining", "%", 100.0), ("voltage", "V", 1.0)))
     ]
-    caption = "Charge and voltage of the battery, as the vehicle reported them to the ground station."
+    caption = "Charge and voltage of the battery."
     if not len(battery.time_s):
-        caption = "The vehicle reported no battery."
+        caption = "The log has no battery."
     return Figure("battery", "Battery", panels, caption, linked=True, height=120)
 
 

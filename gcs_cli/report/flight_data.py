@@ -110,6 +110,8 @@ class Flight:
     rotor_command: Series = field(default_factory=lambda: empty_series(0))
     torque: Series = field(default_factory=lambda: empty_series(3))
     """Torque that the controller asks for, body FRD [N m]."""
+    battery: Series = field(default_factory=lambda: empty_series(2))
+    """Remaining charge, 0 to 1, and voltage [V]; NaN where unknown."""
     statuses: tuple[Status, ...] = ()
     landed: tuple[tuple[float, bool], ...] = ()
     mission: tuple[MissionProgress, ...] = ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,10 @@ from gcs_cli.charts.figure import AnyFigure
 from gcs_cli.charts.pages import render_page, shown
 from gcs_cli.report.conditions import conditions, flown
 from gcs_cli.report.flight_charts import in_modes, shown_span, time_figures, timing_figures
-from gcs_cli.report.flight_data import Flight
+from gcs_cli.report.flight_data import Flight, LoopTiming
 from gcs_cli.report.path_charts import map_figure, space_figure
 from gcs_cli.report.summary import max_overshoot_m
-from gcs_cli.report.telemetry import Telemetry, read_telemetry
+from gcs_cli.report.telemetry import read_loop_timing
 
 TEMPLATES = Path(__file__).parent / "templates"
 _COMPLETED = "completed"
@@ -26,14 +26,13 @@ _LEVELS = [severity.name.lower() for severity in Severity]
 def write_report(path: Path, flight: Flight, plan: Plan, summary: dict[str, Any], tlog: Path) -> None:
     """Write ``report.html``, whole or not at all; raise OSError when that fails.
 
-    ``summary`` is what ``summarise`` returns. Battery and loop timing come from the file ``tlog``, the latter from the
-    log if it is not there.
+    ``summary`` is what ``summarise`` returns. Loop timing comes from the file ``tlog``, else from the log.
     """
-    write_text_atomically(path, render_report(flight, plan, summary, read_telemetry(tlog, flight.start_s)))
+    write_text_atomically(path, render_report(flight, plan, summary, read_loop_timing(tlog, flight.start_s)))
 
 
-def render_report(flight: Flight, plan: Plan, summary: dict[str, Any], telemetry: Telemetry) -> str:
-    """Return the report as HTML."""
+def render_report(flight: Flight, plan: Plan, summary: dict[str, Any], timing: Sequence[LoopTiming]) -> str:
+    """Return the report as HTML; ``timing`` is that of the telemetry."""
     return render_page(
         TEMPLATES,
         "report.html",
@@ -42,7 +41,7 @@ def render_report(flight: Flight, plan: Plan, summary: dict[str, Any], telemetry
         is_good=summary["outcome"] == _COMPLETED,
         lines=[" · ".join(line) for line in ([summary["outcome_text"]], flown(summary), conditions(summary))],
         tiles=tiles(summary),
-        figures=list(_figures(flight, plan, telemetry)),
+        figures=list(_figures(flight, plan, timing)),
         waypoints=[{**row, "command": _command(plan, row["seq"])} for row in summary["waypoints"]],
         texts=[
             (
@@ -57,13 +56,13 @@ def render_report(flight: Flight, plan: Plan, summary: dict[str, Any], telemetry
     )
 
 
-def _figures(flight: Flight, plan: Plan, telemetry: Telemetry) -> Iterator[AnyFigure]:
+def _figures(flight: Flight, plan: Plan, timing: Sequence[LoopTiming]) -> Iterator[AnyFigure]:
     span = shown_span(flight)
     yield space_figure(flight, plan, span)
     yield map_figure(flight, plan, span)
-    for figure in time_figures(flight, telemetry.battery):
+    for figure in time_figures(flight):
         yield in_modes(figure, flight)
-    yield from timing_figures(telemetry.loop_timing or flight.loop_timing)
+    yield from timing_figures(timing or flight.loop_timing)
 
 
 def tiles(summary: dict[str, Any]) -> list[tuple[str, str]]:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import io
+
+import numpy as np
 import pytest
+from pyulog import ULog
 
 from flightstack.mavlink.files import FileTree
 from flightstack.services.files.ftp_server import FtpServer
@@ -24,6 +28,15 @@ def flight_log() -> bytes:
     content = world.flight().log.content
     assert len(content) > 100_000
     return content
+
+
+def test_battery_is_logged_twice_a_second(flight_log: bytes) -> None:
+    battery = ULog(io.BytesIO(flight_log)).get_dataset("battery_status").data
+    assert set(np.diff(battery["timestamp"])) == {500_000}
+    assert len(battery["timestamp"]) >= 6  # 3 s
+    assert np.all(
+        (battery["voltage_v"] > 10.0) & (battery["current_a"] > 0.0) & (battery["remaining"] <= 1.0)
+    )
 
 
 def test_over_mavlink_ftp_and_a_link_that_loses_a_third(flight_log: bytes) -> None:

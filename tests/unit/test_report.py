@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flightstack.mavlink.dialect import FsLoopTiming, mavlink
+from flightstack.mavlink.dialect import FsLoopTiming
 from flightstack.mavlink.link import Link
 from flightstack.plan import Plan, load_plan
 from gcs_cli.link.tlog import TlogFile
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.conditions import conditions
 from gcs_cli.report.flight_charts import mode_bands, time_figures
-from gcs_cli.report.flight_data import Flight, Text, empty_series, loop_timing, series
+from gcs_cli.report.flight_data import Flight, LoopTiming, Text, loop_timing, series
 from gcs_cli.report.page import render_report, write_report
 from gcs_cli.report.path_charts import map_figure
 from gcs_cli.report.summary import RunInfo, summarise
-from gcs_cli.report.telemetry import Telemetry, read_telemetry
+from gcs_cli.report.telemetry import read_loop_timing
 from tests.support.parsed_page import own_part, parsed
 from tests.support.square_plan import square_plan
 from tests.support.synthetic_flight import synthetic_flight_bytes
@@ -39,25 +40,21 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> Flight:
     return read_flight(path)
 
 
-def timing_row(time_s: float, real_time: bool = False) -> object:
+def timing_row(time_s: float, real_time: bool = False) -> LoopTiming:
     return loop_timing(time_s, 500.0, (14.0, 22.0, 180.0, 3.0, 9.0, 60.0), int(real_time))
 
 
-def heard(*timings: object, battery: object = None) -> Telemetry:
-    return Telemetry(list(timings), battery or empty_series(2))
-
-
 def report(
-    flight: Flight, plan: Plan | None = None, telemetry: Telemetry | None = None, outcome: str = "completed"
+    flight: Flight, plan: Plan | None = None, timing: Sequence[LoopTiming] = (), outcome: str = "completed"
 ) -> str:
     plan = plan or square_plan()
     summary = summarise(flight, plan, RunInfo(outcome, "missions/square.plan", 1.2, seed=1))
-    return render_report(flight, plan, summary, telemetry or heard())
+    return render_report(flight, plan, summary, timing)
 
 
 def test_the_report_shows_every_part_of_the_flight(flight: Flight) -> None:
-    battery = series(np.array([1.0, 2.0]), np.array([[90.0, 16.0], [89.0, 15.9]]))
-    page = parsed(report(flight, telemetry=heard(timing_row(1.0), timing_row(2.0), battery=battery)))
+    battery = series(np.array([1.0, 2.0]), np.array([[0.9, 16.0], [0.89, 15.9]]))
+    page = parsed(report(replace(flight, battery=battery), timing=[timing_row(1.0), timing_row(2.0)]))
     assert list(page.charts) == CHARTS
     for part in (
         "Path in space", "Path from above", "Position", "Attitude", "Rotor speeds", "Tracking error", "Loop timing",
@@ -72,7 +69,7 @@ def test_the_report_shows_every_part_of_the_flight(flight: Flight) -> None:
 
 
 def test_every_chart_has_a_caption_and_linked_charts_one_range(flight: Flight) -> None:
-    page = parsed(report(flight, telemetry=heard(timing_row(1.0))))
+    page = parsed(report(flight, timing=[timing_row(1.0)]))
     assert page.text.count("Setpoint minus ") == 2
     assert page.attributes.count(("class", "note")) == len(CHARTS)
     ranges = {tuple(chart["layout"]["xaxis"]["range"]) for chart in page.charts.values() if chart["linked"]}
@@ -80,7 +77,7 @@ def test_every_chart_has_a_caption_and_linked_charts_one_range(flight: Flight) -
 
 
 def test_the_report_needs_nothing_from_outside_and_is_small(flight: Flight) -> None:
-    html = own_part(report(flight, telemetry=heard(timing_row(1.0))))
+    html = own_part(report(flight, timing=[timing_row(1.0)]))
     page = parsed(html)
     assert not re.search(r"https?:|@import|url\(", html)
     assert {name for name, _ in page.attributes}.isdisjoint({"src", "href", "srcset", "data", "onload"})
@@ -108,25 +105,9 @@ def test_fence_and_rally_points_are_drawn(flight: Flight) -> None:
 def test_errors_are_setpoint_minus_position_on_each_axis(flight: Flight) -> None:
     time_s, position = flight.position_setpoint
     shifted = series(time_s.copy(), position - np.array([0.1, 0.2, 0.3]))
-    figures = {
-        figure.name: figure for figure in time_figures(replace(flight, position=shifted), empty_series(2))
-    }
+    figures = {figure.name: figure for figure in time_figures(replace(flight, position=shifted))}
     means = [float(panel.series[0].y.mean()) for panel in figures["position-error"].panels]
     assert means == pytest.approx([0.1, 0.2, -0.3, math.sqrt(0.14)], abs=1e-6)
-
-
-def test_battery_has_the_time_of_the_last_position(tmp_path: Path) -> None:
-    tlog, link = tmp_path / "gcs.tlog", Link(1, 1)
-    unknown = dict.fromkeys(mavlink.MAVLink_sys_status_message.fieldnames, 0)
-    with TlogFile(tlog) as log:
-        for second, (percent, voltage_mv) in enumerate([(60, 16_000), (-1, 65_535), (58, 15_900)]):
-            status = {**unknown, "battery_remaining": percent, "voltage_battery": voltage_mv}
-            at = mavlink.MAVLink_local_position_ned_message(1000 * second, 0, 0, 0, 0, 0, 0)
-            for message in (at, mavlink.MAVLink_sys_status_message(**status)):
-                log.write(second, link.encode(message))
-    battery = read_telemetry(tlog, start_s=0.5).battery
-    assert battery.time_s.tolist() == [-0.5, 0.5, 1.5]
-    assert np.array_equal(battery.values, [[60.0, 16.0], [np.nan, np.nan], [58.0, 15.9]], equal_nan=True)
 
 
 def test_a_flight_without_loop_timing_says_so(flight: Flight) -> None:
@@ -134,7 +115,7 @@ def test_a_flight_without_loop_timing_says_so(flight: Flight) -> None:
 
 
 def test_real_time_shows_lateness_too(flight: Flight) -> None:
-    text = parsed(report(flight, telemetry=heard(timing_row(1.0, True), timing_row(2.0, True)))).text
+    text = parsed(report(flight, timing=[timing_row(1.0, True), timing_row(2.0, True)])).text
     assert "lateness of a tick" in text
     assert "lockstep" not in text
 
@@ -145,7 +126,7 @@ def test_the_head_says_under_what_it_flew(flight: Flight) -> None:
         inner_hz=1000.0, outer_hz=250.0, wind="5,-3", gust=1.0, torque_gust=0.1, battery_start=60.0,
         battery_drain=20.0, faults=("rotor:2:off@8", "state:freeze@9"), ideal_rotors=True, params="my.params",
     )  # fmt: skip
-    head = render_report(flight, square_plan(), summarise(flight, square_plan(), run), heard())
+    head = render_report(flight, square_plan(), summarise(flight, square_plan(), run), [])
     head = head.partition("<header>")[2].partition("</header>")[0]
     assert "vehicle paper_quad · controller backstepping, gains paper · loops in python" in head
     assert "1000 and 250 Hz · plant multibody" in head
@@ -229,7 +210,7 @@ def test_loop_timing_comes_from_the_telemetry_log(tmp_path: Path, flight: Flight
                 0,
             ]
             log.write(1_760_000_000_000_000 + second, link.encode(FsLoopTiming(*values)))
-    timings = read_telemetry(tlog).loop_timing
+    timings = read_loop_timing(tlog)
     assert [timing.time_s for timing in timings] == [0.0, 1.0, 2.0]
     assert (timings[0].period_us, timings[0].execution_max_us, timings[0].real_time) == (2000.0, 90.0, False)
     summary = summarise(flight, square_plan(), RunInfo("completed", "square.plan"))
@@ -237,7 +218,7 @@ def test_loop_timing_comes_from_the_telemetry_log(tmp_path: Path, flight: Flight
     assert "period 2000 µs" in out.read_text(encoding="utf-8")
     write_report(out, flight, square_plan(), summary, tmp_path / "missing.tlog")
     assert "No loop timing" in out.read_text(encoding="utf-8")
-    assert read_telemetry(tlog, 0.5).loop_timing[1].time_s == 0.5
+    assert read_loop_timing(tlog, 0.5)[1].time_s == 0.5
 
 
 def test_report_names_force_torque_and_parameters() -> None:
