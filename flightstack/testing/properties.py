@@ -17,7 +17,7 @@ from flightstack.testing.expression import Expression
 _AROUND = (-0.2, -0.1, -0.02, 0.0, 0.02, 0.1, 0.2)
 """Times of the values that a failure shows, relative to the violation [s]."""
 _TEXT = re.compile(
-    r"(?P<what>.*?)(?:\s+within\s+(?P<within>[0-9.]+)\s*s)?(?:\s+(?:of|after)\s+(?P<event>[a-z_0-9]+))?",
+    r"(?P<what>.*?)(?:\s+within\s+(?P<within>[0-9.]+)\s*s)?(?:\s+(?:of|after)\s+(?P<event>[A-Za-z_0-9]+))?",
     re.DOTALL,
 )
 
