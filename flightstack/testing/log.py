@@ -77,17 +77,17 @@ class Log(Mapping[str, Topic]):
     """Topics by name; docs/reference/log-topics.md lists them."""
 
     def __init__(self, content: bytes) -> None:
-        """Read the bytes of a ULog file; raise ConfigError if they are none."""
+        """Read the bytes of a ULog file, b"" for a log without topics; raise ConfigError if they are none."""
         self.content = content
         """The bytes of the file."""
-        log = parse_ulog(content, "the flight log")
-        self._data = {item.name: item.data for item in log.data_list}
+        log = parse_ulog(content, "the flight log") if content else None
+        self._data = {item.name: item.data for item in log.data_list} if log else {}
         self._topics: dict[str, Topic] = {}
-        self.parameters: dict[str, float] = dict(log.initial_parameters)
+        self.parameters: dict[str, float] = dict(log.initial_parameters) if log else {}
         """Parameters at the start of the flight."""
         self.texts = tuple(
             LoggedText(item.timestamp * 1e-6, item.log_level - ord("0"), item.message)
-            for item in log.logged_messages
+            for item in (log.logged_messages if log else ())
         )
 
     def __getitem__(self, name: str) -> Topic:
