@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from flightstack.commander.arming_checks import ArmingFacts
-from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase
+from flightstack.commander.failsafe import Action, Decision, Failsafe, Phase, action_of
 from flightstack.commander.failsafe_step import (
     IDLE,
     Announcement,
@@ -129,6 +129,15 @@ class FailsafeMonitor:
         """Active failsafes that a user has overridden."""
         entries = self._memory.entries
         return tuple(failsafe for failsafe in active_failsafes(self._memory) if entries[failsafe].overridden)
+
+    @property
+    def demands_action(self) -> bool:
+        """True if an active failsafe that is not overridden has an action above a warning."""
+        entries = self._memory.entries
+        return any(
+            not entry.overridden and action_of(failsafe, self._behaviour) > Action.WARN
+            for failsafe, entry in entries.items()
+        )
 
     @property
     def decision(self) -> Decision:

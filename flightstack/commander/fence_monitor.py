@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from flightstack.core.contract import FloatArray
 from flightstack.guidance.fence import NO_FENCE, Fence, FenceBreach, FenceEvaluator
+from flightstack.guidance.trajectory import BRAKING
 from flightstack.params.behaviour import Behaviour
 
 BREACH_GROWS_M = 5.0
@@ -58,7 +59,8 @@ class FenceMonitor(FenceEvaluator):
 
     def _set_up(self) -> None:
         b = self._behaviour
-        decelerations = (b.acceleration_m_s2, b.vertical_acceleration_m_s2) if b.fence_predicts else None
+        accelerations = (b.acceleration_m_s2, b.vertical_acceleration_m_s2)
+        decelerations = (BRAKING * accelerations[0], BRAKING * accelerations[1]) if b.fence_predicts else None
         self.configure(
             self._fence_areas, b.fence_max_distance_m, b.fence_max_altitude_m, self._home_ned_m, decelerations
         )

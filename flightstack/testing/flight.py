@@ -208,6 +208,8 @@ class Flight:
     @cached_property
     def events(self) -> tuple[Event, ...]:
         """Events in order: those that the test caused, modes, items reached, takeoff, landing, failsafes."""
+        if not self.log:
+            return self.caused
         data, start_s = self.data, self.data.start_s
         found = [*self.caused, *(Event(span.begin_s, f"mode_{span.mode}") for span in self.modes)]
         found += [

@@ -58,6 +58,22 @@ def _checks(expect: Expect, flight: Flight, last: State, events: Sequence[Event]
     for event in events:
         if event.name.startswith(_UNEXPECTED):
             yield Check("answers", False, f"{event.name} at t = {event.time_s:.2f} s")
+    if flight.log:
+        yield from _of_flight(expect, flight)
+    elif _needs_flight(expect):
+        yield Check("a flight", False, f"the vehicle did not arm; {last}")
+    for text in expect.at_end:
+        yield Check(f"at end {text}", Expression(text).of_state(last), str(last))
+
+
+def _needs_flight(expect: Expect) -> bool:
+    """Return True for an expectation that is checked in the log of a flight."""
+    figures = (getattr(expect, name) for name in (*_FIGURES, "reached", "duration_s", "no_text_above"))
+    texts = expect.always + expect.eventually + expect.texts
+    return bool(texts) or any(value is not None for value in figures)
+
+
+def _of_flight(expect: Expect, flight: Flight) -> Iterator[Check]:
     if expect.reached is not None:
         yield Check(
             f"reached = {list(expect.reached)}", flight.reached == list(expect.reached), f"{flight.reached}"
@@ -66,8 +82,6 @@ def _checks(expect: Expect, flight: Flight, last: State, events: Sequence[Event]
     for kind, texts in (("always", expect.always), ("eventually", expect.eventually)):
         for text in texts:
             yield _property(kind, text, flight)
-    for text in expect.at_end:
-        yield Check(f"at end {text}", Expression(text).of_state(last), str(last))
     yield from _texts(expect, flight)
 
 

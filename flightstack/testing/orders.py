@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Message
 from gcs_cli.link import calls
 
 if TYPE_CHECKING:
@@ -35,8 +38,39 @@ ORDERS: dict[str, Order] = {
     "speed": Order(1, 1, lambda _w, v: calls.speed_command(v[0]), "speed M_S"),
     "start_mission": Order(0, 0, lambda _w, _v: calls.START_MISSION, "start_mission"),
     "reboot": Order(0, 0, lambda _w, _v: calls.REBOOT, "reboot"),
+    "mav_cmd": Order(1, 8, lambda _w, v: (int(v[0]), v[1:]), "mav_cmd NUMBER [PARAM1 … PARAM7]"),
 }
 """Requests that an event may make, besides ``mode NAME``."""
+
+
+class Stream(NamedTuple):
+    """Messages that a client sends at 20 Hz: how many numbers they have, and the message."""
+
+    numbers: int
+    message: Callable[[list[float]], Message]
+    form: str
+
+
+STREAMS: dict[str, Stream] = {
+    "sticks": Stream(4, lambda v: _sticks(*v), "sticks FORWARD RIGHT UP YAW"),
+    "setpoint": Stream(3, lambda v: _target(_POSITION, v[0], v[1], -v[2]), "setpoint NORTH_M EAST_M ALT_M"),
+    "velocity": Stream(3, lambda v: _target(_VELOCITY, v[0], v[1], -v[2]), "velocity NORTH EAST UP"),
+}
+"""What a client streams until the next of them, or ``silence``: sticks from −1 to 1, offboard setpoints [m, m/s]."""
+
+_POSITION, _VELOCITY = 0b1101_1111_1000, 0b1101_1100_0111
+"""Type masks of SET_POSITION_TARGET_LOCAL_NED: the bits of the fields to ignore."""
+
+
+def _sticks(forward: float, right: float, up: float, yaw: float) -> Message:
+    x, y, z, r = 1000.0 * forward, 1000.0 * right, 500.0 + 500.0 * up, 1000.0 * yaw
+    return mavlink.MAVLink_manual_control_message(1, round(x), round(y), round(z), round(r), 0)
+
+
+def _target(ignored: int, x: float, y: float, z: float) -> Message:
+    return mavlink.MAVLink_set_position_target_local_ned_message(
+        0, 1, 1, mavlink.MAV_FRAME_LOCAL_NED, ignored, x, y, z, x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
 
 
 def order(world: World, text: str, client: Client) -> None:
@@ -46,14 +80,21 @@ def order(world: World, text: str, client: Client) -> None:
     if word in ("mode", "hold"):
         world.set_mode(Mode.HOLD if word == "hold" else rest[0], client)
         return
-    world.request(word, ORDERS[word].make(world, [float(value) for value in rest]), client)
+    values = [float(value) for value in rest]
+    if word == "silence":
+        client.streams.clear()
+    elif word in STREAMS:
+        client.streams = {word: partial(STREAMS[word].message, values)}
+    else:
+        world.request(word, ORDERS[word].make(world, values), client)
 
 
 def check_command(text: str) -> None:
     """Raise ConfigError for a request that no event can make."""
     word, *rest = text.split() or [""]
-    forms = ", ".join([*(order.form for order in ORDERS.values()), "hold", "mode NAME"])
-    if word == "hold" and not rest:
+    known = (*ORDERS.values(), *STREAMS.values())
+    forms = ", ".join([*(order.form for order in known), "silence", "hold", "mode NAME"])
+    if word in ("silence", "hold") and not rest:
         return
     if word == "mode" and len(rest) == 1:
         if rest[0] not in Mode.__members__:
@@ -61,11 +102,17 @@ def check_command(text: str) -> None:
                 "command", text, f"has no mode {rest[0]!r}; modes are {', '.join(Mode.__members__)}"
             )
         return
-    request = ORDERS.get(word)
+    fewest, most = _counts(word)
     try:
         numbers = [float(value) for value in rest]
     except ValueError:
         numbers = [math.nan]
-    fits = request is not None and request.fewest <= len(numbers) <= request.most
-    if not fits or not all(map(math.isfinite, numbers)):
+    if not fewest <= len(numbers) <= most or not all(map(math.isfinite, numbers)):
         raise ConfigError("command", text, f"is none of {forms}")
+
+
+def _counts(word: str) -> tuple[float, float]:
+    """Return how many numbers at least and at most follow a word; none for an unknown word."""
+    if word in STREAMS:
+        return STREAMS[word].numbers, STREAMS[word].numbers
+    return (ORDERS[word].fewest, ORDERS[word].most) if word in ORDERS else (math.inf, 0)

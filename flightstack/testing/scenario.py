@@ -214,8 +214,8 @@ def _check_event(path: Path, name: str, event: Event, clients: set[str]) -> None
         )
     if event.for_s is not None and event.fault is event.link is event.power is None:
         raise ConfigError(path, f"{name}.for_s", "is for fault, link and power")
-    if event.refused is not None and event.command is event.upload is event.param is None:
-        raise ConfigError(path, f"{name}.refused", "is for command, param and upload")
+    if event.refused is not None and event.command is event.upload is event.param is event.fault is None:
+        raise ConfigError(path, f"{name}.refused", "is for command, fault, param and upload")
 
 
 def _check_texts(scenario: Scenario) -> None:

@@ -161,7 +161,8 @@ def _happen(world: World, event: Event) -> None:
         elif event.refused not in error.reason:
             world.happened(f"unexpected reason: {error}, expected {event.refused!r}")
     except ConfigError as error:
-        world.happened(f"unexpected: {error}")
+        if event.refused is None or event.refused not in str(error):
+            world.happened(f"unexpected: {error}")
     else:
         if event.refused is not None:
-            world.happened(f"not refused: {event.command or event.param or event.upload}")
+            world.happened(f"not refused: {event.command or event.param or event.upload or event.fault}")

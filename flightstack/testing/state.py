@@ -34,6 +34,8 @@ class State(NamedTuple):
     """Charge that the vehicle reports; NaN without a battery."""
     failsafes: tuple[str, ...]
     """Active failsafes by their names, the most important first, such as GCS_LOST or BATTERY_LOW."""
+    failsafe: bool
+    """True if a failsafe acts."""
     item: int
     """The current mission item, from 0; −1 without a mission."""
     error_m: float
@@ -99,6 +101,7 @@ def state_of(stack: Stack, simulator: Simulator) -> State:
         distance_to_home_m=distance(position.x - home.x, position.y - home.y),
         battery_percent=100.0 * stack.simulator.battery.remaining,
         failsafes=tuple(failsafe.name for failsafe in stack.parts.failsafes.active),
+        failsafe=stack.journal.failsafe_acts,
         item=now.progress.current if now.mission_count else -1,
         error_m=distance(*(now.setpoint[0:3] - position).tolist()),
     )

@@ -81,10 +81,13 @@ class FlightMonitor:
         for severity, text in failsafes.evaluate(conditions, phase):
             self._journal.say(severity, text)
         decision = failsafes.decision
-        if decision.action <= Action.WARN:
+        acts = decision.action > Action.WARN
+        goes_on = self._journal.failsafe_acts and failsafes.demands_action
+        if (acts and decision != before) or (acts or goes_on) is not self._journal.failsafe_acts:
+            self._journal.failsafe_acts = acts or goes_on
+            self._journal.status(now.status)
+        if not acts:
             return
-        if decision != before:
-            self._journal.status(now.status, failsafe=True)
         if Failsafe.POSITION_ERROR in failsafes.active:
             self._navigator.reset_reference(now.state)
         for event in EVENTS_OF_ACTION.get(decision.action, ()):

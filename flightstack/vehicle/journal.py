@@ -37,6 +37,8 @@ class Journal:
         self._now = now
         self._recorder = recorder
         self._events: list[Event] = []
+        self.failsafe_acts = False
+        """True from the action of a failsafe to its end, or until a user overrides it."""
 
     def take_events(self) -> list[Event]:
         """Return the events since the last call, oldest first."""
@@ -60,9 +62,10 @@ class Journal:
         """Record progress of the mission."""
         self._recorder.mission(self._now.time_us, progress, count)
 
-    def status(self, status: Status, failsafe: bool = False) -> None:
+    def status(self, status: Status) -> None:
         """Record a change of mode, arming, or failsafe."""
-        self._recorder.status(self._now.time_us, status, failsafe)
+        self._recorder.status(self._now.time_us, status, self.failsafe_acts)
+        self.failsafe_acts = self.failsafe_acts and status.armed
 
     def landed(self, landed: bool) -> None:
         """Record and announce a change of the land detector."""

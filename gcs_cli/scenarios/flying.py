@@ -8,10 +8,8 @@ import traceback
 
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.testing import Verdict, run_scenario
-from gcs_cli.report.flight_data import empty_series
 from gcs_cli.report.page import render_report
 from gcs_cli.report.summary import RunInfo, summarise
-from gcs_cli.report.telemetry import Telemetry
 from gcs_cli.scenarios.figures import figures_of
 from gcs_cli.scenarios.result import Result, Wanted, not_flown
 from gcs_cli.scenarios.selection import Case
@@ -77,4 +75,4 @@ def _report(case: Case, verdict: Verdict) -> str:
     )
     summary = summarise(flight.data, flight.plan, run)
     summary["log_sha256"] = hashlib.sha256(flight.log.content).hexdigest()
-    return render_report(flight.data, flight.plan, summary, Telemetry([], empty_series(2)))
+    return render_report(flight.data, flight.plan, summary, [])
