@@ -43,6 +43,10 @@ ORDERS: dict[str, Order] = {
 """Requests that an event may make, besides ``mode NAME``."""
 
 
+_POSITION, _VELOCITY = 0b1101_1111_1000, 0b1101_1100_0111
+"""Type masks of SET_POSITION_TARGET_LOCAL_NED: the bits of the fields to ignore."""
+
+
 class Stream(NamedTuple):
     """Messages that a client sends at 20 Hz: how many numbers they have, and the message."""
 
@@ -57,9 +61,6 @@ STREAMS: dict[str, Stream] = {
     "velocity": Stream(3, lambda v: _target(_VELOCITY, v[0], v[1], -v[2]), "velocity NORTH EAST UP"),
 }
 """What a client streams until the next of them, or ``silence``: sticks from −1 to 1, offboard setpoints [m, m/s]."""
-
-_POSITION, _VELOCITY = 0b1101_1111_1000, 0b1101_1100_0111
-"""Type masks of SET_POSITION_TARGET_LOCAL_NED: the bits of the fields to ignore."""
 
 
 def _sticks(forward: float, right: float, up: float, yaw: float) -> Message:
@@ -92,8 +93,7 @@ def order(world: World, text: str, client: Client) -> None:
 def check_command(text: str) -> None:
     """Raise ConfigError for a request that no event can make."""
     word, *rest = text.split() or [""]
-    known = (*ORDERS.values(), *STREAMS.values())
-    forms = ", ".join([*(order.form for order in known), "silence", "hold", "mode NAME"])
+    forms = [order.form for order in ORDERS.values()] + [stream.form for stream in STREAMS.values()]
     if word in ("silence", "hold") and not rest:
         return
     if word == "mode" and len(rest) == 1:
@@ -108,7 +108,7 @@ def check_command(text: str) -> None:
     except ValueError:
         numbers = [math.nan]
     if not fewest <= len(numbers) <= most or not all(map(math.isfinite, numbers)):
-        raise ConfigError("command", text, f"is none of {forms}")
+        raise ConfigError("command", text, f"is none of {', '.join(forms)}, silence, hold, mode NAME")
 
 
 def _counts(word: str) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from flightstack.core.errors import ConfigError
-from flightstack.testing.client import RefusedError
+from flightstack.testing.client import Client, RefusedError
 from flightstack.testing.expression import Expression
 from flightstack.testing.flight import Flight
 from flightstack.testing.judge import Check, judge
@@ -138,23 +138,27 @@ def _trigger(world: World, event: Event) -> Callable[[State], bool]:
     return lambda _state: any(happened.name == name for happened in world.events)
 
 
+def _set_param(world: World, text: str) -> None:
+    name, _, value = text.partition("=")
+    world.param_set(name.strip(), float(value))
+
+
+_EFFECTS: dict[str, Callable[[World, Event, Client], None]] = {
+    "fault": lambda world, event, _: world.fault(event.fault or "", for_s=event.for_s),
+    "link": lambda world, event, client: world.fault(f"link {client.name} {event.link}", for_s=event.for_s),
+    "power": lambda world, event, _: world.fault("power cycle", for_s=event.for_s),
+    "param": lambda world, event, _: _set_param(world, event.param or ""),
+    "upload": lambda world, event, _: world.upload(event.upload or ""),
+    "command": lambda world, event, client: order(world, event.command or "", client),
+}
+"""What the effect of an event does, by its key."""
+
+
 def _happen(world: World, event: Event) -> None:
-    """Carry out the effect of an event; raise AssertionError for an answer that was not expected."""
-    client = world.clients[event.client or "gcs"]
+    """Carry out the effect of an event, and record an answer that was not expected."""
+    effect = next(name for name in _EFFECTS if getattr(event, name) is not None)
     try:
-        if event.fault is not None:
-            world.fault(event.fault, for_s=event.for_s)
-        elif event.link is not None:
-            world.fault(f"link {client.name} {event.link}", for_s=event.for_s)
-        elif event.power is not None:
-            world.fault("power cycle", for_s=event.for_s)
-        elif event.param is not None:
-            name, _, value = event.param.partition("=")
-            world.param_set(name.strip(), float(value))
-        elif event.upload is not None:
-            world.upload(event.upload)
-        else:
-            order(world, event.command or "", client)
+        _EFFECTS[effect](world, event, world.clients[event.client or "gcs"])
     except RefusedError as error:
         if event.refused is None:
             world.happened(f"unexpected refusal: {error}")
@@ -165,4 +169,4 @@ def _happen(world: World, event: Event) -> None:
             world.happened(f"unexpected: {error}")
     else:
         if event.refused is not None:
-            world.happened(f"not refused: {event.command or event.param or event.upload or event.fault}")
+            world.happened(f"not refused: {getattr(event, effect)}")
