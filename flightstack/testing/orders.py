@@ -51,15 +51,15 @@ class Stream(NamedTuple):
     form: str
 
 
+_POSITION, _VELOCITY = 0b1101_1111_1000, 0b1101_1100_0111
+"""Type masks of SET_POSITION_TARGET_LOCAL_NED: the bits of the fields to ignore."""
+
 STREAMS: dict[str, Stream] = {
     "sticks": Stream(4, lambda v: _sticks(*v), "sticks FORWARD RIGHT UP YAW"),
     "setpoint": Stream(3, lambda v: _target(_POSITION, v[0], v[1], -v[2]), "setpoint NORTH_M EAST_M ALT_M"),
     "velocity": Stream(3, lambda v: _target(_VELOCITY, v[0], v[1], -v[2]), "velocity NORTH EAST UP"),
 }
 """What a client streams until the next of them, or ``silence``: sticks from −1 to 1, offboard setpoints [m, m/s]."""
-
-_POSITION, _VELOCITY = 0b1101_1111_1000, 0b1101_1100_0111
-"""Type masks of SET_POSITION_TARGET_LOCAL_NED: the bits of the fields to ignore."""
 
 
 def _sticks(forward: float, right: float, up: float, yaw: float) -> Message:
@@ -92,8 +92,8 @@ def order(world: World, text: str, client: Client) -> None:
 def check_command(text: str) -> None:
     """Raise ConfigError for a request that no event can make."""
     word, *rest = text.split() or [""]
-    known = (*ORDERS.values(), *STREAMS.values())
-    forms = ", ".join([*(order.form for order in known), "silence", "hold", "mode NAME"])
+    known = [*(order.form for order in ORDERS.values()), *(stream.form for stream in STREAMS.values())]
+    forms = ", ".join([*known, "silence", "hold", "mode NAME"])
     if word in ("silence", "hold") and not rest:
         return
     if word == "mode" and len(rest) == 1:

@@ -139,22 +139,9 @@ def _trigger(world: World, event: Event) -> Callable[[State], bool]:
 
 
 def _happen(world: World, event: Event) -> None:
-    """Carry out the effect of an event; raise AssertionError for an answer that was not expected."""
-    client = world.clients[event.client or "gcs"]
+    """Carry out the effect of an event, and record an answer that was not expected."""
     try:
-        if event.fault is not None:
-            world.fault(event.fault, for_s=event.for_s)
-        elif event.link is not None:
-            world.fault(f"link {client.name} {event.link}", for_s=event.for_s)
-        elif event.power is not None:
-            world.fault("power cycle", for_s=event.for_s)
-        elif event.param is not None:
-            name, _, value = event.param.partition("=")
-            world.param_set(name.strip(), float(value))
-        elif event.upload is not None:
-            world.upload(event.upload)
-        else:
-            order(world, event.command or "", client)
+        _act(world, event)
     except RefusedError as error:
         if event.refused is None:
             world.happened(f"unexpected refusal: {error}")
@@ -166,3 +153,20 @@ def _happen(world: World, event: Event) -> None:
     else:
         if event.refused is not None:
             world.happened(f"not refused: {event.command or event.param or event.upload or event.fault}")
+
+
+def _act(world: World, event: Event) -> None:
+    client = world.clients[event.client or "gcs"]
+    if event.fault is not None:
+        world.fault(event.fault, for_s=event.for_s)
+    elif event.link is not None:
+        world.fault(f"link {client.name} {event.link}", for_s=event.for_s)
+    elif event.power is not None:
+        world.fault("power cycle", for_s=event.for_s)
+    elif event.param is not None:
+        name, _, value = event.param.partition("=")
+        world.param_set(name.strip(), float(value))
+    elif event.upload is not None:
+        world.upload(event.upload)
+    else:
+        order(world, event.command or "", client)

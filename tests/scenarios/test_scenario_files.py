@@ -7,9 +7,12 @@ from pathlib import Path
 import pytest
 
 from flightstack.testing import load_scenario, run_scenario
+from tests.support.tools import NIGHTLY
 
 FOLDER = Path(__file__).parent / "files"
-FILES = sorted(FOLDER.glob("*/*.toml"))
+LONG = ("loop_30_min",)
+"""Scenarios of half a minute of CPU time, flown with NIGHTLY=1 only."""
+FILES = [path for path in sorted(FOLDER.glob("*/*.toml")) if NIGHTLY or path.stem not in LONG]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
