@@ -42,11 +42,6 @@ class State(NamedTuple):
     """Distance between position and position setpoint; NaN if the setpoint leaves an axis free."""
 
     @property
-    def failsafe(self) -> bool:
-        """True if a failsafe acts."""
-        return bool(self.failsafes)
-
-    @property
     def north_m(self) -> float:
         """Position north of home at the start."""
         return self.position_ned_m.x
