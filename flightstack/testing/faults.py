@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from flightstack.core.errors import ConfigError
 from flightstack.testing.link import Channel
 from sim_bridge.errors import UsageProblemError
-from sim_bridge.plant.fault_table import Fault
+from sim_bridge.plant.fault_table import Fault, Kind
 from sim_bridge.plant.faults import parse_fault
 
 if TYPE_CHECKING:
@@ -73,6 +73,8 @@ def _parsed(text: str, rotors: int) -> Fault:
 def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
     simulator = world.engine.simulator
     fault = _parsed(text, len(world.engine.stack.vehicle.rotors))
+    if fault.kind is Kind.STATE_DROP:
+        raise ConfigError("fault", text, "is impossible in lockstep: both sides would wait for ever")
     begin_us = simulator.time_us + fault.begin_us
     end_us = None if fault.end_us is None else simulator.time_us + fault.end_us
     if for_s is not None:

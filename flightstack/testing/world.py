@@ -391,10 +391,10 @@ class World:
     ) -> Outcome:
         """Fly a plan with ``step`` in place of ``World.step``; it may return True to end the flight early."""
         self.plan = plan
-        if limit_s is None:
-            limit_s = flight_limit_s(plan.items, self.setup.home, self.engine.stack.now.behaviour)
         try:
             self.upload(plan)
+            if limit_s is None:  # of an accepted plan: one with an idle loop would take for ever
+                limit_s = flight_limit_s(plan.items, self.setup.home, self.engine.stack.now.behaviour)
             self.arm()
             self.start_mission()
         except RefusedError as error:

@@ -74,7 +74,7 @@ def test_a_fast_goto_that_looks_ahead_hardly_leaves_the_fence() -> None:
     world.run_until("north_m > 40.0", 30.0)
     world.upload([circle((0.0, 0.0), 120.0)], MissionType.FENCE)
     far = farthest_until(world, lambda state: state.velocity_ned_m_s.x < -1.0, 35.0)
-    assert 80.0 < far < 150.0
+    assert 80.0 < far < 121.0  # 118.6; 121.3 if the prediction brakes with all of MPC_ACC_HOR
 
 
 def test_a_goto_through_an_exclusion_area_is_refused_and_one_past_it_is_flown() -> None:
