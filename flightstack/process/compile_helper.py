@@ -56,8 +56,9 @@ def start(announced: Sequence[str] = ()) -> None:
 
 def wait() -> None:
     """Wait until the helper has ended, if one was started."""
-    if _helper is not None:
+    if _helper is not None and _helper.stdin is not None:
         _helper.wait()
+        _helper.stdin.close()
 
 
 def _is_useful() -> bool:
