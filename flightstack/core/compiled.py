@@ -150,7 +150,7 @@ def as_tuple(array: Any, count: int) -> Any:
     return tuple(array[:count].tolist())
 
 
-@overload(as_tuple, prefer_literal=True)
+@overload(as_tuple, prefer_literal=True, jit_options={"no_cfunc_wrapper": True})
 def _as_tuple(array, count):  # type: ignore[no-untyped-def]  # Numba compares both signatures with annotations
     if isinstance(count, numba.types.Literal):
         return lambda array, count: to_fixed_tuple(array, count)  # noqa: PLW0108  # Numba compares the names too
