@@ -94,6 +94,8 @@ def _start(given: RunOptions) -> tuple[App, StackConfig, ProcessConfig] | None:
 
     Raise ConfigError, TargetError or PortBusyError.
     """
+    from flightstack.firmware.choice import PYTHON
+    from flightstack.process import compile_helper
     from flightstack.process.app import App
     from flightstack.process.assembly import kernels_of
     from flightstack.process.compile_notice import announce_compilation
@@ -103,6 +105,8 @@ def _start(given: RunOptions) -> tuple[App, StackConfig, ProcessConfig] | None:
     config = _stack_config(given, directory)
     _print_warnings(given)
     announce_compilation("flightstack", kernels_of(config))
+    if config.loops == PYTHON:
+        compile_helper.start(kernels_of(config))
     if given.check:
         _check(config)
         return None

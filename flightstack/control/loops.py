@@ -38,6 +38,7 @@ from flightstack.core.compiled import as_tuple, compiled, direct, specialise, st
 from flightstack.core.contract import (
     ATTITUDE_TARGET_SIZE,
     MAX_ROTORS,
+    SETPOINT_SIZE,
     AttitudeReference,
     FloatArray,
     LoopRow,
@@ -240,7 +241,7 @@ def inner_kernel(
     achieved = mix(demanded, mixer, row[COMMAND_AT:], m["work"])
     is_valid = math.isfinite(achieved.thrust_n) and _is_finite(achieved.torque_frd_n_m)
     if not (is_valid and all_finite(row[COMMAND_AT : COMMAND_AT + n])):  # a sum overflowed
-        row[:] = last
+        store(row, last)
         store_status(row, OUTPUT_NOT_FINITE)
         return
     store(m["reference"], filtered)
@@ -301,21 +302,19 @@ class PythonLoops:
             CONTROLLER_MEMORY_SIZE=len(controller.initial_memory),
             CONTROLLER_PARAMS_SIZE=numbers.controller.size,
         )
-        self._compile(controller.name)
         self._last_arrays: tuple[FloatArray, FloatArray] | None = None
         self._bound: tuple[FloatArray, FloatArray] | None = None
         self._inner, self._outer = self._kernel, outer_kernel
+        self._compile(controller.name)
 
     def _compile(self, name: str) -> None:
-        """Compile the kernel with the controller, or load it from the cache; raise ConfigError."""
+        """Compile the kernels, or load them from the cache; raise ConfigError."""
         state = np.array([0.0] * 6 + [1.0] + [0.0] * 6)
         self.reset(state)
         try:
-            speeds, row = np.zeros(MAX_ROTORS, np.float32), np.zeros(LoopRow.SIZE)
-            self._kernel(state, 1.0, speeds, self._memory, row)
+            self.warm_up(state, np.zeros(SETPOINT_SIZE), np.zeros(MAX_ROTORS, np.float32))
         except Exception as error:  # a user's controller may fail in any way
             raise compile_error(name, error) from error
-        self.reset(state)
 
     def get_parameter(self, name: str) -> float:
         """Return the parameter's value in the loops; raise KeyError if unknown."""

@@ -101,6 +101,11 @@ def _remove_old(base: Path) -> None:
             shutil.rmtree(entry.path, ignore_errors=True)
 
 
+def is_shared() -> bool:
+    """Return True if all processes of this user share the cache."""
+    return _base().name == "kernels"
+
+
 @cache
 def directory(module_names: frozenset[str], version: str) -> Path:
     """Return the cache directory for kernels made from these modules; ``version`` is the compiler's."""

@@ -25,6 +25,7 @@ from flightstack.params.gains_file import open_gains
 from flightstack.params.param_file import LoadedParams
 from flightstack.params.store import ParamStore
 from flightstack.params.vehicle import Vehicle, load_vehicle
+from flightstack.process import compile_helper
 from flightstack.process.clock import LoopTiming, Rates, TimingReport, rates
 from flightstack.services.commands.context import VehicleContext
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
@@ -45,8 +46,8 @@ from flightstack.vehicle.parameters import (
 from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_status
 
 _KERNELS = (
-    "inner_kernel", "store_outer_row", "outer_heading", "follow_rotors", "detect", "rest_kernel",
-    "levelling_kernel", "stream_kernel", "goal_kernel", "outer_kernel", "fence_step",
+    "inner_kernel", "outer_kernel", "rest_kernel", "levelling_kernel", "stream_kernel", "goal_kernel",
+    "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
 
@@ -105,7 +106,7 @@ def vehicle_of(config: StackConfig) -> Vehicle:
 
 
 def kernels_of(config: StackConfig) -> tuple[str, ...]:
-    """Return the names of the kernels that ``build`` compiles or loads, in order."""
+    """Return the names of the kernels that ``build`` compiles or loads: those of the loops, then the other ones."""
     needs_loops = config.loops == PYTHON
     return tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
 
@@ -136,11 +137,14 @@ def build(
 ) -> Stack:
     """Build a stack with the loops of ``make`` that serves ``logs`` to ground stations.
 
-    Raise ConfigError for an invalid configuration.
+    The compile helper and this process share the compilation. Raise ConfigError for an invalid configuration.
     """
     loop_rates = rates(config.inner_hz, config.outer_hz)
     setup = _loops_setup(config, loop_rates)
+    if config.loops == PYTHON:
+        compile_helper.start()
     backend = make(config.loops, setup, config.lockstep)
+    compile_helper.wait()
     try:
         return _join(config, setup.vehicle, loop_rates, backend, open_log, logs)
     except BaseException:

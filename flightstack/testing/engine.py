@@ -10,7 +10,8 @@ from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import FlightLog
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link
-from flightstack.process.assembly import Stack, build, reboot_config, transfer_state
+from flightstack.process import compile_helper
+from flightstack.process.assembly import Stack, build, reboot_config, transfer_state, vehicle_of
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
 from flightstack.testing.setup import Setup
@@ -49,8 +50,9 @@ class Engine:
         self._open: FlightLog | None = None
         self._flight_logs = flight_logs
         self._wrap_loops = wrap_loops
+        compile_helper.start()
+        self.simulator: Simulator = setup.simulator(vehicle_of(self.config))
         self.stack = self._build()
-        self.simulator: Simulator = setup.simulator(self.stack.vehicle)
         self.simulator.set_interval_us(self.stack.rates.interval_us)
         self._codec = Link(1, SIMULATOR_COMPONENT)
         self.actuators = ActuatorsFrame()

@@ -23,7 +23,7 @@ import math
 
 import numpy as np
 
-from flightstack.core.compiled import compiled
+from flightstack.core.compiled import compiled, store
 from flightstack.core.contract import MAX_ROTORS, FloatArray, Record, RecordArray, Vector3
 from sim_bridge.plant.battery import discharge
 from sim_bridge.plant.integrator import LARGEST_TURN_RAD, next_gust
@@ -102,7 +102,7 @@ def show_pose(memory: RecordArray, drive: RecordArray, qpos: FloatArray, qvel: F
     m, d = memory[0], drive[0]
     proximity = _proximity(m["body"], m)
     if proximity != LOST:
-        m["stage"][:] = m["body"]
+        store(m["stage"], m["body"])
         _store_speeds(m, d, 0)
         _write_pose(m["body"], d, 0, m["rotor_count"], qpos, qvel)
     return proximity

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import gc
 import importlib
 import math
 import os
@@ -22,6 +24,8 @@ from sim_bridge.plant.integrator import advance_kernel
 
 inner = None  # bound by ``specialise``
 FACTOR = 0.0
+TEMPLATES = ("inner_kernel", "_advance", "_slope_at")
+"""Functions that ``specialise`` compiles."""
 
 
 @compiled
@@ -206,3 +210,45 @@ print("scipy.linalg" in sys.modules)
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"
+
+
+def assigned_slices(path: Path) -> list[str]:
+    """Slices to which compiled functions of a source file assign more than a constant."""
+    return [
+        f"{path.name}:{node.lineno}"
+        for function in ast.parse(path.read_text()).body
+        if isinstance(function, ast.FunctionDef)
+        and (function.name in TEMPLATES or any(map(is_compiled, function.decorator_list)))
+        for node in ast.walk(function)
+        if isinstance(node, ast.Assign) and not isinstance(node.value, ast.Constant)
+        for target in node.targets
+        if isinstance(target, ast.Subscript) and isinstance(target.slice, ast.Slice)
+    ]
+
+
+def is_compiled(decorator: ast.expr) -> bool:
+    return isinstance(decorator, ast.Name) and decorator.id == "compiled"
+
+
+def test_no_kernel_assigns_an_array_to_a_slice() -> None:
+    """One such statement takes two seconds to compile; see ``store``."""
+    top = Path(module.__file__).parents[2]
+    sources = [path for package in ("flightstack", "sim_bridge") for path in (top / package).rglob("*.py")]
+    assert [found for path in sources for found in assigned_slices(path)] == []
+
+
+@pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+def test_kernels_call_parts_without_a_wrapper_for_python() -> None:
+    @compiled
+    def used(x: float) -> float:
+        return x + 1.0
+
+    @compiled
+    def using(x: float) -> float:
+        return used(x)
+
+    assert using(1.0) == 2.0
+    assert used.overloads == {}
+    assert len(used.part.overloads) == 1
+    assert used(2.0) == 3.0
+    assert gc.isenabled()

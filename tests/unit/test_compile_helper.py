@@ -1,0 +1,118 @@
+"""The compile helper: shares the compilation of a cold cache, ends with its parent, and may fail."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flightstack.process import compile_helper
+from flightstack.testing import World
+
+pytestmark = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+ROOT = Path(__file__).resolve().parents[2]
+CPUS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+FLIGHT: dict[str, Any] = {"vehicle": "x_quad", "wind": (4.0, -2.0), "gust": 1.0}
+COLD_FLIGHT = """
+import hashlib, json, sys
+from numba.core import event
+from flightstack.process.compile_notice import base_name
+from flightstack.testing import World
+
+class Listener(event.Listener):
+    compiled = []
+    def on_start(self, event):
+        self.compiled.append(base_name(event.data["dispatcher"].py_func.__name__))
+    def on_end(self, event):
+        pass
+
+event.register("numba:compile", Listener())
+world = World(**json.loads(sys.argv[1]))
+world.fly("square.plan")
+print(json.dumps([Listener.compiled, hashlib.sha256(world.engine.newest_log()).hexdigest()]))
+"""
+ORPHAN = """
+import os
+from flightstack.process import compile_helper
+compile_helper.start(["stream_kernel"])
+os.write(1, str(compile_helper._helper.pid).encode())
+os._exit(0)
+"""
+
+
+def digest_of_flight() -> str:
+    world = World(**FLIGHT)
+    world.fly("square.plan")
+    return hashlib.sha256(world.engine.newest_log()).hexdigest()
+
+
+def run(code: str, *arguments: str, cache: Path) -> subprocess.CompletedProcess[str]:
+    environment = {key: text for key, text in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        cwd=ROOT,
+        env={**environment, "XDG_CACHE_HOME": str(cache)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+
+
+@pytest.fixture
+def not_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compile_helper, "_helper", None)
+
+
+@pytest.fixture
+def cold(monkeypatch: pytest.MonkeyPatch, not_started: None) -> None:
+    monkeypatch.setattr(compile_helper, "_is_cached", lambda kernel: False)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1}, raising=False)
+
+
+@pytest.mark.skipif(CPUS < 2, reason="the helper needs a second CPU")
+def test_cold_cache_is_compiled_once_and_gives_the_same_log(tmp_path: Path) -> None:
+    """The helper compiles guidance and commander, this process the rest."""
+    compiled, digest = json.loads(run(COLD_FLIGHT, json.dumps(FLIGHT), cache=tmp_path).stdout)
+    assert {"inner_kernel", "outer_kernel", "_advance"} <= set(compiled)
+    assert not {"stream_kernel", "goal_kernel", "rest_kernel", "detect", "fence_step", "outer_heading"} & set(
+        compiled
+    )
+    assert digest == digest_of_flight()
+
+
+@pytest.mark.skipif(CPUS < 2, reason="the helper needs a second CPU")
+def test_compile_helper_ends_with_its_parent(tmp_path: Path) -> None:
+    """The pipe of stderr closes when the helper has ended."""
+    parent = run(ORPHAN, cache=tmp_path)
+    assert int(parent.stdout) > 0
+    kernels = {path.name.split("-")[0] for path in tmp_path.rglob("*.nbi")}
+    assert "recorder.outer_heading" not in kernels  # the last one
+
+
+def test_a_failing_compile_helper_changes_nothing(cold: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compile_helper, "__name__", "flightstack.process.no_such_module")
+    expected = digest_of_flight()
+    assert compile_helper._helper is not None
+    assert compile_helper._helper.wait() != 0
+    monkeypatch.setattr(compile_helper, "_helper", None)
+    monkeypatch.setattr(sys, "executable", "/no/such/python")
+    assert digest_of_flight() == expected
+    assert compile_helper._helper is None
+
+
+def test_compile_helper_starts_for_a_cold_cache_only(not_started: None) -> None:
+    World(**FLIGHT)  # compiles, or loads from the cache
+    compile_helper.wait()
+    assert not compile_helper._is_useful()
+
+
+def test_compile_helper_needs_a_second_cpu(cold: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert compile_helper._is_useful()
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
+    assert not compile_helper._is_useful()
