@@ -81,7 +81,7 @@ def compile_kernels() -> None:
     FailsafeMonitor(
         vehicle, behaviour, loop_rates.outer_hz, loop_rates.divisor, np.zeros(STATE_SIZE), simulator
     ).warm_up()
-    FlightRecorder(lambda: None, {}, dict, DEFAULT_HOME)
+    FlightRecorder(lambda: None, {}, dict, DEFAULT_HOME, lambda: simulator.battery)
 
 
 def _end_with_parent() -> None:
