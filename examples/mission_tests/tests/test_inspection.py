@@ -67,4 +67,4 @@ def test_application_obeys_the_battery_failsafe(sitl_server):
     server = sitl_server(vehicle="x_quad", speed=SPEED, battery_percent=40.0, battery_drain=10.0, params=limits)
     flown = fly(server, [FACADE[0], FAR])
     assert flown.report == Report(photos=1, problem="the vehicle changed to RETURN_TO_LAUNCH")
-    flown.flight.eventually("landed and distance_to_home_m < 0.3 after failsafe")
+    flown.flight.eventually("landed and distance_to_home_m < 0.3 after mode_RETURN")
