@@ -55,14 +55,15 @@ def test_photos_are_sharp_in_gusts(sitl_server):
 
 
 def test_point_beyond_the_fence_ends_the_inspection(sitl_server):
-    flown = fly(sitl_server(vehicle="x_quad", speed=SPEED, params={"GF_MAX_HOR_DIST": 20.0}), [FACADE[0], FAR])
+    server = sitl_server(vehicle="x_quad", speed=SPEED, params={"GF_MAX_HOR_DIST": 20.0})
+    flown = fly(server, [FACADE[0], FAR])
     assert flown.report == Report(photos=1, problem="point 1: COMMAND_DENIED")
     flown.flight.always("distance_to_home_m < 20")
     assert flown.flight.landing_error_m < 0.3
 
 
 def test_application_obeys_the_battery_failsafe(sitl_server):
-    """10 % of the charge last 12 s in flight and minutes on the ground: the failsafe acts on the way to the far point."""
+    """10 % of the charge last 12 s in flight and minutes on the ground: it acts on the way to the far point."""
     limits = {"BAT_LOW_THR": 0.31, "BAT_CRIT_THR": 0.3, "COM_LOW_BAT_ACT": 3, "RTL_RETURN_ALT": 5}
     server = sitl_server(vehicle="x_quad", speed=SPEED, battery_percent=40.0, battery_drain=10.0, params=limits)
     flown = fly(server, [FACADE[0], FAR])
