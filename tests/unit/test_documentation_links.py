@@ -11,13 +11,13 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("firmware/*.md")])
 SOURCES = [
     path
-    for folder in ("flightstack", "sim_bridge", "gcs_cli", "firmware", "tests", "tools", "benchmarks")
+    for folder in ("flightstack", "sim_bridge", "gcs_cli", "firmware", "tests", "tools", "benchmarks", "examples")
     for path in (ROOT / folder).rglob("*.*")
     if path.suffix in {".py", ".c", ".h", ".toml"}
 ]
 _LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 _PATH = re.compile(
-    r"`((?:flightstack|sim_bridge|gcs_cli|firmware|tests|tools|benchmarks|missions)/[\w./-]+)`"
+    r"`((?:flightstack|sim_bridge|gcs_cli|firmware|tests|tools|benchmarks|missions|examples)/[\w./-]+)`"
 )
 _DOCS = re.compile(r"docs/[\w/-]+\.md")
 

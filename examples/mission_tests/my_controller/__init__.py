@@ -44,9 +44,7 @@ def read_params(vehicle: Vehicle, gains: Table) -> Params:
     """Read ``[attitude_pd]``: natural frequencies [rad/s] of roll and pitch, and of yaw; the damping is critical."""
     tilt_rad_s, yaw_rad_s = gains.numbers("frequency_rad_s", 2, 0.1, 100.0, (14.0, 5.0))
     gains.finish()
-    return Params(
-        tilt_rad_s**2, 2.0 * tilt_rad_s, yaw_rad_s**2, 2.0 * yaw_rad_s, *vehicle.inertia_kg_m2
-    )
+    return Params(tilt_rad_s**2, 2.0 * tilt_rad_s, yaw_rad_s**2, 2.0 * yaw_rad_s, *vehicle.inertia_kg_m2)
 
 
 CONTROLLER = AttitudeController("pd", step, Memory, Params, (0.0,), read_params)
