@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("firmware/*.md")])
 SOURCES = [
     path
-    for folder in ("flightstack", "sim_bridge", "gcs_cli", "firmware", "tests", "tools", "benchmarks", "examples")
+    for folder in ("flightstack", "sim_bridge", "gcs_cli", "firmware", "tests", "tools", "benchmarks")
     for path in (ROOT / folder).rglob("*.*")
     if path.suffix in {".py", ".c", ".h", ".toml"}
 ]
