@@ -14,4 +14,4 @@ def take_photo(number: int, position: Position) -> None:
 
 
 report = asyncio.run(inspect(sys.argv[1], take_photo))
-sys.exit(report.problem)
+sys.exit(report.problem or 0)
