@@ -147,8 +147,8 @@ def _report_failure(item: pytest.Item, report: pytest.TestReport, reason: str) -
         item.user_properties += kept.properties  # of the JUnit file, which has those of the test
         report.user_properties += kept.properties
         _attach(item.config, report, kept.properties)
-    for server in running:
-        folder = artifacts.folder(item.nodeid) / f"instance-{server.instance}"
+    for number, server in enumerate(running, 1):  # two may have had one instance, one after the other
+        folder = artifacts.folder(item.nodeid) / f"server-{number}"
         server.keep_in(folder)
         lines += [*server.lines(), f"files:   {folder} (after the test)"]
     lines.append(f"repeat:  {_command(item)}")

@@ -103,11 +103,17 @@ class Server:
         guard, self._guard = self._guard, None
         guard.communicate()  # closes its standard input
         for folder in self._kept_in:
-            shutil.copytree(self.folder, folder, dirs_exist_ok=True)
+            self._copy_to(folder)
 
     def keep_in(self, folder: Path) -> None:
-        """Copy the files to ``folder`` after the processes have ended."""
-        self._kept_in.append(folder)
+        """Copy the files to ``folder`` once the processes have ended."""
+        if self._guard is None:
+            self._copy_to(folder)
+        else:
+            self._kept_in.append(folder)
+
+    def _copy_to(self, folder: Path) -> None:
+        shutil.copytree(self.folder, folder, dirs_exist_ok=True)
 
     def lines(self) -> list[str]:
         """Return links and last output, for the report of a failed test."""

@@ -106,7 +106,7 @@ class SitlServer:
         self._owners = owners
         self._make_folder = make_folder
         self.running: list[Server] = []
-        """Servers that were not stopped."""
+        """Servers of tests and fixtures that are not over, whether stopped or not."""
 
     def __call__(self, *, speed: float = 1.0, timeout_s: float = 180.0, **conditions: Any) -> Server:
         """Start simulator and flight stack, and wait until the vehicle is healthy; raise ServerError, ConfigError.

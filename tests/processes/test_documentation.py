@@ -15,6 +15,7 @@ import gcs_cli.fly.processes
 from flightstack.testing.instances import free_instance
 from tests.support import commands
 from tests.support.console_blocks import Command, File, Skipped, shows, steps
+from tests.support.plugin_run import PLUGIN
 from tests.support.programs import Program
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -23,6 +24,7 @@ SKIPPED = {
     "install.md": 3,
     "first-flight.md": 2,
     "controller.md": 1,
+    "mission-tests.md": 1,
     "qgroundcontrol-mavsdk.md": 1,
     "pil.md": 3,
     "compare.md": 1,
@@ -92,8 +94,9 @@ class Reader:
 
     def _result(self, arguments: list[str]) -> commands.Ended:
         program, *rest = arguments
-        if program == "python":
-            done = subprocess.run([sys.executable, *rest], capture_output=True, text=True, check=False)
+        if program in ("python", "pytest"):
+            options = rest if program == "python" else ["-m", "pytest", *PLUGIN, *rest]
+            done = subprocess.run([sys.executable, *options], capture_output=True, text=True, check=False)
             return commands.Ended(done.stdout, done.stderr, done.returncode)
         if program == "gcs":
             starts_processes = rest[0] == "fly" or (rest[0] == "pil" and rest[1] not in ("doctor", "replay"))

@@ -116,6 +116,19 @@ def test_failed_test_keeps_the_output_of_the_processes(outside: pytest.Pytester)
     assert (folder / "sim-bridge.log").read_text().startswith("sim-bridge: x_quad")
 
 
+def test_failed_test_keeps_the_logs_of_each_stopped_server(outside: pytest.Pytester) -> None:
+    outside.makepyfile("""
+        def test_fails(sitl_server):
+            for seed in (5, 6):
+                server = sitl_server(vehicle="x_quad", speed=10.0, seed=seed)
+                server.stop()
+            assert server.log is None
+    """)
+    run(outside, "--sitl-artifacts", "kept").assert_outcomes(failed=1)
+    logs = sorted(outside.path.glob("kept/*/*/sim-bridge.log"))
+    assert [re.findall(r"seed (\d)", log.read_text()) for log in logs] == [["5"], ["6"]]
+
+
 def test_servers_end_with_their_fixture(outside: pytest.Pytester) -> None:
     outside.makepyfile("""
         import pytest

@@ -17,7 +17,7 @@ SOURCES = [
 ]
 _LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 _PATH = re.compile(
-    r"`((?:flightstack|sim_bridge|gcs_cli|firmware|tests|tools|benchmarks|missions)/[\w./-]+)`"
+    r"`((?:flightstack|sim_bridge|gcs_cli|firmware|tests|tools|benchmarks|missions|examples)/[\w./-]+)`"
 )
 _DOCS = re.compile(r"docs/[\w/-]+\.md")
 

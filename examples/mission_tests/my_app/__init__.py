@@ -1,0 +1,1 @@
+"""An inspection flight: take off, take a photo at each point, return."""
