@@ -16,7 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from flightstack.testing.client import Client, RefusedError
+    from flightstack.testing.client import Client, ConditionTimeoutError, RefusedError
     from flightstack.testing.expression import SIGNALS
     from flightstack.testing.flight import Event, Flight, ModeSpan, Sample
     from flightstack.testing.link import Link
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from flightstack.testing.scenario_run import Verdict, run_scenario
     from flightstack.testing.setup import Setup
     from flightstack.testing.state import State
-    from flightstack.testing.world import ConditionTimeoutError, World
+    from flightstack.testing.world import World
 
 _HOMES = {
     "Client": "client",
-    "ConditionTimeoutError": "world",
+    "ConditionTimeoutError": "client",
     "Event": "flight",
     "Flight": "flight",
     "Link": "link",

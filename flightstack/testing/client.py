@@ -41,6 +41,18 @@ class RefusedError(AssertionError):
         """The MAV_RESULT of a command, or the MAV_MISSION_RESULT of a transfer."""
 
 
+class ConditionTimeoutError(AssertionError):
+    """A condition did not come true within its limit of simulated time.
+
+    >>> from flightstack.testing import World
+    >>> try:
+    ...     World().run_until("armed", timeout_s=1.0)
+    ... except ConditionTimeoutError as error:
+    ...     print(str(error).partition(";")[0])
+    'armed' did not come true within 1 s of simulated time
+    """
+
+
 class Client:
     """One client of the vehicle. ``name`` also names its link in scenario files.
 

@@ -10,6 +10,7 @@ from flightstack.testing.client import Client, RefusedError
 from flightstack.testing.expression import Expression
 from flightstack.testing.flight import Flight
 from flightstack.testing.judge import Check, judge
+from flightstack.testing.mission_flight import fly_plan
 from flightstack.testing.orders import order
 from flightstack.testing.scenario import Event, Scenario, repeat_command
 from flightstack.testing.state import State
@@ -89,8 +90,8 @@ class _Run:
         world, scenario = self._world, self._scenario
         limit_s = scenario.limit_s
         if scenario.plan is not None:
-            return world.fly_plan(
-                scenario.setup(world.setup.seed).load_plan(scenario.plan), limit_s, self._step
+            return fly_plan(
+                world, scenario.setup(world.setup.seed).load_plan(scenario.plan), limit_s, self._step
             )
         end_s = scenario.duration_s or limit_s or _DEFAULT_LIMIT_S
         flew = False

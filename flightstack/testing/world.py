@@ -20,40 +20,27 @@ from typing import Any
 from flightstack.commander.failsafe import Failsafe
 from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
-from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import MissionItem, MissionType, Plan
-from flightstack.testing.client import Client, RefusedError
+from flightstack.testing.client import Client, ConditionTimeoutError, RefusedError
 from flightstack.testing.engine import Engine
 from flightstack.testing.expression import Expression
 from flightstack.testing.faults import apply_fault
 from flightstack.testing.flight import Event, Flight
 from flightstack.testing.link import Link
 from flightstack.testing.log import Log
+from flightstack.testing.mission_flight import fly_plan
 from flightstack.testing.network import Network
 from flightstack.testing.setup import Setup
 from flightstack.testing.state import State, state_of
-from gcs_cli.fly.flight_limit import flight_limit_s
 from gcs_cli.link import calls
 from gcs_cli.link.calls import Request
-from gcs_cli.report.flight_outcome import Code, Outcome, ends_in_air, judged, too_late, with_log
-from gcs_cli.vehicle.view_types import MISSION_COMPLETE, Mission, VehicleView
+from gcs_cli.report.flight_outcome import Outcome, with_log
 
 GROUND = "gcs"
 """Name of the ground station that each world has."""
 _REQUEST_LIMIT_S = 120.0
 _CONNECT_LIMIT_S = 10.0
 """Longest wait for the first heartbeat, which a bad link may delay or lose."""
-
-
-class ConditionTimeoutError(AssertionError):
-    """A condition did not come true within its limit of simulated time.
-
-    >>> try:
-    ...     World().run_until("armed", timeout_s=1.0)
-    ... except ConditionTimeoutError as error:
-    ...     print(str(error).partition(";")[0])
-    'armed' did not come true within 1 s of simulated time
-    """
 
 
 class World:
@@ -384,48 +371,10 @@ class World:
         """
         if plan is not None:
             self.plan = plan if isinstance(plan, Plan) else self.setup.load_plan(plan)
-        return self.flight(self.fly_plan(self.plan, limit_s))
-
-    def fly_plan(
-        self, plan: Plan, limit_s: float | None = None, step: Callable[[], bool | None] | None = None
-    ) -> Outcome:
-        """Fly a plan with ``step`` in place of ``World.step``; it may return True to end the flight early."""
-        self.plan = plan
-        try:
-            self.upload(plan)
-            if limit_s is None:  # of an accepted plan: one with an idle loop would take for ever
-                limit_s = flight_limit_s(plan.items, self.setup.home, self.engine.stack.now.behaviour)
-            self.arm()
-            self.start_mission()
-        except RefusedError as error:
-            return Outcome(Code.VEHICLE_LOST if error.is_silent else Code.REFUSED, str(error))
-        return self._flown(self.time_s + limit_s, limit_s, step or self.step)
-
-    def _flown(self, end_s: float, limit_s: float, step: Callable[[], bool | None]) -> Outcome:
-        """Fly to the end, and return to launch after a mission that ends in the air."""
-        items, is_returning = self.plan.items, not ends_in_air(self.plan.items)
-        while (now := self.engine.stack.now).status.armed:
-            if self.time_s > end_s:
-                return too_late(self._view(), items, limit_s)
-            if not is_returning and now.mission_complete and now.status.mode is Mode.HOLD:
-                is_returning = True
-                self.rtl()
-            if step():
-                break
-        return judged(self._view(), items)
-
-    def _view(self) -> VehicleView:
-        """Return the ground station's view with the true progress, which messages on a bad link may lack."""
-        now = self.engine.stack.now
-        progress = Mission(
-            now.progress.current, now.mission_count, now.progress.reached,
-            MISSION_COMPLETE if now.mission_complete else None,
-        )  # fmt: skip
-        landed = mavlink.MAV_LANDED_STATE_ON_GROUND if now.landed else mavlink.MAV_LANDED_STATE_IN_AIR
-        return self.gcs.session.view._replace(mission=progress, landed_state=landed)
+        return self.flight(fly_plan(self, self.plan, limit_s))
 
     def flight(self, outcome: Outcome | None = None) -> Flight:
-        """Return the newest flight from its log, up to now if it is not over; ``outcome`` is that of ``fly_plan``."""
+        """Return the newest flight from its log, up to now if it is not over; ``outcome`` is that of its mission."""
         log = Log(self.engine.newest_log())
         flight = Flight(log, outcome, self.plan, self.setup, tuple(self.events))
         if outcome is None or not log:
