@@ -21,7 +21,7 @@ from flightstack.commander.failsafe import Failsafe
 from flightstack.core.contract import Vector3
 from flightstack.core.enums import Mode
 from flightstack.plan import MissionItem, MissionType, Plan
-from flightstack.testing.client import Client, ConditionTimeoutError, RefusedError
+from flightstack.testing.client import Client, ConditionTimeoutError, Network, RefusedError
 from flightstack.testing.engine import Engine
 from flightstack.testing.expression import Expression
 from flightstack.testing.faults import apply_fault
@@ -29,7 +29,6 @@ from flightstack.testing.flight import Event, Flight
 from flightstack.testing.link import Link
 from flightstack.testing.log import Log
 from flightstack.testing.mission_flight import fly_plan
-from flightstack.testing.network import Network
 from flightstack.testing.setup import Setup
 from flightstack.testing.state import State, state_of
 from gcs_cli.link import calls

@@ -10,9 +10,9 @@ import re
 from xml.etree.ElementTree import Element
 
 from flightstack.params.vehicle import Rotor, Vehicle
-from sim_bridge.multibody.default_parts import arm_m, propeller_radius_m
 from sim_bridge.multibody.frames import flip_vector
 from sim_bridge.multibody.xml import add, add_visual
+from sim_bridge.plant.dimensions import arm_m, propeller_radius_m
 
 Colour = tuple[float, float, float, float]
 CARBON: Colour = (0.115, 0.12, 0.13, 1.0)

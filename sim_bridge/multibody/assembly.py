@@ -18,10 +18,11 @@ import numpy as np
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError
 from flightstack.params.vehicle import Rotor, Vehicle
-from sim_bridge.multibody.default_parts import LIMITS, Adjustments, arm_m, default_parts
+from sim_bridge.multibody.default_parts import LIMITS, Adjustments, default_parts
 from sim_bridge.multibody.mass import MassProperties, about_point
 from sim_bridge.multibody.placing import PlacedPart, of_all, of_body, place
 from sim_bridge.multibody.solver import solve
+from sim_bridge.plant.dimensions import arm_m
 
 TOLERANCE = 1e-3
 """Relative error above which ``export-mjcf`` warns."""

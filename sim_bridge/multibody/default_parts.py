@@ -13,6 +13,7 @@ from typing import NamedTuple
 from flightstack.params.vehicle import Rotor, Vehicle
 from flightstack.params.vehicle_parts import MATERIALS, Part
 from sim_bridge.multibody.placing import PlacedPart
+from sim_bridge.plant.dimensions import arm_m, foot_z_m, propeller_radius_m
 
 
 class Adjustments(NamedTuple):
@@ -48,26 +49,8 @@ The paper's vehicle is met within the first; x_quad needs the second, with light
 _PLATE, _ARMS, _MOTORS, _LEGS, _FEET, _BATTERY, _AVIONICS, _COLUMN = (
     0.08, 0.08, 0.24, 0.05, 0.04, 0.31, 0.15, 0.02,
 )  # fmt: skip
-_SPACING_SHARE = 0.44  # propeller radius over the distance of neighbouring rotors
 _PROPELLER_THICKNESS_M = 0.002
 _CLEARANCE_M = 0.004
-
-
-def propeller_radius_m(vehicle: Vehicle) -> float:
-    """Return the radius of propellers that do not overlap."""
-    at = [rotor.position_frd_m[:2] for rotor in vehicle.rotors]
-    gaps = [math.dist(a, b) for index, a in enumerate(at) for b in at[:index] if math.dist(a, b) > 1e-3]
-    return _SPACING_SHARE * min([*gaps, 1.2 * arm_m(vehicle)])
-
-
-def arm_m(vehicle: Vehicle) -> float:
-    """Return the mean distance of the rotors from the vertical axis."""
-    return sum(math.hypot(*rotor.position_frd_m[:2]) for rotor in vehicle.rotors) / len(vehicle.rotors)
-
-
-def foot_z_m(vehicle: Vehicle) -> float:
-    """Return the height of the ground, FRD, under a vehicle that stands at its origin, as in the rigid plant."""
-    return max(vehicle.leg_height_m, *(rotor.position_frd_m[2] for rotor in vehicle.rotors))
 
 
 def default_parts(vehicle: Vehicle, adjust: Adjustments) -> list[PlacedPart]:

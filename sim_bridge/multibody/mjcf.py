@@ -24,12 +24,12 @@ from flightstack.core.geometry import quaternion_from_euler
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from flightstack.params.vehicle_parts import Part
 from sim_bridge.multibody.assembly import Assembly, assemble
-from sim_bridge.multibody.default_parts import foot_z_m
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.mesh_file import corners_and_faces, read_mesh
 from sim_bridge.multibody.placing import PlacedPart
 from sim_bridge.multibody.xml import add, exact
 from sim_bridge.plant.contact import DAMPING_RATIO, FRICTION, contact_model
+from sim_bridge.plant.dimensions import foot_z_m
 
 HOVER = "hover"
 """Name of the keyframe: hovering at rest, the rotors at hover speed."""

@@ -17,10 +17,10 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.geometry import quaternion_from_euler
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.multibody.assembly import assemble
-from sim_bridge.multibody.default_parts import foot_z_m
 from sim_bridge.multibody.frame_load import FrameLoad
 from sim_bridge.multibody.mjcf import contact_solref, model_xml
 from sim_bridge.plant import rotor_drive
+from sim_bridge.plant.dimensions import foot_z_m
 from sim_bridge.plant.layout import DIVERGED
 from sim_bridge.plant.loading import Loading
 from sim_bridge.plant.plant import InitialState, PlantOptions

@@ -10,9 +10,9 @@ from xml.etree.ElementTree import Element
 
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.multibody import appearance
-from sim_bridge.multibody.default_parts import foot_z_m
 from sim_bridge.multibody.landmarks import add_landmarks
 from sim_bridge.multibody.xml import add, add_visual, section
+from sim_bridge.plant.dimensions import foot_z_m
 
 PAD_M = 4.0
 """Half the side of the landing pad."""

@@ -12,6 +12,7 @@ from flightstack.core.portable_math import distance, exp
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle
 from sim_bridge.plant.battery import BatteryState, battery_state, set_battery, set_pack
 from sim_bridge.plant.dead_time import DeadTime
+from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.plant.fault_effects import PlantFaults, RotorFault
 from sim_bridge.plant.layout import MEMORY, OUTPUT
 from sim_bridge.plant.loading import AS_BUILT, Body, Loading, inverse, loaded
@@ -108,8 +109,6 @@ class RecordPlant(ABC):
 
     def _set_air(self, faults: PlantFaults) -> None:
         """Set mean wind, gusts, wind shear and ground effect."""
-        from sim_bridge.multibody.default_parts import foot_z_m, propeller_radius_m  # noqa: PLC0415  # rarely needed
-
         m, vehicle, options = self.memory[0], self._vehicle, self._disturbance
         m["wind"] = np.array(options.wind_ned_m_s) + np.array(faults.wind_step_ned_m_s)
         self._turbulence.set_gust(options.gust_m_s if faults.gust_m_s is None else faults.gust_m_s)

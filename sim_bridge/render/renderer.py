@@ -10,9 +10,9 @@ import numpy as np
 from flightstack.params.vehicle import Vehicle
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.multibody import appearance
-from sim_bridge.multibody.default_parts import foot_z_m
 from sim_bridge.multibody.frames import flip_quaternion, flip_vector
 from sim_bridge.multibody.mjcf import model_xml
+from sim_bridge.plant.dimensions import foot_z_m
 from sim_bridge.render.cameras import Site, View, view
 from sim_bridge.render.marks import MOST_TRAIL, Marks, RotorAppearance
 from sim_bridge.render.offscreen import make_context

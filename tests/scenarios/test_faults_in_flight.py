@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flightstack.testing import World
-from sim_bridge.multibody.default_parts import propeller_radius_m
+from sim_bridge.plant.dimensions import propeller_radius_m
 
 BOTH_PLANTS = pytest.mark.parametrize("plant", ["rigid", "multibody"])
 

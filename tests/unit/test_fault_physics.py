@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from flightstack.core.contract import Vector3
 from flightstack.params.vehicle import GRAVITY_M_S2, Vehicle, load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG
-from sim_bridge.multibody.default_parts import foot_z_m, propeller_radius_m
+from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
 from sim_bridge.plant.fault_effects import plant_faults
 from sim_bridge.plant.faults import parse_fault
