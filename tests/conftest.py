@@ -6,6 +6,7 @@ import faulthandler
 import os
 import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -26,6 +27,9 @@ settings.load_profile("explore" if os.environ.get("NIGHTLY") else "repeatable")
 
 HANGS_AFTER_S = 600.0
 
+# half a minute of CPU time
+collect_ignore = [] if os.environ.get("NIGHTLY") else ["scenarios/files/long/loop_30_min.toml"]
+
 TIERS = {
     "unit": "unit",
     "protocol": "protocol",
@@ -43,8 +47,8 @@ TIERS = {
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark each test with its tier."""
     for item in items:
-        folder, name = item.path.parent.name, item.path.name
-        tier = "paper" if name.startswith("test_paper") else TIERS[folder]
+        folder = item.path.relative_to(Path(__file__).parent).parts[0]
+        tier = "paper" if item.path.name.startswith("test_paper") else TIERS[folder]
         item.add_marker(getattr(pytest.mark, tier))
 
 
