@@ -58,7 +58,7 @@ ERRORS = {
     "event = [{at_s = 1, upload = 'none.plan'}]": "event[0].upload: cannot be read",
     "event = [{at_s = 1, link = 'cut', client = 'me'}]": "event[0].client: 'me' is not one of gcs",
     "event = [{at_s = 1, command = 'arm', for_s = 1}]": "event[0].for_s: is for fault, link and power",
-    "event = [{at_s = 1, link = 'cut', refused = ''}]": "event[0].refused: is for command, param and upload",
+    "event = [{at_s = 1, link = 'cut', refused = ''}]": "event[0].refused: is for command, fault, param and upload",
     "event = [{when = 'hight > 1', link = 'cut'}]": "event[0].when: hight > 1: has an unknown name hight",
     "event = [{after = 'takeoff', link = 'cut'}]": "event[0].after: takeoff: is no event that is known in flight:",
     "expect = {outcome = 'GCS_LOSST'}": "expect.outcome: 'GCS_LOSST' is not one of any, completed",

@@ -160,7 +160,7 @@ def test_cut_link_fails_safe_after_the_same_time_at_any_rate(inner_hz: float) ->
         world.run_until("altitude_m > 2.5", timeout_s=20.0)
         world.link.cut()
         cut_s = world.time_s
-        lost_s = world.run_until("failsafe", timeout_s=60.0).time_s - cut_s
+        lost_s = world.run_until(lambda state: state.failsafes, timeout_s=60.0).time_s - cut_s
         assert world.state.failsafes == ("GCS_LOST",)
         assert 8.9 <= lost_s <= 10.1  # COM_DL_LOSS_T after the last heartbeat, up to 1 s before the cut
 
@@ -170,7 +170,7 @@ def test_companion_does_not_count_as_data_link(world: World) -> None:
     world.takeoff(3.0)
     world.run_until("altitude_m > 2.5", timeout_s=20.0)
     world.link.cut()
-    assert "GCS_LOST" in world.run_until("failsafe", timeout_s=60.0).failsafes
+    assert "GCS_LOST" in world.run_until(lambda state: state.failsafes, timeout_s=60.0).failsafes
 
 
 def test_request_before_any_contact_is_not_answered(world: World) -> None:
