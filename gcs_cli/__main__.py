@@ -10,7 +10,7 @@ import typer
 from flightstack.core.errors import ConfigError
 from flightstack.process.command_line import UsageError, Version, expand_options, make_app, usage_sentence
 from flightstack.process.console import complain, drop, replace_unencodable
-from gcs_cli.commands import GcsGroup, add_groups
+from gcs_cli.commands.registry import GcsGroup, add_groups
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
 from gcs_cli.settings import LinkOptions, Settings, SigningKeyOption
 

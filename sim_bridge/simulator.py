@@ -22,8 +22,8 @@ from sim_bridge.plant.battery import INTERVAL_US as BATTERY_INTERVAL_US
 from sim_bridge.plant.battery import battery_report
 from sim_bridge.plant.fault_checks import Flight, check_faults
 from sim_bridge.plant.fault_effects import plant_faults
+from sim_bridge.plant.fault_schedule import Schedule
 from sim_bridge.plant.fault_table import ROWS, STATE_KINDS, Fault, Kind
-from sim_bridge.plant.faults import Schedule
 from sim_bridge.plant.layout import CONTACT, DIVERGED, OUTPUT
 from sim_bridge.plant.plant import Plant, PlantOptions
 from sim_bridge.plants import make_plant

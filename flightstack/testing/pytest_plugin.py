@@ -16,7 +16,7 @@ from flightstack.testing.owners import Owners
 
 if TYPE_CHECKING:
     from flightstack.testing.artifacts import Artifacts, Evidence
-    from flightstack.testing.scenario_items import ScenarioFile
+    from flightstack.testing.pytest_items import ScenarioFile
     from flightstack.testing.sitl import Sitl, SitlServer
 
 _OWNERS = pytest.StashKey[Owners]()
@@ -194,7 +194,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> ScenarioFi
     """Collect scenario files: a test for each seed."""
     if file_path.suffix != ".toml" or not _may_be_scenario(file_path):
         return None
-    from flightstack.testing.scenario_items import ScenarioFile  # noqa: PLC0415
+    from flightstack.testing.pytest_items import ScenarioFile  # noqa: PLC0415
 
     return ScenarioFile.of(file_path, parent)
 

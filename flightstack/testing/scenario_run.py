@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from flightstack.core.errors import ConfigError
 from flightstack.testing.client import Client, RefusedError
+from flightstack.testing.expectations import Check, judge
 from flightstack.testing.expression import Expression
 from flightstack.testing.flight import Flight
-from flightstack.testing.judge import Check, judge
 from flightstack.testing.mission_flight import fly_plan
 from flightstack.testing.orders import order
 from flightstack.testing.scenario import Event, Scenario, repeat_command

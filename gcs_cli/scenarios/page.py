@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flightstack.testing.judge import Check
+from flightstack.testing.expectations import Check
 from gcs_cli.charts.pages import UNKNOWN, render_page
 from gcs_cli.scenarios.result import Row, margin_text, percent
 

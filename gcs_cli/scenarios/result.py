@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from flightstack.testing.judge import Check
+from flightstack.testing.expectations import Check
 from gcs_cli.charts.figure import Figure
 from gcs_cli.scenarios.selection import Case
 

@@ -18,7 +18,7 @@ from flightstack.mavlink.frames import FrameFinder
 from flightstack.mavlink.link import Link, Message
 from flightstack.params.vehicle import Vehicle
 from flightstack.simulator_link.hot_frames import LOCKSTEP_FLAG, ActuatorsFrame
-from sim_bridge.plant.faults import Kind
+from sim_bridge.plant.fault_schedule import Kind
 from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.server.hil import HilControls, hil_state
 from sim_bridge.simulator import (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flightstack.mavlink.dialect import mavlink
-from sim_bridge.plant.faults import Fault, Kind
+from sim_bridge.plant.fault_schedule import Fault, Kind
 from sim_bridge.simulator import Simulator
 
 NEARLY_EMPTY = 0.03

@@ -15,7 +15,7 @@ from flightstack.process.clock import minimise_timer_slack
 from flightstack.process.compile_notice import announce_compilation
 from sim_bridge.errors import PlantDivergedError
 from sim_bridge.output import complain, say
-from sim_bridge.plant.faults import Fault
+from sim_bridge.plant.fault_schedule import Fault
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.plants import kernels_of
 from sim_bridge.render.live_view import LiveView

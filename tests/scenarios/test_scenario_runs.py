@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
 
 from flightstack.testing import Verdict, load_scenario, run_scenario
-from flightstack.testing.judge import Check, judge
+from flightstack.testing.expectations import Check, judge
 from flightstack.testing.scenario import Expect
 from gcs_cli.scenarios.flying import fly_case
 from gcs_cli.scenarios.result import Wanted
@@ -67,6 +67,11 @@ EXPECTATIONS: list[tuple[dict[str, object], dict[str, object], str]] = [
     ({"no_text_above": "warning"}, {"no_text_above": "debug"}, "no text above debug: t = "),
     ({"texts": ("Landing detected",)}, {"texts": ("Rotor",)}, "text 'Rotor': Armed; "),
 ]
+
+
+def test_every_expectation_is_tested() -> None:
+    tested = {name for _, bad, _ in EXPECTATIONS for name in bad}
+    assert tested == {field.name for field in fields(Expect)}
 
 
 @pytest.mark.parametrize(("good", "bad", "words"), EXPECTATIONS, ids=lambda value: str(value)[:40])

@@ -16,7 +16,7 @@ from flightstack.simulator_link.hot_frames import ARMED_FLAG
 from sim_bridge.plant.dimensions import foot_z_m, propeller_radius_m
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
 from sim_bridge.plant.fault_effects import plant_faults
-from sim_bridge.plant.faults import parse_fault
+from sim_bridge.plant.fault_schedule import parse_fault
 from sim_bridge.plant.layout import CONTACT, DIVERGED
 from sim_bridge.plant.loading import Body, Loading, inverse, loaded
 from sim_bridge.plant.plant import InitialState, Plant, PlantOptions

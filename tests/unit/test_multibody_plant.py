@@ -25,7 +25,7 @@ from sim_bridge.multibody.plant import MultibodyPlant
 from sim_bridge.plant.contact import FRICTION
 from sim_bridge.plant.disturbance import NO_DISTURBANCE, Disturbance
 from sim_bridge.plant.fault_effects import PlantFaults, RotorFault, plant_faults
-from sim_bridge.plant.faults import parse_fault
+from sim_bridge.plant.fault_schedule import parse_fault
 from sim_bridge.plant.layout import CONTACT, DIVERGED
 from sim_bridge.plant.plant import AT_REST, InitialState, Plant, PlantOptions
 from sim_bridge.plants import PLANT_NAMES, make_plant

@@ -129,7 +129,7 @@ NOT_FLIGHT = (
     "flightstack/core/geometry_bulk.py",  # reports
     "flightstack/flight_log/poses_file.py",  # pictures
     "flightstack/testing/flight.py",  # figures of a flown flight
-    "flightstack/testing/judge.py",
+    "flightstack/testing/expectations.py",
     "flightstack/testing/link.py",  # random.Random of lossy links, integers alone
     "flightstack/plan/fence_shape.py",  # whether a plan is accepted
     "flightstack/transports/memory.py",  # random.Random of a lossy line, integers alone

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from flightstack.testing.judge import Check
+from flightstack.testing.expectations import Check
 from flightstack.testing.scenario import Scenario
 from gcs_cli.charts.figure import Axis, Figure, Panel, Series
 from gcs_cli.scenarios.display import make_display, print_failures, print_summary

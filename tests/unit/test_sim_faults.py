@@ -19,8 +19,8 @@ from flightstack.params.vehicle import load_vehicle
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, LOCKSTEP_FLAG, ActuatorsFrame
 from sim_bridge.errors import UsageProblemError
 from sim_bridge.plant.disturbance import Disturbance
+from sim_bridge.plant.fault_schedule import Fault, Kind, parse_fault
 from sim_bridge.plant.fault_table import TABLE, Row
-from sim_bridge.plant.faults import Fault, Kind, parse_fault
 from sim_bridge.plant.plant import PlantOptions
 from sim_bridge.server.endpoint import HIL_STATE_QUATERNION_ID, FlightStackEndpoint
 from sim_bridge.simulator import Simulator

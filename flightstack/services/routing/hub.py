@@ -18,10 +18,10 @@ from flightstack.mavlink.signing import Signing
 from flightstack.plan.kept_plans import KeptPlans
 from flightstack.services.commands.context import VehicleContext
 from flightstack.services.mission.mission_server import MissionService
+from flightstack.services.registry import Service, make_services
 from flightstack.services.routing.peer import Peer, PeerAddress
 from flightstack.services.routing.router import Router
 from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_signing, signing_setup
-from flightstack.services.services import Service, make_services
 from flightstack.services.telemetry.streams import API_RATES_HZ, GROUND_RATES_HZ, Streams
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.services.telemetry.vehicle import status_texts, system_time_at

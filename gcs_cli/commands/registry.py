@@ -1,0 +1,113 @@
+"""The commands of ``gcs`` and their groups. The module of a command is imported when the command is used."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+
+from flightstack.process.command_line import HELP_FLAGS, make_app
+from gcs_cli.lazy_group import LazyCommand, LazyGroup
+
+_ACTIONS = "gcs_cli.commands.actions"
+_MISSION = "gcs_cli.commands.mission"
+_PARAM = "gcs_cli.commands.param"
+_LOG = "gcs_cli.commands.log"
+_PIL = "gcs_cli.commands.pil"
+_PIL_FLY = "fly"
+
+
+class GcsGroup(LazyGroup):
+    """``gcs``."""
+
+    lazy = {  # noqa: RUF012  # ClassVar in the base
+        "fly": LazyCommand(
+            "gcs_cli.commands.fly", "Fly a mission in simulation and write log, summary and report."
+        ),
+        "paper": LazyCommand(
+            "gcs_cli.commands.paper", "Fly every experiment of the paper and report the results."
+        ),
+        "test": LazyCommand("gcs_cli.commands.test", "Fly scenario files and judge the flights."),
+        "arm": LazyCommand(_ACTIONS, "Arm the vehicle."),
+        "disarm": LazyCommand(_ACTIONS, "Disarm the vehicle."),
+        "takeoff": LazyCommand(_ACTIONS, "Take off; arm first if disarmed."),
+        "land": LazyCommand(_ACTIONS, "Land at the current position."),
+        "rtl": LazyCommand(_ACTIONS, "Return to launch and land."),
+        "hold": LazyCommand(_ACTIONS, "Hold the position."),
+        "goto": LazyCommand(_ACTIONS, "Fly to a position and hold there."),
+        "speed": LazyCommand(_ACTIONS, "Set the ground speed until disarmed."),
+        "sethome": LazyCommand(_ACTIONS, "Set the home position."),
+        "mode": LazyCommand(_ACTIONS, "Select a flight mode."),
+        "reboot": LazyCommand(_ACTIONS, "Reboot the vehicle, which must be on the ground."),
+        "status": LazyCommand("gcs_cli.commands.status", "Show the state of the vehicle."),
+        "watch": LazyCommand("gcs_cli.commands.watch", "Watch the vehicle; q or Ctrl-C ends."),
+        "perf": LazyCommand("gcs_cli.commands.perf", "Show the timing of the flight stack's loops."),
+        "replay": LazyCommand("gcs_cli.commands.replay", "Draw a flight: pictures, a film, or a window."),
+        "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),
+    }
+
+
+class MissionGroup(LazyGroup):
+    """``gcs mission``."""
+
+    lazy = {  # noqa: RUF012
+        "upload": LazyCommand(_MISSION, "Replace the vehicle's mission by that of a file."),
+        "check": LazyCommand(_MISSION, "Check a file as the vehicle does, without a vehicle."),
+        "download": LazyCommand(_MISSION, "Download the vehicle's mission, geofence and rally points."),
+        "clear": LazyCommand(_MISSION, "Remove the vehicle's mission, geofence or rally points."),
+        "start": LazyCommand(_MISSION, "Start the mission; the vehicle arms for it."),
+    }
+
+
+class ParamGroup(LazyGroup):
+    """``gcs param``."""
+
+    lazy = {  # noqa: RUF012
+        "list": LazyCommand(_PARAM, "List the parameters; highlight those that are not at their default."),
+        "get": LazyCommand(_PARAM, "Show one parameter."),
+        "set": LazyCommand(_PARAM, "Set a parameter."),
+        "reset": LazyCommand(_PARAM, "Reset parameters to their defaults."),
+        "save": LazyCommand(_PARAM, "Write all parameters to a file, as QGroundControl does."),
+        "load": LazyCommand(_PARAM, "Set the parameters that a file has; the others stay as they are."),
+        "diff": LazyCommand(_PARAM, "Show parameters that differ from the defaults, or from a file."),
+    }
+
+
+class LogGroup(LazyGroup):
+    """``gcs log``."""
+
+    lazy = {  # noqa: RUF012
+        "list": LazyCommand(_LOG, "List the logs, the oldest first."),
+        "download": LazyCommand(_LOG, "Download a log, or all of them."),
+    }
+
+
+class PilGroup(LazyGroup):
+    """``gcs pil``; ``gcs pil square.plan`` is ``gcs pil fly square.plan``."""
+
+    lazy = {  # noqa: RUF012
+        _PIL_FLY: LazyCommand(_PIL, "Fly a mission with each of the loops, and compare."),
+        "replay": LazyCommand(_PIL, "Feed a target with the inputs of a flight log."),
+        "doctor": LazyCommand(_PIL, "Measure the link to a target, and suggest settings."),
+    }
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Insert ``fly`` if the first argument is no command."""
+        if args and args[0] not in self.commands and args[0] not in HELP_FLAGS:
+            args = [_PIL_FLY, *args]
+        return super().parse_args(ctx, args)
+
+
+def add_groups(app: typer.Typer) -> None:
+    """Add the groups of commands to ``gcs``."""
+    for name, group, text in (
+        ("mission", MissionGroup, "The vehicle's mission."),
+        ("param", ParamGroup, "The vehicle's parameters."),
+        ("log", LogGroup, "The vehicle's flight logs."),
+        (
+            "pil",
+            PilGroup,
+            "Check the loops in C and on a target.\n\n`gcs pil MISSION` flies it as MIL, SIL and PIL.",
+        ),
+    ):
+        app.add_typer(make_app(cls=group, help=text, no_args_is_help=True), name=name)
