@@ -85,8 +85,8 @@ def compile_kernels() -> None:
 
 
 def _end_with_parent() -> None:
-    """Exit when stdin closes."""
-    sys.stdin.buffer.read()
+    """Exit when stdin closes. It is read without a buffer, whose lock would abort the interpreter at its end."""
+    os.read(0, 1)
     os._exit(1)
 
 

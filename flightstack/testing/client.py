@@ -81,6 +81,7 @@ class Client:
         """The number of received messages of each type."""
         self.texts: list[str] = []
         """Status texts, oldest first."""
+        self._next_piece = (0, 0)
         self.reached: list[int] = []
         """Mission items that the vehicle reported as reached, in order."""
         self.streams: dict[str, Callable[[], Message]] = {}
@@ -112,12 +113,20 @@ class Client:
         self.received[kind] = message
         self.counts[kind] = self.counts.get(kind, 0) + 1
         if kind == "STATUSTEXT":
-            if message.id and message.chunk_seq:
-                self.texts[-1] += message.text
-            else:
-                self.texts.append(message.text)
+            self._take_text(message)
         elif kind == "MISSION_ITEM_REACHED":
             self.reached.append(message.seq)
+
+    def _take_text(self, message: Message) -> None:
+        """Take a text or a piece of one; a piece after a lost one is dropped."""
+        piece = (message.id, message.chunk_seq)
+        if not message.id or not message.chunk_seq:
+            self.texts.append(message.text)
+        elif piece == self._next_piece and self.texts:
+            self.texts[-1] += message.text
+        else:
+            return
+        self._next_piece = (message.id, message.chunk_seq + 1)
 
     # ------------------------------------------------------------------ requests
 

@@ -122,7 +122,7 @@ class Engine:
         if self.loses_states:
             self._missed_us += self.stack.rates.interval_us
         else:
-            assert self.stack.simulator.receive(memoryview(self.states()))
+            self._check(self.stack.simulator.receive(memoryview(self.states())))
 
     def states(self) -> bytes | memoryview:
         """Return the bytes that the simulator sends for one step."""
@@ -130,7 +130,12 @@ class Engine:
 
     def take_answer(self, answer: bytes | memoryview) -> None:
         """Take the stack's actuators."""
-        assert self.actuators.open(answer)
+        self._check(self.actuators.open(answer))
+
+    @staticmethod
+    def _check(is_valid: bool) -> None:
+        if not is_valid:
+            raise AssertionError("simulator and flight stack exchanged a frame that one of them refuses")
 
     def pass_requests(self) -> None:
         """Pass the vehicle's requests to the simulator, and the answers back."""

@@ -28,7 +28,7 @@ class LinkFault(NamedTuple):
 
 
 LINK_FAULTS: dict[str, LinkFault] = {
-    "cut": LinkFault("", 0.0, "nothing arrives"),
+    "cut": LinkFault("is_cut", 0.0, "nothing arrives"),
     "restore": LinkFault("", 0.0, "the link is perfect again"),
     "loss": LinkFault("loss", 1.0, "this share of the datagrams is lost"),
     "delay": LinkFault("delay_s", 60.0, "each datagram arrives this time later [s]"),
@@ -74,7 +74,7 @@ def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
     simulator = world.engine.simulator
     fault = _parsed(text, len(world.engine.stack.vehicle.rotors))
     if fault.kind is Kind.STATE_DROP:
-        raise ConfigError("fault", text, "is impossible in lockstep: both sides would wait for ever")
+        raise ConfigError("fault", text, "is impossible in lockstep: both sides would wait for each other")
     begin_us = simulator.time_us + fault.begin_us
     end_us = None if fault.end_us is None else simulator.time_us + fault.end_us
     if for_s is not None:
@@ -83,7 +83,11 @@ def _simulator_fault(world: World, text: str, for_s: float | None) -> None:
         simulator.inject(fault._replace(begin_us=begin_us, end_us=end_us))
     except UsageProblemError as error:
         raise ConfigError("fault", text, str(error).rpartition(": ")[2]) from None
-    world.happened("fault")
+    begin_s = (begin_us - simulator.time_us) * 1e-6
+    if begin_s > 0.0:
+        world.after(begin_s, partial(world.happened, "fault"))
+    else:
+        world.happened("fault")
 
 
 def check_link(text: str) -> tuple[tuple[str, ...], str, Callable[[Channel], None]]:
@@ -101,10 +105,10 @@ def _change_link(world: World, words: list[str], for_s: float | None) -> None:
     directions, name, change = check_link(" ".join(words))
     for direction in directions:
         channel: Channel = getattr(client.link, direction)
-        before = channel.conditions
         change(channel)
-        if for_s is not None:
-            world.after(for_s, partial(channel.set_all, before))
+        condition = LINK_FAULTS[name].condition
+        if for_s is not None and condition:
+            world.after(for_s, partial(channel.end, condition, getattr(channel.conditions, condition)))
     world.happened(f"link_{name}")
     if for_s is not None:
         world.after(for_s, partial(world.happened, f"link_{name}_end"))

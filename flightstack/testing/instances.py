@@ -29,9 +29,10 @@ def free_instance(taken: Collection[int] = ()) -> int:
     """
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    own = range(FIRST + worker, FIRST + COUNT, workers)
-    for offset in range(len(own)):
-        instance = own[(os.getpid() + offset) % len(own)]
+    own = list(range(FIRST + worker % COUNT, FIRST + COUNT, workers))
+    begin = os.getpid() % len(own)
+    others = [instance for instance in range(FIRST, FIRST + COUNT) if instance not in own]
+    for instance in (*own[begin:], *own[:begin], *others):
         if instance not in taken and _is_free(instance):
             return instance
     raise ServerError(f"all ports of instances {FIRST} to {FIRST + COUNT - 1} are in use")

@@ -47,9 +47,10 @@ class Channel:
                 )
         self.conditions = self.conditions._replace(**values)  # type: ignore[arg-type]
 
-    def set_all(self, conditions: Conditions) -> None:
-        """Replace all conditions."""
-        self.conditions = conditions
+    def end(self, name: str, value: float) -> None:
+        """End a condition that was set to ``value``, unless it has changed since."""
+        if getattr(self.conditions, name) == value:
+            self.conditions = self.conditions._replace(**{name: getattr(PERFECT, name)})
 
     def cut(self) -> None:
         """Drop all datagrams, those under way too."""

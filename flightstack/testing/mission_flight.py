@@ -25,7 +25,7 @@ def fly_plan(
     world.plan = plan
     try:
         world.upload(plan)
-        if limit_s is None:  # of an accepted plan: one with an idle loop would take for ever
+        if limit_s is None:  # of an accepted plan: one with an idle loop never ends
             limit_s = flight_limit_s(plan.items, world.setup.home, world.engine.stack.now.behaviour)
         world.arm()
         world.start_mission()

@@ -150,7 +150,12 @@ def _spans(signals: Signals, window: Window) -> list[tuple[float, float]]:
         if not begins:
             known = ", ".join(signals.events) or "none"
             raise ConfigError("event", window.event, f"did not happen in this flight; its events are {known}")
-    return [(begin_s, begin_s + window.within_s) for begin_s in begins]
+    spans = [(begin_s, begin_s + window.within_s) for begin_s in begins]
+    first_s, last_s = signals.time_s[0], signals.time_s[-1]
+    within_flight = [(begin_s, end_s) for begin_s, end_s in spans if begin_s <= last_s and end_s >= first_s]
+    if not within_flight:
+        raise ConfigError("event", str(window.event), "has no sample of this flight in its window")
+    return within_flight
 
 
 def _worst(name: str, signals: Signals, names: Expression | tuple[str, ...], margin: FloatArray) -> Margin:

@@ -18,7 +18,7 @@ from flightstack.params.toml_file import read_toml
 from flightstack.params.vehicle import DEFAULT_VEHICLE
 from flightstack.testing.events import check_event
 from flightstack.testing.expression import Expression
-from flightstack.testing.faults import check_fault, check_link
+from flightstack.testing.faults import DIRECTIONS, LINK_FAULTS, check_fault, check_link
 from flightstack.testing.orders import check_command
 from flightstack.testing.properties import parse_window
 from flightstack.testing.setup import Setup
@@ -194,8 +194,14 @@ def is_scenario(path: Path) -> bool:
 def load_scenario(path: Path) -> Scenario:
     """Read a scenario file; raise ConfigError, which names the key and what is allowed."""
     scenario = replace(read_record(Scenario, path, read_toml(path).values()), path=path)
+    names = [client.name for client in scenario.client]
+    for index, name in enumerate(names):
+        if not name.isidentifier() or name in ("gcs", *DIRECTIONS, *LINK_FAULTS) or name in names[:index]:
+            raise ConfigError(
+                path, f"client[{index}].name", f"{name!r} is no name of a further client, or taken"
+            )
     for index, event in enumerate(scenario.event):
-        _check_event(path, f"event[{index}]", event, {client.name for client in scenario.client})
+        _check_event(path, f"event[{index}]", event, set(names))
     _check_texts(scenario)
     if scenario.plan is None and scenario.duration_s is None and scenario.limit_s is None:
         raise ConfigError(path, "plan", "is missing; without a plan give duration_s or limit_s")
@@ -212,6 +218,8 @@ def _check_event(path: Path, name: str, event: Event, clients: set[str]) -> None
         raise ConfigError(
             path, f"{name}.client", f"{event.client!r} is not one of {', '.join(sorted(clients | {'gcs'}))}"
         )
+    if event.client is not None and event.link is event.command is None:
+        raise ConfigError(path, f"{name}.client", "is for link and command")
     if event.for_s is not None and event.fault is event.link is event.power is None:
         raise ConfigError(path, f"{name}.for_s", "is for fault, link and power")
     if event.refused is not None and event.command is event.upload is event.param is event.fault is None:

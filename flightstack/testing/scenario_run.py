@@ -84,7 +84,8 @@ class _Run:
         self._scenario = scenario
         self._waiting = [(event, _trigger(world, event)) for event in scenario.event]
         self._due: list[tuple[float, Event]] = []
-        self._unexpected: list[str] = []
+        self._requests: list[Event] = []
+        world.watch(self._fire)  # time goes on while a request waits for its answer
 
     def fly(self) -> Outcome | None:
         world, scenario = self._world, self._scenario
@@ -103,23 +104,33 @@ class _Run:
 
     def missed(self) -> tuple[Check, ...]:
         """Return a failed check for each event that did not happen: what it was to test was not flown."""
-        pending = [event for event, _ in self._waiting] + [event for _, event in self._due]
+        pending = [event for event, _ in self._waiting] + [event for _, event in self._due] + self._requests
         missed = [index for index, event in enumerate(self._scenario.event) if event in pending]
         return tuple(Check(f"event[{index}]", False, "did not happen in this flight") for index in missed)
 
-    def _step(self) -> bool:
-        """Fire the events that are due, and run one outer tick; return True at the end of the scenario's duration."""
+    def _fire(self) -> None:
+        """Find the events that are due: faults act at once, requests wait for the next step."""
         world = self._world
-        now_s, waiting = world.time_s, self._waiting
-        if waiting or self._due:
-            state = world.state
-            fired = [event for event, is_due in waiting if is_due(state)]
-            self._waiting = [(event, is_due) for event, is_due in waiting if event not in fired]
-            self._due += [(now_s + event.delay_s, event) for event in fired]
-            due = [event for at_s, event in self._due if at_s <= now_s + 1e-9]
-            self._due = [entry for entry in self._due if entry[0] > now_s + 1e-9]
-            for event in due:
+        if not (self._waiting or self._due):
+            return
+        now_s, state = world.time_s, world.state
+        fired = [event for event, is_due in self._waiting if is_due(state)]
+        self._waiting = [(event, is_due) for event, is_due in self._waiting if event not in fired]
+        self._due += [(now_s + event.delay_s, event) for event in fired]
+        due = [event for at_s, event in self._due if at_s <= now_s + 1e-9]
+        self._due = [entry for entry in self._due if entry[0] > now_s + 1e-9]
+        for event in due:
+            if event.fault is not None or event.link is not None:
                 _happen(world, event)
+            else:
+                self._requests.append(event)
+
+    def _step(self) -> bool:
+        """Make the requests that are due, and run one outer tick; return True at the end of the scenario's duration."""
+        world = self._world
+        self._fire()
+        while self._requests:
+            _happen(world, self._requests.pop(0))
         world.step()
         duration_s = self._scenario.duration_s
         return duration_s is not None and world.time_s >= duration_s

@@ -93,7 +93,8 @@ class Setup:
         folders = (self.folder,) if isinstance(self.folder, Path) else self.folder
         path = next((path for folder in folders if (path := folder / plan).exists()), folders[0] / plan)
         example = example_plans().get(Path(plan).stem)
-        return example if example is not None and not path.exists() else path
+        is_name = example is not None and str(plan) in (example.stem, example.name)
+        return example if example is not None and is_name and not path.exists() else path
 
     def load_plan(self, plan: str | Path) -> Plan:
         """Read a plan file, as ``plan_path`` finds it; raise ConfigError."""

@@ -15,7 +15,7 @@ from flightstack.testing.server import Server
 from flightstack.testing.setup import Setup
 from flightstack.testing.world import World
 
-_WORLD_OPTIONS = ("telemetry", "flight_logs", "wrap_loops")
+_WORLD_OPTIONS = ("telemetry", "make_engine")
 
 
 class Sitl:

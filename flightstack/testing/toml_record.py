@@ -14,6 +14,7 @@ from flightstack.core.errors import ConfigError
 
 T = TypeVar("T")
 _DEEP = 1e6
+_LARGEST = 1e15
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,13 +94,14 @@ def _scalar(kind: Any, limits: Key, file: object, value: Any, path: str) -> Any:
     if (
         isinstance(value, bool)
         or not isinstance(value, (int, float))
+        or not abs(value) < _LARGEST
         or (kind is int and value != int(value))
     ):
         what = "a whole number" if kind is int else "a number"
         raise ConfigError(file, path, f"{value!r} is not {what}")
     if not limits.low <= value <= limits.high:
         raise ConfigError(
-            file, path, f"{value:g} is outside the allowed range {limits.low:g} to {limits.high:g}"
+            file, path, f"{value!r} is outside the allowed range {limits.low:g} to {limits.high:g}"
         )
     return kind(value)
 

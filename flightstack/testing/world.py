@@ -94,6 +94,8 @@ class World:
 
         ``telemetry``: stream at PX4's default rates to ``gcs.received``, instead of a few messages per second.
         """
+        if setup is not None and conditions:
+            raise TypeError(f"give a setup or conditions, not both: {', '.join(conditions)}")
         self.setup = setup or Setup(**conditions)
         self._telemetry = telemetry
         self.engine = make_engine(self.setup)

@@ -187,7 +187,7 @@ TABLE: tuple[Row, ...] = (
     Row(Kind.STATE_NAN, "state:nan", "state nan", "All numbers of the state are NaN."),
     Row(
         Kind.STATE_DROP, "state:drop", "state dropped",
-        "No state is sent; refused in lockstep, where both sides would wait for ever.",
+        "No state is sent; refused in lockstep, where both sides would wait for each other.",
     ),
     Row(
         Kind.STATE_LATE, "state:late=SECONDS", "state late SECONDS",

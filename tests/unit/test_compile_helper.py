@@ -95,6 +95,19 @@ def test_compile_helper_ends_with_its_parent(tmp_path: Path) -> None:
     assert "recorder.outer_heading" not in kernels  # the last one
 
 
+def test_compile_helper_ends_in_order() -> None:
+    """Its parent holds its standard input open."""
+    command = [sys.executable, "-P", "-m", "flightstack.process.compile_helper"]
+    path = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path)
+    helper = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": path}
+    )
+    assert helper.wait() == 0
+    assert helper.stderr is not None
+    assert helper.stderr.read() == b""
+    helper.communicate()
+
+
 def test_a_failing_compile_helper_changes_nothing(cold: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compile_helper, "__name__", "flightstack.process.no_such_module")
     expected = digest_of_flight()

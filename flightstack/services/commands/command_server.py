@@ -13,7 +13,7 @@ from flightstack.core.enums import Severity
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_for, sender
 from flightstack.plan.item import is_unset
-from flightstack.services.commands import guided, mission, modes, system
+from flightstack.services.commands import guided, mission_commands, modes, system
 from flightstack.services.commands.context import (
     ACCEPTED,
     UNSUPPORTED,
@@ -42,7 +42,7 @@ INJECT_FAILURE = int(mavlink.MAV_CMD_INJECT_FAILURE)
 HANDLERS: dict[int, Handler] = {
     **modes.HANDLERS,
     **guided.HANDLERS,
-    **mission.HANDLERS,
+    **mission_commands.HANDLERS,
     **system.HANDLERS,
 }
 """Handlers of the vehicle's commands, by command number."""

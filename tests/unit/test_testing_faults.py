@@ -1,0 +1,112 @@
+"""Faults of links and simulator in a world: overlaps, delayed begins, and what may not be lost silently."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flightstack.core.errors import ConfigError
+from flightstack.mavlink.dialect import mavlink
+from flightstack.testing import Setup, World, load_scenario, run_scenario
+from flightstack.testing.link import PERFECT
+from flightstack.testing.properties import Signals, Window, always
+
+
+def test_overlapping_faults_of_a_link_end_each_at_its_own_time() -> None:
+    with World() as world:
+        channel = world.link.to_vehicle
+        world.fault("link cut", for_s=1.0)
+        world.run_for(0.5)
+        world.fault("link loss 0.3", for_s=1.0)
+        world.run_for(0.7)
+        assert channel.conditions == PERFECT._replace(loss=0.3)
+        world.run_for(0.5)
+        assert channel.conditions == PERFECT
+
+
+def test_restored_link_is_not_cut_again_at_the_end_of_a_fault() -> None:
+    with World() as world:
+        world.fault("link delay 0.2", for_s=1.0)
+        world.link.restore()
+        world.fault("link delay 0.1")
+        world.run_for(1.2)
+        assert world.link.to_vehicle.conditions == PERFECT._replace(delay_s=0.1)
+
+
+def test_fault_that_begins_later_is_an_event_then() -> None:
+    with World() as world:
+        world.fault("rotor:1:weak=0.9@0.5")
+        assert not world.events
+        world.run_for(0.6)
+        assert [(round(event.time_s, 1), event.name) for event in world.events] == [(0.5, "fault")]
+
+
+def test_setup_and_conditions_are_not_mixed() -> None:
+    with pytest.raises(TypeError, match="give a setup or conditions, not both: seed"):
+        World(Setup(), seed=7)
+
+
+@pytest.mark.parametrize("plan", ["nowhere/square.plan", "square.waypoints", "/nowhere/hop.plan"])
+def test_missing_plan_is_not_replaced_by_an_example(plan: str) -> None:
+    with pytest.raises(ConfigError, match="cannot be read"):
+        Setup().load_plan(plan)
+
+
+def test_event_outside_the_flight_is_no_window() -> None:
+    time_s = np.arange(0.0, 10.0, 0.1)
+    signals = Signals(time_s, {"altitude_m": time_s}, {"link_cut": [20.0]})
+    with pytest.raises(ConfigError, match="has no sample of this flight"):
+        always(signals, "altitude_m > 1000", Window("link_cut", 0.5))
+
+
+def test_lost_piece_of_a_text_is_no_error() -> None:
+    with World() as world:
+        for sequence in (1, 0, 1, 1):
+            world.gcs._take(mavlink.MAVLink_statustext_message(6, b"x" * 50, 7, sequence))
+        assert [len(text) for text in world.gcs.texts] == [100]
+
+
+def test_events_go_on_while_a_request_waits_for_its_answer(tmp_path: Path) -> None:
+    path = tmp_path / "late.toml"
+    path.write_text(
+        """
+        duration_s = 6
+        [[event]]
+        at_s = 0.5
+        link = "delay 1.5"
+        [[event]]
+        at_s = 1.0
+        command = "arm"
+        [[event]]
+        at_s = 1.2
+        link = "restore"
+        [expect]
+        outcome = "any"
+        """
+    )
+    scenario = replace(load_scenario(path), path=path)
+    verdict = run_scenario(scenario)
+    times = {event.name: event.time_s for event in verdict.flight.caused}
+    assert times["link_restore"] == pytest.approx(1.2, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('seed = inf\nduration_s = 1\n[expect]', "is not a whole number"),
+        (f"limit_s = 1{'0' * 400}\n[expect]", "is not a number"),
+        ('duration_s = 1\n[[client]]\nname = "gcs"\n[expect]', "client\\[0\\].name"),
+        ('duration_s = 1\n[[client]]\nname = "a b"\n[expect]', "client\\[0\\].name"),
+        ('duration_s = 1\n[[client]]\nname = "a"\n[[client]]\nname = "a"\n[expect]', "client\\[1\\].name"),
+        ('duration_s = 1\n[[event]]\nat_s = 1\nfault = "rotor 1 dead"\nclient = "gcs"\n[expect]', "link and command"),
+    ],
+    ids=range(6),
+)  # fmt: skip
+def test_bad_scenario_is_one_sentence(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=words):
+        load_scenario(path)
