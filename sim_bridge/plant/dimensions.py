@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
+from flightstack.core.portable_math import distance
 from flightstack.params.vehicle import Vehicle
 
 _SPACING_SHARE = 0.44  # propeller radius over the distance of neighbouring rotors
@@ -12,13 +11,14 @@ _SPACING_SHARE = 0.44  # propeller radius over the distance of neighbouring roto
 def propeller_radius_m(vehicle: Vehicle) -> float:
     """Return the radius of propellers that do not overlap."""
     at = [rotor.position_frd_m[:2] for rotor in vehicle.rotors]
-    gaps = [math.dist(a, b) for index, a in enumerate(at) for b in at[:index] if math.dist(a, b) > 1e-3]
+    between = [distance(a[0] - b[0], a[1] - b[1]) for index, a in enumerate(at) for b in at[:index]]
+    gaps = [gap for gap in between if gap > 1e-3]
     return _SPACING_SHARE * min([*gaps, 1.2 * arm_m(vehicle)])
 
 
 def arm_m(vehicle: Vehicle) -> float:
     """Return the mean distance of the rotors from the vertical axis."""
-    return sum(math.hypot(*rotor.position_frd_m[:2]) for rotor in vehicle.rotors) / len(vehicle.rotors)
+    return sum(distance(*rotor.position_frd_m[:2]) for rotor in vehicle.rotors) / len(vehicle.rotors)
 
 
 def foot_z_m(vehicle: Vehicle) -> float:

@@ -195,7 +195,7 @@ def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(board: Board, tm
         (["hop.plan", "--target", "python"], "--target python: expected emulated, host"),
         (["hop.plan", "--target", "serial:/dev/ttyNONE"], "/dev/ttyNONE: no such device"),
         (["none.plan", "--target", "host"], "none.plan"),
-        (["hop.plan", "--target", "host", "--controller", "mine"], "--controller mine"),
+        (["hop.plan", "--target", "host", "--controller", "mine"], "--controller: mine: there is no such"),
         (["replay", "hop.plan", "--target", "c"], "not a readable flight log"),
         (["replay", "none.ulg"], "none.ulg"),
         (["doctor"], "give either --port DEVICE or --target"),

@@ -14,6 +14,7 @@ import pytest
 
 from flightstack.process import compile_helper
 from flightstack.testing import World
+from tests.support.tools import NIGHTLY
 
 pytestmark = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
 ROOT = Path(__file__).resolve().parents[2]
@@ -75,6 +76,9 @@ def cold(monkeypatch: pytest.MonkeyPatch, not_started: None) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1}, raising=False)
 
 
+@pytest.mark.skipif(
+    not NIGHTLY, reason="half a minute of CPU time; the example of mission tests starts cold too"
+)
 @pytest.mark.skipif(CPUS < 2, reason="the helper needs a second CPU")
 def test_cold_cache_is_compiled_once_and_gives_the_same_log(tmp_path: Path) -> None:
     """The helper compiles guidance and commander, this process the rest."""

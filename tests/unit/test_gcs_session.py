@@ -161,7 +161,7 @@ def test_a_refusal_carries_the_text_that_follows_it() -> None:
     vehicle = FakeVehicle(refusals={ARM: f"Command refused: {reason}"})
     session = met(Session(), vehicle)
     answer = complete(session, vehicle, calls.command(session, *calls.ARM, 0.0))
-    assert answer == Answer(False, reason)
+    assert answer == Answer(False, reason, result=mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
 
 
 def test_a_refusal_without_a_text_names_the_result() -> None:
