@@ -5,11 +5,25 @@ python tools/beside_load.py COMMAND [ARG ...]
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 
 BUSY = "while True: pass"
+
+
+@contextlib.contextmanager
+def busy() -> Iterator[None]:
+    """Keep every core busy."""
+    load = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(os.cpu_count() or 1)]
+    try:
+        yield
+    finally:
+        for process in load:
+            process.kill()
+            process.wait()
 
 
 def main(command: list[str]) -> int:
@@ -17,13 +31,8 @@ def main(command: list[str]) -> int:
     if not command:
         print(__doc__, file=sys.stderr)
         return 2
-    load = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(os.cpu_count() or 1)]
-    try:
+    with busy():
         return subprocess.run(command, check=False).returncode
-    finally:
-        for process in load:
-            process.kill()
-            process.wait()
 
 
 if __name__ == "__main__":
