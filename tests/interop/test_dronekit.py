@@ -100,7 +100,10 @@ class DroneKit:
 
 @pytest.fixture(scope="module")
 def drone(station_vehicle: RealVehicle) -> Iterator[DroneKit]:
+    """Its connection, with the vehicle's streams and parameters: what ``connect(wait_ready=True)`` waits for."""
     drone = DroneKit(f"tcp:{HOST}:{station_vehicle.tcp_port}")
+    drone.master.mav.request_data_stream_send(0, 0, mavlink.MAV_DATA_STREAM_ALL, 4, 1)
+    drone.fetch_parameters()
     yield drone
     drone.close()
 
@@ -128,8 +131,6 @@ def item(command: int, latitude: float, longitude: float, altitude: float) -> An
 def test_its_connection_comes_to_wait_ready(drone: DroneKit) -> None:
     """dronekit: Vehicle.initialize, send_capabilities_request, and what wait_ready waits for."""
     assert drone.master.flightmode not in (None, "INITIALISING", "MAV")
-    drone.master.mav.request_data_stream_send(0, 0, mavlink.MAV_DATA_STREAM_ALL, 4, 1)
-    drone.fetch_parameters()
     assert "MIS_TAKEOFF_ALT" in {value.param_id for value in drone.parameters.values()}
     drone.master.mav.command_long_send(
         0, 0, mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, 0, 1, 0, 0, 0, 0, 0, 0

@@ -21,8 +21,7 @@ class Witness:
         self.connection = mavutil.mavlink_connection(url, **options)
         self.system = system
         self.connection.target_system, self.connection.target_component = system, 1
-        if url.startswith("udpout"):
-            self.beat()  # nobody knows of a datagram socket before it has sent
+        self.beat()  # a link that has sent nothing gets heartbeats alone
         self.until("HEARTBEAT")
 
     @property
