@@ -10,7 +10,7 @@ from flightstack.mavlink.files import Entry
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
-from gcs_cli.link.calls import OWN_ADDRESS, vehicle_address
+from gcs_cli.link.calls import vehicle_address
 from gcs_cli.link.connection import Connection
 
 LOG_FOLDER = "@MAV_LOG"
@@ -84,4 +84,4 @@ def _error(result: object, name: str) -> CliError:
 
 
 def _ftp_client(connection: Connection) -> FtpClient:
-    return FtpClient(vehicle_address(connection.session), OWN_ADDRESS)
+    return FtpClient(vehicle_address(connection.session), connection.session.own)
