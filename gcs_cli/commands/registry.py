@@ -24,6 +24,9 @@ class GcsGroup(LazyGroup):
         "fly": LazyCommand(
             "gcs_cli.commands.fly", "Fly a mission in simulation and write log, summary and report."
         ),
+        "sim": LazyCommand(
+            "gcs_cli.commands.sim", "Simulate one or several vehicles for any MAVLink client."
+        ),
         "paper": LazyCommand(
             "gcs_cli.commands.paper", "Fly every experiment of the paper and report the results."
         ),

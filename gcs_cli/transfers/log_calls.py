@@ -32,6 +32,16 @@ def fetch_list(connection: Connection) -> tuple[LogEntry, ...]:
     raise _error(client.result, "log list")
 
 
+def erase_logs(connection: Connection, before: int) -> tuple[LogEntry, ...]:
+    """Erase the ``before`` logs of the vehicle; return those that are left; raise CliError."""
+    client = LogClient(vehicle_address(connection.session))
+    client.start_erase(before)
+    connection.run(client, "log erase")
+    if isinstance(client.result, LogDone):
+        return client.result.entries
+    raise _error(client.result, "log erase")
+
+
 def fetch_files(connection: Connection) -> tuple[Entry, ...]:
     """Return the logs on the vehicle's MAVLink FTP; none if it does not support that."""
     client = _ftp_client(connection)
