@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import os
-import select
 import sys
-import termios
-import tty
-from typing import Any
 
 import typer
-from rich.console import Console
-from rich.live import Live
 
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.settings import LinkOptions, link_options
 from gcs_cli.tui.watch_lines import state_line, text_line
-from gcs_cli.tui.watch_render import render
 from gcs_cli.vehicle_link import open_link
 
 app = make_app(add_completion=False)
 
-FRAME_S = 0.125
 LINE_S = 1.0
 
 
@@ -50,44 +42,12 @@ def _can_draw() -> bool:
     return sys.stdout.isatty() and os.environ.get("TERM") not in ("dumb", "unknown")
 
 
-class Keyboard:
-    """Reads single keys from the terminal without waiting or echo, within the ``with`` block.
-
-    If stdin is not a terminal, no key is ever pressed.
-    """
-
-    def __init__(self) -> None:
-        self._descriptor = sys.stdin.fileno() if sys.stdin is not None and sys.stdin.isatty() else None
-        self._before: list[Any] = []
-
-    def pressed(self, key: str) -> bool:
-        """Return True if ``key``, in either case, was pressed since the last call."""
-        if self._descriptor is None or not select.select([self._descriptor], [], [], 0)[0]:
-            return False
-        return key in os.read(self._descriptor, 1024).decode(errors="replace").lower()
-
-    def __enter__(self) -> Keyboard:
-        if self._descriptor is not None:
-            self._before = termios.tcgetattr(self._descriptor)
-            tty.setcbreak(self._descriptor)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._descriptor is not None:
-            termios.tcsetattr(self._descriptor, termios.TCSADRAIN, self._before)
-
-
 def watch_screen(connection: Connection) -> None:
-    """Draw the full-screen view until q is pressed."""
-    console = Console()
-    with Keyboard() as keyboard, Live(console=console, screen=True, auto_refresh=False) as live:
-        while not keyboard.pressed("q"):
-            now_s, (width, height) = connection.now_s, console.size
-            live.update(
-                render(connection.session.view, now_s, width, height, str(connection.endpoint)), refresh=True
-            )
-            while connection.now_s < now_s + FRAME_S:
-                connection.step(now_s + FRAME_S)
+    """Show the full-screen view until the user quits."""
+    from gcs_cli.tui.app import WatchApp
+    from gcs_cli.tui.feed import Feed
+
+    WatchApp(Feed(connection)).run()
 
 
 def watch_lines(connection: Connection) -> None:

@@ -1,0 +1,32 @@
+"""The screens of ``gcs watch``: a new one is a module and a row here."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+if TYPE_CHECKING:
+    from gcs_cli.tui.watch_screen import WatchScreen
+
+
+class ScreenEntry(NamedTuple):
+    """A screen: its mode in the application, key, title and class, which is imported when first shown."""
+
+    mode: str
+    key: str
+    title: str
+    location: str
+    summary: str
+
+    def load(self) -> WatchScreen:
+        """Import and make the screen."""
+        module, _, name = self.location.partition(":")
+        return cast("WatchScreen", getattr(import_module(module), name)(self.mode))
+
+
+SCREENS = (
+    ScreenEntry("fly", "1", "Fly", "gcs_cli.tui.fly_screen:FlyScreen", "attitude, position, battery, link"),
+    ScreenEntry(
+        "messages", "5", "Messages", "gcs_cli.tui.messages_screen:MessagesScreen", "texts of the vehicle"
+    ),
+)

@@ -1,0 +1,33 @@
+"""A feed without a link: the screens of ``gcs watch`` show what a test puts into it."""
+
+from __future__ import annotations
+
+from gcs_cli.tui.feed import Feed
+from gcs_cli.tui.history import History
+from gcs_cli.vehicle.view_types import VehicleView
+
+
+class StillFeed(Feed):
+    def __init__(self, view: VehicleView, now_s: float = 10.0) -> None:
+        self.history = History()
+        self.error = None
+        self.shown = view
+        self.time_s = now_s
+
+    @property
+    def view(self) -> VehicleView:
+        return self.shown
+
+    @property
+    def now_s(self) -> float:
+        return self.time_s
+
+    @property
+    def link_name(self) -> str:
+        return "UDP 127.0.0.1:14550"
+
+    def start(self) -> None:
+        """Nothing runs."""
+
+    def stop(self) -> None:
+        """Nothing runs."""
