@@ -19,6 +19,7 @@ from flightstack.vehicle.lockstep import Lockstep
 from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.simulator import SIMULATOR_COMPONENT, Simulator
 
+_PLANT = "flightstack.testing.setup:compile_plant"
 _TIMING_US = 1_000_000
 """Interval of ``loop_timing`` in the log."""
 
@@ -50,9 +51,9 @@ class Engine:
         self._open: FlightLog | None = None
         self._flight_logs = flight_logs
         self._wrap_loops = wrap_loops
-        compile_helper.start()
-        self.simulator: Simulator = setup.simulator(vehicle_of(self.config))
+        compile_helper.start(tasks=(compile_helper.GUIDANCE, _PLANT))
         self.stack = self._build()
+        self.simulator: Simulator = setup.simulator(vehicle_of(self.config))
         self.simulator.set_interval_us(self.stack.rates.interval_us)
         self._codec = Link(1, SIMULATOR_COMPONENT)
         self.actuators = ActuatorsFrame()
