@@ -75,15 +75,15 @@ class State(NamedTuple):
         return "; ".join(parts)
 
 
-def state_of(stack: Stack, simulator: Simulator) -> State:
-    """Return the present state."""
+def state_of(stack: Stack, simulator: Simulator, time_s: float) -> State:
+    """Return the present state; ``time_s`` is the time of the world."""
     now, truth = stack.now, simulator.frame.state
     position, velocity = Vector3(*truth[0:3].tolist()), Vector3(*truth[3:6].tolist())
     euler = euler_from_quaternion(Quaternion(*truth[6:10].tolist()))
     roll, pitch, yaw = (math.degrees(angle) for angle in euler)
     home = stack.places.frame.to_ned(stack.area.home)
     return State(
-        time_s=now.time_us * 1e-6,
+        time_s=time_s,
         mode=now.status.mode.name,
         armed=now.status.armed,
         landed=now.landed,

@@ -250,6 +250,25 @@ def test_power_cycle_keeps_parameters_and_plans(world: World) -> None:
     assert world.fly("hop").completed
 
 
+def test_world_time_goes_on_while_the_vehicle_boots_again(world: World) -> None:
+    world.arm()
+    world.run_for(5.0)
+    flown = world.flight()
+    before_s = world.time_s
+    world.power_cycle(off_s=2.0)
+    assert world.time_s == world.state.time_s == pytest.approx(before_s + 2.0, abs=0.011)
+    world.run_for(3.0)
+    assert world.time_s == pytest.approx(before_s + 5.0, abs=0.011)
+    assert world.gcs.received["ATTITUDE"].time_boot_ms == pytest.approx(3000, abs=260)
+    world.arm()  # the ground station goes on to send heartbeats
+    world.run_for(1.0)
+    again = world.flight()
+    assert [event.name for event in world.events] == ["power_cycle"]
+    assert flown.signals.time_s[-1] < world.events[0].time_s < again.signals.time_s[0]
+    begins_s = [again.signals.time_s[0], again.log.texts[0].time_s, again.log["vehicle_status"].time_s[0]]
+    assert begins_s == pytest.approx([before_s + 5.0] * 3, abs=0.011)
+
+
 def test_power_cycle_in_the_air_drops_the_vehicle(world: World) -> None:
     world.takeoff(5.0)
     world.run_until("altitude_m > 4.5", timeout_s=20.0)
