@@ -27,7 +27,7 @@ SIGNALS: dict[str, str] = {
     "mode": "flight mode, as text: 'MISSION', 'RETURN', 'LAND' …",
     "armed": "true if armed",
     "landed": "true if the land detector reports landed",
-    "failsafe": "true if a failsafe acts",
+    "failsafe": "true while a failsafe acts: until its end, a user's override, or disarming",
     "item": "current mission item, from 0",
     "altitude_m": "height above home at the start",
     "north_m": "position north of home at the start",
@@ -38,7 +38,7 @@ SIGNALS: dict[str, str] = {
     "pitch_deg": "pitch angle",
     "yaw_deg": "yaw angle, −180 to 180",
     "distance_to_home_m": "horizontal distance to home",
-    "error_m": "distance between position and position setpoint",
+    "error_m": "distance between position and position setpoint in flight; 0 on the ground",
     "battery_percent": "charge of the battery",
 }
 """Names in expressions; each is an attribute of ``State`` too."""

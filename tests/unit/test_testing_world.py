@@ -327,6 +327,30 @@ def test_signals_agree_with_the_log(flight: Flight) -> None:
     assert len(part.values["mode"]) == len(part.time_s)
 
 
+def test_error_is_that_of_the_flight(world: World) -> None:
+    """The setpoint sinks half a metre into the ground after the touchdown."""
+    errors_m: list[float] = []
+    world.watch(lambda: errors_m.append(world.state.error_m))
+    flight = world.fly("hop")
+    world.run_for(1.0)
+    assert flight.signals.values["error_m"].max() == flight.max_error_m < 0.1
+    assert max(errors_m) == pytest.approx(flight.max_error_m, abs=0.01)
+    assert flight.signals.values["error_m"][-1] == errors_m[-1] == 0.0
+    flight.always("error_m < 0.1")
+
+
+def test_failsafe_ends_with_disarming(world: World) -> None:
+    world.takeoff(3.0)
+    world.run_until("altitude_m > 2.5", timeout_s=20.0)
+    world.param_set("NAV_DLL_ACT", 3)  # land
+    world.link.cut()
+    world.run_until("landed", timeout_s=60.0)
+    assert world.state.failsafe
+    world.run_until("not armed", timeout_s=10.0)
+    assert not world.state.failsafe
+    world.flight().always("failsafe and armed after failsafe")
+
+
 def test_modes_and_events_are_in_order(flight: Flight) -> None:
     assert [span.mode for span in flight.modes][:2] == ["HOLD", "MISSION"]
     assert all(one.end_s == two.begin_s for one, two in zip(flight.modes, flight.modes[1:], strict=False))
