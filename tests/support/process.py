@@ -17,6 +17,7 @@ from tests.support.programs import PROGRAMS, Program
 
 BOUND_S = 60.0
 MOST_LINES = 200
+SUPERVISOR = "flightstack.process.supervised"
 
 
 def start(module: str, arguments: Sequence[str], listens: bool) -> Program | subprocess.Popen[str]:
@@ -44,7 +45,8 @@ def children_of(pid: int) -> dict[str, int]:
         except (OSError, IndexError):  # the process has ended
             continue
         if parent == pid and "-m" in arguments:
-            found[arguments[arguments.index("-m") + 1]] = int(entry.name)
+            module, *rest = arguments[arguments.index("-m") + 1 :]
+            found[rest[0] if module == SUPERVISOR else module] = int(entry.name)
     return found
 
 
