@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
@@ -26,7 +25,7 @@ from flightstack.testing.setup import Setup
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import parse_endpoint
 from tests.support.plugin_run import PLUGIN, load, prepare, run, section
-from tests.support.process import children_of
+from tests.support.process import children_of, ends_of
 
 pytest_plugins = ["pytester"]
 
@@ -67,16 +66,6 @@ def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     setup = Setup(vehicle="x_quad", params={"MIS_TAKEOFF_ALT": 4.0})
     with Server(setup, folder, speed=10.0, faults=["battery level 0.6 @0.5"]) as started:
         yield started
-
-
-@contextlib.contextmanager
-def ends_of(*processes: int) -> Iterator[None]:
-    """Wait for the ends of processes, which what is done meanwhile causes."""
-    watched = [os.pidfd_open(process) for process in processes]
-    yield
-    for descriptor in watched:
-        assert select.select([descriptor], [], [], LONG_S)[0]
-        os.close(descriptor)
 
 
 def assert_free(port: int) -> None:
