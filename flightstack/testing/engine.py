@@ -29,6 +29,11 @@ class LogBuffer(io.BytesIO):
 
     content = b""
 
+    def __init__(self, boot_s: float) -> None:
+        super().__init__()
+        self.boot_s = boot_s
+        """Simulated time at which the vehicle was switched on: times of the log count from there."""
+
     def close(self) -> None:
         """Close the file and keep its content."""
         self.content = self.getvalue()
@@ -49,6 +54,7 @@ class Engine:
         """One log for each flight, oldest first."""
         self.config = setup.stack_config()
         self._open: FlightLog | None = None
+        self._boot_us = 0
         self._flight_logs = flight_logs
         self._wrap_loops = wrap_loops
         compile_helper.start(tasks=(compile_helper.GUIDANCE, _PLANT))
@@ -79,14 +85,19 @@ class Engine:
         self.stack.now.has_state = True
 
     def _open_log(self) -> FlightLog:
-        self.logs.append(LogBuffer())
+        self.logs.append(LogBuffer(self._boot_us * 1e-6))
         self._open = FlightLog(self.logs[-1], len(self.stack.vehicle.rotors))
         return self._open
 
     @property
     def time_s(self) -> float:
-        """Simulated time [s]."""
-        return self.stack.now.time_us * 1e-6
+        """Simulated time since the start of the world [s]; the vehicle counts from its last power cycle."""
+        return (self._boot_us + self.stack.now.time_us) * 1e-6
+
+    @property
+    def newest_boot_s(self) -> float:
+        """Simulated time from which the times of the newest log count [s]."""
+        return self.logs[-1].boot_s if self.logs else 0.0
 
     def newest_log(self) -> bytes:
         """Return the log of the newest flight, up to now if it is not over; b"" before the first."""
@@ -151,8 +162,11 @@ class Engine:
         old = self.stack
         old.recorder.close()
         self.actuators = ActuatorsFrame()  # all zero: disarmed
-        for _ in range(round(off_s * old.rates.inner_hz)):
+        steps_off = round(off_s * old.rates.inner_hz)
+        for _ in range(steps_off):
             self.simulator.apply(self.actuators)
+        self._check(old.simulator.receive(memoryview(self.states())))  # the new vehicle's clock begins here
+        self._boot_us += old.now.time_us + steps_off * old.rates.interval_us
         old.loops.close()
         self.config = reboot_config(old, self.config)
         self.stack = self._build()
