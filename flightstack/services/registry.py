@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
+import math
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import partial
 from typing import Protocol
 
@@ -54,8 +55,37 @@ class Service(Protocol):
         ...
 
     def next_deadline(self) -> float | None:
-        """Return the link time of the next poll if no message arrives before; −inf for at once, None for never."""
+        """Return the link time of the next poll if no message arrives before; None for never.
+
+        −inf stands for every poll. The hub takes this at its word: before that time it does not poll the service.
+        """
         ...
+
+
+class Schedule:
+    """Polls each service when it is due, and all of them after a message: of ten, one has something to do.
+
+    A message for one service may change another: a command sets a parameter, which the parameter server announces.
+    """
+
+    def __init__(self, services: Sequence[Service]) -> None:
+        self._services = services
+        self._due_s = [-math.inf] * len(services)
+
+    def wake(self) -> None:
+        """Poll all services at the next poll."""
+        self._due_s = [-math.inf] * len(self._services)
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return the messages to send now, each with its peer; None stands for every peer that was heard."""
+        addressed: list[tuple[Hashable | None, Message]] = []
+        due = [index for index, due_s in enumerate(self._due_s) if due_s <= now_s]
+        for index in due:
+            addressed += self._services[index].poll(now_s)
+        for index in due:
+            due_s = self._services[index].next_deadline()
+            self._due_s[index] = math.inf if due_s is None else due_s
+        return addressed
 
 
 VENDOR = "flightstack"
