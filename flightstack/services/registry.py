@@ -70,21 +70,25 @@ class Schedule:
 
     def __init__(self, services: Sequence[Service]) -> None:
         self._services = services
-        self._due_s = [-math.inf] * len(services)
+        self._due_s: dict[int, float] = {}  # by the index of the service; not of those that are never due
+        self.wake()
 
     def wake(self) -> None:
         """Poll all services at the next poll."""
-        self._due_s = [-math.inf] * len(self._services)
+        self._due_s = dict.fromkeys(range(len(self._services)), -math.inf)
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Return the messages to send now, each with its peer; None stands for every peer that was heard."""
         addressed: list[tuple[Hashable | None, Message]] = []
-        due = [index for index, due_s in enumerate(self._due_s) if due_s <= now_s]
+        due = sorted([index for index, due_s in self._due_s.items() if due_s <= now_s])  # in sending order
         for index in due:
             addressed += self._services[index].poll(now_s)
         for index in due:
             due_s = self._services[index].next_deadline()
-            self._due_s[index] = math.inf if due_s is None else due_s
+            if due_s is None:
+                del self._due_s[index]
+            else:
+                self._due_s[index] = due_s
         return addressed
 
 

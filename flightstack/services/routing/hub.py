@@ -206,7 +206,8 @@ class GroundHub:
         """
         self._congested, self._polled_s = congested, now_s
         changed = self._note_changes()
-        self._collect(self._schedule.poll(now_s))
+        if addressed := self._schedule.poll(now_s):
+            self._collect(addressed)
         self._send_texts()
         self._telemetry.begin_poll()
         for address, peer in list(self._peers.items()):
@@ -215,7 +216,8 @@ class GroundHub:
                 frames = [peer.link.encode_shared(message) for message in due]
                 for frame in frames:
                     yield address, frame
-        yield from self._forwarded(now_s)
+        if self._to_forward:
+            yield from self._forwarded(now_s)
         self._forget_silent(now_s)
 
     def _forwarded(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:

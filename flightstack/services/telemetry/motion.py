@@ -75,14 +75,16 @@ def position_target_global(f: VehicleStatus) -> Message:
 def global_position(f: VehicleStatus) -> Message:
     """GLOBAL_POSITION_INT: altitude above the sea and above home."""
     x = f.state
-    point = f.info.frame.to_geo(Vector3(*x[:3]))
+    latitude_deg, longitude_deg, altitude_m = f.info.frame.to_geo(Vector3(*x[:3]))
     return GLOBAL_POSITION_INT(
         boot_ms(f),
-        int32(point.latitude_deg * 1e7),
-        int32(point.longitude_deg * 1e7),
-        int32(point.altitude_m * 1e3),
-        int32((point.altitude_m - f.home.altitude_m) * 1e3),
-        *(int16(v * 100.0) for v in x[3:6]),
+        int32(latitude_deg * 1e7),
+        int32(longitude_deg * 1e7),
+        int32(altitude_m * 1e3),
+        int32((altitude_m - f.home.altitude_m) * 1e3),
+        int16(x[3] * 100.0),
+        int16(x[4] * 100.0),
+        int16(x[5] * 100.0),
         whole(heading_deg(x[6:10]) * 100.0, 0, 35999),
     )
 
