@@ -47,7 +47,7 @@ from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_stat
 
 _KERNELS = (
     "inner_kernel", "outer_kernel", "rest_kernel", "levelling_kernel", "goal_kernel",
-    "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading",
+    "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading", "euler_rad",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
 _REAL_TIME_KERNELS = ("stream_kernel",)

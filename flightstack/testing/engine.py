@@ -79,10 +79,12 @@ class Engine:
 
     def _begin(self) -> None:
         """Connect the stack to the simulator: it has its first state."""
-        self._lockstep = Lockstep(self.stack.simulator, self.stack.autopilot, self.stack.rates.interval_us)
+        self._endpoint, self._now = self.stack.simulator, self.stack.now
+        self._interval_us, self._divisor = self.stack.rates.interval_us, self.stack.rates.divisor
+        self._lockstep = Lockstep(self._endpoint, self.stack.autopilot, self._interval_us)
         self._missed_us = self._next_timing_us = self._ticks = 0
-        self.stack.simulator.receive(memoryview(self.states()))
-        self.stack.now.has_state = True
+        self._endpoint.receive(memoryview(self.states()))
+        self._now.has_state = True
 
     def _open_log(self) -> FlightLog:
         self.logs.append(LogBuffer(self._boot_us * 1e-6))
@@ -92,7 +94,7 @@ class Engine:
     @property
     def time_s(self) -> float:
         """Simulated time since the start of the world [s]; the vehicle counts from its last power cycle."""
-        return (self._boot_us + self.stack.now.time_us) * 1e-6
+        return (self._boot_us + self._now.time_us) * 1e-6
 
     @property
     def newest_boot_s(self) -> float:
@@ -111,30 +113,35 @@ class Engine:
 
     def tick(self) -> bool:
         """Run one exchange: state to the stack, actuators back, all as bytes. Return True after an outer tick."""
-        stack = self.stack
+        link = self._endpoint
         if self._missed_us:
-            commands = stack.autopilot.tick(stack.simulator.time_us + self._missed_us)
+            commands = self.stack.autopilot.tick(link.time_us + self._missed_us)
         else:
             commands = self._lockstep.tick(self.machine_ns)
-        for severity, text in stack.simulator.steps.take_notices():
-            stack.journal.say(severity, text)
-        self.take_answer(stack.simulator.answer(commands, stack.now.status.armed))
+        for severity, text in link.steps.take_notices():
+            self.stack.journal.say(severity, text)
+        self.take_answer(link.answer(commands, self._now.status.armed))
         self._ticks += 1
-        is_outer = self._ticks % stack.rates.divisor == 0
-        if is_outer and stack.now.time_us >= self._next_timing_us:
-            time_us = stack.now.time_us
-            self._next_timing_us = time_us + _TIMING_US
-            stack.recorder.timing(time_us, **stack.report.log_fields(time_us // stack.rates.interval_us))
-        return is_outer
+        if self._ticks % self._divisor:
+            return False
+        if self._now.time_us >= self._next_timing_us:
+            self._record_timing()
+        return True
+
+    def _record_timing(self) -> None:
+        time_us = self._now.time_us
+        self._next_timing_us = time_us + _TIMING_US
+        fields = self.stack.report.log_fields(time_us // self._interval_us)
+        self.stack.recorder.timing(time_us, **fields)
 
     def advance(self) -> None:
         """Advance the simulator by one interval with the newest actuators, and send the stack its state."""
         self.simulator.apply(self.actuators)
-        self.machine_ns += self.stack.rates.interval_us * 1000
+        self.machine_ns += self._interval_us * 1000
         if self.loses_states:
-            self._missed_us += self.stack.rates.interval_us
-        else:
-            self._check(self.stack.simulator.receive(memoryview(self.states())))
+            self._missed_us += self._interval_us
+        elif not self._endpoint.receive(memoryview(self.states())):
+            raise AssertionError("the flight stack refuses a frame of the simulator")
 
     def states(self) -> bytes | memoryview:
         """Return the bytes that the simulator sends for one step."""
@@ -142,12 +149,8 @@ class Engine:
 
     def take_answer(self, answer: bytes | memoryview) -> None:
         """Take the stack's actuators."""
-        self._check(self.actuators.open(answer))
-
-    @staticmethod
-    def _check(is_valid: bool) -> None:
-        if not is_valid:
-            raise AssertionError("simulator and flight stack exchanged a frame that one of them refuses")
+        if not self.actuators.open(answer):
+            raise AssertionError("the simulator refuses a frame of the flight stack")
 
     def pass_requests(self) -> None:
         """Pass the vehicle's requests to the simulator, and the answers back."""
