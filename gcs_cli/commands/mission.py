@@ -12,13 +12,13 @@ from flightstack.core.atomic_file import check_new
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import MissionItem, MissionType, Plan, command_name, load_plan, save_plan
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.errors import FAILED, CliError, VehicleLostError
+from gcs_cli.errors import CliError, VehicleLostError
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.settings import LinkOptions, OverwriteOption
 from gcs_cli.transfers.plan_files import PlanArgument
-from gcs_cli.transfers.plan_parts import Uploads, parts_to_send, plan_parts, plan_problem
+from gcs_cli.transfers.plan_parts import Uploads, parts_to_send, plan_parts
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
@@ -76,21 +76,6 @@ def _complete(connection: Connection, uploads: Uploads, file: Path) -> None:
         raise CliError(f"{name()}: interrupted; {uploads.state}") from None
     except OSError as error:
         raise CliError(f"{name()}: {error.strerror or error}; {uploads.state}") from None
-
-
-@app.command()
-def check(file: PlanArgument) -> None:
-    """Check a file as the vehicle does, without a vehicle.
-
-    Checks mission, geofence and rally points.
-    """
-    plan = load_plan(file)
-    first = next((item.position_deg for item in plan.items if item.position_deg is not None), (0.0, 0.0))
-    problem = plan_problem(plan, plan.home or GeoPoint(*first, 0.0))
-    if problem is not None:
-        raise CliError(f"{file}: {problem}", FAILED)
-    for part in plan_parts(plan):
-        typer.echo(f"{part.name} of {len(part.items)} items: good")
 
 
 @app.command()

@@ -11,6 +11,7 @@ from gcs_cli.lazy_group import LazyCommand, LazyGroup
 
 _ACTIONS = "gcs_cli.commands.actions"
 _MISSION = "gcs_cli.commands.mission"
+_PLANS = "gcs_cli.commands.mission_files"
 _PARAM = "gcs_cli.commands.param"
 _LOG = "gcs_cli.commands.log"
 _PIL = "gcs_cli.commands.pil"
@@ -51,8 +52,18 @@ class MissionGroup(LazyGroup):
     """``gcs mission``."""
 
     lazy = {  # noqa: RUF012
+        "new": LazyCommand(_PLANS, "Write a mission of a pattern."),
+        "check": LazyCommand(
+            _PLANS,
+            "Check a file as the vehicle does: without a vehicle, or with one's geofence, home and parameters.",
+        ),
+        "show": LazyCommand(
+            _PLANS, "Show a plan: its items with distances, headings and times, and a drawing."
+        ),
+        "convert": LazyCommand(
+            _PLANS, "Convert a plan to the format of another file, and name what that format cannot hold."
+        ),
         "upload": LazyCommand(_MISSION, "Replace the vehicle's mission by that of a file."),
-        "check": LazyCommand(_MISSION, "Check a file as the vehicle does, without a vehicle."),
         "download": LazyCommand(_MISSION, "Download the vehicle's mission, geofence and rally points."),
         "clear": LazyCommand(_MISSION, "Remove the vehicle's mission, geofence or rally points."),
         "start": LazyCommand(_MISSION, "Start the mission; the vehicle arms for it."),

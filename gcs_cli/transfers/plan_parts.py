@@ -12,15 +12,12 @@ from flightstack.plan import (
     MissionResult,
     MissionType,
     Plan,
-    check_fence,
-    check_mission,
-    check_rally,
-    fence_shape,
 )
 from gcs_cli.clients.mission_client import MissionClient
 from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Call
 from gcs_cli.link.session import Session
+from gcs_cli.plans.check import plan_problems
 
 RESTORE_TIMEOUT_S = 30.0
 """Longest time to restore the former plans after an interrupt."""
@@ -42,14 +39,9 @@ def plan_parts(plan: Plan) -> list[PlanPart]:
 
 
 def plan_problem(plan: Plan, home: GeoPoint) -> str | None:
-    """Return the reason that a vehicle refuses the plan, or None; the geofence is checked first."""
-    fence = fence_shape(plan.fence, home)
-    checks = (
-        ("geofence", check_fence(plan.fence, home)),
-        ("mission", check_mission(plan.items, home, fence=fence) if plan.items else None),
-        ("list of rally points", check_rally(plan.rally, home, fence=fence)),
-    )
-    return next((f"{name}: {rejection.reason}" for name, rejection in checks if rejection is not None), None)
+    """Return the first reason that a vehicle refuses the plan, or None; the geofence is checked first."""
+    problem = next(plan_problems(plan, home), None)
+    return None if problem is None else f"{problem.part}: {problem.reason}"
 
 
 def parts_to_send(plan: Plan) -> list[PlanPart]:

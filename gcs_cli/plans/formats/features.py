@@ -82,7 +82,12 @@ def _fence_features(plan: Plan) -> Iterator[Feature]:
         yield Feature("point", (((*inner["center"], None),),), {**_area(circle), "radius_m": inner["radius"]})
     if "breachReturn" in document:
         latitude, longitude, altitude = document["breachReturn"]
-        properties = {"part": "geofence", "name": "return point", "return_point": True, "altitude_m": altitude}
+        properties = {
+            "part": "geofence",
+            "name": "return point",
+            "return_point": True,
+            "altitude_m": altitude,
+        }
         yield Feature("point", (((latitude, longitude, altitude),),), properties, True)
 
 
