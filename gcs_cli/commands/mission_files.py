@@ -27,7 +27,7 @@ from gcs_cli.plans.itinerary import home_of_items, itinerary
 from gcs_cli.plans.page import plan_page
 from gcs_cli.plans.survey import survey
 from gcs_cli.plans.table import item_facts, itinerary_facts, mission_table, places_table, totals
-from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
+from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption, output_of
 from gcs_cli.transfers.plan_files import OPTIONAL_PLAN, AnyPlanArgument
 from gcs_cli.transfers.plan_parts import plan_parts
 from gcs_cli.transfers.vehicle_plans import download_plan, limit_parameters
@@ -72,6 +72,7 @@ class Ending(StrEnum):
 
 @app.command()
 def new(
+    context: typer.Context,
     pattern: Annotated[Pattern, typer.Argument(metavar="PATTERN", help=f"{', '.join(Pattern)}.")],
     out: Annotated[
         Path,
@@ -155,7 +156,7 @@ def new(
     else:
         places = patterns.lemniscate(size, points)
     plan = Plan(patterns.pattern_items(places, base, base, route), base, fence=given.fence)
-    output = Output(as_json)
+    output = output_of(context, as_json)
     lost = save_any(out, plan)
     flight = itinerary(plan.items, base)
     output.say(
@@ -185,6 +186,7 @@ def _say_lost(output: Output, lost: str, out: Path) -> None:
 
 @app.command()
 def convert(
+    context: typer.Context,
     source: AnyPlanArgument,
     out: Annotated[
         Path, typer.Argument(metavar="OUT", help=f"File to write: {', '.join(SUFFIXES)}.", show_default=False)
@@ -198,7 +200,7 @@ def convert(
     check_new(out, overwrite)
     plan = load_any(source, altitude)
     lost = save_any(out, plan)
-    output = Output(as_json)
+    output = output_of(context, as_json)
     counts = ", ".join(f"{part.name} of {len(part.items)} items" for part in plan_parts(plan) if part.items)
     output.say(
         "written", f"{counts or 'an empty plan'} written to {out}", file=str(out), items=len(plan.items)
@@ -213,7 +215,6 @@ def check(
     link: LinkOptions,
     file: AnyPlanArgument,
     vehicle: VehicleOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Check a file as the vehicle does: without a vehicle, or with one's geofence, home and parameters.
 
@@ -224,7 +225,7 @@ def check(
     if _uses_vehicle(link, vehicle):
         home, limits, fence = _vehicle_limits(context, link, plan)
     problems = list(plan_problems(plan, home, limits, fence))
-    output = Output(as_json)
+    output = output_of(context, link)
     for problem in problems:
         output.say("problem", f"{problem.part}: {problem.reason}", **problem._asdict())
     refused = {problem.part for problem in problems}
@@ -270,7 +271,6 @@ def show(
     ] = None,
     altitude: AltitudeOption = DEFAULT_ALTITUDE_M,
     overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Show a plan: its items with distances, headings and times, and a drawing."""
     if html is not None:
@@ -284,7 +284,7 @@ def show(
         plan, name = load_any(file, altitude), file.name
     home = home_of_items((*plan.items, *plan.fence, *plan.rally), plan.home)
     if html is None:
-        _print_plan(plan, home, Output(as_json))
+        _print_plan(plan, home, output_of(context, link))
         return
     problems = [f"{problem.part}: {problem.reason}" for problem in plan_problems(plan, home)]
     page = plan_page(name, plan, itinerary(plan.items, home), home, problems)
@@ -292,7 +292,7 @@ def show(
         write_text_atomically(html, page)
     except OSError as error:
         raise ConfigError(html, "", f"cannot be written: {error.strerror or error}") from error
-    Output(as_json).say("written", f"page written to {html}", file=str(html))
+    output_of(context, link).say("written", f"page written to {html}", file=str(html))
 
 
 def _print_plan(plan: Plan, home: GeoPoint, output: Output) -> None:

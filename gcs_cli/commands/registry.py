@@ -65,9 +65,41 @@ class MissionGroup(LazyGroup):
         ),
         "upload": LazyCommand(_MISSION, "Replace the vehicle's mission by that of a file."),
         "download": LazyCommand(_MISSION, "Download the vehicle's mission, geofence and rally points."),
+        "verify": LazyCommand(
+            _MISSION, "Compare the vehicle's plan with a file, item by item; exit with 1 if they differ."
+        ),
         "clear": LazyCommand(_MISSION, "Remove the vehicle's mission, geofence or rally points."),
         "start": LazyCommand(_MISSION, "Start the mission; the vehicle arms for it."),
+        "pause": LazyCommand(_MISSION, "Pause the mission: the vehicle holds its position."),
+        "resume": LazyCommand(_MISSION, "Resume a paused mission at its current item."),
+        "jump": LazyCommand(
+            _MISSION, "Make an item of the mission the current one; a mission in flight continues there."
+        ),
     }
+
+
+def _part_commands(module: str, name: str) -> dict[str, LazyCommand]:
+    return {
+        "upload": LazyCommand(module, f"Replace the vehicle's {name} by that of a file; its mission stays."),
+        "download": LazyCommand(module, f"Download the vehicle's {name}."),
+        "show": LazyCommand(module, f"Show the {name} of a file or of the vehicle."),
+        "verify": LazyCommand(
+            module, f"Compare the vehicle's {name} with that of a file; exit with 1 if they differ."
+        ),
+        "clear": LazyCommand(module, f"Remove the vehicle's {name}."),
+    }
+
+
+class FenceGroup(LazyGroup):
+    """``gcs fence``."""
+
+    lazy = _part_commands("gcs_cli.commands.fence", "geofence")
+
+
+class RallyGroup(LazyGroup):
+    """``gcs rally``."""
+
+    lazy = _part_commands("gcs_cli.commands.rally", "list of rally points")
 
 
 class ParamGroup(LazyGroup):
@@ -112,7 +144,9 @@ class PilGroup(LazyGroup):
 def add_groups(app: typer.Typer) -> None:
     """Add the groups of commands to ``gcs``."""
     for name, group, text in (
-        ("mission", MissionGroup, "The vehicle's mission."),
+        ("mission", MissionGroup, "Missions: files, and the vehicle's."),
+        ("fence", FenceGroup, "The vehicle's geofence."),
+        ("rally", RallyGroup, "The vehicle's rally points."),
         ("param", ParamGroup, "The vehicle's parameters."),
         ("log", LogGroup, "The vehicle's flight logs."),
         (

@@ -47,6 +47,7 @@ class Tolerance(NamedTuple):
 
 
 EXACT = Tolerance()
+PACKED = Tolerance(altitude_m=0.01, degrees_e7=1, nan_is_zero=True, keeps_autocontinue=False)
 
 
 def differences(
