@@ -13,6 +13,7 @@ from flightstack.mavlink.link import Link
 from flightstack.process import compile_helper
 from flightstack.process.assembly import Stack, build, reboot_config, transfer_state, vehicle_of
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
 from flightstack.testing.setup import Setup
 from flightstack.vehicle.lockstep import Lockstep
@@ -140,7 +141,11 @@ class Engine:
         self.machine_ns += self._interval_us * 1000
         if self.loses_states:
             self._missed_us += self._interval_us
-        elif not self._endpoint.receive(memoryview(self.states())):
+        else:
+            self._send_states(self._endpoint)
+
+    def _send_states(self, endpoint: SimulatorEndpoint) -> None:
+        if not endpoint.receive(memoryview(self.states())):
             raise AssertionError("the flight stack refuses a frame of the simulator")
 
     def states(self) -> bytes | memoryview:
@@ -168,7 +173,7 @@ class Engine:
         steps_off = round(off_s * old.rates.inner_hz)
         for _ in range(steps_off):
             self.simulator.apply(self.actuators)
-        self._check(old.simulator.receive(memoryview(self.states())))  # the new vehicle's clock begins here
+        self._send_states(old.simulator)  # the new vehicle's clock begins here
         self._boot_us += old.now.time_us + steps_off * old.rates.interval_us
         old.loops.close()
         self.config = reboot_config(old, self.config)

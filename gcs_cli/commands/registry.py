@@ -11,6 +11,7 @@ from gcs_cli.lazy_group import LazyCommand, LazyGroup
 
 _ACTIONS = "gcs_cli.commands.actions"
 _MISSION = "gcs_cli.commands.mission"
+_PLANS = "gcs_cli.commands.mission_files"
 _PARAM = "gcs_cli.commands.param"
 _LOG = "gcs_cli.commands.log"
 _PIL = "gcs_cli.commands.pil"
@@ -36,12 +37,17 @@ class GcsGroup(LazyGroup):
         "takeoff": LazyCommand(_ACTIONS, "Take off; arm first if disarmed."),
         "land": LazyCommand(_ACTIONS, "Land at the current position."),
         "rtl": LazyCommand(_ACTIONS, "Return to launch and land."),
-        "hold": LazyCommand(_ACTIONS, "Hold the position."),
+        "hold": LazyCommand(_ACTIONS, "Stop and hold the position."),
         "goto": LazyCommand(_ACTIONS, "Fly to a position and hold there."),
+        "yaw": LazyCommand(_ACTIONS, "Turn to a heading and hold the position."),
         "speed": LazyCommand(_ACTIONS, "Set the ground speed until disarmed."),
-        "sethome": LazyCommand(_ACTIONS, "Set the home position."),
-        "mode": LazyCommand(_ACTIONS, "Select a flight mode."),
+        "mode": LazyCommand(_ACTIONS, "Select a flight mode, or list the modes of the vehicle."),
+        "set-home": LazyCommand(_ACTIONS, "Set the home position."),
+        "sethome": LazyCommand(_ACTIONS, "Set the home position.", hidden=True),
+        "terminate": LazyCommand(_ACTIONS, "End the flight at once: the rotors stop and the vehicle falls."),
+        "inject": LazyCommand(_ACTIONS, "Inject a failure (MAV_CMD_INJECT_FAILURE)."),
         "reboot": LazyCommand(_ACTIONS, "Reboot the vehicle, which must be on the ground."),
+        "wait": LazyCommand("gcs_cli.commands.wait", "Wait until the vehicle is in a state."),
         "status": LazyCommand("gcs_cli.commands.status", "Show the state of the vehicle."),
         "watch": LazyCommand("gcs_cli.commands.watch", "Watch the vehicle; q or Ctrl-C ends."),
         "perf": LazyCommand("gcs_cli.commands.perf", "Show the timing of the flight stack's loops."),
@@ -54,12 +60,54 @@ class MissionGroup(LazyGroup):
     """``gcs mission``."""
 
     lazy = {  # noqa: RUF012
+        "new": LazyCommand(_PLANS, "Write a mission of a pattern."),
+        "check": LazyCommand(
+            _PLANS,
+            "Check a file as the vehicle does: without a vehicle, or with one's geofence, home and parameters.",
+        ),
+        "show": LazyCommand(
+            _PLANS, "Show a plan: its items with distances, headings and times, and a drawing."
+        ),
+        "convert": LazyCommand(
+            _PLANS, "Convert a plan to the format of another file, and name what that format cannot hold."
+        ),
         "upload": LazyCommand(_MISSION, "Replace the vehicle's mission by that of a file."),
-        "check": LazyCommand(_MISSION, "Check a file as the vehicle does, without a vehicle."),
         "download": LazyCommand(_MISSION, "Download the vehicle's mission, geofence and rally points."),
+        "verify": LazyCommand(
+            _MISSION, "Compare the vehicle's plan with a file, item by item; exit with 1 if they differ."
+        ),
         "clear": LazyCommand(_MISSION, "Remove the vehicle's mission, geofence or rally points."),
         "start": LazyCommand(_MISSION, "Start the mission; the vehicle arms for it."),
+        "pause": LazyCommand(_MISSION, "Pause the mission: the vehicle holds its position."),
+        "resume": LazyCommand(_MISSION, "Resume a paused mission at its current item."),
+        "jump": LazyCommand(
+            _MISSION, "Make an item of the mission the current one; a mission in flight continues there."
+        ),
     }
+
+
+def _part_commands(module: str, name: str) -> dict[str, LazyCommand]:
+    return {
+        "upload": LazyCommand(module, f"Replace the vehicle's {name} by that of a file; its mission stays."),
+        "download": LazyCommand(module, f"Download the vehicle's {name}."),
+        "show": LazyCommand(module, f"Show the {name} of a file or of the vehicle."),
+        "verify": LazyCommand(
+            module, f"Compare the vehicle's {name} with that of a file; exit with 1 if they differ."
+        ),
+        "clear": LazyCommand(module, f"Remove the vehicle's {name}."),
+    }
+
+
+class FenceGroup(LazyGroup):
+    """``gcs fence``."""
+
+    lazy = _part_commands("gcs_cli.commands.fence", "geofence")
+
+
+class RallyGroup(LazyGroup):
+    """``gcs rally``."""
+
+    lazy = _part_commands("gcs_cli.commands.rally", "list of rally points")
 
 
 class ParamGroup(LazyGroup):
@@ -104,7 +152,9 @@ class PilGroup(LazyGroup):
 def add_groups(app: typer.Typer) -> None:
     """Add the groups of commands to ``gcs``."""
     for name, group, text in (
-        ("mission", MissionGroup, "The vehicle's mission."),
+        ("mission", MissionGroup, "Missions: files, and the vehicle's."),
+        ("fence", FenceGroup, "The vehicle's geofence."),
+        ("rally", RallyGroup, "The vehicle's rally points."),
         ("param", ParamGroup, "The vehicle's parameters."),
         ("log", LogGroup, "The vehicle's flight logs."),
         (
