@@ -71,6 +71,7 @@ class Session:
         """Called with every message from the vehicle."""
         self._heartbeat_type = heartbeat_type
         self._service: Service | None = None
+        self._subscription = Subscription(lambda: self.view, {})
         self._heartbeat_due_s = 0.0
         self._heartbeat_due_vehicle_s = math.inf
 
@@ -81,8 +82,8 @@ class Session:
         return (_BROADCAST, _BROADCAST) if identity is None else (identity.system_id, identity.component_id)
 
     def subscribe(self, rates_hz: Mapping[int, float]) -> None:
-        """Request messages from the vehicle, id -> rate [Hz], until another service is used."""
-        self.use(Subscription(lambda: self.target, rates_hz))
+        """Request messages from the vehicle, id -> rate [Hz], instead of those of an earlier call."""
+        self._subscription = Subscription(lambda: self.view, rates_hz)
 
     def keep_vehicle(self) -> None:
         """Accept no other vehicle from now on, even if this one is lost."""
@@ -132,8 +133,13 @@ class Session:
         self.view = update(self.view, message, now_s)
         if self.observe is not None:
             self.observe(message)
-        if self._service is not None and not self._is_other_system(message):
-            self._service.receive(message, now_s)
+        if not self._is_other_system(message):
+            for service in self._services:
+                service.receive(message, now_s)
+
+    @property
+    def _services(self) -> list[Service]:
+        return [self._subscription] if self._service is None else [self._service, self._subscription]
 
     def poll(self, now_s: float) -> list[bytes]:
         """Return the datagrams to send now to ``peer``."""
@@ -145,16 +151,16 @@ class Session:
             frames.append(self.encode(self._heartbeat(mavlink.MAV_STATE_ACTIVE)))
             self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
             self._heartbeat_due_vehicle_s = math.inf if vehicle_s is None else vehicle_s + HEARTBEAT_PERIOD_S
-        if self._service is not None:
-            frames += [self.encode(message) for message in self._service.poll(now_s)]
+        for service in self._services:
+            frames += [self.encode(message) for message in service.poll(now_s)]
         return frames
 
     def next_deadline(self) -> float | None:
         """Return the time at which to call ``poll`` at the latest; None without a peer."""
         if self.peer is None:
             return None
-        service = None if self._service is None else self._service.next_deadline()
-        return self._heartbeat_due_s if service is None else min(self._heartbeat_due_s, service)
+        due_s = (service.next_deadline() for service in self._services)
+        return min(self._heartbeat_due_s, *(time_s for time_s in due_s if time_s is not None), math.inf)
 
     def farewell(self) -> list[bytes]:
         """Return the HEARTBEAT in state POWEROFF, which ends the link in order."""

@@ -211,8 +211,6 @@ class LinkCounts(NamedTuple):
     rate_hz: float | None = None
     window_start_s: float | None = None
     window_count: int = 0
-    round_trip_s: float | None = None
-    """Time from a TIMESYNC to its answer; None if none was sent."""
 
     @property
     def quality(self) -> float | None:
