@@ -226,12 +226,6 @@ def speed_command(speed_m_s: float) -> Command:
     return int(mavlink.MAV_CMD_DO_CHANGE_SPEED), (1.0, speed_m_s, -1.0)
 
 
-def home_command(home: tuple[float, float, float] | None) -> Command:
-    """Return the command to set home to latitude, longitude and AMSL altitude; None: the current position."""
-    number = int(mavlink.MAV_CMD_DO_SET_HOME)
-    return (number, (1.0,)) if home is None else (number, (0.0, 0.0, 0.0, NAN, *home))
-
-
 def mode_command(main: int, sub: int) -> Command:
     """Return the command that selects a PX4 mode."""
     base = float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)

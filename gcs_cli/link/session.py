@@ -66,7 +66,7 @@ class Session:
         self._system_id = system_id
         self._heartbeat_type = heartbeat_type
         self._service: Service | None = None
-        self._subscription: Subscription | None = None
+        self._subscription = Subscription(lambda: self.view, {})
         self._monitor = LinkMonitor(lambda: self.view.link)
         self._background: list[Service] = [self._monitor] if monitors else []
         self._heartbeat_due_s = 0.0
@@ -104,7 +104,7 @@ class Session:
 
     def subscribe(self, rates_hz: Mapping[int, float]) -> None:
         """Request messages from the vehicle, id -> rate [Hz], instead of those of an earlier call."""
-        self._subscription = Subscription(lambda: self.target, rates_hz) if rates_hz else None
+        self._subscription = Subscription(lambda: self.view, rates_hz)
 
     def keep_vehicle(self) -> None:
         """Accept no other vehicle from now on, even if this one is lost."""
@@ -125,8 +125,8 @@ class Session:
 
     @property
     def _services(self) -> list[Service]:
-        chosen = (self._service, self._subscription)
-        return [*(service for service in chosen if service is not None), *self._background]
+        chosen = [] if self._service is None else [self._service]
+        return [*chosen, self._subscription, *self._background]
 
     def is_heard(self, now_s: float) -> bool:
         """Return True if the vehicle is connected: it was heard, and its heartbeat has not timed out."""
