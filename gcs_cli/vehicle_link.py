@@ -6,13 +6,26 @@ from pathlib import Path
 
 import typer
 
+from flightstack.core.port_numbers import api_client_port, tcp_port
 from flightstack.mavlink.signing import LinkSigning
 from flightstack.process.console import complain
 from flightstack.process.signing_file import open_shared_signing
-from gcs_cli.errors import PortInUseError
+from gcs_cli.errors import USAGE, CliError, PortInUseError
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.endpoint import VEHICLE_CONNECTION, parse_endpoint
-from gcs_cli.settings import LinkOptions, link_options, settings_of
+from gcs_cli.link.endpoint import LOOPBACK, RECORDING, VEHICLE_CONNECTION, VehicleEndpoint, parse_endpoint
+from gcs_cli.link.lines import Line, SeveralLines, open_line
+from gcs_cli.settings import LinkOptions, link_options, signing_key_of
+
+OTHER_CONNECTIONS = (
+    VEHICLE_CONNECTION,
+    f"udpin:{LOOPBACK}:{api_client_port(0)}",
+    f"tcp:{LOOPBACK}:{tcp_port(0)}",
+)
+"""Where a vehicle of this machine may answer while another ground station uses the default port.
+
+Our vehicle answers any client at its own port. PX4 answers one client there, and sends to the port of API clients.
+ArduPilot's simulation listens on TCP.
+"""
 
 
 def open_signing(key: Path | None) -> LinkSigning | None:
@@ -20,26 +33,56 @@ def open_signing(key: Path | None) -> LinkSigning | None:
     return None if key is None else open_shared_signing(key, "gcs")
 
 
-def open_link(context: typer.Context, options: LinkOptions) -> Connection:
+def open_link(
+    context: typer.Context, options: LinkOptions, *, takes_recording: bool = False, in_real_time: bool = True
+) -> Connection:
     """Open the link to the vehicle; raise CliError.
 
-    If another ground station listens on the default port, connect to the vehicle's own port.
+    If another ground station listens on the default port, search the vehicle at ``OTHER_CONNECTIONS``. A command that
+    only shows what the vehicle sends ``takes_recording``-s, played in real time or at once.
     """
     link = link_options(context, options)
-    signing = open_signing(settings_of(context).signing_key)
+    endpoint = link.endpoint
+    if endpoint.kind == RECORDING and not takes_recording:
+        raise CliError(f"{command_name(context)}: {endpoint} is a recording, which takes no commands", USAGE)
+    signing = open_signing(signing_key_of(context))
+    line: Line | None = None
+    if link.is_default:
+        endpoint, line = _default_line(endpoint)
+    return Connection(
+        endpoint, signing=signing, system_id=link.system_id, line=line, in_real_time=in_real_time
+    )
+
+
+def _default_line(endpoint: VehicleEndpoint) -> tuple[VehicleEndpoint, Line]:
     try:
-        return Connection(link.endpoint, signing=signing, system_id=link.system_id)
+        return endpoint, open_line(endpoint)
     except PortInUseError as error:
-        if link.connect is not None:
-            raise
-        vehicle = parse_endpoint(VEHICLE_CONNECTION)
-        complain(f"gcs: {error.port} is in use: connecting to the vehicle at {vehicle}")
-        return Connection(vehicle, signing=signing)
+        others = [parse_endpoint(text) for text in OTHER_CONNECTIONS]
+        complain(f"gcs: {error.port} is in use: trying {', '.join(str(other) for other in others)}")
+        return others[0], SeveralLines(_opened(others))
 
 
-def connect_vehicle(context: typer.Context, options: LinkOptions) -> Connection:
+def _opened(endpoints: list[VehicleEndpoint]) -> list[Line]:
+    lines: list[Line] = []
+    for endpoint in endpoints:
+        try:
+            lines.append(open_line(endpoint))
+        except PortInUseError:
+            continue
+    return lines
+
+
+def command_name(context: typer.Context) -> str:
+    """Return the words of the command, such as ``mission upload``."""
+    return context.command_path.partition(" ")[2] or context.command_path
+
+
+def connect_vehicle(
+    context: typer.Context, options: LinkOptions, *, takes_recording: bool = False, in_real_time: bool = True
+) -> Connection:
     """Open the link and wait for the vehicle; raise CliError."""
-    connection = open_link(context, options)
+    connection = open_link(context, options, takes_recording=takes_recording, in_real_time=in_real_time)
     try:
         connection.wait_for_vehicle(link_options(context, options).timeout_s)
     except BaseException:

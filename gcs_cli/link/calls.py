@@ -12,7 +12,8 @@ from flightstack.mavlink.link import Address
 from flightstack.plan import MissionItem, MissionResult, MissionType
 from gcs_cli.clients.command_client import CommandClient, CommandResult
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient
-from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID, Session
+from gcs_cli.link.session import Session
+from gcs_cli.link.wire import COMPONENT_ID, SYSTEM_ID
 
 OWN_ADDRESS = Address(SYSTEM_ID, COMPONENT_ID)
 TEXT_WAIT_S = 0.3
