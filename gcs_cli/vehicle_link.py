@@ -12,8 +12,20 @@ from flightstack.process.console import complain
 from flightstack.process.signing_file import open_shared_signing
 from gcs_cli.errors import USAGE, CliError, PortInUseError
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.endpoint import LOOPBACK, RECORDING, VEHICLE_CONNECTION, VehicleEndpoint, parse_endpoint
-from gcs_cli.link.lines import Line, SeveralLines, open_line
+from gcs_cli.link.endpoint import (
+    LOOPBACK,
+    RECORDING,
+    SERIAL,
+    TCP,
+    TCP_IN,
+    UDP_IN,
+    VEHICLE_CONNECTION,
+    VehicleEndpoint,
+    parse_endpoint,
+)
+from gcs_cli.link.lines import Line
+from gcs_cli.link.opening import SeveralLines, open_line, opened_lines
+from gcs_cli.link.share import open_shared
 from gcs_cli.settings import LinkOptions, link_options, signing_key_of
 
 OTHER_CONNECTIONS = (
@@ -21,11 +33,14 @@ OTHER_CONNECTIONS = (
     f"udpin:{LOOPBACK}:{api_client_port(0)}",
     f"tcp:{LOOPBACK}:{tcp_port(0)}",
 )
-"""Where a vehicle of this machine may answer while another ground station uses the default port.
+"""Where a vehicle of this machine may answer that sends to another ground station at the default port, or to none.
 
 Our vehicle answers any client at its own port. PX4 answers one client there, and sends to the port of API clients.
 ArduPilot's simulation listens on TCP.
 """
+
+SHARED_KINDS = (UDP_IN, TCP, TCP_IN, SERIAL)
+"""Kinds of links that one process at a time can open."""
 
 
 def open_signing(key: Path | None) -> LinkSigning | None:
@@ -34,43 +49,42 @@ def open_signing(key: Path | None) -> LinkSigning | None:
 
 
 def open_link(
-    context: typer.Context, options: LinkOptions, *, takes_recording: bool = False, in_real_time: bool = True
+    context: typer.Context,
+    options: LinkOptions,
+    *,
+    takes_recording: bool = False,
+    in_real_time: bool = True,
+    shares: bool = False,
 ) -> Connection:
     """Open the link to the vehicle; raise CliError.
 
-    If another ground station listens on the default port, search the vehicle at ``OTHER_CONNECTIONS``. A command that
-    only shows what the vehicle sends ``takes_recording``-s, played in real time or at once.
+    If another ``gcs`` shares the link, use it. If another ground station listens on the default port, search the
+    vehicle at ``OTHER_CONNECTIONS``. A command that only shows what the vehicle sends ``takes_recording``-s, played in
+    real time or at once. A command that runs long ``shares`` its link.
     """
     link = link_options(context, options)
     endpoint = link.endpoint
     if endpoint.kind == RECORDING and not takes_recording:
         raise CliError(f"{command_name(context)}: {endpoint} is a recording, which takes no commands", USAGE)
     signing = open_signing(signing_key_of(context))
-    line: Line | None = None
-    if link.is_default:
+    line = open_shared(endpoint) if endpoint.kind in SHARED_KINDS else None
+    if line is None and link.is_default:
         endpoint, line = _default_line(endpoint)
-    return Connection(
+    connection = Connection(
         endpoint, signing=signing, system_id=link.system_id, line=line, in_real_time=in_real_time
     )
+    if shares and endpoint.kind in SHARED_KINDS:
+        connection.share()
+    return connection
 
 
 def _default_line(endpoint: VehicleEndpoint) -> tuple[VehicleEndpoint, Line]:
+    others = [parse_endpoint(text) for text in OTHER_CONNECTIONS]
     try:
-        return endpoint, open_line(endpoint)
+        return endpoint, SeveralLines({endpoint: open_line(endpoint)}, later=others)
     except PortInUseError as error:
-        others = [parse_endpoint(text) for text in OTHER_CONNECTIONS]
         complain(f"gcs: {error.port} is in use: trying {', '.join(str(other) for other in others)}")
-        return others[0], SeveralLines(_opened(others))
-
-
-def _opened(endpoints: list[VehicleEndpoint]) -> list[Line]:
-    lines: list[Line] = []
-    for endpoint in endpoints:
-        try:
-            lines.append(open_line(endpoint))
-        except PortInUseError:
-            continue
-    return lines
+        return others[0], SeveralLines(opened_lines(others))
 
 
 def command_name(context: typer.Context) -> str:
@@ -79,12 +93,22 @@ def command_name(context: typer.Context) -> str:
 
 
 def connect_vehicle(
-    context: typer.Context, options: LinkOptions, *, takes_recording: bool = False, in_real_time: bool = True
+    context: typer.Context,
+    options: LinkOptions,
+    *,
+    takes_recording: bool = False,
+    in_real_time: bool = True,
+    shares: bool = False,
 ) -> Connection:
-    """Open the link and wait for the vehicle; raise CliError."""
-    connection = open_link(context, options, takes_recording=takes_recording, in_real_time=in_real_time)
+    """Open the link and wait for the vehicle; raise CliError that names the command."""
+    connection = open_link(
+        context, options, takes_recording=takes_recording, in_real_time=in_real_time, shares=shares
+    )
     try:
         connection.wait_for_vehicle(link_options(context, options).timeout_s)
+    except CliError as error:
+        connection.close()
+        raise CliError(f"{command_name(context)}: {error}", error.exit_code) from None
     except BaseException:
         connection.close()
         raise

@@ -24,7 +24,7 @@ LINE_S = 1.0
 def watch(context: typer.Context, link: LinkOptions) -> None:
     """Watch the vehicle; q or Ctrl-C ends."""
     chosen = link_options(context, link)
-    with open_link(context, link, takes_recording=True) as connection:
+    with open_link(context, link, takes_recording=True, shares=True) as connection:
         connection.session.subscribe(ROTORS_AND_TIMING)
         try:
             if _can_draw():

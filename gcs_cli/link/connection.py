@@ -17,9 +17,11 @@ from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Command, Request
 from gcs_cli.link.endpoint import RECORDING, VehicleEndpoint
 from gcs_cli.link.fleet import Fleet
-from gcs_cli.link.lines import Line, open_line
+from gcs_cli.link.lines import Line
+from gcs_cli.link.opening import SeveralLines, open_line
 from gcs_cli.link.playback import PlaybackLine
 from gcs_cli.link.session import Service, Session
+from gcs_cli.link.share import ShareServer
 
 _LONGEST_WAIT_S = 0.25
 """Longest time until Ctrl-C, the end of a child or a resized terminal is noticed."""
@@ -29,6 +31,8 @@ _PROGRESS_S = 0.1
 
 _SETTLE_S = 0.1
 """Time after the first heartbeat in which further vehicles are noticed by their telemetry or TIMESYNC answers."""
+
+_SHARE_PERIOD_S = 1.0
 
 
 class TransferClient(Service, Protocol):
@@ -107,9 +111,11 @@ class Connection:
             self._clock = self._clock if in_real_time else playback.clock
             line = playback
         self._line = open_line(endpoint) if line is None else line
-        peers = self._line.peers
-        only = peers[0] if len(peers) == 1 and vehicle is None and not endpoint.listens else vehicle
-        self.fleet = Fleet(peers, only, record, signing, system_id)
+        if line is None and vehicle is None and not endpoint.listens:
+            (vehicle,) = self._line.peers
+        self.fleet = Fleet(self._line.peers, vehicle, record, signing, system_id)
+        self._server: ShareServer | None = None
+        self._share_due_s = math.inf
 
     @property
     def session(self) -> Session:
@@ -144,18 +150,44 @@ class Connection:
     def step(self, until_s: float) -> None:
         """Send due messages, wait for data until ``until_s`` at most, and receive it."""
         self._send()
-        line = self._line
+        line, server = self._line, self._server
         poll = select.poll()
-        for descriptor, events in line.interests():
+        for descriptor, events in [*line.interests(), *(server.interests() if server else ())]:
             poll.register(descriptor, events)
         due_s = min(_time(self.fleet.next_deadline()), _time(line.due_s()), until_s)
         self._clock.wait(poll, min(_LONGEST_WAIT_S, due_s - self.now_s))
         now_s = self.now_s
         for data, peer in line.receive(now_s):
+            if server is not None:
+                server.forward(data)
             self.fleet.receive(data, peer, now_s)
         for peer in line.closed_peers():
             self.fleet.disconnect(peer)
+        self.fleet.peers = line.peers
+        if isinstance(line, SeveralLines) and self.session.peer is not None:
+            self.endpoint = line.keep(self.session.peer) or self.endpoint
+        self._serve(now_s)
         self._send()
+
+    def share(self) -> None:
+        """Serve this link to other ``gcs`` processes of this user, until the connection is closed."""
+        if not self.is_recording:
+            self._share_due_s = -math.inf
+
+    def _serve(self, now_s: float) -> None:
+        if self._server is not None:
+            for frame in self._server.receive(now_s):
+                self._forward(frame)
+        elif now_s >= self._share_due_s:  # another process may serve it, and end
+            self._share_due_s = now_s + _SHARE_PERIOD_S
+            self._server = ShareServer.open(self.endpoint)
+
+    def _forward(self, frame: bytes) -> None:
+        """Send a frame of another process to all vehicles."""
+        if self.fleet.wire.record is not None:
+            self.fleet.wire.record(frame)
+        for peer in self.fleet.receivers():
+            self._line.send(frame, peer)
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Run until ``condition`` holds; return False after ``timeout_s``, and at the end of a recording."""
@@ -277,6 +309,8 @@ class Connection:
         for data, peer in self.fleet.farewell():
             self._line.send(data, peer)
         self._line.close()
+        if self._server is not None:
+            self._server.close()
         if self._signing is not None:
             self._signing.signing.close()
 

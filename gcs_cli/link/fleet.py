@@ -37,7 +37,7 @@ class Fleet:
         signing: LinkSigning | None = None,
         system_id: int | None = None,
     ) -> None:
-        self.peers = list(peers)
+        self.peers = peers
         self.wire = Wire(signing, record)
         self.observe: Callable[[Message], None] | None = None
         """Called with every message on the link, those of other ground stations and of components too."""
@@ -139,7 +139,7 @@ class Fleet:
                 served.add(peer)
         return out
 
-    def _greeted(self, now_s: float) -> list[Address]:
+    def _greeted(self, now_s: float) -> Collection[Address]:
         """Return the peers to send a heartbeat to although no vehicle has answered."""
         if self._sessions or now_s < self._greeting_due_s:
             return []
@@ -162,8 +162,11 @@ class Fleet:
             if session.peer == peer:
                 session.disconnect()
 
+    def receivers(self) -> list[Address]:
+        """Return the peers with vehicles; before the first heartbeat, the addresses to send to first."""
+        heard = {session.peer for session in self._sessions.values() if session.peer is not None}
+        return sorted(heard if self._sessions else self.peers)
+
     def farewell(self) -> list[Datagram]:
         """Return the HEARTBEATs in state POWEROFF, which end the link in order."""
-        heard = {session.peer for session in self._sessions.values() if session.peer is not None}
-        peers = heard if self._sessions else set(self.peers)
-        return [Datagram(self._hello(peer, mavlink.MAV_STATE_POWEROFF), peer) for peer in sorted(peers)]
+        return [Datagram(self._hello(peer, mavlink.MAV_STATE_POWEROFF), peer) for peer in self.receivers()]

@@ -1,4 +1,4 @@
-"""Transports of a connection: UDP, TCP client and server, serial ports, and several of them at once."""
+"""Transports of a connection: UDP, TCP client and server, and serial ports."""
 
 from __future__ import annotations
 
@@ -14,24 +14,13 @@ from typing import Protocol
 from flightstack.transports.byte_link import LineError
 from flightstack.transports.serial_port import SerialPort
 from flightstack.transports.tcp_server import TcpServer
-from flightstack.transports.udp import Address, PortBusyError, UdpSocket, resolve
-from gcs_cli.errors import USAGE, CliError, PortInUseError
-from gcs_cli.link.endpoint import (
-    SERIAL,
-    TCP,
-    TCP_IN,
-    UDP_IN,
-    UDP_OUT,
-    VEHICLE_CONNECTION,
-    VehicleEndpoint,
-)
+from flightstack.transports.udp import Address, UdpSocket
 
 RETRY_S = 0.25
 """Time between two attempts to connect or to reopen a device."""
 _BUFFER = 65536
 _MOST_UNSENT = 65536
 """Bytes that are queued for a stream; further frames are dropped, as telemetry links do."""
-_MOST_PEERS = 256
 
 Interest = tuple[int, int]
 """A file descriptor and the events of ``select.poll`` to wait for."""
@@ -65,38 +54,6 @@ class Line(Protocol):
 
     def close(self) -> None:
         """Close the transport; a second call does nothing."""
-
-
-def open_line(endpoint: VehicleEndpoint) -> Line:
-    """Open the transport of ``endpoint``; raise CliError (usage), PortInUseError if a port is in use."""
-    try:
-        if endpoint.kind == UDP_IN:
-            return UdpLine(UdpSocket(endpoint.host, endpoint.port))
-        if endpoint.kind == TCP_IN:
-            return TcpInLine(endpoint.host, endpoint.port)
-        if endpoint.kind == SERIAL:
-            return SerialLine(endpoint.host, endpoint.port)
-        peer = (_resolved(endpoint.host), endpoint.port)
-        if endpoint.kind == UDP_OUT:
-            # bound to the loopback interface, the socket cannot be reached from the network
-            return UdpLine(UdpSocket("127.0.0.1" if peer[0].startswith("127.") else "0.0.0.0"), peer)
-        if endpoint.kind == TCP:
-            return StreamLine(socket.AF_INET, peer, peer)
-    except PortBusyError as error:
-        sentence = f"{error}: end the other ground station, or use --connect {VEHICLE_CONNECTION}"
-        if error.is_in_use:
-            raise PortInUseError(endpoint, sentence) from None
-        raise CliError(sentence, USAGE) from None
-    except LineError as error:
-        raise CliError(str(error), USAGE) from None
-    raise ValueError(f"no transport for {endpoint}")
-
-
-def _resolved(host: str) -> str:
-    try:
-        return resolve(host)
-    except OSError:
-        raise CliError(f"--connect: no host named {host}", USAGE) from None
 
 
 class UdpLine:
@@ -368,64 +325,3 @@ class SerialLine:
         if self._port is not None:
             self._port.close()
         self._port = None
-
-
-class SeveralLines:
-    """Several transports, to find the vehicle on one of them. ``keep`` closes the others."""
-
-    def __init__(self, lines: Iterable[Line]) -> None:
-        self._lines = list(lines)
-        self._by_peer: dict[Address, Line] = {}
-
-    @property
-    def peers(self) -> Sequence[Address]:
-        """Addresses to send to before a vehicle is heard."""
-        return [peer for line in self._lines for peer in line.peers]
-
-    @property
-    def problem(self) -> str:
-        """The first reason that no data can be exchanged, if it concerns all lines."""
-        problems = [line.problem for line in self._lines]
-        return problems[0] if problems and all(problems) else ""
-
-    def keep(self, peer: Address) -> None:
-        """Close all transports but that of ``peer``."""
-        kept = self._by_peer.get(peer)
-        if kept is not None:
-            for line in self._lines:
-                if line is not kept:
-                    line.close()
-            self._lines = [kept]
-
-    def interests(self) -> Iterable[Interest]:
-        """Return the descriptors to wait for."""
-        return [interest for line in self._lines for interest in line.interests()]
-
-    def due_s(self) -> float | None:
-        """Return the earliest time of all."""
-        return min((due_s for line in self._lines if (due_s := line.due_s()) is not None), default=None)
-
-    def receive(self, now_s: float) -> Iterator[tuple[bytes, Address]]:
-        """Yield the data that has arrived on any of them."""
-        for line in self._lines:
-            for data, peer in line.receive(now_s):
-                if len(self._by_peer) > _MOST_PEERS:
-                    self._by_peer.clear()
-                self._by_peer[peer] = line
-                yield data, peer
-
-    def send(self, data: bytes, peer: Address) -> None:
-        """Send a frame on the transport of ``peer``."""
-        line = self._by_peer.get(peer)
-        for each in [line] if line is not None else self._lines:
-            if line is not None or peer in each.peers:
-                each.send(data, peer)
-
-    def closed_peers(self) -> Iterable[Address]:
-        """Return the peers whose connections were closed."""
-        return [peer for line in self._lines for peer in line.closed_peers()]
-
-    def close(self) -> None:
-        """Close all."""
-        for line in self._lines:
-            line.close()

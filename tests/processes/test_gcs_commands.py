@@ -304,7 +304,8 @@ def test_no_vehicle(command: list[str]) -> None:
     with UdpSocket("127.0.0.1") as silent:
         result = gcs("--timeout", "0.2", "--connect", f"udpout:127.0.0.1:{silent.address[1]}", *command)
     assert (result.stdout, result.returncode) == ("", 3)
-    assert result.stderr.startswith("gcs: no vehicle answered at UDP 127.0.0.1:")
+    name = "" if command == ["watch"] else f"{' '.join(command)}: "
+    assert result.stderr.startswith(f"gcs: {name}no vehicle answered at UDP 127.0.0.1:")
 
 
 def test_a_busy_port_is_named_with_the_way_round() -> None:
