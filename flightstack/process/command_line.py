@@ -166,7 +166,7 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing f
 
 @dataclasses.dataclass(frozen=True)
 class PictureOptions:
-    """Options of ``gcs replay`` and ``sim-bridge render``, as given; None where not given."""
+    """Options of ``gcs log draw`` and ``sim-bridge render``, as given; None where not given."""
 
     png: Annotated[
         Path | None,

@@ -14,6 +14,7 @@ _MISSION = "gcs_cli.commands.mission"
 _PLANS = "gcs_cli.commands.mission_files"
 _PARAM = "gcs_cli.commands.param"
 _LOG = "gcs_cli.commands.log"
+_LOG_FILE = "gcs_cli.commands.log_file"
 _PIL = "gcs_cli.commands.pil"
 _PIL_FLY = "fly"
 
@@ -51,7 +52,7 @@ class GcsGroup(LazyGroup):
         "status": LazyCommand("gcs_cli.commands.status", "Show the state of the vehicle."),
         "watch": LazyCommand("gcs_cli.commands.watch", "Watch the vehicle; q or Ctrl-C ends."),
         "perf": LazyCommand("gcs_cli.commands.perf", "Show the timing of the flight stack's loops."),
-        "replay": LazyCommand("gcs_cli.commands.replay", "Draw a flight: pictures, a film, or a window."),
+        "report": LazyCommand("gcs_cli.commands.report", "Write the report page of a flight from its log."),
         "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),
     }
 
@@ -130,6 +131,11 @@ class LogGroup(LazyGroup):
     lazy = {  # noqa: RUF012
         "list": LazyCommand(_LOG, "List the logs, the oldest first."),
         "download": LazyCommand(_LOG, "Download a log, or all of them."),
+        "erase": LazyCommand(_LOG, "Erase all logs but the one that is being written."),
+        "info": LazyCommand(_LOG_FILE, "Show what a log holds."),
+        "plot": LazyCommand(_LOG_FILE, "Plot fields of a log."),
+        "export": LazyCommand(_LOG_FILE, "Export a log as CSV, Parquet, MCAP or Rerun."),
+        "draw": LazyCommand("gcs_cli.commands.log_draw", "Draw a flight: pictures, a film, or a window."),
     }
 
 
@@ -156,7 +162,7 @@ def add_groups(app: typer.Typer) -> None:
         ("fence", FenceGroup, "The vehicle's geofence."),
         ("rally", RallyGroup, "The vehicle's rally points."),
         ("param", ParamGroup, "The vehicle's parameters."),
-        ("log", LogGroup, "The vehicle's flight logs."),
+        ("log", LogGroup, "Flight logs: those on the vehicle, and files."),
         (
             "pil",
             PilGroup,

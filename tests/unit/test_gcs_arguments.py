@@ -36,7 +36,7 @@ from gcs_cli.fly.fly_options import (
 )
 from gcs_cli.link.endpoint import DEFAULT_CONNECTION, VehicleEndpoint, parse_endpoint
 from gcs_cli.report.flight_outcome import Code, Outcome
-from gcs_cli.report.replay import Run
+from gcs_cli.report.poses import Run
 from gcs_cli.report.run_directory import LOG_NAME, make_run_directory
 from gcs_cli.transfers.plan_files import example_plans
 from sim_bridge.__main__ import run as sim_bridge_run
