@@ -10,11 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.core.enums import CUSTOM_MODE
-from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
+from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, add_ardupilot_messages, mavlink
 from flightstack.mavlink.link import Link
-from flightstack.services.telemetry.modes import MODES, NOT_SELECTABLE
-from gcs_cli.vehicle.px4_modes import mode_name, mode_numbers, settable_modes
 from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
 from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, VehicleView
@@ -126,8 +123,8 @@ def test_battery_is_none_when_it_is_not_measured(vehicle: Vehicle) -> None:
         )
 
     assert vehicle.send(status(65535, -1, -1)).battery is None
-    assert vehicle.send(status(12_100, 530, 76)).battery == pytest.approx((0.76, 12.1, 5.3))
-    assert vehicle.send(status(12_100, -1, -1)).battery == (None, 12.1, None)
+    assert vehicle.send(status(12_100, 530, 76)).battery == pytest.approx((0.76, 12.1, 5.3, None))
+    assert vehicle.send(status(12_100, -1, -1)).battery == (None, 12.1, None, None)
     assert vehicle.view.healthy is True
     assert vehicle.send(status(65535, -1, -1, health=0)).healthy is False
 
@@ -263,7 +260,11 @@ def _raw_frame(message_id: int, payload: bytes) -> Any:
     return next(iter(Link(0, 0).decode(packed)), None)
 
 
-FOLDED = [0, 1, 2, 30, 32, 33, 42, 46, 74, 83, 85, 242, 245, 253, 291, 53002]
+add_ardupilot_messages()
+FOLDED = [
+    0, 1, 2, 24, 30, 32, 33, 42, 46, 74, 83, 85, 111, 147, 168, 193, 230, 231, 242, 245, 253, 291, 435, 11030, 11031,
+    53002,
+]  # fmt: skip
 
 
 @settings(max_examples=150)
@@ -281,23 +282,3 @@ def test_the_list_of_folded_messages_is_whole() -> None:
     from gcs_cli.vehicle.vehicle_view import _FOLDS  # noqa: PLC0415
 
     assert {mavlink.mavlink_map[number].msgname for number in FOLDED} == set(_FOLDS)
-
-
-def test_modes_have_px4s_names_and_numbers() -> None:
-    assert mode_name(4 << 16 | 5 << 24) == "RTL"
-    assert mode_name(3 << 16) == "POSITION"
-    assert mode_name(77 << 16) == "mode 77.0"
-    assert mode_numbers("loiter") == mode_numbers("Hold") == (4, 3)
-    for name in settable_modes():
-        numbers = mode_numbers(name)
-        assert numbers is not None
-        assert mode_name(numbers[0] << 16 | numbers[1] << 24) == name.upper()
-
-
-def test_settable_modes_are_those_that_the_vehicle_announces() -> None:
-    announced = [entry.mode for entry in MODES if not entry.properties & NOT_SELECTABLE]
-    assert list(settable_modes().values()) == [CUSTOM_MODE[mode] for mode in announced]
-    assert list(settable_modes()) == [
-        "hold", "takeoff", "mission", "rtl", "land", "position", "altitude", "offboard"
-    ]  # fmt: skip
-    assert mode_numbers("stabilized") is mode_numbers("termination") is mode_numbers("nonsense") is None
