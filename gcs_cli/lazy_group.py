@@ -20,6 +20,8 @@ class LazyCommand(NamedTuple):
     module: str
     summary: str
     """The line in the list of commands; equal to the first sentence of the command's help."""
+    hidden: bool = False
+    """True for a former name, which the list leaves out."""
 
     def load(self, name: str) -> Any:
         """Import the module and return the Click command."""
@@ -34,7 +36,10 @@ class LazyGroup(TyperGroup):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
-        listed = {name: TyperCommand(name, help=command.summary) for name, command in self.lazy.items()}
+        listed = {
+            name: TyperCommand(name, help=command.summary, hidden=command.hidden)
+            for name, command in self.lazy.items()
+        }
         self.commands = {**listed, **self.commands}
 
     def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:

@@ -22,6 +22,7 @@ from flightstack.process.command_line import (
     PanelGroup,
     UsageError,
     Version,
+    expand_options,
     make_app,
     usage_sentence,
 )
@@ -59,31 +60,10 @@ def _load_vehicle(name: str, plant: str, drag: bool) -> Vehicle:
 
 
 @app.callback(invoke_without_command=True)
+@expand_options
 def run(
     context: typer.Context,
-    vehicle: options.Vehicle = "paper_quad",
-    plant: options.Plant = "rigid",
-    speed: options.Speed = "1",
-    host: options.Host = "127.0.0.1",
-    port: options.Port = None,
-    instance: options.Instance = 0,
-    seed: options.Seed = 1,
-    wind: options.Wind = "0,0",
-    gust: options.Gust = 0.0,
-    drag: options.Drag = False,
-    force: options.Force = _ZERO,
-    torque: options.Torque = _ZERO,
-    torque_gust: options.TorqueGust = 0.0,
-    ideal_rotors: options.IdealRotors = False,
-    physics_hz: options.PhysicsHz = 1000.0,
-    battery_start: options.BatteryStart = None,
-    battery_capacity: options.BatteryCapacity = None,
-    battery_drain: options.BatteryDrain = None,
-    fault: options.Faults = None,
-    home: options.Home = "47.397742,8.545594,488.0",
-    view: options.View = False,
-    timeout: options.Timeout = None,
-    check: options.Check = False,
+    given: options.SimulatorOptions,
     version: Version = False,  # handled by its callback
 ) -> None:
     """Simulate a vehicle for one flight stack, which connects over TCP.
@@ -92,37 +72,44 @@ def run(
     """
     if context.invoked_subcommand is not None:
         return
+    served = _server_options(given)
+    if given.check:
+        raise typer.Exit
+    raise typer.Exit(_serve(served, given.vehicle if given.view else None))
+
+
+def _server_options(given: options.SimulatorOptions) -> ServerOptions:
+    """Check the options; raise UsageProblemError, ConfigError."""
+    plant, port, timeout = given.plant, given.port, given.timeout
     arguments.check_plant(plant)
-    arguments.check_range("--instance", instance, 0, 250)
-    arguments.check_range("--seed", seed, 0, 2**63)
+    arguments.check_range("--instance", given.instance, 0, 250)
+    arguments.check_range("--seed", given.seed, 0, 2**63)
     from sim_bridge.plant.disturbance import check_wind  # noqa: PLC0415
     from sim_bridge.plant.plant import PlantOptions  # noqa: PLC0415
     from sim_bridge.server.server import ServerOptions  # noqa: PLC0415
 
-    loaded = _load_vehicle(vehicle, plant, drag)
-    battery = arguments.check_battery(loaded, battery_start, battery_capacity, battery_drain)
-    disturbance = _disturbance(wind, gust, force, torque, torque_gust)
-    check_wind(loaded, plant, disturbance)
-    plant_options = PlantOptions(disturbance, seed, battery=battery)
-    served = ServerOptions(
-        vehicle=loaded,
+    vehicle = _load_vehicle(given.vehicle, plant, given.drag)
+    battery = arguments.check_battery(
+        vehicle, given.battery_start, given.battery_capacity, given.battery_drain
+    )
+    disturbance = _disturbance(given.wind, given.gust, given.force, given.torque, given.torque_gust)
+    check_wind(vehicle, plant, disturbance)
+    plant_options = PlantOptions(disturbance, given.seed, battery=battery)
+    default_port = simulator_port(given.instance)
+    return ServerOptions(
+        vehicle=vehicle,
         plant=plant,
         plant_options=plant_options,
-        faults=arguments.parse_faults(fault or [], loaded, plant, plant_options),
-        home=arguments.parse_home(home),
-        speed=arguments.parse_speed(speed),
-        host=host,
-        port=simulator_port(instance)
-        if port is None
-        else int(arguments.check_range("--port", port, 0, 65535)),
-        system_id=system_id(instance),
-        ideal_rotors=ideal_rotors,
-        physics_hz=arguments.check_physics_hz(physics_hz),
+        faults=arguments.parse_faults(given.fault or [], vehicle, plant, plant_options),
+        home=arguments.parse_home(given.home),
+        speed=arguments.parse_speed(given.speed),
+        host=given.host,
+        port=default_port if port is None else int(arguments.check_range("--port", port, 0, 65535)),
+        system_id=system_id(given.instance),
+        ideal_rotors=given.ideal_rotors,
+        physics_hz=arguments.check_physics_hz(given.physics_hz),
         timeout_s=None if timeout is None else arguments.check_range("--timeout", timeout, 0.001, 1e6),
     )
-    if check:
-        raise typer.Exit
-    raise typer.Exit(_serve(served, vehicle if view else None))
 
 
 def check_arguments(given: Sequence[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
@@ -49,6 +50,36 @@ Timeout = Annotated[
     ),
 ]
 Check = Annotated[bool, typer.Option("--check", help="Check the options and exit.")]
+
+
+@dataclass(frozen=True)
+class SimulatorOptions:
+    """The options of the simulator process, as given."""
+
+    vehicle: Vehicle = "paper_quad"
+    plant: Plant = "rigid"
+    speed: Speed = "1"
+    host: Host = "127.0.0.1"
+    port: Port = None
+    instance: Instance = 0
+    seed: Seed = 1
+    wind: Wind = "0,0"
+    gust: Gust = 0.0
+    drag: Drag = False
+    force: Force = "0,0,0"
+    torque: Torque = "0,0,0"
+    torque_gust: TorqueGust = 0.0
+    ideal_rotors: IdealRotors = False
+    physics_hz: PhysicsHz = 1000.0
+    battery_start: BatteryStart = None
+    battery_capacity: BatteryCapacity = None
+    battery_drain: BatteryDrain = None
+    fault: Faults = None
+    home: Home = "47.397742,8.545594,488.0"
+    view: View = False
+    timeout: Timeout = None
+    check: Check = False
+
 
 # of an open-loop flight
 Rotors = Annotated[str, typer.Option(metavar="W1,W2,…", help="Constant rotor speeds, rad/s.")]

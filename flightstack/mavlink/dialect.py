@@ -8,6 +8,7 @@ lack the plan ids at the end.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
@@ -22,6 +23,16 @@ for _layout in LAYOUTS:
     mavlink.mavlink_map[_layout.message_id] = _class
     setattr(mavlink, _class.__name__, _class)
     setattr(mavlink, f"MAVLINK_MSG_ID_{_layout.name}", _layout.message_id)
+
+
+@cache
+def add_ardupilot_messages() -> None:
+    """Register the messages that only ArduPilot's dialect has. Its import takes 0.1 s: call it for such a vehicle."""
+    from pymavlink.dialects.v20 import ardupilotmega  # noqa: PLC0415
+
+    for number, kind in ardupilotmega.mavlink_map.items():
+        mavlink.mavlink_map.setdefault(number, kind)
+
 
 EscStatus: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["ESC_STATUS"].message_id]
 FsLoopTiming: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["FS_LOOP_TIMING"].message_id]
@@ -41,5 +52,6 @@ __all__ = [
     "FsActuators",
     "FsLoopTiming",
     "FsPlantState",
+    "add_ardupilot_messages",
     "mavlink",
 ]

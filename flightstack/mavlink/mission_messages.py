@@ -15,7 +15,7 @@ from flightstack.core.float32 import as_float32
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message
 from flightstack.plan.item import MissionItem, float_coordinate, integer_coordinate
-from flightstack.plan.vocabulary import GLOBAL_FRAMES
+from flightstack.plan.vocabulary import SCALED_FRAMES
 
 PROTOCOL = frozenset(
     {
@@ -66,7 +66,7 @@ def item_from_message(message: Message) -> MissionItem:
     """Return the item of a MISSION_ITEM_INT or of the deprecated MISSION_ITEM."""
     x, y = message.x, message.y
     if message.get_type() == "MISSION_ITEM":
-        is_global = message.frame in GLOBAL_FRAMES
+        is_global = message.frame in SCALED_FRAMES
         x, y = integer_coordinate(x, is_global), integer_coordinate(y, is_global)
     return MissionItem(
         message.command, message.frame,

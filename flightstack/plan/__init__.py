@@ -1,6 +1,6 @@
 """Plans: missions, geofences and rally points, their files (``.plan``, ``.waypoints``) and their validation."""
 
-from flightstack.plan.check import DEFAULT_LIMITS, Limits, check_mission
+from flightstack.plan.check import DEFAULT_LIMITS, Limits, check_mission, mission_rejections
 from flightstack.plan.fence import check_fence, fence_shape
 from flightstack.plan.fence_shape import FenceShape
 from flightstack.plan.files import load_plan, save_plan
@@ -51,6 +51,7 @@ __all__ = [
     "command_name",
     "fence_shape",
     "load_plan",
+    "mission_rejections",
     "result_name",
     "save_plan",
 ]

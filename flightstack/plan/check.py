@@ -6,7 +6,7 @@ Pure. Items are numbered from 0, as in MAVLink.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -61,21 +61,40 @@ def check_mission(
 
     All positions and the straight legs between them must be inside ``fence``.
     """
+    return next(mission_rejections(items, home, limits, fence), None)
+
+
+def mission_rejections(
+    items: Sequence[MissionItem],
+    home: GeoPoint,
+    limits: Limits = DEFAULT_LIMITS,
+    fence: FenceShape | None = None,
+) -> Iterator[Rejection]:
+    """Yield the rejections of a mission; the first one is ``check_mission``'s.
+
+    Faults of single items come first. If there is one, loops, distances and the geofence are not checked.
+    """
     if len(items) > limits.max_items:
         reason = f"the mission has {len(items)} items, and at most {limits.max_items} are allowed"
-        return Rejection(MissionResult.NO_SPACE, None, reason)
+        yield Rejection(MissionResult.NO_SPACE, None, reason)
+        return
+    is_bad = False
     for seq, item in enumerate(items):
         fault = _item_fault(item, seq, len(items)) or _altitude_fault(item, home, limits)
         if fault:
-            return item_rejection(seq, item, fault)
+            is_bad = True
+            yield item_rejection(seq, item, fault)
+    if is_bad:
+        return
     if not any(item.command in NAV_COMMANDS for item in items):
         reason = "the mission has no item to fly to (takeoff, waypoint, loiter, land or return)"
-        return Rejection(MissionResult.INVALID, None, reason)
+        yield Rejection(MissionResult.INVALID, None, reason)
     loop = find_idle_loop(items)
     if loop is not None:
         fault = Fault(MissionResult.INVALID_PARAM1, "jumps in a loop that holds no item to fly")
-        return item_rejection(loop, items[loop], fault)
-    return _distance_rejection(items, home, limits) or leg_rejection(items, home, fence)
+        yield item_rejection(loop, items[loop], fault)
+    yield from _distance_rejections(items, home, limits)
+    yield from leg_rejections(items, home, fence)
 
 
 def _item_fault(item: MissionItem, seq: int, count: int) -> Fault | None:
@@ -118,7 +137,7 @@ def _altitude_fault(item: MissionItem, home: GeoPoint, limits: Limits) -> Fault 
     return None
 
 
-def _distance_rejection(items: Sequence[MissionItem], home: GeoPoint, limits: Limits) -> Rejection | None:
+def _distance_rejections(items: Sequence[MissionItem], home: GeoPoint, limits: Limits) -> Iterator[Rejection]:
     frame = LocalFrame(home)
     north_m, east_m = 0.0, 0.0
     limit_m, start = limits.max_first_distance_m, "home"
@@ -129,15 +148,14 @@ def _distance_rejection(items: Sequence[MissionItem], home: GeoPoint, limits: Li
         distance_m = distance(there.x - north_m, there.y - east_m)
         if limit_m > 0.0 and distance_m > limit_m:
             reason = f"is {distance_m:.0f} m from {start}, and at most {limit_m:g} m are allowed"
-            return item_rejection(seq, item, Fault(MissionResult.INVALID, reason))
-        if 0.0 < limits.max_home_distance_m < (from_home_m := distance(there.x, there.y)):
+            yield item_rejection(seq, item, Fault(MissionResult.INVALID, reason))
+        elif 0.0 < limits.max_home_distance_m < (from_home_m := distance(there.x, there.y)):
             reason = (
                 f"is {from_home_m:.0f} m from home, and at most {limits.max_home_distance_m:g} m are allowed"
             )
-            return item_rejection(seq, item, Fault(MissionResult.INVALID, reason))
+            yield item_rejection(seq, item, Fault(MissionResult.INVALID, reason))
         north_m, east_m = there.x, there.y
         limit_m, start = limits.max_distance_m, "the position before it"
-    return None
 
 
 Place = tuple[float, float]
@@ -178,23 +196,28 @@ def mission_legs(items: Sequence[MissionItem], home: Place, shape: FenceShape) -
 
 def leg_rejection(items: Sequence[MissionItem], home: GeoPoint, fence: FenceShape | None) -> Rejection | None:
     """Return the rejection of the first item that is outside ``fence`` or whose leg leaves it, or None."""
+    return next(leg_rejections(items, home, fence), None)
+
+
+def leg_rejections(
+    items: Sequence[MissionItem], home: GeoPoint, fence: FenceShape | None
+) -> Iterator[Rejection]:
+    """Yield the rejections of the items that are outside ``fence`` or whose leg leaves it."""
     if fence is None or not len(fence.areas):
-        return None
+        return
     home_ne_m = fence.local(home.latitude_deg, home.longitude_deg)
     legs = mission_legs(items, home_ne_m, fence)
     if not legs:
-        return None
+        return
     outside = fence.segments_outside(
         np.array([leg.begin for leg in legs]), np.array([leg.end for leg in legs])
     )
-    if not outside:
-        return None
-    index, place = outside[0]
-    leg = legs[index]
-    if not fence.allows(*leg.end):
-        fault = Fault(MissionResult.INVALID, "is outside the geofence")
-    else:
-        way = f"the way from {leg.start} to it leaves the geofence"
-        north_m, east_m = place[0] - home_ne_m[0], place[1] - home_ne_m[1]
-        fault = Fault(MissionResult.INVALID, f"{way}, {north_m:.0f} m north and {east_m:.0f} m east of home")
-    return item_rejection(leg.seq, items[leg.seq], fault)
+    for index, place in outside:
+        leg = legs[index]
+        if not fence.allows(*leg.end):
+            reason = "is outside the geofence"
+        else:
+            north_m, east_m = place[0] - home_ne_m[0], place[1] - home_ne_m[1]
+            reason = f"the way from {leg.start} to it leaves the geofence"
+            reason += f", {north_m:.0f} m north and {east_m:.0f} m east of home"
+        yield item_rejection(leg.seq, items[leg.seq], Fault(MissionResult.INVALID, reason))

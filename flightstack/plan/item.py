@@ -11,10 +11,10 @@ from flightstack.core.float32 import as_float32
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.vocabulary import (
     ALSO_UNSET_E7,
-    GLOBAL_FRAMES,
     OPEN_POSITION_COMMANDS,
     PLACE_COMMANDS,
     RELATIVE_FRAMES,
+    SCALED_FRAMES,
     UNSET_E7,
 )
 
@@ -27,7 +27,8 @@ class MissionItem:
 
     ``x`` and ``y`` are the integers of MISSION_ITEM_INT: latitude and longitude in 1e-7 degrees in the global frames
     (``UNSET_E7`` if not given), plain numbers in frame MISSION. ``z`` is the altitude in metres, above home in the
-    relative frames, else above sea level. NaN equals NaN in comparisons of items.
+    relative frames, above the terrain in the terrain frames, else above sea level. NaN equals NaN when items are
+    compared.
     """
 
     command: int
@@ -49,7 +50,7 @@ class MissionItem:
     @property
     def is_global(self) -> bool:
         """True if x and y are a latitude and longitude."""
-        return self.frame in GLOBAL_FRAMES
+        return self.frame in SCALED_FRAMES
 
     @property
     def altitude_is_relative(self) -> bool:

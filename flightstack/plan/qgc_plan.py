@@ -18,7 +18,7 @@ from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import values
 from flightstack.plan.item import MissionItem, Plan, float_coordinate
 from flightstack.plan.qgc_areas import fence_document, fence_items, rally_document, rally_items
-from flightstack.plan.vocabulary import GLOBAL_FRAMES, Command
+from flightstack.plan.vocabulary import SCALED_FRAMES, Command
 
 
 class _Entry(NamedTuple):
@@ -93,7 +93,7 @@ def _simple_item(listed: dict[str, Any], where: str, file: object) -> _Entry:
     params = listed.get("params")
     if not isinstance(params, list) or len(params) != 7:
         raise ConfigError(file, f"{where}, params", "must be a list of 7 numbers")
-    is_global = frame in GLOBAL_FRAMES
+    is_global = frame in SCALED_FRAMES
     numbers = [
         values.number(file, f"{where}, {values.field_name(index, is_global)}", value)
         for index, value in enumerate(params)

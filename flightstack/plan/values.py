@@ -10,11 +10,11 @@ from flightstack.core.float32 import as_float32
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan.item import MissionItem, integer_coordinate
 from flightstack.plan.vocabulary import (
-    GLOBAL_FRAMES,
     MAX_MISSION_ITEMS,
     OPEN_POSITION_COMMANDS,
     POSITION_COMMANDS,
-    Command,
+    SCALED_FRAMES,
+    TERRAIN_FRAMES,
     Frame,
     command_name,
 )
@@ -55,31 +55,29 @@ def integer(file: object, key: str, value: Any, high: int) -> int:
     return value
 
 
-def command(file: object, key: str, value: Any) -> Command:
-    """Return a supported command."""
-    code = integer(file, key, value, 65535)
-    try:
-        return Command(code)
-    except ValueError:
-        allowed = ", ".join(f"{known.value} {known.name}" for known in Command)
-        raise ConfigError(file, key, f"{code} is not supported; supported are {allowed}") from None
+def command(file: object, key: str, value: Any) -> int:
+    """Return a MAV_CMD: files hold the commands of any vehicle, and the vehicle refuses those that it does not know."""
+    return integer(file, key, value, 65535)
 
 
-def frame(file: object, key: str, value: Any) -> Frame:
-    """Return a supported coordinate frame."""
+def frame(file: object, key: str, value: Any) -> int:
+    """Return a frame of MISSION_ITEM_INT in which coordinates are degrees or plain numbers."""
     code = integer(file, key, value, 255)
-    try:
-        return Frame(code)
-    except ValueError:
-        allowed = ", ".join(f"{known.value} {known.name}" for known in Frame)
-        raise ConfigError(file, key, f"{code} is not supported; supported are {allowed}") from None
+    if code not in SCALED_FRAMES and code != Frame.MISSION:
+        names = {
+            **{int(known): known.name for known in Frame},
+            **dict.fromkeys(TERRAIN_FRAMES, "GLOBAL_TERRAIN_ALT"),
+        }
+        allowed = ", ".join(f"{number} {name}" for number, name in sorted(names.items()))
+        raise ConfigError(file, key, f"{code} is not supported; supported are {allowed}")
+    return code
 
 
 def mission_item(
-    file: object, where: str, code: Command, frame_code: Frame, values: list[float], *, autocontinue: bool
+    file: object, where: str, code: int, frame_code: int, values: list[float], *, autocontinue: bool
 ) -> MissionItem:
     """Return the item with these seven parameters; raise ConfigError for a bad position."""
-    is_global = frame_code in GLOBAL_FRAMES
+    is_global = frame_code in SCALED_FRAMES
     for index, limit_deg in _RANGE_DEG.items() if is_global else ():
         value = values[index]
         if math.isnan(value):

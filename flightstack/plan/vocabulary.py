@@ -89,7 +89,12 @@ POSITION_COMMANDS = frozenset(
 )
 """Commands with a position in x, y and z."""
 
-PLACE_COMMANDS: frozenset[int] = POSITION_COMMANDS | frozenset(FenceCommand) | {RALLY_POINT}
+FOREIGN_PLACE_COMMANDS = frozenset({17, 18, 31, 82, 84, 85, 94, 189, 195, 201})
+"""Other mission commands of MAVLink with latitude and longitude, which other vehicles fly."""
+
+PLACE_COMMANDS: frozenset[int] = (
+    POSITION_COMMANDS | FOREIGN_PLACE_COMMANDS | frozenset(FenceCommand) | {RALLY_POINT}
+)
 """Commands with latitude and longitude in x and y."""
 
 OPEN_POSITION_COMMANDS = frozenset({Command.NAV_LAND, Command.NAV_TAKEOFF})
@@ -100,6 +105,10 @@ NAV_COMMANDS = POSITION_COMMANDS | {Command.NAV_RETURN_TO_LAUNCH, Command.NAV_DE
 
 RELATIVE_FRAMES = frozenset({Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT})
 GLOBAL_FRAMES = RELATIVE_FRAMES | {Frame.GLOBAL, Frame.GLOBAL_INT}
+TERRAIN_FRAMES = frozenset({10, 11})
+"""MAV_FRAME_GLOBAL_TERRAIN_ALT and its INT form: altitude above the terrain, which other vehicles fly."""
+SCALED_FRAMES: frozenset[int] = GLOBAL_FRAMES | TERRAIN_FRAMES
+"""Frames whose x and y are a latitude and longitude."""
 
 
 PLAN_NAMES = {

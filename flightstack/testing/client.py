@@ -18,7 +18,7 @@ from gcs_cli.clients.param_client import ParamClient
 from gcs_cli.clients.param_operations import ParamDone, ParamFailed
 from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Call
-from gcs_cli.link.session import Session
+from gcs_cli.link.session import SYSTEM_ID, Session
 from gcs_cli.transfers.plan_parts import Uploads
 
 STREAM_STEP_S = 0.05
@@ -67,13 +67,15 @@ class Client:
     (0.0, True)
     """
 
-    def __init__(self, name: str, address: PeerAddress, link: Link, is_companion: bool) -> None:
+    def __init__(
+        self, name: str, address: PeerAddress, link: Link, is_companion: bool, system_id: int = SYSTEM_ID
+    ) -> None:
         self.name = name
         self.address = address
         self.link = link
         """The link to the vehicle."""
         kind = mavlink.MAV_TYPE_ONBOARD_CONTROLLER if is_companion else mavlink.MAV_TYPE_GCS
-        self.session = Session(address[1:], heartbeat_type=kind)
+        self.session = Session(address[1:], heartbeat_type=kind, own_system=system_id)
         self.session.observe = self._take
         self.received: dict[str, Message] = {}
         """The newest message of each type."""
@@ -88,6 +90,11 @@ class Client:
         """Makers of messages that are sent at 20 Hz, such as offboard setpoints and stick positions."""
         self._stream_due_s = -math.inf
         self._outbox: list[bytes] = []
+
+    @property
+    def system_id(self) -> int:
+        """MAVLink system id of its messages."""
+        return self.session.own.system
 
     # ------------------------------------------------------------------ traffic
 
@@ -160,7 +167,7 @@ class ParamRequest:
     """A pending read or change of one parameter."""
 
     def __init__(self, session: Session, name: str, value: float | None) -> None:
-        self._client = ParamClient(calls.vehicle_address(session), calls.OWN_ADDRESS)
+        self._client = ParamClient(calls.vehicle_address(session), session.own)
         if value is None:
             self._client.start_get(name)
         else:
@@ -204,16 +211,32 @@ class Network:
         self._seed = seed
         self.clients: dict[str, Client] = {}
 
-    def add(self, name: str, hub: GroundHub, telemetry: bool, is_companion: bool = False) -> Client:
-        """Connect a client; its link has a seed of its own. Raise ValueError for a name in use."""
+    def add(
+        self,
+        name: str,
+        hub: GroundHub,
+        telemetry: bool,
+        is_companion: bool = False,
+        system_id: int | None = None,
+    ) -> Client:
+        """Connect a client; its link has a seed of its own. Raise ValueError for a name in use or a bad system id."""
         if name in self.clients:
             raise ValueError(f"a client named {name!r} is there already")
+        if system_id is None:
+            system_id = self._free_system_id()
+        elif not 1 <= system_id <= SYSTEM_ID:
+            raise ValueError(f"system_id must be 1 to {SYSTEM_ID}, not {system_id}")
         number = len(self.clients)
         address = PeerAddress(API if is_companion else GROUND, "memory", number)
-        client = Client(name, address, Link(self._seed * 1000 + number), is_companion)
+        client = Client(name, address, Link(self._seed * 1000 + number), is_companion, system_id)
         self.clients[name] = client
         self.connect(client, hub, telemetry)
         return client
+
+    def _free_system_id(self) -> int:
+        """Return the largest system id that no client has."""
+        taken = {client.system_id for client in self.clients.values()}
+        return next(number for number in range(SYSTEM_ID, 0, -1) if number not in taken)
 
     def connect(self, client: Client, hub: GroundHub, telemetry: bool) -> None:
         """Add a client to a hub, that of a vehicle after a power cycle too."""

@@ -46,6 +46,8 @@ class ClientKey:
 
     name: str = key("", "name of a further client, for `client` of events")
     companion: bool = key(False, "a companion computer, whose heartbeats do not count as data link")
+    system_id: int | None = key(None, "MAVLink system id; otherwise the largest free one: 254, 253 …",
+                                low=1, high=255)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ def run_scenario(scenario: Scenario, seed: int | None = None) -> Verdict:
     seed = scenario.seed if seed is None else seed
     with World(scenario.setup(seed)) as world:
         for client in scenario.client:
-            world.add_client(client.name, is_companion=client.companion)
+            world.add_client(client.name, is_companion=client.companion, system_id=client.system_id)
         run = _Run(world, scenario)
         flight = world.flight(run.fly())
         last = world.state

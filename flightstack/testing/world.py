@@ -125,9 +125,12 @@ class World:
         """All clients by name."""
         return self._network.clients
 
-    def add_client(self, name: str, *, is_companion: bool = False) -> Client:
-        """Connect another ground station, or a companion computer, whose heartbeats do not count as data link."""
-        return self._network.add(name, self.engine.stack.ground, self._telemetry, is_companion)
+    def add_client(self, name: str, *, is_companion: bool = False, system_id: int | None = None) -> Client:
+        """Connect another ground station, or a companion computer, whose heartbeats do not count as data link.
+
+        ``system_id`` is by default the largest free one: 255 for the world's ground station, then 254, 253 and so on.
+        """
+        return self._network.add(name, self.engine.stack.ground, self._telemetry, is_companion, system_id)
 
     @property
     def state(self) -> State:

@@ -6,15 +6,19 @@ Protocol: https://mavlink.io/en/services/command.html
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from flightstack.core.float32 import as_float32
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message, is_for, is_from
+from gcs_cli.autopilots.autopilot import VehicleCommand
 
 _ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
 _IN_PROGRESS: int = mavlink.MAV_RESULT_IN_PROGRESS
+UNUSED = 2**31 - 1
+"""Latitude or longitude of a COMMAND_INT that the vehicle is to ignore."""
 
 
 class CommandTiming(NamedTuple):
@@ -76,6 +80,15 @@ class CommandClient:
             *self.vehicle, frame, command, 0, 0, *values, x, y, as_float32(z)
         )
         self._begin(command, message, now_s)
+
+    def send_command(self, command: VehicleCommand, now_s: float) -> None:
+        """Begin a command in the form that it names; NaN as latitude or longitude is sent as MAVLink's "unused"."""
+        if command.frame is None:
+            self.send(command.number, command.params, now_s)
+            return
+        params = (*command.params, *[0.0] * (7 - len(command.params)))
+        x, y = (UNUSED if math.isnan(degrees) else round(degrees * 1e7) for degrees in params[4:6])
+        self.send_int(command.number, params[:4], x, y, params[6], frame=command.frame, now_s=now_s)
 
     def _begin(self, command: int, request: Message, now_s: float) -> None:
         self.result = None

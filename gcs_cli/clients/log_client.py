@@ -1,7 +1,10 @@
-"""Client of the log protocol, sans-IO: lists a vehicle's logs and downloads one.
+"""Client of the log protocol, sans-IO: lists a vehicle's logs, downloads one, and erases all.
 
 ``start_…`` begins an operation, ``poll`` returns the messages to send, ``receive`` processes received ones, and
-``result`` is the result at the end. Works with PX4, which numbers logs from 0, and ArduPilot, which numbers from 1.
+``result`` is the result at the end.
+
+A list of n logs is complete when n entries have come: ArduPilot counts ids from 1 with last_log_num = n, we from 0 with
+last_log_num = n - 1, and PX4 from 0 with last_log_num = n, an id that it does not have.
 """
 
 from __future__ import annotations
@@ -25,6 +28,9 @@ FEW = 40
 """Number of missing blocks above which one request covers them and the blocks between them."""
 MAX_REQUESTS = 20
 ALL_LOGS = 0xFFFF
+ERASE_RETRY_S = 1.0
+"""Time after which LOG_ERASE is repeated; it has no acknowledgement, and a vehicle may erase for seconds."""
+ERASE_TRIES = 3
 
 
 class LogEntry(NamedTuple):
@@ -61,6 +67,10 @@ class LogClient:
         self._outbox: list[Message] = []
         self._entries: dict[int, LogEntry] = {}
         self._ids: range | None = None
+        """Candidate ids: one more than there are logs."""
+        self._before: int | None = None
+        """Number of logs before an erase."""
+        self._erases_left = 0
         self._log_id: int | None = None
         self._file: PartialFile | None = None
         self._asked_end = 0
@@ -71,7 +81,15 @@ class LogClient:
     def start_list(self) -> None:
         """List all logs."""
         self._start()
-        self._entries, self._ids = {}, None
+        self._entries, self._ids, self._before = {}, None, None
+
+    def start_erase(self, before: int) -> None:
+        """Erase all of ``before`` logs, and list those that are left.
+
+        Repeated until fewer are left; the log that is being written may stay.
+        """
+        self.start_list()
+        self._before, self._erases_left = before, ERASE_TRIES
 
     def start_download(self, entry: LogEntry) -> None:
         """Download a log of the list."""
@@ -103,6 +121,15 @@ class LogClient:
             self._on_entry(message, now_s)
         elif kind == "LOG_DATA" and self._file is not None and message.id == self._log_id:
             self._on_data(self._file, message, now_s)
+        elif kind == "STATUSTEXT" and self._before is not None and "log" in message.text.lower():
+            self._on_erase_text(message)
+
+    def _on_erase_text(self, message: Message) -> None:
+        """Take a text about the erase: a warning is the reason of a refusal, a notice says that it is done."""
+        if message.severity <= mavlink.MAV_SEVERITY_WARNING:
+            self._end(LogFailed(message.text.partition(": ")[2] or message.text))
+        elif "erased" in message.text:
+            self._erases_left = 0
 
     def poll(self, now_s: float) -> list[Message]:
         """Return the messages to send now."""
@@ -131,17 +158,30 @@ class LogClient:
         if message.num_logs == 0:
             self._end(LogDone())
             return
-        # the latest numbers count: a new log may have begun; an id is never below 0, whatever the count is
+        # the latest numbers count: a new log may have begun
         last = message.last_log_num
-        self._ids = range(max(0, last - message.num_logs + 1), last + 1)
+        self._ids = range(max(0, last - message.num_logs), last + 1)
         if message.id not in self._entries:
             self._progress_s = now_s
         self._entries[message.id] = LogEntry(message.id, message.size, message.time_utc)
         self._retry_s = now_s + RETRY_S
-        if all(log_id in self._entries for log_id in self._ids):
-            self._end(LogDone(tuple(self._entries[log_id] for log_id in self._ids)))
+        found = [self._entries[log_id] for log_id in self._ids if log_id in self._entries]
+        if len(found) >= message.num_logs:
+            self._on_list(tuple(found[-message.num_logs :]), now_s)
+
+    def _on_list(self, entries: tuple[LogEntry, ...], now_s: float) -> None:
+        """End with the complete list, or repeat an erase that has had no effect."""
+        if self._before is None or len(entries) < self._before or not self._erases_left:
+            self._end(LogDone(entries))
+        else:
+            self._entries, self._ids = {}, None
+            self._retry_s = now_s + ERASE_RETRY_S
+            self._progress_s = now_s
 
     def _ask_for_entries(self, now_s: float) -> None:
+        if self._erases_left and self._ids is None:
+            self._erases_left -= 1
+            self._outbox.append(mavlink.MAVLink_log_erase_message(*self.vehicle))
         missing = [log_id for log_id in self._ids or () if log_id not in self._entries]
         first, last = (missing[0], missing[-1]) if missing else (0, ALL_LOGS)
         self._outbox.append(mavlink.MAVLink_log_request_list_message(*self.vehicle, first, last))

@@ -1,32 +1,69 @@
-"""``gcs arm``, ``takeoff``, ``goto``, ``mode`` and similar: one command to the vehicle, one line of output."""
+"""``gcs arm``, ``takeoff``, ``goto``, ``mode`` and similar: one action, done when the vehicle reports the effect."""
 
 from __future__ import annotations
 
+import sys
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
-from flightstack.process.command_line import expand_options, make_app
+from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
+from gcs_cli.actions import in_flight, on_vehicle
+from gcs_cli.actions.action import Action
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
+from gcs_cli.link.perform import ask_modes, perform
+from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions
-from gcs_cli.vehicle.px4_modes import mode_numbers, settable_modes
+from gcs_cli.vehicle.view_types import VehicleView
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 
-_HOME_WAIT_S = 3.0
-_MODES = ", ".join(settable_modes())
+YesOption = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")]
+AltitudeOption = Annotated[
+    float | None,
+    typer.Option("--alt", metavar="METRES", min=0.1, max=10_000.0, help="Altitude above home."),
+]
+
+
+@dataclass(frozen=True)
+class ActionOptions:
+    """Options of all actions."""
+
+    no_wait: Annotated[
+        bool,
+        typer.Option(
+            "--no-wait", help="End with the acknowledgement; do not wait for the effect.", **IN_OUTPUT
+        ),
+    ] = False
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a line.", **IN_OUTPUT)] = (
+        False
+    )
+
+
+def run_action(context: typer.Context, link: LinkOptions, options: ActionOptions, action: Action) -> None:
+    """Connect, perform ``action`` and print the result."""
+    with connect_vehicle(context, link) as connection:
+        perform(connection, action, Output(options.as_json), waits=not options.no_wait)
+
+
+def confirm(question: str, yes: bool) -> None:
+    """Ask on a terminal before a dangerous action; raise CliError if the answer is no or no one can be asked."""
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise CliError(f"{question}: add --yes", USAGE)
+    if not typer.confirm(f"{question}. Continue?", err=True):
+        raise CliError("cancelled: nothing was sent")
 
 
 @app.command()
 @expand_options
-def arm(context: typer.Context, link: LinkOptions) -> None:
+def arm(context: typer.Context, link: LinkOptions, options: ActionOptions) -> None:
     """Arm the vehicle."""
-    with connect_vehicle(context, link) as connection:
-        connection.command(calls.ARM, "arming")
-    typer.echo("armed")
+    run_action(context, link, options, on_vehicle.arm())
 
 
 @app.command()
@@ -34,89 +71,72 @@ def arm(context: typer.Context, link: LinkOptions) -> None:
 def disarm(
     context: typer.Context,
     link: LinkOptions,
-    force: Annotated[bool, typer.Option("--force", help="Disarm in the air too: the rotors stop.")] = False,
+    options: ActionOptions,
+    force: Annotated[
+        bool, typer.Option("--force", help="Disarm in the air too: the rotors stop. Asks first in the air.")
+    ] = False,
+    yes: YesOption = False,
 ) -> None:
     """Disarm the vehicle."""
     with connect_vehicle(context, link) as connection:
-        connection.command(calls.FORCE_DISARM if force else calls.DISARM, "disarming")
-    typer.echo("disarmed")
+        if force and not yes and _may_fly(connection):
+            confirm("the vehicle may be in the air, and its rotors will stop", yes)
+        perform(
+            connection, on_vehicle.disarm(force=force), Output(options.as_json), waits=not options.no_wait
+        )
+
+
+def _may_fly(connection: Connection) -> bool:
+    """Return True unless the vehicle is disarmed or reports that it is on the ground."""
+    connection.wait_for(lambda: connection.session.view.on_ground is not None, _LANDED_STATE_S)
+    view = connection.session.view
+    return view.armed and view.on_ground is not True
+
+
+_LANDED_STATE_S = 1.5
 
 
 @app.command()
 @expand_options
 def takeoff(
-    context: typer.Context,
-    link: LinkOptions,
-    alt: Annotated[
-        float | None,
-        typer.Option("--alt", metavar="METRES", min=0.1, max=10_000.0, help="Altitude above home."),
-    ] = None,
+    context: typer.Context, link: LinkOptions, options: ActionOptions, alt: AltitudeOption = None
 ) -> None:
-    """Take off; arm first if disarmed."""
-    with connect_vehicle(context, link) as connection:
-        altitude_amsl_m = calls.NAN if alt is None else alt + _home_altitude_m(connection)
-        connection.command(calls.takeoff_command(altitude_amsl_m), "takeoff")
-        if not connection.session.view.armed:
-            connection.command(calls.ARM, "arming for takeoff")
-    typer.echo("taking off" if alt is None else f"taking off to {alt:g} m")
+    """Take off; arm first if disarmed.
 
-
-def _home_altitude_m(connection: Connection) -> float:
-    """Return the altitude of home above mean sea level, the reference of MAV_CMD_NAV_TAKEOFF."""
-    session = connection.session
-    if not connection.wait_for(
-        lambda: session.view.home is not None or session.view.geo is not None, _HOME_WAIT_S
-    ):
-        raise CliError("takeoff: the vehicle does not send its position, which --alt needs: leave --alt out")
-    if session.view.home is not None:
-        return session.view.home.altitude_m
-    assert session.view.geo is not None
-    return session.view.geo.altitude_m - session.view.geo.relative_altitude_m
+    Ends when the altitude is reached within 0.5 m. Without --alt the vehicle climbs to its own takeoff altitude, which
+    ArduPilot does not have.
+    """
+    run_action(context, link, options, in_flight.takeoff(alt))
 
 
 @app.command()
 @expand_options
-def land(context: typer.Context, link: LinkOptions) -> None:
-    """Land at the current position."""
-    with connect_vehicle(context, link) as connection:
-        connection.command(calls.LAND, "landing")
-    typer.echo("landing")
+def land(context: typer.Context, link: LinkOptions, options: ActionOptions) -> None:
+    """Land at the current position.
+
+    Ends when the vehicle has landed and disarmed.
+    """
+    run_action(context, link, options, in_flight.land())
 
 
 @app.command()
 @expand_options
-def rtl(context: typer.Context, link: LinkOptions) -> None:
-    """Return to launch and land."""
-    with connect_vehicle(context, link) as connection:
-        connection.command(calls.RETURN, "return")
-    typer.echo("returning to launch")
+def rtl(context: typer.Context, link: LinkOptions, options: ActionOptions) -> None:
+    """Return to launch and land.
+
+    Ends when the vehicle has landed and disarmed.
+    """
+    run_action(context, link, options, in_flight.return_to_launch())
 
 
 @app.command()
 @expand_options
-def hold(context: typer.Context, link: LinkOptions) -> None:
-    """Hold the position."""
-    _select_mode(context, link, "hold")
+def hold(context: typer.Context, link: LinkOptions, options: ActionOptions) -> None:
+    """Stop and hold the position.
 
-
-@app.command()
-@expand_options
-def mode(
-    context: typer.Context,
-    link: LinkOptions,
-    name: Annotated[str, typer.Argument(metavar="MODE", help=f"{_MODES}.")],
-) -> None:
-    """Select a flight mode."""
-    _select_mode(context, link, name)
-
-
-def _select_mode(context: typer.Context, link: LinkOptions, name: str) -> None:
-    numbers = mode_numbers(name)
-    if numbers is None:
-        raise CliError(f"mode {name}: the vehicle has no such mode; choose one of {_MODES}", USAGE)
-    with connect_vehicle(context, link) as connection:
-        connection.command(calls.mode_command(*numbers), f"mode {name.lower()}")
-    typer.echo(f"mode {name.lower()}")
+    Selects the mode HOLD of PX4, or BRAKE of ArduCopter, which needs no remote control. Ends when the vehicle stands.
+    """
+    run_action(context, link, options, in_flight.hold())
 
 
 @app.command()
@@ -124,18 +144,28 @@ def _select_mode(context: typer.Context, link: LinkOptions, name: str) -> None:
 def goto(
     context: typer.Context,
     link: LinkOptions,
+    options: ActionOptions,
     latitude: Annotated[float, typer.Argument(min=-90.0, max=90.0, help="Degrees.")],
     longitude: Annotated[float, typer.Argument(min=-180.0, max=180.0, help="Degrees.")],
-    alt: Annotated[float | None, typer.Option("--alt", metavar="METRES", help="Altitude above home.")] = None,
+    alt: AltitudeOption = None,
 ) -> None:
     """Fly to a position and hold there.
 
-    Put -- before negative degrees.
+    Ends when the vehicle stands there, within 1 m. Put -- before negative degrees.
     """
-    with connect_vehicle(context, link) as connection:
-        altitude_amsl_m = calls.NAN if alt is None else alt + _home_altitude_m(connection)
-        connection.command(calls.goto_command(latitude, longitude, altitude_amsl_m), "goto")
-    typer.echo(f"flying to {latitude:.7f} {longitude:.7f}" + ("" if alt is None else f" at {alt:g} m"))
+    run_action(context, link, options, in_flight.goto(latitude, longitude, alt))
+
+
+@app.command()
+@expand_options
+def yaw(
+    context: typer.Context,
+    link: LinkOptions,
+    options: ActionOptions,
+    heading: Annotated[float, typer.Argument(min=0.0, max=360.0, help="Degrees clockwise from north.")],
+) -> None:
+    """Turn to a heading and hold the position."""
+    run_action(context, link, options, in_flight.yaw(heading))
 
 
 @app.command()
@@ -143,21 +173,62 @@ def goto(
 def speed(
     context: typer.Context,
     link: LinkOptions,
+    options: ActionOptions,
     metres_per_second: Annotated[float, typer.Argument(help="Ground speed [m/s]; -2 for the default.")],
 ) -> None:
-    """Set the ground speed until disarmed."""
-    with connect_vehicle(context, link) as connection:
-        connection.command(calls.speed_command(metres_per_second), "speed")
-    typer.echo(
-        "flying at the default speed" if metres_per_second < 0.0 else f"flying at {metres_per_second:g} m/s"
-    )
+    """Set the ground speed until disarmed.
+
+    ArduPilot forgets it with the next mode change. No vehicle reports it: the command ends with the acknowledgement.
+    """
+    wanted = None if metres_per_second < 0.0 else metres_per_second
+    run_action(context, link, options, in_flight.speed(wanted))
 
 
 @app.command()
 @expand_options
-def sethome(
+def mode(
     context: typer.Context,
     link: LinkOptions,
+    options: ActionOptions,
+    name: Annotated[
+        str | None, typer.Argument(metavar="MODE", help="Name of the mode; without one, list the modes.")
+    ] = None,
+) -> None:
+    """Select a flight mode, or list the modes of the vehicle."""
+    with connect_vehicle(context, link) as connection:
+        output = Output(options.as_json)
+        view = connection.session.view
+        if name is None:
+            is_listed = ask_modes(connection)
+            _list_modes(connection.session.view, is_listed, output)
+            return
+        if view.autopilot.mode_number(name, view.vehicle_type) is None:
+            ask_modes(connection)  # the vehicle may have modes of its own
+        perform(connection, on_vehicle.select_mode(name), output, waits=not options.no_wait)
+
+
+def _list_modes(view: VehicleView, is_listed: bool, output: Output) -> None:
+    labels = {mode.number: mode.label for mode in view.modes}
+    for name, number in on_vehicle.mode_choices(view).items():
+        label = labels.get(number, "")
+        shown = f"{name.lower():<20} {label}".rstrip()
+        output.say(
+            "mode",
+            shown + (" (current)" if number == view.custom_mode else ""),
+            mode=name,
+            custom_mode=number,
+            label=label or None,
+            current=number == view.custom_mode,
+            listed_by_vehicle=is_listed,
+        )
+
+
+@app.command("set-home")
+@expand_options
+def set_home(
+    context: typer.Context,
+    link: LinkOptions,
+    options: ActionOptions,
     place: Annotated[
         list[float] | None,
         typer.Argument(help="Latitude, longitude, altitude above mean sea level [current position]."),
@@ -169,22 +240,52 @@ def sethome(
     """
     if place and len(place) != 3:
         raise CliError(
-            "sethome: give latitude, longitude and altitude, or nothing for the current position", USAGE
+            "set-home: give latitude, longitude and altitude, or nothing for the current position", USAGE
         )
     home = (place[0], place[1], place[2]) if place else None
-    with connect_vehicle(context, link) as connection:
-        connection.command(calls.home_command(home), "sethome")
-    typer.echo(
-        "home is the current position"
-        if home is None
-        else f"home is {home[0]:.7f} {home[1]:.7f} {home[2]:g} m"
-    )
+    run_action(context, link, options, on_vehicle.set_home(home))
+
+
+app.command("sethome", hidden=True)(set_home)
 
 
 @app.command()
 @expand_options
-def reboot(context: typer.Context, link: LinkOptions) -> None:
-    """Reboot the vehicle, which must be on the ground."""
-    with connect_vehicle(context, link) as connection:
-        connection.command(calls.REBOOT, "reboot")
-    typer.echo("rebooting")
+def terminate(
+    context: typer.Context, link: LinkOptions, options: ActionOptions, yes: YesOption = False
+) -> None:
+    """End the flight at once: the rotors stop and the vehicle falls.
+
+    Asks first on a terminal; elsewhere it needs --yes.
+    """
+    confirm("the rotors will stop and the vehicle will fall", yes)
+    run_action(context, link, options, on_vehicle.terminate())
+
+
+@app.command()
+@expand_options
+def inject(
+    context: typer.Context,
+    link: LinkOptions,
+    options: ActionOptions,
+    unit: Annotated[str, typer.Argument(help="What fails: motor, gps, gyro, battery …")],
+    failure: Annotated[
+        str, typer.Argument(help="How: off, stuck, garbage, wrong, slow, delayed; ok repairs.")
+    ],
+    number: Annotated[int, typer.Option("--number", "-n", min=0, help="Which one; 0: all.")] = 0,
+) -> None:
+    """Inject a failure (MAV_CMD_INJECT_FAILURE).
+
+    The vehicle must allow it: SYS_FAILURE_EN is 1 on PX4. ArduPilot has no such command.
+    """
+    run_action(context, link, options, on_vehicle.inject_failure(unit, failure, number))
+
+
+@app.command()
+@expand_options
+def reboot(context: typer.Context, link: LinkOptions, options: ActionOptions) -> None:
+    """Reboot the vehicle, which must be on the ground.
+
+    Ends when the vehicle is back.
+    """
+    run_action(context, link, options, on_vehicle.reboot())

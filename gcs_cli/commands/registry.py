@@ -24,6 +24,9 @@ class GcsGroup(LazyGroup):
         "fly": LazyCommand(
             "gcs_cli.commands.fly", "Fly a mission in simulation and write log, summary and report."
         ),
+        "sim": LazyCommand(
+            "gcs_cli.commands.sim", "Simulate one or several vehicles for any MAVLink client."
+        ),
         "paper": LazyCommand(
             "gcs_cli.commands.paper", "Fly every experiment of the paper and report the results."
         ),
@@ -33,12 +36,17 @@ class GcsGroup(LazyGroup):
         "takeoff": LazyCommand(_ACTIONS, "Take off; arm first if disarmed."),
         "land": LazyCommand(_ACTIONS, "Land at the current position."),
         "rtl": LazyCommand(_ACTIONS, "Return to launch and land."),
-        "hold": LazyCommand(_ACTIONS, "Hold the position."),
+        "hold": LazyCommand(_ACTIONS, "Stop and hold the position."),
         "goto": LazyCommand(_ACTIONS, "Fly to a position and hold there."),
+        "yaw": LazyCommand(_ACTIONS, "Turn to a heading and hold the position."),
         "speed": LazyCommand(_ACTIONS, "Set the ground speed until disarmed."),
-        "sethome": LazyCommand(_ACTIONS, "Set the home position."),
-        "mode": LazyCommand(_ACTIONS, "Select a flight mode."),
+        "mode": LazyCommand(_ACTIONS, "Select a flight mode, or list the modes of the vehicle."),
+        "set-home": LazyCommand(_ACTIONS, "Set the home position."),
+        "sethome": LazyCommand(_ACTIONS, "Set the home position.", hidden=True),
+        "terminate": LazyCommand(_ACTIONS, "End the flight at once: the rotors stop and the vehicle falls."),
+        "inject": LazyCommand(_ACTIONS, "Inject a failure (MAV_CMD_INJECT_FAILURE)."),
         "reboot": LazyCommand(_ACTIONS, "Reboot the vehicle, which must be on the ground."),
+        "wait": LazyCommand("gcs_cli.commands.wait", "Wait until the vehicle is in a state."),
         "status": LazyCommand("gcs_cli.commands.status", "Show the state of the vehicle."),
         "watch": LazyCommand("gcs_cli.commands.watch", "Watch the vehicle; q or Ctrl-C ends."),
         "perf": LazyCommand("gcs_cli.commands.perf", "Show the timing of the flight stack's loops."),

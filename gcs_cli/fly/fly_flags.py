@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -170,9 +170,10 @@ class RunOptions(ResultOptions):
     timeout: FlownTimeoutOption = None
 
 
-def complete_options(
-    context: typer.Context, command: str, options: FlyOptions, run: RunOptions
-) -> FlyOptions:
+Options = TypeVar("Options", bound=FlyOptions)
+
+
+def complete_options(context: typer.Context, command: str, options: Options, run: RunOptions) -> Options:
     """Return the options with those given before the command; raise CliError (usage) for ``--connect``."""
     settings = settings_of(context)
     if settings.link.connect is not None:

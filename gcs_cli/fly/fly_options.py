@@ -36,7 +36,7 @@ def checked_plan(options: FlyOptions) -> Plan:
     """Check the options before anything starts, and return the plan; raise CliError or ConfigError."""
     plan = load_plan(options.plan_path)
     home = home_of(options, plan)
-    _check_options(options, home)
+    check_options(options, home)
     if not plan.items:
         raise CliError(f"{options.plan_path}: has no mission items", USAGE)
     problem = plan_problem(plan, home)
@@ -80,7 +80,7 @@ def longest_flight_s(options: FlyOptions, plan: Plan) -> float:
     return flight_limit_s(plan.items, home_of(options, plan), behaviour)
 
 
-def _check_options(options: FlyOptions, home: GeoPoint) -> None:
+def check_options(options: FlyOptions, home: GeoPoint) -> None:
     """Check the options as simulator and flight stack do at their start."""
     try:
         check_simulator(simulator_arguments(options, home))
@@ -135,7 +135,7 @@ def simulator_arguments(options: FlyOptions, home: GeoPoint) -> list[str]:
     return [
         *passed(options, TO_SIMULATOR),
         f"--port={options.simulator_port}",
-        f"--home={_home(home)}",
+        f"--home={home_text(home)}",
         f"--timeout={options.timeout_s:g}",
     ]
 
@@ -151,7 +151,7 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_po
         f"--gcs={LOOPBACK}:{ground_port}",
         f"--gcs={LOOPBACK}:{options.gcs_port}",
         f"--log={folder / LOG_NAME}",
-        f"--home={_home(home)}",
+        f"--home={home_text(home)}",
         f"--exit-on-gcs-loss={GCS_LOSS_S:g}",
         f"--params={options.params or 'none'}",
         "--state=none",  # a flight depends on its command line alone
@@ -160,5 +160,6 @@ def stack_arguments(options: FlyOptions, home: GeoPoint, folder: Path, ground_po
     ]
 
 
-def _home(home: GeoPoint) -> str:
+def home_text(home: GeoPoint) -> str:
+    """Return a position as the options ``--home`` read it."""
     return f"{home.latitude_deg!r},{home.longitude_deg!r},{home.altitude_m!r}"

@@ -12,9 +12,8 @@ from flightstack.mavlink.link import Address
 from flightstack.plan import MissionItem, MissionResult, MissionType
 from gcs_cli.clients.command_client import CommandClient, CommandResult
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient
-from gcs_cli.link.session import COMPONENT_ID, SYSTEM_ID, Session
+from gcs_cli.link.session import Session
 
-OWN_ADDRESS = Address(SYSTEM_ID, COMPONENT_ID)
 TEXT_WAIT_S = 0.3
 """How long to wait for the STATUSTEXT that explains a refusal; it follows the answer."""
 
@@ -100,7 +99,7 @@ class Call:
 
 def command(session: Session, number: int, params: Sequence[float], now_s: float) -> Call:
     """Begin a command; omitted parameters are zero."""
-    client = CommandClient(vehicle_address(session), OWN_ADDRESS)
+    client = CommandClient(vehicle_address(session), session.own)
     client.send(number, params, now_s)
     return Call(session, client)
 
@@ -109,7 +108,7 @@ def command_int(
     session: Session, number: int, params: Sequence[float], x: int, y: int, z: float, frame: int, now_s: float
 ) -> Call:
     """Begin a COMMAND_INT of four parameters and a position in ``frame``; x and y in 1e-7 degrees."""
-    client = CommandClient(vehicle_address(session), OWN_ADDRESS)
+    client = CommandClient(vehicle_address(session), session.own)
     client.send_int(number, params, x, y, z, frame=frame, now_s=now_s)
     return Call(session, client)
 
@@ -137,7 +136,7 @@ def clear(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
 
 def mission_client(session: Session, kind: MissionType) -> MissionClient:
     """Return a client that transfers one type of plan."""
-    return MissionClient(vehicle_address(session), OWN_ADDRESS, kind)
+    return MissionClient(vehicle_address(session), session.own, kind)
 
 
 def vehicle_address(session: Session) -> Address:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.link import Address as Component
 from flightstack.mavlink.link import Link, Message
 from flightstack.mavlink.signing import LinkSigning, without_signature
 from flightstack.transports.udp import Address
@@ -40,8 +41,8 @@ class Session:
     The first peer that sends an autopilot's heartbeat is the vehicle; datagrams of others are dropped unless the
     vehicle is lost. With ``peer``, only datagrams from that address are accepted, and with ``system_id``, only that
     vehicle. Heartbeats are sent once per second of this clock and of vehicle time, because a simulation that is faster
-    than real time measures their timeout in its own time. ``heartbeat_type`` is the MAV_TYPE that this side announces.
-    ``record`` gets every frame, sent and received, without its signature.
+    than real time measures their timeout in its own time. ``heartbeat_type`` is the MAV_TYPE that this side announces,
+    ``own_system`` its system id. ``record`` gets every frame, sent and received, without its signature.
     """
 
     def __init__(
@@ -51,9 +52,12 @@ class Session:
         signing: LinkSigning | None = None,
         system_id: int | None = None,
         heartbeat_type: int = mavlink.MAV_TYPE_GCS,
+        own_system: int = SYSTEM_ID,
     ) -> None:
         self.view = VehicleView()
         self.peer = peer
+        self.own = Component(own_system, COMPONENT_ID)
+        """System and component of this side."""
         self.foreign_systems: set[int] = set()
         """System ids of other vehicles."""
         self._only_peer = peer
@@ -61,7 +65,7 @@ class Session:
         self.bad = 0
         self._links: dict[Address, Link] = {}
         self._signing = signing
-        self._out = Link(SYSTEM_ID, COMPONENT_ID, signing=signing)
+        self._out = Link(*self.own, signing=signing)
         self.record = record
         self.observe: Callable[[Message], None] | None = None
         """Called with every message from the vehicle."""
@@ -98,7 +102,7 @@ class Session:
             return
         if len(self._links) > _MOST_PEERS:
             self._links.clear()
-        link = self._links.setdefault(peer, Link(SYSTEM_ID, COMPONENT_ID, signing=self._signing))
+        link = self._links.setdefault(peer, Link(*self.own, signing=self._signing))
         bad_before = link.bad
         for message in link.decode(data):
             if link.is_authentic(message) and (heard or self._is_vehicle(message, peer, now_s)):

@@ -49,6 +49,7 @@ def _tiles(rows: Sequence[Row], failed: int, wall_s: float) -> list[tuple[str, s
 
 def _row(index: int, row: Row) -> dict[str, Any]:
     case, result = row.case, row.result
+    file = case.name.replace("/", "-")  # of a saved chart
     share = None if result.closest is None else result.closest.share
     return {
         "label": case.label,
@@ -62,7 +63,7 @@ def _row(index: int, row: Row) -> dict[str, Any]:
         "outcome": result.outcome,
         "outcome_text": result.outcome_text,
         "checks": [_check(check) for check in sorted(result.checks, key=lambda check: check.passed)],
-        "figures": [replace(figure, name=f"{figure.name}-{case.name}") for figure in result.figures],
+        "figures": [replace(figure, name=f"{figure.name}-{file}") for figure in result.figures],
         "texts": result.texts,
         "kept": row.kept,
         "command": case.command,

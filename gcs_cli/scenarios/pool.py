@@ -113,7 +113,8 @@ class Pool:
 
     def __init__(self, jobs: int) -> None:
         """Start the first worker, which imports while the caller reads the files."""
-        self._jobs = jobs
+        self.jobs = jobs
+        """Flights at once, at most."""
         self._answers: SimpleQueue[tuple[_Worker, Any]] = SimpleQueue()
         self._idle = [_Worker(self._answers)]
         self._busy: list[_Worker] = []
@@ -129,7 +130,7 @@ class Pool:
         finished: set[int] = set()
         try:
             while done < end:
-                while next_index < end and len(self._busy) < self._jobs:
+                while next_index < end and len(self._busy) < self.jobs:
                     self._take().fly(next_index, cases[next_index], wanted)
                     yield Started(next_index)
                     next_index += 1

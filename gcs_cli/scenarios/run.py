@@ -17,6 +17,7 @@ from gcs_cli.errors import DONE, FAILED, INTERRUPTED, CliError
 from gcs_cli.report.run_directory import LOG_NAME, REPORT_NAME, RUNS, fresh_directory
 from gcs_cli.scenarios.display import Display, make_display, print_failures, print_summary
 from gcs_cli.scenarios.junit import junit_xml
+from gcs_cli.scenarios.options import TestOptions
 from gcs_cli.scenarios.page import render_results
 from gcs_cli.scenarios.pool import Finished, Notice, Pool, Started
 from gcs_cli.scenarios.result import Result, Row, Wanted, as_json, not_flown
@@ -27,25 +28,6 @@ _POLL_S = 0.5
 
 
 @dataclass(frozen=True)
-class TestOptions:
-    """What ``gcs test`` was asked for."""
-
-    paths: tuple[Path, ...]
-    jobs: int
-    expression: str | None = None
-    seed: int | None = None
-    repeat: int | None = None
-    junit: Path | None = None
-    report: Path | None = None
-    keep: Path | None = None
-    """Folder for the files of failed flights; None: one of its own in ``runs``."""
-    as_json: bool = False
-    stops_at_failure: bool = False
-
-    __test__ = False  # not a test of pytest's
-
-
-@dataclass(frozen=True)
 class Run:
     """What was flown."""
 
@@ -53,6 +35,8 @@ class Run:
     total: int
     wall_s: float
     interrupted: bool
+    jobs: int
+    """Flights at once."""
 
     @property
     def exit_code(self) -> int:
@@ -93,16 +77,16 @@ def run_once(pool: Pool, options: TestOptions, console: Console) -> int:
 
 def run_watching(pool: Pool, options: TestOptions, console: Console) -> int:
     """Fly all scenarios, and those whose files change until Ctrl-C; return the exit code of the newest results."""
-    stamps, rows = Stamps(), dict[str, Row]()
+    stamps, rows = Stamps(), dict[tuple[Path, int], Row]()
     code = DONE
     with contextlib.suppress(KeyboardInterrupt):
         cases = _cases(options)
         while True:
             changed = stamps.changed(cases)
-            stamps.poll(find_scenarios(options.paths))
+            stamps.poll(find_scenarios(_paths(options)))
             run = _fly(pool, changed, options, console)
-            rows |= {row.case.name: row for row in run.rows}
-            newest = [rows[case.name] for case in cases if case.name in rows]
+            rows |= {row.case.key: row for row in run.rows}
+            newest = [replace(rows[case.key], case=case) for case in cases if case.key in rows]
             whole = replace(run, rows=tuple(newest), total=len(newest))
             code = whole.exit_code
             _write(whole, options)
@@ -113,8 +97,12 @@ def run_watching(pool: Pool, options: TestOptions, console: Console) -> int:
     return code
 
 
+def _paths(options: TestOptions) -> list[Path]:
+    return options.paths or [Path()]
+
+
 def _cases(options: TestOptions) -> list[Case]:
-    files = find_scenarios(options.paths)
+    files = find_scenarios(_paths(options))
     return select(files, options.expression, options.seed, options.repeat)
 
 
@@ -124,7 +112,7 @@ def _changed_cases(stamps: Stamps, options: TestOptions, console: Console) -> li
     while True:
         time.sleep(_POLL_S)
         try:
-            if stamps.poll(find_scenarios(options.paths)):
+            if stamps.poll(find_scenarios(_paths(options))):
                 return _cases(options)
         except (ConfigError, CliError) as error:
             if str(error) != shown:
@@ -139,9 +127,7 @@ def _fly(pool: Pool, cases: Sequence[Case], options: TestOptions, console: Conso
     collected = _Collected(cases, display, Keeper(options.keep))
     interrupted = False
     try:
-        with contextlib.closing(
-            pool.fly(cases, wanted, stops_at_failure=options.stops_at_failure)
-        ) as messages:
+        with contextlib.closing(pool.fly(cases, wanted, stops_at_failure=options.exitfirst)) as messages:
             for message in messages:
                 if isinstance(message, Started):
                     display.start(cases[message.case])
@@ -156,8 +142,9 @@ def _fly(pool: Pool, cases: Sequence[Case], options: TestOptions, console: Conso
     finally:
         collected.show_rest()
         display.close()
-    rows = collected.rows(options.stops_at_failure)
-    return Run(rows, len(cases), time.monotonic() - began_s, interrupted)
+    rows = collected.rows(options.exitfirst)
+    wall_s = time.monotonic() - began_s
+    return Run(rows, len(cases), wall_s, interrupted, min(pool.jobs, len(cases)))
 
 
 class _Collected:
@@ -216,7 +203,7 @@ def _write(run: Run, options: TestOptions) -> None:
 
 def _print(run: Run, options: TestOptions, console: Console) -> None:
     print_failures(console, run.rows)
-    print_summary(console, run.rows, min(options.jobs, run.total), run.wall_s)
+    print_summary(console, run.rows, run.jobs, run.wall_s)
     if options.report is not None:
         console.print(f"report: {options.report}", markup=False, highlight=False, soft_wrap=True)
 

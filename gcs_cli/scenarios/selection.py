@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -24,14 +25,19 @@ class Case:
     scenario: Scenario
     seed: int
     label: str
-    """Name of the scenario, with its folder where another one has the same name."""
+    """Name of the scenario, with its folder where another one has the same name; unique in a run."""
     command: str
     """The command that repeats this flight alone."""
 
     @property
     def name(self) -> str:
-        """Scenario and seed, unique in a run; also the name of a folder."""
-        return f"{self.label}-seed{self.seed}".replace(os.sep, "-")
+        """Scenario and seed, unique in a run; also the relative path of a folder."""
+        return f"{self.label}-seed{self.seed}"
+
+    @property
+    def key(self) -> tuple[Path, int]:
+        """File and seed: the same in each run, whatever other files there are."""
+        return self.scenario.path.resolve(), self.seed
 
 
 def find_scenarios(paths: Sequence[Path]) -> list[Path]:
@@ -78,39 +84,54 @@ def select(
 
 
 def _labels(files: Sequence[Path]) -> dict[Path, str]:
+    """Return the stem of each file, or its path below the common folder if another file has the same stem."""
     counts = Counter(file.stem for file in files)
-    return {file: file.stem if counts[file.stem] == 1 else str(file.with_suffix("")) for file in files}
+    top = os.path.commonpath([file.resolve().parent for file in files])
+    below = {file: file.resolve().relative_to(top).as_posix().removesuffix(".toml") for file in files}
+    return {file: file.stem if counts[file.stem] == 1 else below[file] for file in files}
+
+
+_WORD = re.compile(r"""'[^']*'|"[^"]*"|[^\s()]+""")
+_OPERATORS = ("and", "or", "not")
 
 
 class Selector:
     """An expression over names as that of pytest's ``-k``: parts of names with ``and``, ``or``, ``not`` and brackets.
 
-    >>> Selector("square and not wind")("square_in_rain"), Selector("square and not wind")("square_in_wind")
+    A part has any characters but blanks and brackets, or stands in quotes.
+
+    >>> Selector("square and not in-wind")("square"), Selector("square and not in-wind")("square-in-wind")
     (True, False)
     """
 
     def __init__(self, text: str) -> None:
         """Raise CliError (usage) for an expression with an error."""
+        self._parts: list[str] = []
         try:
-            self._tree = ast.parse(text.strip(), mode="eval").body if text.strip() else None
+            source = _WORD.sub(self._operand, text).strip()
+            self._tree = ast.parse(source, mode="eval").body if source else None
             self("")
         except (SyntaxError, ValueError):
             problem = "must be parts of names, joined by and, or, not and brackets"
             raise CliError(f"-k {text}: {problem}", USAGE) from None
 
+    def _operand(self, word: re.Match[str]) -> str:
+        """Return an operator as it is, and the name of a variable for a part."""
+        if word[0] in _OPERATORS:
+            return word[0]
+        self._parts.append(word[0].strip("'\"").lower())
+        return f"part{len(self._parts) - 1}"
+
     def __call__(self, name: str) -> bool:
         """Return True if the expression selects a name."""
-        return self._tree is None or _matches(self._tree, name.lower())
+        return self._tree is None or self._matches(self._tree, name.lower())
 
-
-def _matches(node: ast.expr, name: str) -> bool:
-    if isinstance(node, ast.Name):
-        return node.id.lower() in name
-    if isinstance(node, ast.Constant):  # a quoted name, or a number
-        return str(node.value).lower() in name
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-        return not _matches(node.operand, name)
-    if isinstance(node, ast.BoolOp):
-        found = [_matches(part, name) for part in node.values]
-        return all(found) if isinstance(node.op, ast.And) else any(found)
-    raise ValueError("-k")
+    def _matches(self, node: ast.expr, name: str) -> bool:
+        if isinstance(node, ast.Name):
+            return self._parts[int(node.id.removeprefix("part"))] in name
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            return not self._matches(node.operand, name)
+        if isinstance(node, ast.BoolOp):
+            found = [self._matches(part, name) for part in node.values]
+            return all(found) if isinstance(node.op, ast.And) else any(found)
+        raise ValueError("-k")

@@ -10,7 +10,7 @@ from flightstack.mavlink.files import Entry
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
-from gcs_cli.link.calls import OWN_ADDRESS, vehicle_address
+from gcs_cli.link.calls import vehicle_address
 from gcs_cli.link.connection import Connection
 
 LOG_FOLDER = "@MAV_LOG"
@@ -30,6 +30,16 @@ def fetch_list(connection: Connection) -> tuple[LogEntry, ...]:
     if isinstance(client.result, LogDone):
         return client.result.entries
     raise _error(client.result, "log list")
+
+
+def erase_logs(connection: Connection, before: int) -> tuple[LogEntry, ...]:
+    """Erase the ``before`` logs of the vehicle; return those that are left; raise CliError."""
+    client = LogClient(vehicle_address(connection.session))
+    client.start_erase(before)
+    connection.run(client, "log erase")
+    if isinstance(client.result, LogDone):
+        return client.result.entries
+    raise _error(client.result, "log erase")
 
 
 def fetch_files(connection: Connection) -> tuple[Entry, ...]:
@@ -84,4 +94,4 @@ def _error(result: object, name: str) -> CliError:
 
 
 def _ftp_client(connection: Connection) -> FtpClient:
-    return FtpClient(vehicle_address(connection.session), OWN_ADDRESS)
+    return FtpClient(vehicle_address(connection.session), connection.session.own)

@@ -7,7 +7,7 @@ from flightstack.mavlink.param_values import Parameter
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
 from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed, ParamTiming
 from gcs_cli.errors import FAILED, NO_ANSWER, CliError
-from gcs_cli.link.calls import OWN_ADDRESS, TEXT_WAIT_S, vehicle_address
+from gcs_cli.link.calls import TEXT_WAIT_S, vehicle_address
 from gcs_cli.link.connection import Connection
 from gcs_cli.vehicle.param_info import METADATA_PATH, ParamInfo, number_text, parse_metadata
 
@@ -53,7 +53,7 @@ def change(connection: Connection, name: str, value: float) -> Parameter:
 
 def fetch_metadata(connection: Connection) -> dict[str, ParamInfo]:
     """Return the metadata of the vehicle's parameters, by name; empty if it sends none."""
-    client = FtpClient(vehicle_address(connection.session), OWN_ADDRESS)
+    client = FtpClient(vehicle_address(connection.session), connection.session.own)
     client.start_download(METADATA_PATH)
     connection.run(client, "parameter metadata", METADATA_WAIT_S)
     return parse_metadata(client.result.content) if isinstance(client.result, FtpDone) else {}
@@ -83,4 +83,4 @@ def _error(result: object, what: str) -> CliError:
 
 
 def _param_client(connection: Connection) -> ParamClient:
-    return ParamClient(vehicle_address(connection.session), OWN_ADDRESS, TIMING)
+    return ParamClient(vehicle_address(connection.session), connection.session.own, TIMING)

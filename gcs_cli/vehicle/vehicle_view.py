@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from flightstack.core.portable_math import euler_angles
-from gcs_cli.vehicle.px4_modes import mode_name
+from flightstack.mavlink.dialect import mavlink
 from gcs_cli.vehicle.status_texts import add_piece, without_stale_piece
 from gcs_cli.vehicle.view_types import (
+    AvailableMode,
     Battery,
+    Estimator,
     Euler,
     GeoPosition,
+    Gnss,
     Identity,
     LinkCounts,
     LoopTiming,
@@ -30,6 +33,20 @@ _PREARM_CHECK = 1 << 28  # MAV_SYS_STATUS_PREARM_CHECK: no sensor
 _RATE_WINDOW_S = 1.0
 _MOST_ROTORS = 16
 _NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
+_NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+_RESTART_S = 1.0
+"""Step back of the vehicle's clock that no reordering of datagrams explains."""
+_LONGEST_ROUND_TRIP_S = 60.0
+_ATTITUDE, _VELOCITY, _POSITION, _ALTITUDE, _CONSTANT = 1, 0b110, 1 << 4, 1 << 5, 1 << 7
+"""Flags of ESTIMATOR_STATUS and EKF_STATUS_REPORT."""
+
+
+SENSOR_NAMES = {
+    bit: entry.name.removeprefix("MAV_SYS_STATUS_").removeprefix("SENSOR_").lower().replace("_", " ")
+    for bit, entry in mavlink.enums["MAV_SYS_STATUS_SENSOR"].items()
+    if bit.bit_count() == 1 and bit not in (_PREARM_CHECK, mavlink.MAV_SYS_STATUS_EXTENSION_USED)
+}
+"""Names of the sensors in SYS_STATUS, by bit."""
 
 
 def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
@@ -48,7 +65,14 @@ def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
         return view
     view = without_stale_piece(view, now_s)._replace(link=_counted(view.link, message.get_seq(), now_s))
     fold = _FOLDS.get(message.get_type())
-    return view if fold is None else fold(view, message, now_s)
+    return view if fold is None else _restarted(view.time_s, fold(view, message, now_s))
+
+
+def _restarted(before_s: float | None, view: VehicleView) -> VehicleView:
+    """Return ``view``, with the restart counted if the vehicle's clock went back."""
+    if before_s is None or view.time_s is None or view.time_s > before_s - _RESTART_S:
+        return view
+    return view._replace(restarts=view.restarts + 1)
 
 
 def _counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
@@ -60,7 +84,9 @@ def _counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
         start = now_s
     elif now_s - start >= _RATE_WINDOW_S:
         start, count, rate = now_s, 0, count / (now_s - start)
-    return LinkCounts(link.received + 1, link.lost + gap, sequence, now_s, rate, start, count)
+    return LinkCounts(
+        link.received + 1, link.lost + gap, sequence, now_s, rate, start, count, link.round_trip_s
+    )
 
 
 def _number(value: float) -> float | None:
@@ -83,22 +109,116 @@ def _heartbeat(view: VehicleView, message: Any, now_s: float) -> VehicleView:
     armed = bool(message.base_mode & _ARMED)
     return view._replace(
         last_heartbeat_s=now_s,
-        mode=mode_name(message.custom_mode),
+        mode=mode_name(view, message.custom_mode),
+        custom_mode=message.custom_mode,
         armed=armed,
         ever_armed=view.ever_armed or armed,
         system_status=message.system_status,
     )
 
 
+def mode_name(view: VehicleView, custom_mode: int) -> str:
+    """Return the name of a custom mode of this vehicle; an unknown one is shown by its number."""
+    known = view.autopilot.mode_name(view.vehicle_type, custom_mode)
+    if known is not None:
+        return known
+    labels = (mode.label.upper() for mode in view.modes if mode.number == custom_mode)
+    return next(labels, f"mode {custom_mode}")
+
+
+def _available_mode(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    selectable = not message.properties & _NOT_SELECTABLE
+    entry = AvailableMode(message.custom_mode, message.mode_name, selectable, message.standard_mode)
+    others = [mode for mode in view.modes if mode.number != entry.number]
+    view = view._replace(modes=(*others, entry), mode_total=message.number_modes)
+    return view._replace(mode=mode_name(view, view.custom_mode))
+
+
 def _system(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    used = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled & ~_PREARM_CHECK
-    view = view._replace(healthy=not used & ~message.onboard_control_sensors_health)
+    enabled = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled
+    failed = enabled & ~message.onboard_control_sensors_health
+    view = view._replace(
+        healthy=not failed & ~_PREARM_CHECK,
+        unhealthy=tuple(name for bit, name in SENSOR_NAMES.items() if failed & bit),
+        can_arm=not failed & _PREARM_CHECK if enabled & _PREARM_CHECK else None,
+    )
     remaining = message.battery_remaining / 100 if 0 <= message.battery_remaining <= 100 else None
     voltage = message.voltage_battery / 1000 if 0 < message.voltage_battery < 65535 else None
     current = message.current_battery / 100 if message.current_battery >= 0 else None
     if remaining is None and voltage is None:
         return view._replace(battery=None)
-    return view._replace(battery=Battery(remaining, voltage, current))
+    if not view.armed or remaining is None:
+        view = view._replace(charge_at_arming=None)
+    elif view.charge_at_arming is None and view.time_s is not None:
+        view = view._replace(charge_at_arming=(view.time_s, remaining))
+    time_s = None if view.battery is None else view.battery.time_remaining_s
+    return view._replace(battery=Battery(remaining, voltage, current, time_s))
+
+
+def _fence(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    return view._replace(fence_breached=bool(message.breach_status))
+
+
+def _battery(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    """Take the remaining time of the first battery; SYS_STATUS has the rest."""
+    if message.id != 0 or view.battery is None:
+        return view
+    return view._replace(battery=view.battery._replace(time_remaining_s=message.time_remaining or None))
+
+
+def _gnss(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    satellites = None if message.satellites_visible == 255 else message.satellites_visible
+    hdop = None if message.eph == 65535 else message.eph / 100
+    return view._replace(gnss=Gnss(message.fix_type, satellites, hdop, message.h_acc / 1e3 or None))
+
+
+def _estimator_status(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    ratios = (message.vel_ratio, message.pos_horiz_ratio, message.pos_vert_ratio, message.mag_ratio)
+    return view._replace(estimator=_estimator(message.flags, ratios))
+
+
+def _ekf_status(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    variances = (
+        message.velocity_variance,
+        message.pos_horiz_variance,
+        message.pos_vert_variance,
+        message.compass_variance,
+    )
+    return view._replace(estimator=_estimator(message.flags, variances))
+
+
+def _estimator(flags: int, ratios: Iterable[float]) -> Estimator:
+    finite = [ratio for ratio in ratios if math.isfinite(ratio)]
+    return Estimator(
+        bool(flags & _ATTITUDE),
+        flags & _VELOCITY == _VELOCITY,
+        bool(flags & _POSITION) and not flags & _CONSTANT,
+        bool(flags & _ALTITUDE),
+        max(finite, default=None),
+    )
+
+
+def _wind(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    """ArduPilot's WIND: the direction that the wind comes from, and the speed."""
+    if not math.isfinite(message.direction):
+        return view._replace(wind_ned_m_s=None)
+    away_rad = math.radians(message.direction)
+    north, east = -message.speed * math.cos(away_rad), -message.speed * math.sin(away_rad)
+    return view._replace(wind_ned_m_s=_vector(north, east, message.speed_z))
+
+
+def _wind_cov(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    return view._replace(wind_ned_m_s=_vector(message.wind_x, message.wind_y, message.wind_z))
+
+
+def _timesync(view: VehicleView, message: Any, now_s: float) -> VehicleView:
+    """Take the round trip from the answer to a TIMESYNC with our clock in ``ts1``."""
+    if message.tc1 == 0:  # a request of the vehicle
+        return view
+    round_trip_s = now_s - message.ts1 / 1e9
+    if not 0.0 <= round_trip_s < _LONGEST_ROUND_TRIP_S:
+        return view
+    return view._replace(link=view.link._replace(round_trip_s=round_trip_s))
 
 
 def _attitude(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
@@ -132,7 +252,7 @@ def _global_position(view: VehicleView, message: Any, _now_s: float) -> VehicleV
 
 def _home(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     home = GeoPosition(message.latitude / 1e7, message.longitude / 1e7, message.altitude / 1e3, 0.0)
-    return view._replace(home=home)
+    return view._replace(home=home, home_count=view.home_count + 1)
 
 
 def _position_target(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
@@ -165,15 +285,24 @@ def _item_reached(view: VehicleView, message: Any, _now_s: float) -> VehicleView
 
 
 def _rotors(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    first = message.index
+    return _with_rotors(view, message.index, message.rpm)
+
+
+def _with_rotors(view: VehicleView, first: int, speeds_rpm: Iterable[float]) -> VehicleView:
     if first >= _MOST_ROTORS:
         return view
     rpm = list(view.rotor_rpm) + [0.0] * (first + 4 - len(view.rotor_rpm))
-    rpm[first : first + 4] = [float(value) for value in message.rpm]
+    rpm[first : first + 4] = [float(value) for value in speeds_rpm]
     if view.identity is not None and view.identity.rotors is not None:  # a message always holds four
         rpm = rpm[: view.identity.rotors]
     peak = max(view.rotor_peak_rpm, *(abs(value) for value in rpm))
     return view._replace(rotor_rpm=tuple(rpm), rotor_peak_rpm=peak)
+
+
+def _esc_telemetry(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    """ArduPilot's ESC_TELEMETRY_1_TO_4 and the like: the speeds of four rotors, the first one in the name."""
+    first = int(message.get_type().split("_")[2]) - 1
+    return _with_rotors(view, first, message.rpm)
 
 
 def _loop_timing(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
@@ -190,7 +319,16 @@ def _system_time(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
 
 _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "HEARTBEAT": _heartbeat,
+    "AVAILABLE_MODES": _available_mode,
     "SYS_STATUS": _system,
+    "BATTERY_STATUS": _battery,
+    "FENCE_STATUS": _fence,
+    "GPS_RAW_INT": _gnss,
+    "ESTIMATOR_STATUS": _estimator_status,
+    "EKF_STATUS_REPORT": _ekf_status,
+    "WIND": _wind,
+    "WIND_COV": _wind_cov,
+    "TIMESYNC": _timesync,
     "ATTITUDE": _attitude,
     "ATTITUDE_TARGET": _attitude_target,
     "LOCAL_POSITION_NED": _local_position,
@@ -202,6 +340,8 @@ _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "MISSION_CURRENT": _mission_current,
     "MISSION_ITEM_REACHED": _item_reached,
     "ESC_STATUS": _rotors,
+    "ESC_TELEMETRY_1_TO_4": _esc_telemetry,
+    "ESC_TELEMETRY_5_TO_8": _esc_telemetry,
     "FS_LOOP_TIMING": _loop_timing,
     "SYSTEM_TIME": _system_time,
     "STATUSTEXT": add_piece,

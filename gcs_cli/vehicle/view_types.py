@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
+
+from gcs_cli.autopilots.autopilot import Autopilot
+from gcs_cli.autopilots.registry import autopilot_of
 
 TEXTS_KEPT = 100
 LOST_AFTER_S = 5.0
 """Heartbeat timeout of a vehicle: five missed heartbeats."""
 
-_POWEROFF = 7  # MAV_STATE_POWEROFF
+_SMALLEST_USE = 0.02
+"""Consumption from which the remaining time is computed; charge is reported in steps of 0.01."""
+_POWEROFF, _TERMINATED = 7, 8  # MAV_STATE
+_FAILSAFE = (5, 6, _TERMINATED)  # MAV_STATE_CRITICAL, EMERGENCY and FLIGHT_TERMINATION
+ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
+"""MAV_LANDED_STATE."""
+_FIXES = {2: "2D fix", 3: "3D fix", 4: "DGPS", 5: "RTK float", 6: "RTK fixed", 7: "static", 8: "PPP"}
+"""Names of GPS_FIX_TYPE; smaller numbers are no fix."""
 _KINDS = {
     2: ("quadrotor", 4),
     13: ("hexarotor", 6),
@@ -100,6 +111,57 @@ class Battery(NamedTuple):
     voltage_v: float | None
     current_a: float | None
 
+    time_remaining_s: float | None = None
+
+
+class Gnss(NamedTuple):
+    """State of the satellite receiver; None for values that it does not report."""
+
+    fix_type: int
+    satellites: int | None = None
+    hdop: float | None = None
+    horizontal_accuracy_m: float | None = None
+
+    @property
+    def has_position(self) -> bool:
+        """True if the receiver has a position in three dimensions."""
+        return self.fix_type >= 3
+
+    @property
+    def fix_name(self) -> str:
+        """Name of the type of fix."""
+        return _FIXES.get(self.fix_type, "no fix")
+
+
+class Estimator(NamedTuple):
+    """Health of the vehicle's state estimator, of ESTIMATOR_STATUS or ArduPilot's EKF_STATUS_REPORT."""
+
+    has_attitude: bool
+    has_velocity: bool
+    has_position: bool
+    """True if the horizontal position is known absolutely."""
+    has_altitude: bool
+    worst_ratio: float | None = None
+    """Largest innovation test ratio; from 1 on the estimator rejects that measurement."""
+
+    @property
+    def healthy(self) -> bool:
+        """True if attitude, velocity and position are known and no measurement is rejected."""
+        known = self.has_attitude and self.has_velocity and self.has_position and self.has_altitude
+        return known and (self.worst_ratio is None or self.worst_ratio < 1.0)
+
+
+class AvailableMode(NamedTuple):
+    """A mode of the vehicle as it lists it in AVAILABLE_MODES."""
+
+    number: int
+    """The custom mode."""
+    label: str
+    """The vehicle's own name of it."""
+    is_selectable: bool
+    standard_mode: int
+    """MAV_STANDARD_MODE; 0: none."""
+
 
 class LoopTiming(NamedTuple):
     """One FS_LOOP_TIMING: times over the last 4096 ticks, counts since start."""
@@ -151,6 +213,8 @@ class LinkCounts(NamedTuple):
     rate_hz: float | None = None
     window_start_s: float | None = None
     window_count: int = 0
+    round_trip_s: float | None = None
+    """Time from a TIMESYNC to its answer; None if none was sent."""
 
     @property
     def quality(self) -> float | None:
@@ -165,12 +229,27 @@ class VehicleView(NamedTuple):
     identity: Identity | None = None
     last_heartbeat_s: float | None = None
     mode: str | None = None
+    """Name of the flight mode: the autopilot's, else that in AVAILABLE_MODES, else the number."""
+    custom_mode: int = 0
+    modes: tuple[AvailableMode, ...] = ()
+    """The modes that the vehicle lists; empty until it is asked."""
+    mode_total: int = 0
+    """Number of modes that the vehicle has, as AVAILABLE_MODES says."""
     armed: bool = False
     ever_armed: bool = False
     system_status: int = 0
     landed_state: int = 0
     healthy: bool | None = None
     """True if all sensors are healthy; in a simulation: if the simulator's state is received."""
+    can_arm: bool | None = None
+    """Result of the vehicle's pre-arm check; None if it reports none."""
+    gnss: Gnss | None = None
+    estimator: Estimator | None = None
+    wind_ned_m_s: Vector | None = None
+    """Velocity of the air."""
+    unhealthy: tuple[str, ...] = ()
+    """Names of the enabled sensors that the vehicle reports as unhealthy."""
+    fence_breached: bool = False
     attitude: Euler | None = None
     rates_frd_rad_s: Vector | None = None
     attitude_target: Euler | None = None
@@ -178,11 +257,15 @@ class VehicleView(NamedTuple):
     velocity_ned_m_s: Vector | None = None
     geo: GeoPosition | None = None
     home: GeoPosition | None = None
+    home_count: int = 0
+    """Number of received home positions."""
     heading_deg: float | None = None
     throttle: float | None = None
     setpoint: Setpoint | None = None
     mission: Mission = Mission()
     battery: Battery | None = None
+    charge_at_arming: tuple[float, float] | None = None
+    """Vehicle time [s] and remaining charge, 0 to 1, when the vehicle armed."""
     rotor_rpm: tuple[float, ...] = ()
     rotor_peak_rpm: float = 0.0
     timing: LoopTiming | None = None
@@ -190,12 +273,69 @@ class VehicleView(NamedTuple):
     text_count: int = 0
     partial_text: PartialText | None = None
     time_s: float | None = None
+    restarts: int = 0
+    """How often the vehicle's clock began anew."""
     link: LinkCounts = LinkCounts()
+
+    @property
+    def autopilot(self) -> Autopilot:
+        """Facts about the vehicle's autopilot."""
+        return autopilot_of(0 if self.identity is None else self.identity.autopilot)
+
+    @property
+    def vehicle_type(self) -> int:
+        """The MAV_TYPE; 0 if unknown."""
+        return 0 if self.identity is None else self.identity.vehicle_type
+
+    @property
+    def in_failsafe(self) -> bool:
+        """True if the vehicle reports a critical state, an emergency or a termination."""
+        return self.system_status in _FAILSAFE
+
+    @property
+    def terminated(self) -> bool:
+        """True if the vehicle has terminated the flight."""
+        return self.system_status == _TERMINATED
+
+    @property
+    def on_ground(self) -> bool | None:
+        """True if the vehicle reports that it stands on the ground; None if it does not report that."""
+        return None if self.landed_state == 0 else self.landed_state == ON_GROUND
+
+    @property
+    def relative_altitude_m(self) -> float | None:
+        """Altitude above home."""
+        return None if self.geo is None else self.geo.relative_altitude_m
+
+    @property
+    def ground_speed_m_s(self) -> float | None:
+        """Horizontal speed."""
+        velocity = self.velocity_ned_m_s
+        return None if velocity is None else math.hypot(velocity.x, velocity.y)
+
+    @property
+    def home_altitude_m(self) -> float | None:
+        """Altitude of home above mean sea level."""
+        if self.home is not None:
+            return self.home.altitude_m
+        return None if self.geo is None else self.geo.altitude_m - self.geo.relative_altitude_m
 
     @property
     def powered_off(self) -> bool:
         """True if the vehicle has reported that it shuts down."""
         return self.system_status == _POWEROFF
+
+    @property
+    def battery_time_s(self) -> float | None:
+        """Remaining time of the battery: the vehicle's, else from the mean consumption since arming."""
+        if self.battery is None or self.battery.time_remaining_s is not None:
+            return None if self.battery is None else self.battery.time_remaining_s
+        left = self.battery.remaining
+        if left is None or self.charge_at_arming is None or self.time_s is None:
+            return None
+        armed_s, charge = self.charge_at_arming
+        used, elapsed_s = charge - left, self.time_s - armed_s
+        return left / used * elapsed_s if used >= _SMALLEST_USE and elapsed_s > 0.0 else None
 
     def silent_s(self, now_s: float) -> float | None:
         """Seconds since the last heartbeat; None before the first."""

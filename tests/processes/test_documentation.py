@@ -32,7 +32,7 @@ SKIPPED = {
     "film.md": 1,
 }
 """Number of blocks that a page marks as not to be run; 0 for any other page."""
-MODULES = {"sim-bridge": "sim_bridge", "flightstack": "flightstack"}
+MODULES = {"sim-bridge": "sim_bridge", "flightstack": "flightstack", "gcs": "gcs_cli"}
 IN_PROCESS = {
     "gcs": commands.gcs,
     "flightstack": commands.flightstack_command,
@@ -79,7 +79,11 @@ class Reader:
         program, *arguments = command.arguments
         arguments += ["--instance", self._instance]
         self._beside.append(Program(MODULES[program], arguments, self._folder, joins_output=True))
-        self._beside[-1].stdout.readline()  # written once its ports are open
+        if program == "gcs":  # gcs sim
+            while "Ctrl-C ends" not in (line := self._beside[-1].stdout.readline()):
+                assert line, "gcs sim ended at its start"
+        else:
+            self._beside[-1].stdout.readline()  # written once its ports are open
 
     def _run(self, command: Command) -> None:
         if command.arguments == ["echo", "$?"]:
@@ -107,7 +111,7 @@ class Reader:
     def _end(self) -> None:
         """Interrupt the vehicle; the simulator, which serves one vehicle, ends after it."""
         for program in reversed(self._beside):
-            if program.args[0] == "flightstack":
+            if program.args[0] != "sim_bridge":
                 program.send_signal(signal.SIGINT)
             output, _ = program.communicate()
             assert program.returncode == 0, output

@@ -21,7 +21,6 @@ from flightstack.transports.udp import UdpSocket
 from gcs_cli.__main__ import main
 from gcs_cli.clients.command_client import CommandClient, CommandTiming
 from gcs_cli.clients.log_client import LogEntry
-from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.transfers import log_calls
 from tests.support.commands import Ended, gcs
@@ -45,9 +44,9 @@ def told(vehicle: FakeVehicle, *arguments: object) -> Ended:
         (["arm"], "armed", (400, (1, 0))),
         (["disarm"], "disarmed", (400, (0, 0))),
         (["disarm", "--force"], "disarmed", (400, (0, 21196))),
-        (["land"], "landing", (21, (0, 0))),
-        (["rtl"], "returning to launch", (20, (0, 0))),
-        (["hold"], "mode hold", (176, (1, 4, 3))),
+        (["land", "--no-wait"], "landing", (21, (0, 0))),
+        (["rtl", "--no-wait"], "returning to launch", (20, (0, 0))),
+        (["hold"], "holding the position", (176, (1, 4, 3))),
         (["mode", "MISSION"], "mode mission", (176, (1, 4, 4))),
         (["mission", "start"], "mission started", (300, (0, 0))),
     ],
@@ -65,7 +64,8 @@ def test_an_order_is_carried_out_and_told_in_one_line(
 def test_takeoff_counts_from_sea_level_and_arms() -> None:
     vehicle = FakeVehicle()
     result = told(vehicle, "takeoff", "--alt", "10")
-    assert (result.stdout, result.returncode) == ("taking off to 10 m\n", 0)
+    first, second = result.stdout.splitlines()
+    assert (first, second[:12], result.returncode) == ("taking off to 10 m", "at 10 m afte", 0)
     (takeoff, values), (arm, _) = vehicle.commands
     assert (takeoff, values[6], arm) == (22, 498.0, ARM)
 
@@ -76,9 +76,17 @@ def test_a_refusal_tells_the_vehicles_reason() -> None:
     assert result.stderr == "gcs: arming refused: no valid position and attitude yet\n"
 
 
+def test_an_unknown_mode_names_the_modes_of_the_vehicle() -> None:
+    result = told(FakeVehicle(), "mode", "nonsense")
+    assert (result.stdout, result.returncode) == ("", 2)
+    assert result.stderr.startswith(
+        "gcs: mode: the vehicle has no mode nonsense; choose one of TAKEOFF, HOLD, MIS"
+    )
+
+
 def test_a_vehicle_that_does_not_answer_is_a_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
     quick = functools.partial(CommandClient, timing=CommandTiming(timeout_s=0.02))
-    monkeypatch.setattr(calls, "CommandClient", quick)
+    monkeypatch.setattr("gcs_cli.actions.run.CommandClient", quick)
     result = told(FakeVehicle(ignored={ARM}), "arm")
     assert result.returncode == 3
     assert "did not answer MAV_CMD_COMPONENT_ARM_DISARM" in result.stderr
@@ -330,10 +338,6 @@ def test_beside_a_ground_station_the_vehicle_is_called_at_its_own_port(
     [
         (["frobnicate"], "No such command"),
         (["arm", "--frobnicate"], "No such option"),
-        (
-            ["mode", "acro"],
-            "mode acro: the vehicle has no such mode; choose one of hold, takeoff, mission, rtl, ",
-        ),
         (["takeoff", "--alt", "-3"], "--alt: -3 is outside the allowed range 0.1 to 10000"),
         (["takeoff", "--alt", "high"], "--alt: 'high' is not a number; give 0.1 to 10000"),
         (["fly", "--seed", "x"], "--seed: 'x' is not a whole number; give 0 to 2147483647"),

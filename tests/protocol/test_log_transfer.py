@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Address, Message
+from flightstack.mavlink.link import Address, Link, Message
 from flightstack.services.logs.log_server import LogServer
 from flightstack.transports.memory import LOSSLESS, Conditions
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
@@ -199,6 +201,69 @@ def test_log_data_waits_for_a_congested_peer_and_not_for_others() -> None:
         assert server.poll(float(second)) == []
     congested.clear()
     assert [(peer, message.ofs) for peer, message in server.poll(60.0)] == [(GCS, 0), (GCS, 90)]
+
+
+def listed(vehicle: Vehicle, conditions: Conditions = LOSSLESS, seed: int = 0) -> tuple[int, ...]:
+    """Return the ids of the logs that a client lists."""
+    client = LogClient(VEHICLE)
+    client.start_list()
+    Ether(vehicle.server, Station(client, conditions, seed)).run(lambda: client.result is not None, 10.0)
+    assert isinstance(client.result, LogDone)
+    return tuple(entry.log_id for entry in client.result.entries)
+
+
+class Px4Server(LogServer):
+    """Announces the number of logs as last_log_num, as PX4 does, whose ids end one before."""
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        sent = super().poll(now_s)
+        for _, message in sent:
+            if message.get_type() == "LOG_ENTRY":
+                message.last_log_num = message.num_logs
+        return sent
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_log_list_of_px4_ends_with_the_last_id(seed: int) -> None:
+    vehicle = Vehicle()
+    vehicle.server = Px4Server(VEHICLE, vehicle.store, lambda: False, lambda *_: None)
+    assert listed(vehicle, LOSSY if seed else LOSSLESS, seed) == (0, 1, 2, 3)
+
+
+def erased(vehicle: Vehicle, conditions: Conditions = LOSSLESS, seed: int = 0) -> LogDone | LogFailed | None:
+    client = LogClient(VEHICLE)
+    client.start_erase(len(vehicle.store.content))
+    Ether(vehicle.server, Station(client, conditions, seed)).run(lambda: client.result is not None, 20.0)
+    return client.result
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_erase_ends_when_fewer_logs_are_left(seed: int) -> None:
+    vehicle = Vehicle()
+    result = erased(vehicle, LOSSY if seed else LOSSLESS, seed)
+    assert isinstance(result, LogDone)
+    assert [entry.size for entry in result.entries] == [len(LOGS["open.ulg"])]
+
+
+def test_erase_without_effect_ends_with_the_same_list() -> None:
+    vehicle = Vehicle({"open.ulg": b"abc"})
+    assert erased(vehicle) == LogDone((LogEntry(0, 3, 1_700_000_000),))
+
+
+def test_erase_reports_the_refusal_of_an_armed_vehicle() -> None:
+    client = LogClient(VEHICLE)
+    client.start_erase(4)
+    client.poll(0.0)
+    text = mavlink.MAVLink_statustext_message(
+        mavlink.MAV_SEVERITY_WARNING, b"Logs not erased: the vehicle is armed"
+    )
+    client.receive(as_received(text), 0.1)
+    assert client.result == LogFailed("the vehicle is armed")
+
+
+def as_received(message: Message) -> Message:
+    (decoded,) = Link(*GCS).decode(Link(*VEHICLE).encode(message))
+    return decoded
 
 
 def test_the_client_takes_numbers_from_one_as_ardupilot_gives_them() -> None:

@@ -16,7 +16,9 @@ from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
 from flightstack.transports.udp import UdpSocket
 
 ARM, START, SHUT_DOWN, REQUEST, RETURN, SET_INTERVAL = 400, 300, 246, 512, 20, 511
-HOLD, MISSION, RTL = (4 << 16 | sub << 24 for sub in (3, 4, 5))
+LAND_NOW, TAKE_OFF, SET_MODE = 21, 22, 176
+TAKEOFF, HOLD, MISSION, RTL, LAND = (4 << 16 | sub << 24 for sub in (2, 3, 4, 5, 6))
+HOME_M = 488.0
 ACCEPTED, REJECTED, UNSUPPORTED = 0, 1, 3
 STEP_S = 0.05
 EVERY_TYPE = 255
@@ -58,6 +60,8 @@ class FakeVehicle:
         self.asked: set[int] = set()
         self.armed = self.silent = self.powered_off = self.complete = False
         self.mode, self.current, self.time_s = HOLD, 0, 0.0
+        self.altitude_m = 3.0
+        self.takeoff_m = self.altitude_m
         self._uploading: list[Any] = []
         self._expected = 0
         self._out: list[Any] = []
@@ -108,7 +112,14 @@ class FakeVehicle:
                 return UNSUPPORTED
             self.asked.add(int(params[0]))
             self._out.append(self._on_request()[int(params[0])])
-        elif command not in (21, 22, 176):
+        elif command == LAND_NOW:
+            self._become(mode=LAND)
+        elif command == TAKE_OFF:
+            self._become(mode=TAKEOFF)
+            self.takeoff_m = params[6] - HOME_M
+        elif command == SET_MODE:
+            self._become(mode=int(params[1]) << 16 | int(params[2]) << 24)
+        else:
             return UNSUPPORTED
         return ACCEPTED
 
@@ -191,12 +202,16 @@ class FakeVehicle:
         return frame
 
     def _fly(self) -> None:
-        if not (self.armed and self.mode in (MISSION, RTL)):
+        if self.armed and self.mode == TAKEOFF:
+            self.altitude_m = self.takeoff_m
+            self._become(mode=HOLD)
+            self._out += self._telemetry()
+        if not (self.armed and self.mode in (MISSION, RTL, LAND)):
             return
         self.time_s += self.simulated_s_per_item
         if self.current == self.stop_at_item:
             self._stop()
-        elif self.mode == RTL:
+        elif self.mode in (RTL, LAND):
             self._become(armed=False, mode=HOLD)
         elif self.current == len(self.items) - 1:
             self.complete = True
@@ -248,12 +263,12 @@ class FakeVehicle:
         return mavlink.MAVLink_mission_current_message(self.current, len(self.items), state, 1)
 
     def _telemetry(self) -> list[Any]:
-        ms = int(self.time_s * 1e3)
+        ms, above_mm = int(self.time_s * 1e3), round(self.altitude_m * 1e3)
         return [
             mavlink.MAVLink_attitude_message(ms, 0.1, -0.05, 1.5, 0.0, 0.0, 0.0),
-            mavlink.MAVLink_local_position_ned_message(ms, 1.0, 2.0, -3.0, 0.5, 0.0, 0.0),
+            mavlink.MAVLink_local_position_ned_message(ms, 1.0, 2.0, -self.altitude_m, 0.4, 0.0, 0.0),
             mavlink.MAVLink_global_position_int_message(
-                ms, 473977420, 85455940, 491000, 3000, 50, 0, 0, 9000
+                ms, 473977420, 85455940, round((HOME_M + self.altitude_m) * 1e3), above_mm, 50, 0, 0, 9000
             ),
             mavlink.MAVLink_home_position_message(
                 473977420, 85455940, 488000, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0, 0

@@ -12,8 +12,19 @@ from hypothesis import strategies as st
 from flightstack.core.float32 import as_float32
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.behaviour import Behaviour
-from flightstack.plan import UNSET_E7, Command, Frame, Limits, MissionItem, MissionResult, check_mission
+from flightstack.plan import (
+    UNSET_E7,
+    Command,
+    Frame,
+    Limits,
+    MissionItem,
+    MissionResult,
+    check_mission,
+    fence_shape,
+    mission_rejections,
+)
 from flightstack.plan.item import integer_coordinate
+from tests.support.plan_items import circle, item
 
 NAN = float("nan")
 INF = math.inf
@@ -170,12 +181,12 @@ def idle_loop_by_brute_force(items: tuple[MissionItem, ...]) -> bool:
     count = len(items)
     timed = (Command.NAV_WAYPOINT, Command.NAV_DELAY)
     reach = [[False] * count for _ in items]
-    for seq, item in enumerate(items):
-        if item.command in timed:
+    for seq, each in enumerate(items):
+        if each.command in timed:
             continue
-        if item.command == Command.DO_JUMP and item.param2 != 0.0:
-            reach[seq][int(item.param1)] = True
-        if seq + 1 < count and not (item.command == Command.DO_JUMP and item.param2 < 0.0):
+        if each.command == Command.DO_JUMP and each.param2 != 0.0:
+            reach[seq][int(each.param1)] = True
+        if seq + 1 < count and not (each.command == Command.DO_JUMP and each.param2 < 0.0):
             reach[seq][seq + 1] = True
     for via in range(count):
         for start in range(count):
@@ -243,3 +254,16 @@ def test_a_coordinate_of_any_float_is_an_integer_that_fits(value: float) -> None
         assert result == round(value * 1e7)
     elif not math.isnan(value):
         assert abs(result) > 1_800_000_000
+
+
+def test_mission_rejections_name_every_faulty_item() -> None:
+    bad = replace(WAYPOINT, command=17)
+    found = list(mission_rejections((WAYPOINT, bad, WAYPOINT, replace(WAYPOINT, z=-50.0)), HOME))
+    assert [rejection.seq for rejection in found] == [1, 3]
+
+
+def test_mission_rejections_name_every_item_outside_the_fence() -> None:
+    fence = fence_shape([circle((0.0, 0.0), 50.0)], HOME)
+    items = [item(Command.NAV_WAYPOINT, north, 0.0, 5.0) for north in (10.0, 80.0, 20.0, 90.0)]
+    found = list(mission_rejections(items, HOME, fence=fence))
+    assert {rejection.seq for rejection in found} == {1, 2, 3}  # 2: the way back from outside

@@ -31,8 +31,8 @@ FREE_COMMANDS = st.sampled_from([command for command in Command if command != Co
 
 @st.composite
 def items(draw: st.DrawFn, count: int) -> MissionItem:
-    command = draw(st.sampled_from(Command))
-    frame = draw(st.sampled_from(Frame))
+    command = draw(st.sampled_from([*Command, 82, 206]))  # with commands and frames of other vehicles
+    frame = draw(st.sampled_from([*Frame, 10]))
     params = [draw(FLOATS) for _ in range(5)]
     x, y = draw(st.integers(-(10**9) + 10**8, 9 * 10**8)), draw(st.integers(-18 * 10**8, 18 * 10**8))
     if frame != Frame.MISSION and command in (Command.NAV_TAKEOFF, Command.NAV_LAND) and draw(st.booleans()):
@@ -239,15 +239,18 @@ BAD_PLANS: dict[str, tuple[Any, str]] = {
         "item 0: the complex item 'StructureScan' has no list of simple items",
     ),
     "frame": (
-        document(simple(), simple(frame=10)),
-        "item 1, frame: 10 is not supported; supported are 0",
+        document(simple(), simple(frame=7)),
+        "item 1, frame: 7 is not supported; supported are 0",
     ),
     "command": (
-        document(simple(206)),
-        "item 0, command: 206 is not supported; supported are 16",
+        document(simple(65536)),
+        "item 0, command: 65536 must be a whole number from 0 to 65535",
     ),
     "command text": (document(simple("16")), "item 0, command: '16' must be a whole number from 0"),  # type: ignore[arg-type]
-    "survey": (document(simple(), survey(simple(), simple(206))), "item 2, command: 206 is not supported"),
+    "survey": (
+        document(simple(), survey(simple(), simple(-1))),
+        "item 2, command: -1 must be a whole number",
+    ),
     "params": (with_params(0, 0), "item 0, params: must be a list of 7 numbers"),
     "param": (with_params(0, "x", 0, 0, 0, 0, 0), "item 0, param 2: 'x' must be a number"),
     "true": (with_params(True, 0, 0, 0, 0, 0, 0), "item 0, param 1: True must be a number"),
@@ -290,7 +293,10 @@ BAD_PLANS: dict[str, tuple[Any, str]] = {
     "short row": (waypoints("1 2 3"), "line 3: has 3 values and must have 12"),
     "word": (waypoints(ROW.replace("10", "high")), "line 3: 'high' is not a number"),
     "text frame": (waypoints(ROW.replace("\t3\t", "\t4\t")), "line 3, item 0, frame: 4 is not supported"),
-    "text command": (waypoints(ROW.replace("16", "17")), "line 3, item 0, command: 17 is not supported"),
+    "text command": (
+        waypoints(ROW.replace("16", "-1")),
+        "line 3, item 0, command: -1 must be a whole number",
+    ),
     "text latitude": (waypoints(ROW.replace("47.4", "nan")), "line 3, item 0, latitude: is NaN"),
     "text infinity": (waypoints(ROW.replace("47.4", "inf")), "line 3: inf must be a finite"),
     "text jump": (

@@ -55,8 +55,35 @@ def test_equal_names_are_shown_with_their_folder(folder: Path) -> None:
     cases = select(find_scenarios([Path()]))
     assert [(case.label, case.seed) for case in cases[:3]] == [("a", 1), ("a", 2), ("b", 1)]
     assert {case.label for case in cases[4:]} == {"rain/gust", "wind/gust"}
-    assert len({case.name for case in cases}) == len(cases)
-    assert all("/" not in case.name for case in cases)
+    assert {case.name for case in cases[4:]} == {
+        f"{label}-seed{seed}" for label in ("rain/gust", "wind/gust") for seed in (1, 2)
+    }
+
+
+def write(*names: str) -> None:
+    for name in names:
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(TEXT)
+
+
+def test_names_of_files_with_similar_paths_differ(folder: Path) -> None:
+    write("rain-gust.toml", "x/rain-gust.toml")
+    cases = select(find_scenarios([Path(), folder / "x"]))
+    assert len({case.name for case in cases}) == len(cases) == 12
+
+
+def test_names_stay_below_the_folder_of_kept_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder / "wind")
+    cases = select([Path("../rain/gust.toml"), folder / "wind" / "gust.toml"])
+    assert [case.label for case in cases] == ["rain/gust"] * 2 + ["wind/gust"] * 2
+    assert cases[0].command.startswith("gcs test ../rain/gust.toml ")
+
+
+def test_key_of_a_case_does_not_depend_on_other_files(folder: Path) -> None:
+    (alone,) = select([Path("wind/gust.toml")], repeat=1)
+    _, beside = select([Path("rain/gust.toml"), Path("wind/gust.toml")], repeat=1)
+    assert alone.label != beside.label
+    assert alone.key == beside.key
 
 
 def test_seed_and_repeat_replace_those_of_the_file(folder: Path) -> None:
@@ -72,17 +99,23 @@ def test_seed_and_repeat_replace_those_of_the_file(folder: Path) -> None:
     [
         ("square", {"square_in_wind", "square"}),
         ("square and not wind", {"square"}),
-        ("WIND or hop", {"square_in_wind", "hop"}),
+        ("WIND or hop", {"square_in_wind", "hop", "wind-gust.2"}),
         ("not (wind or hop)", {"square"}),
         ("'in_w'", {"square_in_wind"}),
-        ("", {"square", "square_in_wind", "hop"}),
+        ("wind-gust", {"wind-gust.2"}),
+        ("not wind-gust and not HOP", {"square", "square_in_wind"}),
+        ("gust.2 or (hop)", {"wind-gust.2", "hop"}),
+        ('"gust.2"', {"wind-gust.2"}),
+        ("2", {"wind-gust.2"}),
+        ("", {"square", "square_in_wind", "hop", "wind-gust.2"}),
     ],
 )
 def test_an_expression_selects_by_parts_of_names(expression: str, names: set[str]) -> None:
-    assert {name for name in ("square", "square_in_wind", "hop") if Selector(expression)(name)} == names
+    every = ("square", "square_in_wind", "hop", "wind-gust.2")
+    assert {name for name in every if Selector(expression)(name)} == names
 
 
-@pytest.mark.parametrize("expression", ["a and", "f(x)", "a + b", "a; b"])
+@pytest.mark.parametrize("expression", ["a and", "f(x)", "a + b", "a; b", "()", "a b", "not", "(a"])
 def test_an_expression_with_an_error_is_refused(expression: str) -> None:
     with pytest.raises(CliError, match="must be parts of names, joined by and, or, not and brackets"):
         Selector(expression)

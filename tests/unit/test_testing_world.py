@@ -22,6 +22,7 @@ from flightstack.testing import (
     World,
 )
 from flightstack.testing.log import unit_of
+from gcs_cli.link import calls
 from gcs_cli.report.analysis import flight_of
 from gcs_cli.report.summary import RunInfo, summarise
 
@@ -143,6 +144,27 @@ def test_clients_have_names_and_links_of_their_own(world: World) -> None:
     world.run_for(2.0)
     assert other.counts == before
     assert world.gcs.counts["HEARTBEAT"] > before["HEARTBEAT"]
+
+
+def test_clients_have_system_ids_of_their_own(world: World) -> None:
+    for name, system_id in (("tablet", None), ("companion", 100), ("phone", None)):
+        world.add_client(name, is_companion=name == "companion", system_id=system_id)
+    assert [client.system_id for client in world.clients.values()] == [255, 254, 100, 253]
+    with pytest.raises(ValueError, match="system_id must be 1 to 255, not 256"):
+        world.add_client("watch", system_id=256)
+
+
+def test_answer_goes_to_the_client_that_asked(world: World) -> None:
+    tablet = world.add_client("tablet")
+    world.request("arming", calls.ARM, tablet)
+    assert tablet.received["COMMAND_ACK"].target_system == tablet.system_id == 254
+    assert "COMMAND_ACK" not in world.gcs.received
+    world.wait_for(tablet.parameter("MIS_TAKEOFF_ALT", 3.0), "the altitude")
+    world.wait_for(tablet.upload(world.setup.load_plan("hop")), "the plan")
+    assert tablet.received["MISSION_ACK"].target_system == 254
+    assert world.param_get("MIS_TAKEOFF_ALT") == 3.0
+    assert len(world.download()) == 2
+    assert world.gcs.received["MISSION_COUNT"].target_system == 255
 
 
 def test_request_over_a_cut_link_is_not_answered(world: World) -> None:

@@ -10,11 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.core.enums import CUSTOM_MODE
-from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
+from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, add_ardupilot_messages, mavlink
 from flightstack.mavlink.link import Link
-from flightstack.services.telemetry.modes import MODES, NOT_SELECTABLE
-from gcs_cli.vehicle.px4_modes import mode_name, mode_numbers, settable_modes
 from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
 from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import TEXTS_KEPT, VehicleView
@@ -126,8 +123,8 @@ def test_battery_is_none_when_it_is_not_measured(vehicle: Vehicle) -> None:
         )
 
     assert vehicle.send(status(65535, -1, -1)).battery is None
-    assert vehicle.send(status(12_100, 530, 76)).battery == pytest.approx((0.76, 12.1, 5.3))
-    assert vehicle.send(status(12_100, -1, -1)).battery == (None, 12.1, None)
+    assert vehicle.send(status(12_100, 530, 76)).battery == pytest.approx((0.76, 12.1, 5.3, None))
+    assert vehicle.send(status(12_100, -1, -1)).battery == (None, 12.1, None, None)
     assert vehicle.view.healthy is True
     assert vehicle.send(status(65535, -1, -1, health=0)).healthy is False
 
@@ -263,7 +260,11 @@ def _raw_frame(message_id: int, payload: bytes) -> Any:
     return next(iter(Link(0, 0).decode(packed)), None)
 
 
-FOLDED = [0, 1, 2, 30, 32, 33, 42, 46, 74, 83, 85, 242, 245, 253, 291, 53002]
+add_ardupilot_messages()
+FOLDED = [
+    0, 1, 2, 24, 30, 32, 33, 42, 46, 74, 83, 85, 111, 147, 168, 193, 230, 231, 242, 245, 253, 291, 435, 11030, 11031,
+    162, 53002,
+]  # fmt: skip
 
 
 @settings(max_examples=150)
@@ -283,21 +284,39 @@ def test_the_list_of_folded_messages_is_whole() -> None:
     assert {mavlink.mavlink_map[number].msgname for number in FOLDED} == set(_FOLDS)
 
 
-def test_modes_have_px4s_names_and_numbers() -> None:
-    assert mode_name(4 << 16 | 5 << 24) == "RTL"
-    assert mode_name(3 << 16) == "POSITION"
-    assert mode_name(77 << 16) == "mode 77.0"
-    assert mode_numbers("loiter") == mode_numbers("Hold") == (4, 3)
-    for name in settable_modes():
-        numbers = mode_numbers(name)
-        assert numbers is not None
-        assert mode_name(numbers[0] << 16 | numbers[1] << 24) == name.upper()
+def test_unhealthy_sensors_are_named(vehicle: Vehicle) -> None:
+    present = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    view = vehicle.send(
+        mavlink.MAVLink_sys_status_message(
+            present, present, mavlink.MAV_SYS_STATUS_SENSOR_GPS, 0, 15_000, -1, 90, 0, 0, 0, 0, 0, 0
+        )
+    )
+    assert view.unhealthy == ("3d mag",)
+    assert view.healthy is False
 
 
-def test_settable_modes_are_those_that_the_vehicle_announces() -> None:
-    announced = [entry.mode for entry in MODES if not entry.properties & NOT_SELECTABLE]
-    assert list(settable_modes().values()) == [CUSTOM_MODE[mode] for mode in announced]
-    assert list(settable_modes()) == [
-        "hold", "takeoff", "mission", "rtl", "land", "position", "altitude", "offboard"
-    ]  # fmt: skip
-    assert mode_numbers("stabilized") is mode_numbers("termination") is mode_numbers("nonsense") is None
+def test_battery_time_is_the_vehicles_own(vehicle: Vehicle) -> None:
+    vehicle.send(mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 15_000, -1, 90, 0, 0, 0, 0, 0, 0))
+    cells = [15_000] + [65535] * 9
+    message = mavlink.MAVLink_battery_status_message(0, 0, 0, 0, cells, -1, -1, -1, 90, 600)
+    assert vehicle.send(message).battery_time_s == 600.0
+    view = vehicle.send(mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 15_000, -1, 89, 0, 0, 0, 0, 0, 0))
+    assert view.battery_time_s == 600.0
+
+
+def test_charge_at_arming_is_kept_until_disarmed(vehicle: Vehicle) -> None:
+    def charge(percent: int) -> VehicleView:
+        message = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 15_000, -1, percent, 0, 0, 0, 0, 0, 0)
+        return vehicle.send(message)
+
+    vehicle.send(heartbeat(base=1 | 128))
+    vehicle.send(mavlink.MAVLink_system_time_message(0, 100_000))
+    assert charge(90).charge_at_arming == (100.0, 0.9)
+    vehicle.send(mavlink.MAVLink_system_time_message(0, 160_000))
+    assert charge(80).battery_time_s == pytest.approx(480.0)
+    vehicle.send(heartbeat())
+    assert charge(80).charge_at_arming is None
+
+
+def test_fence_breach_is_folded(vehicle: Vehicle) -> None:
+    assert vehicle.send(mavlink.MAVLink_fence_status_message(1, 1, 3, 0)).fence_breached

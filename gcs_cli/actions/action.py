@@ -1,0 +1,62 @@
+"""An action as a value: the commands to send, and the state of the vehicle that shows their effect. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeAlias
+
+from gcs_cli.autopilots.autopilot import VehicleCommand
+from gcs_cli.vehicle.view_types import VehicleView
+
+Condition: TypeAlias = Callable[[VehicleView], bool]
+
+HEARTBEAT_LIMIT_S = 5.0
+"""Limit of an effect that the next heartbeat shows."""
+
+
+class Step(NamedTuple):
+    """One command, and its effect."""
+
+    name: str
+    """Subject of a refusal: "arming", "takeoff"."""
+    command: VehicleCommand
+    effect: Condition | None
+    """Holds once the effect is reached; None if the vehicle does not report it."""
+    missing: str = ""
+    """Predicate of an effect that was not reached in time: "is not armed"."""
+    limit_s: float = HEARTBEAT_LIMIT_S
+    """Time of the vehicle after which the effect counts as missing."""
+    is_flight: bool = False
+    """True if the time starts anew whenever the vehicle has moved."""
+    modes: frozenset[str] = frozenset()
+    """Modes that belong to the step: once in one of them, a change to another mode ends the action; empty: any."""
+    needs_armed: bool = False
+    """True if a disarm before the effect ends the action."""
+    restarts: bool = False
+    """True if the vehicle restarts: silence does not end the action."""
+
+
+class Action(NamedTuple):
+    """What a user asks of a vehicle."""
+
+    name: str
+    plan: Callable[[VehicleView], tuple[Step, ...]]
+    """Returns the steps for a vehicle in this state; raises ``ActionError``."""
+    doing: str
+    """The action under way: "taking off to 10 m"."""
+    done: str
+    """The reached effect: "at 10 m"."""
+    facts: Mapping[str, Any] = {}
+    """Values for programs, with the unit in the key."""
+    needs: Condition | None = None
+    """State that ``plan`` needs, for example a position."""
+    needs_text: str = ""
+    """Says what is missing if that state does not come."""
+
+
+class ActionError(Exception):
+    """The action is impossible with this vehicle; one sentence."""
+
+
+class NotReadyError(ActionError):
+    """The present state of the vehicle does not permit the action; one sentence."""

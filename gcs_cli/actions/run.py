@@ -1,0 +1,227 @@
+"""Run an action: send its commands, read the answers, wait for the effect. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from typing import NamedTuple
+
+from flightstack.core.enums import Severity
+from flightstack.mavlink.link import Address, Message
+from gcs_cli.actions.action import Action, ActionError, NotReadyError, Step
+from gcs_cli.actions.progress import EffectTimer
+from gcs_cli.clients.command_client import CommandClient
+from gcs_cli.vehicle.view_types import VehicleView
+
+NEEDS_LIMIT_S = 3.0
+"""How long an action waits for the telemetry that it needs."""
+TEXT_WAIT_S = 0.3
+"""How long to wait for the STATUSTEXT that explains a refusal; it follows the answer."""
+_POLL_S = 0.25
+_MOST_REASONS = 3
+
+
+class Outcome(Enum):
+    """How an action ended."""
+
+    DONE = "done"
+    """The vehicle reports the effect."""
+    ACKNOWLEDGED = "acknowledged"
+    """The vehicle accepted the command and does not report its effect, or the caller did not want to wait."""
+    REFUSED = "refused"
+    """The vehicle refused, or its state does not permit the action."""
+    IMPOSSIBLE = "impossible"
+    """The request does not fit this vehicle: it has no such mode, or needs an altitude."""
+    SILENT = "silent"
+    """The vehicle did not answer."""
+    NOT_SEEN = "not_seen"
+    """Accepted, but the effect was not reached in time."""
+    ENDED = "ended"
+    """The vehicle left the action for another mode, disarmed, or was lost."""
+
+
+class Result(NamedTuple):
+    """End of an action."""
+
+    outcome: Outcome
+    sentence: str
+    elapsed_s: float
+    """Time from the first command to the effect, of the vehicle's clock if it sends one."""
+
+    @property
+    def ok(self) -> bool:
+        """True if the vehicle did what was asked, as far as it reports."""
+        return self.outcome in (Outcome.DONE, Outcome.ACKNOWLEDGED)
+
+
+class ActionRun:
+    """One run of an action. It is a service of a session: ``receive``, ``poll``, ``next_deadline``.
+
+    ``view`` returns the present state of the vehicle. Without ``waits`` the run ends with the last acknowledgement.
+    """
+
+    def __init__(
+        self,
+        action: Action,
+        view: Callable[[], VehicleView],
+        now_s: float,
+        own: Address,
+        *,
+        waits: bool = True,
+    ) -> None:
+        self.action = action
+        self.result: Result | None = None
+        """Set at the end."""
+        self.step: Step | None = None
+        """The step under way; None before the first."""
+        self.acknowledged = False
+        """True once the vehicle has accepted the command of the last step."""
+        self._view = view
+        self._own = own
+        self._waits = waits
+        self._begun_s = now_s
+        self._steps: list[Step] | None = None
+        self._client: CommandClient | None = None
+        self._timer: EffectTimer | None = None
+        self._whole = EffectTimer(view(), now_s)
+        self._texts_before = 0
+        self._text_due_s: float | None = None
+
+    # -- service of a session
+
+    def receive(self, message: Message, now_s: float) -> None:
+        """Process a message from the vehicle."""
+        if self._client is not None:
+            self._client.receive(message, now_s)
+
+    def poll(self, now_s: float) -> list[Message]:
+        """Advance the run, and return the messages to send now."""
+        if self.result is None:
+            self._advance(now_s)
+        return [] if self._client is None else self._client.poll(now_s)
+
+    def next_deadline(self) -> float | None:
+        """Return the time at which to call ``poll`` at the latest."""
+        if self.result is not None:
+            return None
+        due_s = None if self._client is None else self._client.next_deadline()
+        wake_s = self._whole.now_s + _POLL_S
+        return wake_s if due_s is None else min(due_s, wake_s)
+
+    def cancel(self) -> None:
+        """Stop: no further command is sent."""
+        self._client = None
+        self.result = Result(Outcome.ENDED, f"{self.action.name}: cancelled", self._whole.elapsed_s)
+
+    # -- steps
+
+    def _advance(self, now_s: float) -> None:
+        view = self._view()
+        self._whole.update(view, now_s)
+        restarts = self.step is not None and self.step.restarts
+        if not restarts and (view.powered_off or view.lost(now_s)):
+            how = "shut down" if view.powered_off else "was lost"
+            self._end(Outcome.ENDED, f"{self.action.name}: the vehicle {how}")
+        elif self._steps is None:
+            self._begin(view, now_s)
+        elif self._timer is not None:
+            self._await_effect(view, now_s)
+        else:
+            self._await_answer(view, now_s)
+
+    def _begin(self, view: VehicleView, now_s: float) -> None:
+        action = self.action
+        if action.needs is not None and not action.needs(view):
+            if now_s - self._begun_s >= NEEDS_LIMIT_S:
+                self._end(Outcome.REFUSED, f"{action.name}: {action.needs_text}")
+            return
+        try:
+            self._steps = list(action.plan(view))
+        except ActionError as error:
+            outcome = Outcome.REFUSED if isinstance(error, NotReadyError) else Outcome.IMPOSSIBLE
+            self._end(outcome, f"{action.name}: {error}")
+            return
+        self._next_step(view, now_s)
+
+    def _next_step(self, view: VehicleView, now_s: float) -> None:
+        assert self._steps is not None
+        if not self._steps:
+            self._end(Outcome.DONE, self.action.done)
+            return
+        self.step, self._timer, self._text_due_s = self._steps.pop(0), None, None
+        assert view.identity is not None
+        self._client = CommandClient(Address(*view.identity[:2]), self._own)
+        self._client.send_command(self.step.command, now_s)
+        self._texts_before = view.text_count
+
+    def _await_answer(self, view: VehicleView, now_s: float) -> None:
+        assert self._client is not None
+        assert self.step is not None
+        assert self._steps is not None
+        answer = self._client.result
+        if answer is None:
+            return
+        if answer.result is None:
+            self._end(Outcome.SILENT, f"{self.step.name}: {answer.reason}")
+        elif not answer.accepted:
+            self._refuse(view, answer.reason, now_s)
+        elif self.step.effect is None or not (self._waits or self._steps):
+            self.acknowledged = not self._steps
+            if self._steps:
+                self._next_step(view, now_s)
+            else:
+                self._end(Outcome.ACKNOWLEDGED, self.action.doing)
+        else:
+            self.acknowledged = not self._steps
+            self._timer = EffectTimer(view, now_s)
+            self._await_effect(view, now_s)
+
+    def _refuse(self, view: VehicleView, answer: str, now_s: float) -> None:
+        """End with the vehicle's texts; they follow the answer."""
+        assert self.step is not None
+        if self._text_due_s is None:
+            self._text_due_s = now_s + TEXT_WAIT_S
+        if now_s >= self._text_due_s:
+            reason = refusal_reason(view, self._texts_before)
+            self._end(Outcome.REFUSED, f"{self.step.name} refused: {reason or answer}")
+
+    def _await_effect(self, view: VehicleView, now_s: float) -> None:
+        step, timer = self.step, self._timer
+        assert step is not None
+        assert timer is not None
+        assert step.effect is not None
+        timer.update(view, now_s)
+        if step.effect(view):
+            self._next_step(view, now_s)
+            return
+        if view.mode in step.modes:
+            timer.was_in_mode = True
+        elif timer.was_in_mode:
+            self._end(Outcome.ENDED, f"{self.action.name}: the vehicle changed to mode {view.mode}")
+            return
+        timer.was_armed |= view.armed
+        if step.needs_armed and timer.was_armed and not view.armed:
+            self._end(Outcome.ENDED, f"{self.action.name}: the vehicle disarmed")
+        elif timer.is_over(step.limit_s, step.is_flight):
+            waited = f"within {step.limit_s:g} s"
+            if step.is_flight:
+                waited = f"and has not moved for {step.limit_s:g} s"
+            self._end(Outcome.NOT_SEEN, f"{step.name}: the vehicle acknowledged, but {step.missing} {waited}")
+
+    def _end(self, outcome: Outcome, sentence: str) -> None:
+        self._client = None
+        self.result = Result(outcome, sentence, self._whole.elapsed_s)
+
+
+def refusal_reason(view: VehicleView, texts_before: int) -> str:
+    """Return the vehicle's warnings after the first ``texts_before`` texts; empty if there is none."""
+    reasons: list[str] = []
+    for entry in view.texts_since(texts_before):
+        if entry.severity > Severity.WARNING:
+            continue
+        text = entry.text
+        for prefix in view.autopilot.refusal_prefixes:
+            text = text.removeprefix(prefix)
+        if text and text not in reasons:
+            reasons.append(text)
+    return "; ".join(reasons[-_MOST_REASONS:])

@@ -1,0 +1,1 @@
+"""What each autopilot does in its own way: modes, altitudes, arming, streams, parameters. One module per autopilot."""

@@ -1,0 +1,92 @@
+"""ArduPilot: ArduCopter, and the modes of its other vehicles.
+
+Commands: GCS_Common.cpp and GCS_MAVLink_Copter.cpp of ArduPilot. ``hold`` selects BRAKE, as QGroundControl's pause
+does: LOITER takes the climb rate from the throttle stick, and without a remote control the vehicle descends in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from flightstack.mavlink.dialect import mavlink
+from gcs_cli.autopilots import common_commands
+from gcs_cli.autopilots.autopilot import Autopilot, Phase, Role, VehicleCommand
+
+_ENUM_OF_TYPE = {
+    mavlink.MAV_TYPE_FIXED_WING: "PLANE_MODE",
+    mavlink.MAV_TYPE_GROUND_ROVER: "ROVER_MODE",
+    mavlink.MAV_TYPE_SURFACE_BOAT: "ROVER_MODE",
+    mavlink.MAV_TYPE_SUBMARINE: "SUB_MODE",
+    mavlink.MAV_TYPE_ANTENNA_TRACKER: "TRACKER_MODE",
+}
+"""Enumeration of the modes by MAV_TYPE; all other types are ArduCopter's."""
+_COPTER = "COPTER_MODE"
+
+
+@cache
+def _names_of(enum: str) -> dict[int, str]:
+    from pymavlink.dialects.v20 import ardupilotmega  # noqa: PLC0415  # 0.1 s, for this autopilot only
+
+    entries: Mapping[int, Any] = ardupilotmega.enums[enum]
+    prefix = f"{enum}_"
+    named = {number: entry.name.removeprefix(prefix) for number, entry in entries.items()}
+    return {number: name for number, name in named.items() if name != "ENUM_END"}
+
+
+def _mode_names(vehicle_type: int) -> Mapping[int, str]:
+    return _names_of(_ENUM_OF_TYPE.get(vehicle_type, _COPTER))
+
+
+def _select_mode(custom_mode: int) -> VehicleCommand:
+    return common_commands.custom_mode(float(custom_mode))
+
+
+def _yaw(heading_deg: float) -> VehicleCommand:
+    """CONDITION_YAW to an absolute heading, at the default rate, the shorter way round."""
+    return VehicleCommand(mavlink.MAV_CMD_CONDITION_YAW, (heading_deg % 360.0, 0.0, 0.0, 0.0))
+
+
+ARDUPILOT = Autopilot(
+    name="ardupilot",
+    title="ArduPilot",
+    mode_names=_mode_names,
+    selectable=lambda _vehicle_type, _mode: True,
+    roles={
+        Role.HOLD: "BRAKE",
+        Role.RETURN: "RTL",
+        Role.LAND: "LAND",
+        Role.TAKEOFF: "GUIDED",
+        Role.GUIDED: "GUIDED",
+        Role.MISSION: "AUTO",
+    },
+    aliases={"HOLD": "BRAKE", "RETURN": "RTL", "MISSION": "AUTO", "OFFBOARD": "GUIDED", "POSITION": "LOITER"},
+    select_mode=_select_mode,
+    takeoff_phases=(Phase.GUIDED, Phase.ARM, Phase.TAKEOFF),
+    takeoff_frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    has_takeoff_altitude=False,
+    goto_frame=mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+    goto_keeps_altitude=False,
+    yaw=_yaw,
+    yaw_phases=(Phase.GUIDED,),
+    default_speed=None,
+    start_phases=(Phase.GUIDED, Phase.ARM, Phase.START),
+    stream_groups_hz={
+        mavlink.MAV_DATA_STREAM_RAW_SENSORS: 2,
+        mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: 2,
+        mavlink.MAV_DATA_STREAM_RC_CHANNELS: 2,
+        mavlink.MAV_DATA_STREAM_POSITION: 4,
+        mavlink.MAV_DATA_STREAM_EXTRA1: 10,
+        mavlink.MAV_DATA_STREAM_EXTRA2: 4,
+        mavlink.MAV_DATA_STREAM_EXTRA3: 2,
+    },
+    stream_messages_hz={
+        mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
+        mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+    },
+    refusal_prefixes=("Arm: ", "PreArm: "),
+    casts_parameters=True,
+    mission_begins_with_home=True,
+    stores_items_exactly=False,
+)

@@ -1,0 +1,43 @@
+"""Any other MAVLink vehicle: standard commands, altitudes above home, and modes as the vehicle lists them."""
+
+from __future__ import annotations
+
+import math
+
+from flightstack.mavlink.dialect import mavlink
+from gcs_cli.autopilots import common_commands
+from gcs_cli.autopilots.ardupilot import ARDUPILOT
+from gcs_cli.autopilots.autopilot import Autopilot, Phase, VehicleCommand
+
+_RELATIVE = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+
+
+def _yaw(heading_deg: float) -> VehicleCommand:
+    nan = math.nan
+    return common_commands.reposition(_RELATIVE, nan, nan, nan, math.radians(heading_deg))
+
+
+GENERIC = Autopilot(
+    name="generic",
+    title="this autopilot",
+    mode_names=lambda _vehicle_type: {},
+    selectable=lambda _vehicle_type, _mode: True,
+    roles={},
+    aliases={},
+    select_mode=lambda mode: common_commands.custom_mode(float(mode)),
+    takeoff_phases=(Phase.TAKEOFF, Phase.ARM),
+    takeoff_frame=_RELATIVE,
+    has_takeoff_altitude=False,
+    goto_frame=_RELATIVE,
+    goto_keeps_altitude=False,
+    yaw=_yaw,
+    yaw_phases=(),
+    default_speed=-2.0,
+    start_phases=(Phase.ARM, Phase.START),
+    stream_groups_hz=ARDUPILOT.stream_groups_hz,
+    stream_messages_hz={},
+    refusal_prefixes=(),
+    casts_parameters=False,
+    mission_begins_with_home=False,
+    stores_items_exactly=False,
+)

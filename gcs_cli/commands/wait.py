@@ -1,0 +1,73 @@
+"""``gcs wait``: end when the vehicle is in a state, for shell scripts."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.actions.conditions import ConditionError, ViewCondition, choices, parse_condition
+from gcs_cli.errors import NO_ANSWER, USAGE, CliError, VehicleLostError
+from gcs_cli.link.connection import Connection
+from gcs_cli.output import Output
+from gcs_cli.settings import JsonOption, LinkOptions, link_options
+from gcs_cli.vehicle_link import connect_vehicle
+
+app = make_app(add_completion=False)
+
+DEFAULT_TIMEOUT_S = 60.0
+
+
+@app.command()
+@expand_options
+def wait(
+    context: typer.Context,
+    link: LinkOptions,
+    conditions: Annotated[
+        list[str],
+        typer.Argument(metavar="CONDITION...", help=f"{choices()}. Quote > and <.", show_default=False),
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """Wait until the vehicle is in a state.
+
+    Several conditions must hold at once. Exit code 1: the vehicle was lost; 3: --timeout passed (60 s by default, of
+    real time).
+    """
+    wanted = [_parsed(text) for text in conditions]
+    given = link_options(context, link).timeout
+    timeout_s = DEFAULT_TIMEOUT_S if given is None else given
+    with connect_vehicle(context, link) as connection:
+        wait_for(connection, wanted, timeout_s, Output(as_json))
+
+
+def _parsed(text: str) -> ViewCondition:
+    try:
+        return parse_condition(text)
+    except ConditionError as error:
+        raise CliError(f"wait: {error}", USAGE) from None
+
+
+def wait_for(connection: Connection, wanted: list[ViewCondition], timeout_s: float, output: Output) -> None:
+    """Wait until all conditions hold; raise CliError after ``timeout_s``, or if the vehicle is lost."""
+    session, begun_s = connection.session, connection.now_s
+
+    def ends() -> bool:
+        view = session.view
+        is_gone = view.powered_off or view.lost(connection.now_s)
+        return is_gone or all(condition.holds(view) for condition in wanted)
+
+    in_time = connection.wait_for(ends, timeout_s)
+    view = session.view
+    if all(condition.holds(view) for condition in wanted):
+        words = [condition.text for condition in wanted]
+        elapsed_s = round(connection.now_s - begun_s, 3)
+        output.say("wait", ", ".join(words), conditions=words, elapsed_s=elapsed_s)
+        return
+    missing = [condition for condition in wanted if not condition.holds(view)]
+    if in_time:
+        how = "shut down" if view.powered_off else "was lost"
+        raise VehicleLostError(f"wait {missing[0].text}: the vehicle {how}")
+    states = "; ".join(f"{condition.text}: {condition.value(view)}" for condition in missing)
+    raise CliError(f"wait: not within {timeout_s:g} s: {states}", NO_ANSWER)

@@ -1,0 +1,60 @@
+"""``gcs sim`` as a process: ready vehicles, their end together, and a process that dies."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+from pathlib import Path
+
+from flightstack.core.port_numbers import INSTANCES
+from flightstack.testing.instances import ServerError, free_instance
+from tests.support.commands import gcs
+from tests.support.process import Process, children_of
+
+
+def free_pair() -> int:
+    """Return an instance that is free together with the next one."""
+    taken: list[int] = []
+    while True:
+        taken.append(free_instance(taken))
+        with contextlib.suppress(ServerError):
+            return free_instance(set(range(INSTANCES)) - {taken[-1] + 1}) - 1
+
+
+def test_sim_serves_vehicles_until_interrupted(tmp_path: Path) -> None:
+    first = free_pair()
+    sim = Process(
+        "gcs_cli", "sim", "--json", "--vehicles", "2", "--instance", str(first), "--speed", "10",
+        "--log", str(tmp_path / "a.ulg"), "--state", str(tmp_path / "state"),
+    )  # fmt: skip
+    try:
+        sim.wait_for('"ready"')
+        events = [json.loads(line) for line in sim.lines if line.startswith("{")]
+        assert [event["event"] for event in events] == ["vehicle_ready", "vehicle_ready", "ready"]
+        assert [event["instance"] for event in events[:2]] == [first, first + 1]
+        for event in events[:2]:
+            assert gcs("--connect", event["gcs"], "--timeout", 60, "arm").returncode == 0
+        sim.interrupt()
+        assert sim.end() == 0
+        assert json.loads(sim.lines[-1]) == {"event": "ended", "reason": "interrupted"}
+    finally:
+        sim.kill()
+    assert sorted(path.name for path in (tmp_path / "state").iterdir()) == [
+        f"instance-{first}",
+        f"instance-{first + 1}",
+    ]
+    assert (tmp_path / f"instance-{first}" / "a.ulg").stat().st_size > 0
+
+
+def test_sim_ends_all_when_one_process_dies() -> None:
+    first = free_instance()
+    sim = Process("gcs_cli", "sim", "--instance", str(first), "--log", "none", "--state", "none")
+    try:
+        sim.wait_for("Ctrl-C ends the simulation")
+        os.kill(children_of(sim._popen.pid)["flightstack"], signal.SIGKILL)
+        assert sim.end() == 1
+        assert f"gcs: vehicle {first + 1}: flightstack was killed by signal 9" in sim.output
+    finally:
+        sim.kill()

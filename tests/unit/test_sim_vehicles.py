@@ -1,0 +1,116 @@
+"""``gcs sim``: options, files, start positions and addresses of each vehicle, without processes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from flightstack.__main__ import RunOptions
+from flightstack.core.geodesy import LocalFrame
+from flightstack.params.config import DEFAULT_HOME
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.sim.sim_flags import TO_STACK, SimOptions
+from gcs_cli.sim.sim_vehicles import connections, ready_text, stack_arguments, start_of, vehicles_of
+from tests.support.commands import gcs
+
+
+def test_vehicles_stand_spaced_to_the_east() -> None:
+    fleet = vehicles_of(SimOptions(vehicles=3, spacing=5.0))
+    places = [LocalFrame(DEFAULT_HOME).to_ned(start_of(vehicle)) for vehicle in fleet]
+    assert [place.x for place in places] == [0.0, 0.0, 0.0]
+    assert [round(place.y, 6) for place in places] == [0.0, 5.0, 10.0]
+    assert start_of(fleet[0]) == DEFAULT_HOME
+
+
+def test_each_vehicle_has_an_instance_and_a_seed() -> None:
+    fleet = vehicles_of(SimOptions(vehicles=2, instance=7, seed=3))
+    assert [(vehicle.instance, vehicle.seed) for vehicle in fleet] == [(7, 3), (8, 4)]
+
+
+def test_one_vehicle_has_the_files_that_were_given() -> None:
+    (only,) = vehicles_of(SimOptions(log="a/b.ulg", state="s", params=Path("p.params")))
+    assert {"--log=a/b.ulg", "--state=s", "--params=p.params"} <= set(stack_arguments(only))
+
+
+def test_several_vehicles_share_no_file() -> None:
+    fleet = vehicles_of(SimOptions(vehicles=2, log="a/b.ulg", state="s"))
+    assert [vehicle.log for vehicle in fleet] == ["a/instance-0/b.ulg", "a/instance-1/b.ulg"]
+    assert [vehicle.state for vehicle in fleet] == ["s/instance-0", "s/instance-1"]
+
+
+def test_several_vehicles_only_read_the_parameter_file(tmp_path: Path) -> None:
+    file = tmp_path / "tuned.params"
+    file.write_text("1\t1\tMPC_XY_CRUISE\t3\t9\n1\t1\tMAV_SYS_ID\t9\t6\n")
+    for vehicle in vehicles_of(SimOptions(vehicles=2, params=file, param=["MPC_Z_VEL_MAX_UP=2"])):
+        arguments = stack_arguments(vehicle)
+        assert [text for text in arguments if text.startswith("--param")] == [
+            "--param=MPC_XY_CRUISE=3",
+            "--param=MPC_Z_VEL_MAX_UP=2",
+        ]
+
+
+def test_files_are_those_of_flightstack_by_default() -> None:
+    for vehicle in vehicles_of(SimOptions(vehicles=2)):
+        flags = {text.partition("=")[0] for text in stack_arguments(vehicle)}
+        assert not flags & {"--log", "--state", "--params"}
+
+
+def test_none_means_no_files_for_all_vehicles() -> None:
+    for vehicle in vehicles_of(SimOptions(vehicles=2, log="none", state="none", params=Path("none"))):
+        assert {"--log=none", "--state=none", "--params=none"} <= set(stack_arguments(vehicle))
+
+
+def test_instances_beyond_the_last_one_are_refused() -> None:
+    with pytest.raises(CliError, match="--vehicles 3: the last instance would be 250") as error:
+        vehicles_of(SimOptions(vehicles=3, instance=248))
+    assert error.value.exit_code == USAGE
+
+
+def test_addresses_are_those_of_the_instance() -> None:
+    first, second = vehicles_of(SimOptions(vehicles=2))
+    assert connections(first)["mavsdk"] == "udpin://127.0.0.1:14540"
+    assert connections(second) | {"longitude_deg": 0.0} == {
+        "instance": 1,
+        "system_id": 2,
+        "mavsdk": "udpin://127.0.0.1:14541",
+        "ground_station_port": 14551,
+        "gcs": "udpout:127.0.0.1:18571",
+        "tcp": "tcp:127.0.0.1:5770",
+        "latitude_deg": DEFAULT_HOME.latitude_deg,
+        "longitude_deg": 0.0,
+        "altitude_m": DEFAULT_HOME.altitude_m,
+    }
+    assert "gcs --instance 1 status" in ready_text(second)
+
+
+def test_the_default_speed_is_real_time() -> None:
+    assert SimOptions().speed_factor == 1.0
+    assert math.isinf(SimOptions(speed="max").speed_factor)
+
+
+def test_passed_options_are_options_of_the_flight_stack() -> None:
+    assert set(TO_STACK) <= set(RunOptions.__dataclass_fields__)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--watch --json", "give either --watch or --json"),
+        ("--vehicles 0", "--vehicles: 0 is outside the allowed range 1 to 250"),
+        ("--plant flat", "--plant: 'flat' is not one of"),
+        ("--wind 3", "--wind: '3' has 1 number"),
+        ("--param MPC_XY_CRUSE=3", "--param: MPC_XY_CRUSE"),
+        ("--home 1,2", "--home: 1,2"),
+        ("--log a.ulg --vehicles 2 --gains loud", "loud: is neither"),
+    ],
+)
+def test_bad_options_are_refused_before_anything_starts(
+    words: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ended = gcs("sim", *words.split())
+    assert (ended.returncode, ended.stdout) == (USAGE, "")
+    assert ended.stderr.startswith(f"gcs: {said}")
+    assert list(tmp_path.iterdir()) == []
