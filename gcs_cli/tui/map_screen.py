@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from typing import ClassVar
 
 from rich.text import Text
@@ -13,16 +14,18 @@ from textual.widgets import Static
 
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint
-from flightstack.mavlink.dialect import mavlink
+from gcs_cli.actions import in_flight
 from gcs_cli.errors import CliError
-from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
+from gcs_cli.link.perform import perform
+from gcs_cli.output import Output
 from gcs_cli.tui.confirm import Confirm
+from gcs_cli.tui.drawing import watch_app
 from gcs_cli.tui.map_drawing import legend, place_text
 from gcs_cli.tui.map_model import MapModel
 from gcs_cli.tui.map_widget import MapWidget
 from gcs_cli.tui.plan_fetcher import PlanFetcher
-from gcs_cli.tui.watch_screen import WatchScreen, watch_app
+from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
 
 
@@ -70,6 +73,8 @@ class MapScreen(WatchScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the map, and download the plans if they changed."""
         super().show(view, now_s)
+        if not self.query(MapWidget):  # resumed before it was composed
+            return
         history = watch_app(self).feed.history
         system_id = None if view.identity is None else view.identity.system_id
         current = [stream.last for stream in history.streams(system_id) if stream.name == "MISSION_CURRENT"]
@@ -144,18 +149,19 @@ class MapScreen(WatchScreen):
             return
         target = frame.to_geo(Vector3(*place, 0.0))
         try:
-            await asyncio.wrap_future(watch_app(self).feed.submit(lambda link: _goto(link, target)))
+            self.notify(await asyncio.wrap_future(watch_app(self).feed.submit(partial(_goto, target=target))))
         except CliError as error:
             self.notify(str(error), severity="error")
-        else:
-            self.notify(f"the vehicle accepted: fly to {text}")
 
 
-def _goto(connection: Connection, target: GeoPoint) -> None:
-    """Send the position in integers: a float has steps of about half a metre."""
-    number, params = calls.goto_command(target.latitude_deg, target.longitude_deg)
-    x, y = round(target.latitude_deg * 1e7), round(target.longitude_deg * 1e7)
-    call = calls.command_int(
-        connection.session, number, params[:4], x, y, params[6], mavlink.MAV_FRAME_GLOBAL, connection.now_s
-    )
-    connection.complete(call, "goto")
+class _NoOutput(Output):
+    """Prints nothing: the screen shows the result."""
+
+    def say(self, event: str, sentence: str, **facts: object) -> None:
+        """Ignore the sentence."""
+
+
+def _goto(connection: Connection, target: GeoPoint) -> str:
+    """Send the vehicle there and return its answer; the flight itself is on the map."""
+    action = in_flight.goto(target.latitude_deg, target.longitude_deg)
+    return perform(connection, action, _NoOutput(False), waits=False).sentence

@@ -7,10 +7,10 @@ from textual.message import Message
 
 from gcs_cli.tui.canvas import DOTS_X, DOTS_Y
 from gcs_cli.tui.canvas_widget import CanvasWidget
+from gcs_cli.tui.drawing import watch_app
 from gcs_cli.tui.map_drawing import draw_map
 from gcs_cli.tui.map_scene import MapScene
 from gcs_cli.tui.viewport import Viewport
-from gcs_cli.tui.watch_screen import watch_app
 
 _PAN_SHARE = 0.1
 _ZOOM_STEP = 2.0**0.5

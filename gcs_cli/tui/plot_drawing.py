@@ -16,6 +16,8 @@ from gcs_cli.tui.viewport import round_step
 CURVE_COLOURS = ("#63a8ff", "#ffa04d", "#4fd196", "#ff7ab8", "#b797ff", "#dcbb4a", "#4dd0dd", "#ff6b6b")
 _GAP_PERIODS, _LEAST_GAP_S = 6.0, 1.0
 """A curve is interrupted if no sample arrives for this many of its usual periods, and for this time."""
+_LEAST_RANGE = 1e-4
+"""Of an axis: smaller changes are noise in most units."""
 _TICK_ROWS = 4
 _PARTS = 5
 """An axis ends at a multiple of this part of its tick step, so that it seldom changes."""
@@ -106,7 +108,9 @@ def scale_of(lane: Lane, span: Span) -> Scale:
             low, high = min(low, float(values.min())), max(high, float(values.max()))
     if low > high:
         low, high = 0.0, 1.0
-    least = max(abs(low), abs(high)) * 1e-6 or 1.0  # float32 values have about seven digits
+    least = max(_LEAST_RANGE, max(abs(low), abs(high)) * 1e-6)  # float32 values have about seven digits
+    if low == high:
+        least = max(1.0, 0.02 * abs(low))
     if high - low < least:
         middle = (low + high) / 2
         low, high = middle - least / 2, middle + least / 2
@@ -120,8 +124,8 @@ def scale_of(lane: Lane, span: Span) -> Scale:
 def tick_labels(scale: Scale) -> list[str]:
     """Return the texts of the ticks, with as many decimals as the step needs."""
     largest = max(abs(scale.low), abs(scale.high))
-    if largest >= 1e7 or scale.step < 1e-6:
-        return [f"{tick:.6g}" for tick in scale.ticks]
+    if largest >= 1e10:
+        return [f"{tick:.{math.ceil(math.log10(largest / scale.step))}e}" for tick in scale.ticks]
     digits = max(0, -math.floor(math.log10(scale.step) + 1e-9))
     return [f"{round(tick, digits) + 0.0:.{digits}f}" for tick in scale.ticks]
 
@@ -130,10 +134,10 @@ def value_text(value: float) -> str:
     """Return a value as the legend shows it."""
     if not math.isfinite(value):
         return "—"
-    if value and (abs(value) >= 1e7 or abs(value) < 1e-3):
+    if abs(value) >= 1e7:
         return f"{value:.3e}"
-    digits = max(0, 3 - max(0, math.floor(math.log10(abs(value)))) if value else 3)
-    return f"{value + 0.0:.{digits}f}"
+    digits = 3 - math.floor(math.log10(max(1.0, abs(value))))
+    return f"{round(value, max(0, digits)) + 0.0:.{max(0, digits)}f}"
 
 
 def value_at(curve: Curve, time_s: float | None) -> float:
@@ -141,14 +145,15 @@ def value_at(curve: Curve, time_s: float | None) -> float:
     if time_s is None:
         return float(curve.values[-1]) if len(curve.values) else math.nan
     last = int(np.searchsorted(curve.times_s, time_s, side="right"))
-    if not last or (last < len(curve.times_s) and curve.times_s[last] - curve.times_s[last - 1] > _gap_s(curve)):
+    if not last or time_s - curve.times_s[last - 1] > _gap_s(curve):
         return math.nan
     return float(curve.values[last - 1])
 
 
 def _gap_s(curve: Curve) -> float:
     """Return the time between two samples from which a curve is interrupted."""
-    return max(_LEAST_GAP_S, _GAP_PERIODS * float(np.median(np.diff(curve.times_s))))
+    periods_s = np.diff(curve.times_s)
+    return max(_LEAST_GAP_S, _GAP_PERIODS * float(np.median(periods_s)) if len(periods_s) else 0.0)
 
 
 def cell_time(column: int, span: Span, gutter: int, width: int) -> float:
@@ -237,6 +242,12 @@ def _draw_times(canvas: Canvas, span: Span, gutter: int, row: int, colours: Pale
         column = min(canvas.width - 1, gutter + int((length_s - ago_s) / length_s * cells))
         text = "0 s" if not ago_s else f"−{ago_s:g} s"
         canvas.label(column, row, "┴", colours.muted)
-        canvas.label(
-            max(0, min(canvas.width - len(text), column - len(text) // 2)), row + 1, text, colours.muted
-        )
+        _label_centred(canvas, column, row + 1, text, colours.muted)
+    if span.cursor_s is not None:
+        column = gutter + int((span.cursor_s - span.start_s) / length_s * cells)
+        text = f" −{span.end_s - span.cursor_s:.2f} s "
+        _label_centred(canvas, column, row + 1, text, f"bold {colours.text}")
+
+
+def _label_centred(canvas: Canvas, column: int, row: int, text: str, style: str) -> None:
+    canvas.label(max(0, min(canvas.width - len(text), column - len(text) // 2)), row, text, style)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from flightstack.mavlink.link import Message
+from gcs_cli.tui.field_picker import Choice
 from gcs_cli.tui.history import History, Stream
-from gcs_cli.tui.plot_drawing import CURVE_COLOURS, Curve
-from gcs_cli.vehicle.field_units import field_unit, shown_unit, shown_values
+from gcs_cli.tui.plot_drawing import CURVE_COLOURS, Curve, value_text
+from gcs_cli.vehicle.field_units import enum_text, field_unit, field_value, shown_unit, shown_values
 
 FIRST_FIELDS = ("ATTITUDE.roll", "ATTITUDE.pitch", "VFR_HUD.alt", "VFR_HUD.groundspeed")
 MOST_FIELDS = len(CURVE_COLOURS)
@@ -60,16 +64,26 @@ def _curve(history: History, stream: Stream | None, name: str, system_id: int | 
     return Curve(name, unit, series.times_s, shown_values(stream.last, field, series.values), colour)
 
 
+def value_note(message: Message, field: str) -> str:
+    """Return a field's value in the shown unit, or the name of an enumeration's value."""
+    value = field_value(message, field)
+    unit = field_unit(message, field)
+    if not unit and isinstance(value, int):
+        return enum_text(message, field, value) or str(value)
+    shown = shown_values(message, field, np.array([value], dtype=np.float64))[0]
+    return f"{value_text(float(shown))} {shown_unit(unit)[1]}"
+
+
 def field_choices(history: History, system_id: int | None, fields: PlotFields) -> list[Choice]:
     """Return all fields that were received, the plotted ones first, with their last values."""
     choices = []
     for stream in history.streams(system_id):
-        last = stream.last_row()
-        for index, field in enumerate(stream.fields):
+        for field in stream.fields:
             name = f"{stream.name}.{field}"
-            _, unit = shown_unit(field_unit(stream.last, field))
-            value = shown_values(stream.last, field, last[1 + index : 2 + index])[0]
-            choices.append(Choice(name, f"{value_text(value)} {unit}", fields.colour(name)))
+            note = value_note(stream.last, field)
+            choices.append(Choice(name, note, fields.colour(name)))
     received = {choice.name for choice in choices}
-    choices += [Choice(name, "not received", fields.colour(name)) for name in fields.names if name not in received]
+    choices += [
+        Choice(name, "not received", fields.colour(name)) for name in fields.names if name not in received
+    ]
     return choices

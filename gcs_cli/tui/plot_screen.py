@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -11,10 +10,11 @@ from textual.events import Leave, MouseMove, MouseScrollDown, MouseScrollUp, Res
 
 from gcs_cli.tui.canvas import Canvas
 from gcs_cli.tui.canvas_widget import CanvasWidget
+from gcs_cli.tui.drawing import watch_app
 from gcs_cli.tui.field_picker import Choice, FieldPicker
-from gcs_cli.tui.plot_drawing import Curve, Span, cell_time, draw_plot, gutter_of, value_at, value_text
-from gcs_cli.tui.plot_fields import MOST_FIELDS, PlotFields
-from gcs_cli.tui.watch_screen import WatchScreen, watch_app
+from gcs_cli.tui.plot_drawing import Curve, Span, cell_time, draw_plot, gutter_of
+from gcs_cli.tui.plot_fields import MOST_FIELDS, PlotFields, field_choices
+from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
 
 _SPANS_S = (5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0)
@@ -126,7 +126,7 @@ class PlotScreen(WatchScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the curves up to now, unless paused."""
         super().show(view, now_s)
-        if not self._is_paused:
+        if not self._is_paused and self.query(PlotWidget):
             self._load()
 
     def _load(self) -> None:

@@ -32,6 +32,13 @@ def base_name(field: str) -> str:
     return field.partition("[")[0]
 
 
+def field_value(message: Message, field: str) -> Any:
+    """Return the value of a field or of an array's element."""
+    name, _, index = field.partition("[")
+    value = getattr(message, name)
+    return value[int(index[:-1])] if index else value
+
+
 def field_unit(message: Message, field: str) -> str:
     """Return MAVLink's unit of a field, or an empty text."""
     unit: str = message.fieldunits_by_name.get(base_name(field), "")
