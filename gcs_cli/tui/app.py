@@ -11,6 +11,7 @@ from textual.screen import Screen
 
 from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.palette import Palette, palette_of
+from gcs_cli.tui.plot_fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.themes import THEMES
 from gcs_cli.tui.watch_screen import WatchScreen
@@ -40,6 +41,8 @@ class WatchApp(App[None]):
     def __init__(self, feed: Feed) -> None:
         super().__init__()
         self.feed = feed
+        self.plot_fields = PlotFields()
+        self.redraws = 0
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = THEMES[0].name
@@ -66,9 +69,10 @@ class WatchApp(App[None]):
         """Draw the newest state on the visible screen; raise the error that ended the link."""
         if self.feed.error is not None:
             raise self.feed.error
-        screen = self.screen_stack[0]
+        screen = next(iter(self._screen_stack), None)  # empty while the application ends
         if isinstance(screen, WatchScreen):
             screen.show(self.feed.view, self.feed.now_s)
+            self.redraws += 1
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
         """Yield the entries of the command palette."""

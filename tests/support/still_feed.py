@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from gcs_cli.link.connection import Connection
 from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.history import History
+from gcs_cli.tui.message_log import MessageLog
 from gcs_cli.vehicle.view_types import VehicleView
 
 
 class StillFeed(Feed):
-    def __init__(self, view: VehicleView, now_s: float = 10.0) -> None:
-        self.history = History()
+    def __init__(self, view: VehicleView, now_s: float = 10.0, history: History | None = None) -> None:
+        self.history = history or History()
+        self.messages = MessageLog()
+        self.messages.follow(view)
         self.error = None
         self.shown = view
         self.time_s = now_s
+        self.jobs: list[tuple[Callable[[Connection], Any], Future[Any]]] = []
+        """Jobs that screens have submitted; a test sets their results."""
 
     @property
     def view(self) -> VehicleView:
@@ -25,6 +35,10 @@ class StillFeed(Feed):
     @property
     def link_name(self) -> str:
         return "UDP 127.0.0.1:14550"
+
+    def submit(self, job: Callable[[Connection], Any]) -> Future[Any]:
+        self.jobs.append((job, Future()))
+        return self.jobs[-1][1]
 
     def start(self) -> None:
         """Nothing runs."""
