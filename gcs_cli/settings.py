@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -26,6 +26,9 @@ from gcs_cli.link.endpoint import (
     vehicle_connection,
 )
 from gcs_cli.output import Output
+
+if TYPE_CHECKING:
+    from gcs_cli.link.connection import Connection
 
 DEFAULT_TIMEOUT_S = 5.0
 _TIMEOUT: dict[str, Any] = {"metavar": "SECONDS", "min": SHORTEST_TIMEOUT_S, "max": LONGEST_TIMEOUT_S}
@@ -128,6 +131,8 @@ class Settings:
 
     link: LinkOptions = LinkOptions()
     signing_key: Path | None = None
+    lent: Connection | None = None
+    """The open link of a shell, for commands that name no other link."""
 
 
 def settings_of(context: typer.Context) -> Settings:

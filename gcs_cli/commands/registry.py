@@ -52,6 +52,15 @@ class GcsGroup(LazyGroup):
         "wait": LazyCommand("gcs_cli.commands.wait", "Wait until the vehicle is in a state."),
         "status": LazyCommand("gcs_cli.commands.status", "Show the state of the vehicle."),
         "watch": LazyCommand("gcs_cli.commands.watch", "Watch and command the vehicle; q or Ctrl-C ends."),
+        "messages": LazyCommand(
+            "gcs_cli.commands.messages", "Print the status texts of the vehicle until Ctrl-C."
+        ),
+        "listen": LazyCommand(
+            "gcs_cli.commands.listen", "Print messages of the vehicle, one a line, until Ctrl-C."
+        ),
+        "send": LazyCommand("gcs_cli.commands.send", "Send a MAVLink message to the vehicle."),
+        "record": LazyCommand("gcs_cli.commands.record", "Record all messages of the link until Ctrl-C."),
+        "shell": LazyCommand("gcs_cli.commands.shell", "Run commands over one link."),
         "perf": LazyCommand("gcs_cli.commands.perf", "Show the timing of the flight stack's loops."),
         "report": LazyCommand("gcs_cli.commands.report", "Write the report page of a flight from its log."),
         "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),

@@ -275,6 +275,7 @@ def test_status_as_json() -> None:
     assert facts["battery_remaining"] is None
     assert result.returncode == 0
     lines = told(FakeVehicle(), "status").stdout.splitlines()
+    assert facts.pop("event") == "status"
     assert len(lines) == len(facts)
 
 
