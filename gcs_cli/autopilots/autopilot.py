@@ -79,6 +79,10 @@ class Autopilot(NamedTuple):
     """Rates of MAV_DATA_STREAM groups to request, because the vehicle streams nothing until asked; empty: it does."""
     stream_messages_hz: Mapping[int, float]
     """Rates of single messages to request that are in none of those groups."""
+    lacks_messages: frozenset[int]
+    """Messages not to request: the vehicle answers each request with a warning."""
+    sends_modes_as_stream: bool
+    """True if AVAILABLE_MODES is sent one mode per stream interval, so that its rate must be raised first."""
     refusal_prefixes: tuple[str, ...]
     """Beginnings of the STATUSTEXT that explains a refusal; the reason follows."""
     casts_parameters: bool

@@ -61,6 +61,11 @@ def request_message(message_id: int, parameter: float = 0.0) -> VehicleCommand:
     return VehicleCommand(mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id), parameter))
 
 
+def message_interval(message_id: int, rate_hz: float) -> VehicleCommand:
+    """Return the request for a stream of a message."""
+    return VehicleCommand(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (float(message_id), 1e6 / rate_hz))
+
+
 def custom_mode(*numbers: float) -> VehicleCommand:
     """Return DO_SET_MODE with the custom mode, or PX4's main and sub mode."""
     return VehicleCommand(mavlink.MAV_CMD_DO_SET_MODE, (_CUSTOM_MODE, *numbers))

@@ -233,8 +233,10 @@ def _local_position(view: VehicleView, message: Any, _now_s: float) -> VehicleVi
 
 
 def _global_position(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    """Take the position; ArduPilot sends zeros until it has one."""
     geo = GeoPosition(message.lat / 1e7, message.lon / 1e7, message.alt / 1e3, message.relative_alt / 1e3)
-    return view._replace(geo=geo, time_s=message.time_boot_ms / 1e3)
+    is_known = any(geo[:3])
+    return view._replace(geo=geo if is_known else None, time_s=message.time_boot_ms / 1e3)
 
 
 def _home(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
