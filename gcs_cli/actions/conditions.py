@@ -98,8 +98,7 @@ def is_ready(view: VehicleView) -> bool:
 
     ArduCopter's check needs no position in STABILIZE. Without a check, the sensors must be healthy.
     """
-    has_position = view.geo is not None and (view.estimator is None or view.estimator.has_position)
-    return has_position and bool(view.healthy if view.can_arm is None else view.can_arm)
+    return view.has_position and bool(view.healthy if view.can_arm is None else view.can_arm)
 
 
 STATES: Mapping[str, tuple[Callable[[VehicleView], bool], Callable[[VehicleView], str]]] = {

@@ -84,6 +84,7 @@ ARDUPILOT = Autopilot(
         mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
         mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     },
+    reports_estimator=True,
     lacks_messages=frozenset({FS_LOOP_TIMING_ID, int(EscStatus.id)}),
     sends_modes_as_stream=True,
     refusal_prefixes=("Arm: ", "PreArm: "),

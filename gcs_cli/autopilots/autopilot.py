@@ -79,6 +79,8 @@ class Autopilot(NamedTuple):
     """Rates of MAV_DATA_STREAM groups to request, because the vehicle streams nothing until asked; empty: it does."""
     stream_messages_hz: Mapping[int, float]
     """Rates of single messages to request that are in none of those groups."""
+    reports_estimator: bool
+    """True if the vehicle sends ESTIMATOR_STATUS or EKF_STATUS_REPORT."""
     lacks_messages: frozenset[int]
     """Messages not to request: the vehicle answers each request with a warning."""
     sends_modes_as_stream: bool

@@ -36,6 +36,7 @@ GENERIC = Autopilot(
     start_phases=(Phase.ARM, Phase.START),
     stream_groups_hz=ARDUPILOT.stream_groups_hz,
     stream_messages_hz={},
+    reports_estimator=False,
     lacks_messages=frozenset(),
     sends_modes_as_stream=False,
     refusal_prefixes=(),

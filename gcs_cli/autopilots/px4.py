@@ -93,6 +93,7 @@ PX4 = Autopilot(
     start_phases=(Phase.START,),
     stream_groups_hz={},
     stream_messages_hz={},
+    reports_estimator=True,
     lacks_messages=frozenset(),
     sends_modes_as_stream=False,
     refusal_prefixes=(
