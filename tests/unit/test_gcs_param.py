@@ -107,9 +107,9 @@ def test_a_vehicle_without_metadata_is_listed_all_the_same() -> None:
 def test_the_list_as_json(vehicle: ParamVehicle) -> None:
     facts = json.loads(told(vehicle, "list", "yaw", "--json").stdout)
     assert facts == {
-            "event": "parameter", "name": "MPC_YAW_MODE", "value": 0, "default": 0.0, "min": 0.0, "max": 5.0, "unit": None,
-            "help": "Heading of waypoints without yaw", "details": None,
-            "choices": {"0": "Towards the waypoint", "5": "Unchanged"},
+        "event": "parameter", "name": "MPC_YAW_MODE", "value": 0, "default": 0.0, "min": 0.0, "max": 5.0,
+        "unit": None, "help": "Heading of waypoints without yaw", "details": None,
+        "choices": {"0": "Towards the waypoint", "5": "Unchanged"},
     }  # fmt: skip
 
 
