@@ -90,5 +90,6 @@ ARDUPILOT = Autopilot(
     refusal_prefixes=("Arm: ", "PreArm: "),
     casts_parameters=True,
     mission_begins_with_home=True,
+    replaces_plans_at_once=False,
     stores_items_exactly=False,
 )

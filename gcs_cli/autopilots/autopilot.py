@@ -91,6 +91,8 @@ class Autopilot(NamedTuple):
     """True if an integer parameter is sent as the float of its value, False if as a float of its bits."""
     mission_begins_with_home: bool
     """True if item 0 of a mission is the home position, and the first command is item 1."""
+    replaces_plans_at_once: bool
+    """True if an upload that ends early leaves the former plan; False if it overwrites the plan item by item."""
     stores_items_exactly: bool
     """True if a downloaded item equals the uploaded one; False if frames and unused fields may differ."""
 

@@ -42,5 +42,6 @@ GENERIC = Autopilot(
     refusal_prefixes=(),
     casts_parameters=False,
     mission_begins_with_home=False,
+    replaces_plans_at_once=False,
     stores_items_exactly=False,
 )

@@ -107,5 +107,6 @@ PX4 = Autopilot(
     ),
     casts_parameters=False,
     mission_begins_with_home=False,
+    replaces_plans_at_once=True,
     stores_items_exactly=True,
 )

@@ -226,7 +226,7 @@ def check(
         home, limits, fence = _vehicle_limits(context, link, plan)
     problems = list(plan_problems(plan, home, limits, fence))
     output = output_of(context, link)
-    for problem in problems:
+    for problem in problems if output.as_json or len(problems) > 1 else ():
         output.say("problem", f"{problem.part}: {problem.reason}", **problem._asdict())
     refused = {problem.part for problem in problems}
     for part in plan_parts(plan):
@@ -235,8 +235,10 @@ def check(
                 "good", f"{part.name} of {len(part.items)} items: good", part=part.name, items=len(part.items)
             )
     if problems:
-        many = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-        raise CliError(f"{file}: {many}; the vehicle would refuse it", FAILED)
+        first, more = problems[0], len(problems) - 1
+        raise CliError(
+            f"{file}: {first.part}: {first.reason}" + (f" (and {more} more)" if more else ""), FAILED
+        )
 
 
 def _uses_vehicle(link: LinkOptions, vehicle: bool) -> bool:

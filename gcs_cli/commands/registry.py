@@ -130,7 +130,11 @@ class ParamGroup(LazyGroup):
 
     lazy = {  # noqa: RUF012
         "list": LazyCommand(_PARAM, "List the parameters; highlight those that are not at their default."),
-        "get": LazyCommand(_PARAM, "Show one parameter."),
+        "search": LazyCommand(
+            _PARAM,
+            "Search names and descriptions of parameters, the best match first; misspelt words match too.",
+        ),
+        "get": LazyCommand(_PARAM, "Show parameters with their metadata."),
         "set": LazyCommand(_PARAM, "Set a parameter."),
         "reset": LazyCommand(_PARAM, "Reset parameters to their defaults."),
         "save": LazyCommand(_PARAM, "Write all parameters to a file, as QGroundControl does."),

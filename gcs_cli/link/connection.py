@@ -248,25 +248,16 @@ class Connection:
 
         With ``may_lack``, a type of plan that the vehicle does not support counts as empty.
         """
-        answer = self.wait_for_answer(call, name)
-        if may_lack and answer.result == MissionResult.UNSUPPORTED:
-            return Answer(True)
-        self.check_answer(answer, name() if callable(name) else name)
-        return answer
-
-    def wait_for_answer(self, call: Request, name: str | Callable[[], str]) -> Answer:
-        """Run a request to its end; raise CliError if the vehicle is lost."""
         while (answer := call.answer(self.now_s)) is None:
             self._check_vehicle(name)
             self.step(self.now_s + _LONGEST_WAIT_S)
-        return answer
-
-    @staticmethod
-    def check_answer(answer: Answer, what: str) -> None:
-        """Raise CliError if the vehicle has refused ``what`` or did not answer."""
+        if may_lack and answer.result == MissionResult.UNSUPPORTED:
+            return Answer(True)
         if not answer.accepted:
+            what = name() if callable(name) else name
             said = what if answer.silent or answer.cancelled else f"{what} refused"
             raise CliError(f"{said}: {answer.reason}", NO_ANSWER if answer.silent else FAILED)
+        return answer
 
     def run(
         self,

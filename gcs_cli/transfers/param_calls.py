@@ -83,4 +83,6 @@ def _error(result: object, what: str) -> CliError:
 
 
 def _param_client(connection: Connection) -> ParamClient:
-    return ParamClient(vehicle_address(connection.session), connection.session.own, TIMING)
+    session = connection.session
+    casts = session.view.autopilot.casts_parameters
+    return ParamClient(vehicle_address(session), session.own, TIMING, casts=casts)

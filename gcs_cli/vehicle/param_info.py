@@ -34,6 +34,9 @@ class ParamInfo(NamedTuple):
     help: str = ""
     choices: tuple[tuple[float, str], ...] = ()
     reboot_required: bool = False
+    details: str = ""
+    """The long description."""
+    group: str = ""
 
     @property
     def range_text(self) -> str:
@@ -88,6 +91,8 @@ def _info(entry: dict[str, Any]) -> ParamInfo:
         _text(entry.get("shortDesc")),
         tuple(choices),
         entry.get("rebootRequired") is True,
+        _text(entry.get("longDesc")),
+        _text(entry.get("group")),
     )
 
 

@@ -16,6 +16,7 @@ from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
 from flightstack.transports.udp import UdpSocket
 
 ARM, START, SHUT_DOWN, REQUEST, RETURN, SET_INTERVAL = 400, 300, 246, 512, 20, 511
+SET_CURRENT = 224
 LAND_NOW, TAKE_OFF, SET_MODE = 21, 22, 176
 TAKEOFF, HOLD, MISSION, RTL, LAND = (4 << 16 | sub << 24 for sub in (2, 3, 4, 5, 6))
 HOME_M = 488.0
@@ -102,7 +103,10 @@ class FakeVehicle:
         if command == ARM:
             self._become(armed=params[0] == 1.0)
         elif command == START:
-            self._become(mode=MISSION)
+            self._become(armed=True, mode=MISSION)
+        elif command == SET_CURRENT:
+            self.current = int(params[0])
+            self._out.append(self._mission_current())
         elif command == RETURN:
             self._become(mode=RTL)
         elif command == SHUT_DOWN:
