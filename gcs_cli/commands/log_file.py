@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import shutil
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.errors import ConfigError
@@ -115,9 +115,9 @@ def _print(out: Output, recording: Recording, fields: list[Field], limits: tuple
             time_s, values = field_samples(recording, field, *limits)
             out.say("field", "", name=field.label, time_s=time_s, values=values)
         return
-    width = min(160, shutil.get_terminal_size().columns)
+    console = Console(highlight=False)
     for panel in field_figure(recording, fields, *limits).panels:
-        typer.echo("\n".join(terminal_panel(panel, width, _PANEL_ROWS)))
+        console.print(terminal_panel(panel, console.width, _PANEL_ROWS), soft_wrap=True)
 
 
 @app.command()

@@ -62,6 +62,9 @@ class GcsGroup(LazyGroup):
         "record": LazyCommand("gcs_cli.commands.record", "Record all messages of the link until Ctrl-C."),
         "shell": LazyCommand("gcs_cli.commands.shell", "Run commands over one link."),
         "perf": LazyCommand("gcs_cli.commands.perf", "Show the timing of the flight stack's loops."),
+        "replay": LazyCommand(
+            "gcs_cli.commands.replay", "Replay a log as a vehicle that any client can watch."
+        ),
         "report": LazyCommand("gcs_cli.commands.report", "Write the report page of a flight from its log."),
         "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),
     }

@@ -89,8 +89,8 @@ class Recording:
     topics: tuple[Topic, ...]
     texts: tuple[LogText, ...] = ()
     info: Mapping[str, Any] = field(default_factory=dict)
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    """At the start, or as the vehicle sent them."""
+    parameters: Mapping[str, int | float] = field(default_factory=dict)
+    """At the start, or as the vehicle sent them; integers are ``int``."""
     changes: tuple[ParameterChange, ...] = ()
     dropouts: tuple[Dropout, ...] = ()
     damaged: bool = False

@@ -10,7 +10,7 @@ import numpy as np
 from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.param_values import HASH_NAME, REAL32
+from flightstack.mavlink.param_values import HASH_NAME, REAL32, integer_of
 from gcs_cli.link.tlog import Record, decode_records, encode_record
 from gcs_cli.logs.recording import TLOG, AnyArray, LogText, Recording, Topic
 
@@ -108,12 +108,12 @@ def _word(enum: str, value: int) -> str:
     return str(value) if entry is None else entry.name.removeprefix(f"{enum}_").lower()
 
 
-def _value(message: Message, own: dict[str, list[tuple[int, Message]]]) -> float:
+def _value(message: Message, own: dict[str, list[tuple[int, Message]]]) -> int | float:
     """Return a parameter's value: an integer's bytes on PX4, a number on ArduPilot."""
     bytewise = any(beat.autopilot == mavlink.MAV_AUTOPILOT_PX4 for _, beat in own.get("HEARTBEAT", ())[:1])
-    if not bytewise or message.param_type == REAL32:
+    if message.param_type == REAL32:
         return float(message.param_value)
-    return float(np.float32(message.param_value).view(np.int32))
+    return integer_of(message.param_value) if bytewise else round(message.param_value)
 
 
 def _size_of(records: Sequence[Record]) -> int:

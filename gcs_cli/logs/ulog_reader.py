@@ -31,7 +31,7 @@ def read_ulog(content: bytes, source: str) -> Recording:
         topics=topics,
         texts=tuple(sorted(_texts(log))),
         info=dict(log.msg_info_dict),
-        parameters={name: float(value) for name, value in log.initial_parameters.items()},
+        parameters=dict(log.initial_parameters),
         changes=tuple(
             ParameterChange(int(time_us), name, float(value))
             for time_us, name, value in log.changed_parameters
