@@ -16,7 +16,7 @@ from gcs_cli.clients.log_client import LogEntry
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
-from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
+from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
 from gcs_cli.transfers import log_calls
 from gcs_cli.tui.transfer_bar import TransferBar
 from gcs_cli.vehicle_link import connect_vehicle
@@ -31,15 +31,14 @@ _KILO = 1000.0
 def list_logs(
     context: typer.Context,
     link: LinkOptions,
-    as_json: JsonOption = False,
 ) -> None:
     """List the logs, the oldest first."""
     with connect_vehicle(context, link) as connection:
         logs = log_calls.fetch_list(connection)
         files = log_calls.fetch_files(connection) if logs else ()
     named = [(log, log_calls.file_of(log, logs, files)) for log in logs]
-    out = Output(as_json)
-    if not logs and not as_json:
+    out = output_of(context, link)
+    if not logs and not out.as_json:
         typer.echo("the vehicle has no logs")
     for log, file in named:
         line = f"{log.log_id:5d}  {_time_text(log):<20}  {size_text(log.size):>9}"
@@ -62,10 +61,9 @@ def download(
         bool, typer.Option("--all", help="All logs, except those that are already in the folder.")
     ] = False,
     overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Download a log, or all of them."""
-    out = Output(as_json)
+    out = output_of(context, link)
     number = _number(log_id)
     if everything and log_id != "latest":
         raise CliError("give either a log or --all", USAGE)
@@ -88,7 +86,6 @@ def erase(
     context: typer.Context,
     link: LinkOptions,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Erase all logs but the one that is being written.
 
@@ -108,7 +105,7 @@ def erase(
         raise CliError(f"the vehicle still has all {len(left)} logs")
     count = len(before) - len(left)
     sentence = f"{count} of {len(before)} logs erased"
-    Output(as_json).say(
+    output_of(context, link).say(
         "erased", f"{sentence}, {len(left)} left" if left else sentence, erased=count, left=len(left)
     )
 

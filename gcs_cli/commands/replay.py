@@ -11,9 +11,8 @@ from flightstack.core.port_numbers import system_id
 from flightstack.process import options as stack
 from flightstack.process.command_line import make_app
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.output import Output
 from gcs_cli.replay.replay_run import ReplayPorts, replay_log
-from gcs_cli.settings import FlownInstanceOption, JsonOption, settings_of
+from gcs_cli.settings import FlownInstanceOption, JsonOption, output_of, settings_of
 
 app = make_app(add_completion=False)
 
@@ -52,8 +51,7 @@ def replay(
     number = settings.link.instance if instance is None else instance
     ports = ReplayPorts(number or 0, gcs or [], listen)
     try:
-        replay_log(
-            log, ports, Output(as_json), speed, begin, loop, None if number is None else system_id(number)
-        )
+        system = None if number is None else system_id(number)
+        replay_log(log, ports, output_of(context, as_json), speed, begin, loop, system)
     finally:
         ports.close()
