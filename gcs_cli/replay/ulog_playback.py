@@ -10,12 +10,12 @@ import numpy as np
 
 from flightstack.core.contract import FloatArray
 from flightstack.core.geometry_bulk import euler_from_quaternions
-from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.dialect import EscStatus, mavlink
 from flightstack.mavlink.fields import int16, int32, whole
 from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_values import value_message
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.logs.motion import Motion, Samples, Source, motion_of, samples
+from gcs_cli.logs.motion import Motion, Samples, Source, elements, motion_of, samples
 from gcs_cli.logs.recording import Recording
 
 NAN = math.nan
@@ -34,6 +34,9 @@ _HEALTH = (
 )  # fmt: skip
 _FIX_3D = mavlink.GPS_FIX_TYPE_3D_FIX
 _TYPES = range(1, 64)
+_ROTORS = 4
+"""Rotors in one ESC_STATUS."""
+_RPM_PER_RAD_S = 30.0 / math.pi
 
 
 class Stream(NamedTuple):
@@ -62,11 +65,19 @@ class UlogPlayback:
         self._type = self._read("vehicle_status", "system_type")
         self._landed = self._read("vehicle_land_detected", "landed")
         self._mission = self._read("mission_result", "seq_current", "seq_total", "seq_reached")
+        self._setpoint = self._read(
+            "trajectory_setpoint", *elements("position", 3), *elements("velocity", 3), "yaw"
+        )
+        self._attitude_setpoint = self._read("vehicle_attitude_setpoint", *elements("q_d", 4))
+        self._rotors = self._read("rotor_speeds", *elements("speed_rad_s", _ROTORS))
         self._streams = (
             Stream(0.04, self._attitude),
             Stream(0.04, self._quaternion),
             Stream(0.1, self._local_position),
             Stream(0.1, self._global_position),
+            Stream(0.1, self._attitude_target),
+            Stream(0.1, self._position_target),
+            Stream(0.2, self._rotor_speeds),
             Stream(0.2, self._hud),
             Stream(0.2, self._satellites),
             Stream(0.5, self._extended_state),
@@ -85,7 +96,7 @@ class UlogPlayback:
         ]
 
     def _read(self, topic: str, *fields: str) -> Samples:
-        return samples(self._log, [Source(topic, fields)], len(fields))
+        return samples(self._log, [Source(topic, fields)], len(fields), finite=False)
 
     # -- the interface of a playback
 
@@ -204,6 +215,29 @@ class UlogPlayback:
             self._boot_ms(at_s), int32(1e7 * latitude), int32(1e7 * longitude), int32(1e3 * above_sea_m),
             int32(1e3 * above_home_m), *velocity, 0xFFFF if math.isnan(yaw) else whole(100.0 * yaw, 0, 35_999),
         )  # fmt: skip
+
+    def _attitude_target(self, at_s: float) -> Message | None:
+        q = self._known(self._attitude_setpoint, at_s)
+        if q is None:
+            return None
+        return mavlink.MAVLink_attitude_target_message(self._boot_ms(at_s), 0, q.tolist(), NAN, NAN, NAN, NAN)
+
+    def _position_target(self, at_s: float) -> Message | None:
+        setpoint = self._known(self._setpoint, at_s)
+        if setpoint is None:
+            return None
+        *motion, yaw = setpoint.tolist()
+        frame = mavlink.MAV_FRAME_LOCAL_NED
+        return mavlink.MAVLink_position_target_local_ned_message(
+            self._boot_ms(at_s), frame, 0, *motion, NAN, NAN, NAN, yaw, NAN
+        )
+
+    def _rotor_speeds(self, at_s: float) -> Message | None:
+        speeds = self._known(self._rotors, at_s)
+        if speeds is None:
+            return None
+        rpm = [int32(_RPM_PER_RAD_S * speed) for speed in speeds.tolist()]
+        return EscStatus(0, round(self._time_us(at_s)), rpm, [NAN] * _ROTORS, [NAN] * _ROTORS)
 
     def _hud(self, at_s: float) -> Message | None:
         velocity = self._known(self._motion.velocity, at_s)

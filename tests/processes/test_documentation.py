@@ -31,6 +31,7 @@ SKIPPED = {
     "faults.md": 1,
     "film.md": 1,
     "logs.md": 2,
+    "sim.md": 1,
 }
 """Number of blocks that a page marks as not to be run; 0 for any other page."""
 MODULES = {"sim-bridge": "sim_bridge", "flightstack": "flightstack", "gcs": "gcs_cli"}

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
+import numpy as np
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.session import Session
+from gcs_cli.logs.recording import ULOG, Recording, Topic
 from gcs_cli.logs.tlog_reader import read_tlog
 from gcs_cli.logs.ulog_reader import read_ulog
 from gcs_cli.replay.keys import names_of
@@ -209,6 +212,26 @@ def test_ulog_positions_are_those_of_the_log(ulog: Playback) -> None:
     (message,) = sent
     index = int(topic.time_us.searchsorted(recording.start_us + 10_000_000, side="right")) - 1
     assert (message.x, message.y, message.z) == tuple(float(topic.fields[name][index]) for name in "xyz")
+
+
+def test_battery_with_unknown_current_is_replayed() -> None:
+    def topic(name: str, **fields: float) -> Topic:
+        return Topic(
+            name, np.array([0, 1_000_000]), {key: np.array([value] * 2) for key, value in fields.items()}
+        )
+
+    position = topic("vehicle_local_position", x=1.0, y=2.0, z=-3.0)
+    battery = topic("battery_status", voltage_v=12.5, current_a=math.nan, remaining=0.5)
+    playback = UlogPlayback(Recording("log", ULOG, 0, 1_000_000, None, (position, battery)))
+    (status,) = (m for m in playback.state(1.0) if m.get_type() == "BATTERY_STATUS")
+    assert (status.voltages[0], status.current_battery, status.battery_remaining) == (12_500, -1, 50)
+
+
+def test_setpoints_and_rotors_of_a_ulog_are_replayed(ulog: Playback) -> None:
+    newest = {message.get_type(): message for message in ulog.state(10.0)}
+    target, position = newest["POSITION_TARGET_LOCAL_NED"], newest["LOCAL_POSITION_NED"]
+    assert math.dist((target.x, target.y, target.z), (position.x, position.y, position.z)) < 1.0
+    assert {"ATTITUDE_TARGET", "ESC_STATUS"} <= set(newest)
 
 
 def test_logs_without_a_vehicle_are_usage_errors() -> None:
