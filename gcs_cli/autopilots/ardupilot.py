@@ -92,4 +92,5 @@ ARDUPILOT = Autopilot(
     mission_begins_with_home=True,
     replaces_plans_at_once=False,
     stores_items_exactly=False,
+    log_suffix=".bin",
 )

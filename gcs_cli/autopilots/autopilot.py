@@ -95,6 +95,8 @@ class Autopilot(NamedTuple):
     """True if an upload that ends early leaves the former plan; False if it overwrites the plan item by item."""
     stores_items_exactly: bool
     """True if a downloaded item equals the uploaded one; False if frames and unused fields may differ."""
+    log_suffix: str = ".ulg"
+    """End of the name of a downloaded log."""
 
     def mode_name(self, vehicle_type: int, custom_mode: int) -> str | None:
         """Return the name of a custom mode; None if it is unknown."""

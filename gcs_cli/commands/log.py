@@ -12,6 +12,7 @@ import typer
 from flightstack.core.atomic_file import check_new, write_bytes_atomically
 from flightstack.mavlink.files import Entry
 from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.autopilots.registry import autopilot_of
 from gcs_cli.clients.log_client import LogEntry
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
@@ -77,7 +78,7 @@ def download(
         else:
             log = _chosen(logs, number)
             file = log_calls.file_of(log, logs, files)
-            _download(out, connection, log, file, _path(log, file, output, False), overwrite)
+            _download(out, connection, log, file, _path(connection, log, file, output, False), overwrite)
 
 
 @app.command()
@@ -122,7 +123,7 @@ def _download_all(
     refused: list[str] = []
     for log in logs:
         file = log_calls.file_of(log, logs, files)
-        path = _path(log, file, output, True)
+        path = _path(connection, log, file, output, True)
         if path.exists() and path.stat().st_size == log.size:
             out.say("exists", f"{path} exists already", path=str(path))
         elif path.is_file() and not overwrite:
@@ -172,9 +173,13 @@ def _chosen(logs: tuple[LogEntry, ...], number: int | None) -> LogEntry:
     raise CliError(f"no log {number}: the vehicle has {first} to {last}", FAILED)
 
 
-def _path(log: LogEntry, file: Entry | None, output: Path | None, everything: bool) -> Path:
+def _path(
+    connection: Connection, log: LogEntry, file: Entry | None, output: Path | None, everything: bool
+) -> Path:
     stamp = f"_{_moment(log):%Y%m%d-%H%M%S}" if log.time_utc_s else ""
-    name = f"log_{log.log_id}{stamp}.ulg" if file is None else file.name
+    identity = connection.session.view.identity
+    suffix = "" if identity is None else autopilot_of(identity.autopilot).log_suffix
+    name = f"log_{log.log_id}{stamp}{suffix}" if file is None else file.name
     if output is None:
         return Path(name)
     return output / name if everything or output.is_dir() else output

@@ -45,7 +45,7 @@ def read_ulog(content: bytes, source: str) -> Recording:
 def _topics(log: Any) -> Iterator[Topic]:
     names = Counter(item.name for item in log.data_list)
     for item in sorted(log.data_list, key=lambda item: (item.name, item.multi_id)):
-        if not len(item.data["timestamp"]):
+        if not len(item.data.get("timestamp", ())):  # damaged definitions may lack it
             continue
         several = names[item.name] > 1 and item.multi_id > 0
         yield Topic(

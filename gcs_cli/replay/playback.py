@@ -10,7 +10,7 @@ import numpy as np
 
 from flightstack.mavlink.link import Address, Link, Message
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.link.tlog import decode_records
+from gcs_cli.logs.tlog_reader import dated_records
 
 REPLIES = frozenset({
     "COMMAND_ACK", "PARAM_VALUE", "PARAM_ERROR", "MISSION_COUNT", "MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_REQUEST",
@@ -49,7 +49,7 @@ class TlogPlayback:
         self.vehicle = Address(*vehicle)
         link, found = Link(0, 0), []
         times = []
-        for record in decode_records(content):
+        for record in dated_records(content):
             times.append(record.time_us)
             for message in link.decode(record.frame):
                 if (message.get_srcSystem(), message.get_srcComponent()) == vehicle:

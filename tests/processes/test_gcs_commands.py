@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 import flightstack
+from flightstack.mavlink.dialect import mavlink
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.__main__ import main
 from gcs_cli.clients.command_client import CommandClient, CommandTiming
@@ -241,6 +242,15 @@ def test_download_of_all_logs_goes_on_after_one_that_exists(
     assert [(tmp_path / f"log_{number}.ulg").read_bytes() for number in (0, 2)] == [b"new", b"new"]
     assert told(FakeVehicle(), "log", "download", "--all", "--overwrite", "-o", tmp_path).returncode == 0
     assert grown.read_bytes() == b"new"
+
+
+def test_logs_of_ardupilot_are_named_bin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_calls, "fetch_list", lambda _: (LogEntry(1, 3, 0),))
+    monkeypatch.setattr(log_calls, "fetch_files", lambda _: ())
+    monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
+    vehicle = FakeVehicle(autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
+    assert told(vehicle, "log", "download", "-o", tmp_path).returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["log_1.bin"]
 
 
 def test_a_vehicle_without_geofence_is_downloaded_from() -> None:

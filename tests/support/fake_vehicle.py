@@ -49,6 +49,7 @@ class FakeVehicle:
     at_stop: str = "disarm"
     ends_in_air: bool = False
     simulated_s_per_item: float = 5.0
+    autopilot: int = mavlink.MAV_AUTOPILOT_PX4
 
     def __post_init__(self) -> None:
         self.codec = mavlink.MAVLink(None, self.system_id, 1)
@@ -253,7 +254,7 @@ class FakeVehicle:
     def _heartbeat(self) -> Any:
         base = 128 * self.armed + mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         state = mavlink.MAV_STATE_POWEROFF if self.powered_off else mavlink.MAV_STATE_ACTIVE
-        return mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, base, self.mode, state, 3)
+        return mavlink.MAVLink_heartbeat_message(2, self.autopilot, base, self.mode, state, 3)
 
     def _sys_status(self) -> Any:
         sensors = mavlink.MAV_SYS_STATUS_AHRS
