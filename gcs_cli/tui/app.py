@@ -40,6 +40,7 @@ class WatchApp(App[None]):
     def __init__(self, feed: Feed) -> None:
         super().__init__()
         self.feed = feed
+        self.redraws = 0
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = THEMES[0].name
@@ -69,6 +70,7 @@ class WatchApp(App[None]):
         screen = self.screen_stack[0]
         if isinstance(screen, WatchScreen):
             screen.show(self.feed.view, self.feed.now_s)
+            self.redraws += 1
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
         """Yield the entries of the command palette."""

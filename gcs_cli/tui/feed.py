@@ -12,6 +12,7 @@ from flightstack.mavlink.link import Message
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.tui.history import History
+from gcs_cli.tui.message_log import MessageLog
 from gcs_cli.vehicle.view_types import VehicleView
 
 Result = TypeVar("Result")
@@ -30,6 +31,7 @@ class Feed:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self.history = History()
+        self.messages = MessageLog()
         self.error: Exception | None = None
         """Error that ended the thread."""
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
@@ -40,6 +42,11 @@ class Feed:
     def view(self) -> VehicleView:
         """State of the selected vehicle."""
         return self._connection.session.view
+
+    @property
+    def views(self) -> tuple[VehicleView, ...]:
+        """States of all vehicles on the link, by system id."""
+        return (self.view,) if self.view.identity is not None else ()
 
     @property
     def now_s(self) -> float:
@@ -80,6 +87,8 @@ class Feed:
                 while self._jobs:
                     self._execute(*self._jobs.popleft())
                 self._connection.step(self.now_s + _STEP_S)
+                for view in self.views:
+                    self.messages.follow(view)
         except Exception as error:
             self.error = error
         finally:

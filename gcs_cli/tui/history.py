@@ -62,16 +62,16 @@ class Stream:
         self.last = message
         self.count += 1
 
-    def rows(self) -> NDArray[np.float64]:
-        """Return a copy of the kept rows, oldest first: time, then the fields."""
+    def column(self, index: int) -> NDArray[np.float64]:
+        """Return a copy of the times (column 0) or of a field, oldest first."""
         if self.count <= ROWS_KEPT:
-            return self._rows[: self.count].copy()
+            return self._rows[: self.count, index].copy()
         at = self.count % ROWS_KEPT
-        return np.concatenate((self._rows[at:], self._rows[:at]))
+        return np.concatenate((self._rows[at:, index], self._rows[:at, index]))
 
     def rate_hz(self, now_s: float) -> float:
         """Return the rate over the last seconds."""
-        recent = self.rows()[-3_000:, 0]
+        recent = self.column(0)[-3_000:]
         started = recent[0] if len(recent) else now_s
         window_s = min(_RATE_WINDOW_S, max(1.0, now_s - started))
         return float(np.count_nonzero(recent > now_s - window_s)) / window_s
@@ -135,11 +135,11 @@ class History:
     def series(self, name: str, system_id: int | None = None) -> Series:
         """Return the kept values of a field; empty if it was never received."""
         message, _, field = name.partition(".")
-        for stream in self.streams(system_id):
-            if stream.name == message and field in stream.fields:
-                with self._lock:
-                    rows = stream.rows()
-                return Series(rows[:, 0], rows[:, 1 + stream.fields.index(field)])
+        with self._lock:
+            for stream in self._streams.values():
+                is_wanted = stream.name == message and system_id in (None, stream.key.system_id)
+                if is_wanted and field in stream.fields:
+                    return Series(stream.column(0), stream.column(1 + stream.fields.index(field)))
         return Series(np.empty(0), np.empty(0))
 
     def rate_hz(self, stream: Stream, now_s: float) -> float:

@@ -1,25 +1,22 @@
-"""Panels of the terminal view, drawn from the vehicle's state. Pure."""
+"""Panels of the screen Fly, drawn from the vehicle's state, and the formats that they share. Pure."""
 
 from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Sequence
 
-from rich.console import Group, RenderableType
-from rich.panel import Panel
-from rich.progress_bar import ProgressBar
-from rich.table import Table
 from rich.text import Text
 
-from gcs_cli.tui.horizon import heading_tape, horizon
-from gcs_cli.vehicle.view_types import Euler, Setpoint, StatusText, VehicleView
+from gcs_cli.tui.palette import DARK, Palette
+from gcs_cli.vehicle.view_types import Setpoint, StatusText, Vector, VehicleView
 
 UNKNOWN = "—"
 SEVERITIES = ("EMERG", "ALERT", "CRIT", "ERROR", "WARN", "NOTE", "INFO", "DEBUG")
-_SEVERITY_STYLES = ("bold red", "bold red", "bold red", "red", "yellow", "cyan", "", "dim")
 _MISSION_STATES = {1: "no mission", 2: "not started", 3: "active", 4: "paused", 5: "complete"}
 _MESSAGE_INDENT = 14
 _BLOCKS = "·▏▎▍▌▋▊▉"
+_LOW_CHARGE, _CRITICAL_CHARGE = 0.3, 0.15
 
 
 def number(value: float | None, digits: int = 2, unit: str = "") -> str:
@@ -31,107 +28,137 @@ def number(value: float | None, digits: int = 2, unit: str = "") -> str:
     return f"{round(value, digits) + 0.0:.{digits}f}{unit}"  # + 0.0: no -0.00
 
 
-def framed(title: str, content: RenderableType, style: str = "bright_black") -> Panel:
-    """Return a panel with a frame around ``content``."""
-    heading = Text(title, style="bold cyan")
-    return Panel(content, title=heading, title_align="left", border_style=style, padding=(0, 1))
+def clock_text(time_s: float | None) -> str:
+    """Format vehicle time as minutes and seconds."""
+    if time_s is None:
+        return UNKNOWN
+    minutes, seconds = divmod(time_s, 60)
+    return f"{int(minutes)}:{seconds:04.1f}"
 
 
-def bar(fraction: float | None, width: int, style: str) -> Text:
+def duration_text(seconds: float) -> str:
+    """Format a duration in hours, minutes and seconds, or minutes and seconds."""
+    minutes, rest = divmod(round(min(seconds, 359_999.0)), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def ground_speed(velocity: Vector | None) -> float | None:
+    """Return the horizontal speed [m/s]; None if unknown."""
+    return None if velocity is None else math.hypot(velocity.x, velocity.y)
+
+
+def height_m(view: VehicleView) -> float | None:
+    """Return the altitude above home, else above the local origin [m]; None if unknown."""
+    if view.geo is not None:
+        return view.geo.relative_altitude_m
+    return None if view.position_ned_m is None else -view.position_ned_m.z
+
+
+def bar(fraction: float | None, width: int, style: str, rest: str = DARK.muted) -> Text:
     """Draw a bar with eighths of a cell; an empty one if the value is unknown."""
     full = min(1.0, max(0.0, fraction or 0.0)) * width
     whole = int(full)
     part = _BLOCKS[int((full - whole) * 8)] if whole < width else ""
-    text = Text("█" * whole + part, style=style)
-    text.append("·" * (width - len(text)), style="bright_black")
+    text = Text("█" * whole + part, style=style, no_wrap=True)
+    text.append("·" * (width - len(text)), style=rest)
     return text
 
 
-def attitude_panel(view: VehicleView, width: int, height: int) -> Panel:
-    """Artificial horizon, heading tape, the angles and, if there is room, their setpoints."""
-    inner, room_for_targets = width - 4, height >= 14
-    angles = view.attitude
-    figures = [_angles(angles, inner, "bold")]
-    if room_for_targets:
-        figures.append(_angles(view.attitude_target, inner, "magenta", "target"))
-    picture = horizon(angles, inner, height - 3 - len(figures))
-    tape = heading_tape(None if angles is None else angles.yaw_rad, inner)
-    return framed("Attitude", Group(picture, tape, *figures))
+def row_of(label: str, value: str, style: str, colours: Palette, gap: int = 11) -> Text:
+    """Return a line of a label and its value."""
+    return Text.assemble((f"{label:<{gap}}", colours.muted), (value, style), no_wrap=True)
 
 
-def _angles(angles: Euler | None, width: int, style: str, label: str = "") -> Text:
-    names, gap = (("roll", "pitch", "yaw"), "  ") if width >= 40 else (("R", "P", "Y"), " ")
-    text = Text(no_wrap=True, overflow="crop", justify="center")
-    if label:
-        text.append(f"{label}  ", style="bright_black")
-    for index, name in enumerate(names):
-        degrees = None if angles is None else math.degrees(angles[index])
-        shown = UNKNOWN
-        if degrees is not None:
-            shown = f"{round(degrees) % 360:03d}°" if index == 2 else f"{degrees:+.1f}°"
-        text.append(f"{name} ", style="bright_black")
-        text.append(shown, style=style)
-        text.append(gap if index < 2 else "")
-    return text
-
-
-def position_panel(view: VehicleView) -> Panel:
+def position_panel(view: VehicleView, _now_s: float, width: int, height: int, colours: Palette) -> list[Text]:
     """Position and velocity beside the setpoint."""
-    grid = Table.grid(padding=(0, 1), expand=True)
-    grid.add_column(style="bright_black")
-    for style in ("bold", "magenta"):
-        grid.add_column(justify="right", style=style, no_wrap=True)
-    grid.add_column(style="bright_black")
-    grid.add_row("", Text("now", style="bright_black"), Text("target", style="bright_black"), "")
     position, velocity = view.position_ned_m, view.velocity_ned_m_s
     wanted = view.setpoint or Setpoint()
+    rows: list[tuple[str, float | None, float | None, str]] = []
     for axis, name, sign in ((0, "north", 1), (1, "east", 1), (2, "up", -1)):
         now = None if position is None else sign * position[axis]
         target = None if wanted.position_ned_m is None else sign * wanted.position_ned_m[axis]
-        grid.add_row(name, number(now), number(target), "m")
-    speed = None if velocity is None else math.hypot(velocity.x, velocity.y)
-    wanted_v = wanted.velocity_ned_m_s
-    wanted_speed = None if wanted_v is None else math.hypot(wanted_v.x, wanted_v.y)
-    grid.add_row("speed", number(speed), number(wanted_speed), "m/s")
+        rows.append((name, now, target, "m"))
+    target_v = wanted.velocity_ned_m_s
+    rows.append(("speed", ground_speed(velocity), ground_speed(target_v), "m/s"))
     climb = None if velocity is None else -velocity.z
-    grid.add_row("climb", number(climb), number(None if wanted_v is None else -wanted_v.z), "m/s")
+    rows.append(("climb", climb, None if target_v is None else -target_v.z, "m/s"))
+    column = max(8, (width - 11) // 2)
+    lines = [
+        Text.assemble(
+            (f"{name:<6}", colours.muted),
+            (f"{number(now):>{column}}", f"bold {colours.text}"),
+            (f"{number(target):>{column}}", colours.target),
+            (f" {unit}", colours.muted),
+            no_wrap=True,
+        )
+        for name, now, target, unit in rows
+    ]
+    if height > len(lines):
+        head = Text(f"{'':<6}{'now':>{column}}", colours.muted)
+        lines.insert(0, head.append(f"{'target':>{column}}", colours.target))
     geo = view.geo
-    place = Text(no_wrap=True, overflow="ellipsis", style="bright_black")
-    place.append(UNKNOWN if geo is None else f"{geo.latitude_deg:.6f}° {geo.longitude_deg:.6f}°")
-    return framed("Position", Group(grid, place))
+    if geo is not None:
+        lines.append(Text(f"{geo.latitude_deg:.6f}° {geo.longitude_deg:.6f}°", colours.muted))
+        lines.append(row_of("above sea", f"{geo.altitude_m:.1f} m", colours.text, colours))
+    if view.home is not None and position is not None:
+        distance_m = math.hypot(position.x, position.y)
+        lines.append(row_of("from home", f"{number(distance_m, 1)} m", colours.text, colours))
+    return lines[:height]
 
 
-def rotors_panel(view: VehicleView, width: int) -> Panel:
-    """Rotor speeds as bars scaled to a round number above the largest, throttle and battery."""
-    scale = _round_above(view.rotor_peak_rpm)
-    rows: list[RenderableType] = []
-    for index, rpm in enumerate(view.rotor_rpm or (None,) * 4):
-        fraction = None if rpm is None or not scale else abs(rpm) / scale
-        row = Text(f"{index + 1} ", style="bright_black", no_wrap=True)
-        row.append_text(bar(fraction, max(4, width - 12), "green"))
-        row.append(f"{UNKNOWN if rpm is None else f'{rpm:.0f}':>6}", style="bold")
-        rows.append(row)
-    throttle = Text("throttle ", style="bright_black", no_wrap=True)
-    throttle.append(UNKNOWN if view.throttle is None else f"{view.throttle:.0%}", style="bold")
-    title = f"Rotors 0–{scale:.0f} rpm" if scale else "Rotors rpm"
-    return framed(title, Group(*rows, Text(), throttle, _battery(view)))
+def power_panel(view: VehicleView, _now_s: float, width: int, height: int, colours: Palette) -> list[Text]:
+    """Battery with remaining time, throttle, and rotor speeds as bars."""
+    lines = [_battery(view, width, colours)]
+    if height >= 7:
+        throttle = row_of("throttle", "", "", colours)
+        throttle.append_text(bar(view.throttle, max(4, width - 17), colours.accent, colours.muted))
+        share = UNKNOWN if view.throttle is None else f"{view.throttle:.0%}"
+        lines.append(throttle.append(f" {share:>5}", f"bold {colours.text}"))
+    lines += _rotors(view, width, max(1, height - len(lines)), colours)
+    return lines[:height]
 
 
-def _battery(view: VehicleView) -> Text:
-    line = Text("battery  ", style="bright_black", no_wrap=True)
+def _battery(view: VehicleView, width: int, colours: Palette) -> Text:
     battery = view.battery
     if battery is None:
-        line.append(UNKNOWN, style="bold")
-        return line
+        return row_of("battery", UNKNOWN, f"bold {colours.text}", colours)
     left = battery.remaining
+    line = Text("battery ", colours.muted, no_wrap=True, overflow="crop")
+    style = colours.text
     if left is not None:
-        line.append(f"{left:.0%} ", style="bold green" if left > 0.3 else "bold red")
-    line.append(" ".join(filter(None, (_unit(battery.voltage_v, "V"), _unit(battery.current_a, "A")))))
+        low, critical = left <= _LOW_CHARGE, left <= _CRITICAL_CHARGE
+        style = colours.bad if critical else colours.warning if low else colours.good
+        if width >= 46:
+            line.append_text(bar(left, width - 38, style, colours.muted)).append(" ")
+        line.append(f"{left:.0%} ", f"bold {style}")
+    parts = []
+    if battery.voltage_v is not None:
+        parts.append(f"{battery.voltage_v:.1f} V")
+    if battery.current_a is not None:
+        parts.append(f"{battery.current_a:.1f} A")
+    line.append(" ".join(parts), colours.text)
+    if view.battery_time_s is not None:
+        left_text = duration_text(view.battery_time_s) + (" left" if width >= 40 else "")
+        line.append(f" {left_text}", f"bold {style}")
     return line
 
 
-def _unit(value: float | None, unit: str) -> str:
-    return "" if value is None else f"{value:.1f} {unit}"
+def _rotors(view: VehicleView, width: int, rows: int, colours: Palette) -> list[Text]:
+    speeds: Sequence[float | None] = view.rotor_rpm or (None,) * 4
+    scale = _round_above(view.rotor_peak_rpm)
+    columns = math.ceil(len(speeds) / rows)
+    share = width // columns
+    cells = []
+    for index, rpm in enumerate(speeds):
+        fraction = None if rpm is None or not scale else abs(rpm) / scale
+        cell = Text(f"{index + 1:<2}", colours.muted, no_wrap=True)
+        cell.append_text(bar(fraction, max(2, share - 10), colours.good, colours.muted))
+        cells.append(cell.append(f"{UNKNOWN if rpm is None else f'{rpm:.0f}':>7} ", f"bold {colours.text}"))
+    lines = [Text("", no_wrap=True).join(cells[i : i + columns]) for i in range(0, len(cells), columns)]
+    if len(lines) < rows and scale:
+        lines.append(Text(f"0 to {scale:.0f} rpm".rjust(width - 1), colours.muted))
+    return lines
 
 
 def _round_above(value: float) -> float:
@@ -141,50 +168,45 @@ def _round_above(value: float) -> float:
     return next(decade * step for step in (1, 1.5, 2, 3, 4, 5, 6, 8, 10, 20) if decade * step >= value)
 
 
-def mission_panel(view: VehicleView) -> Panel:
+def mission_panel(view: VehicleView, _now_s: float, width: int, height: int, colours: Palette) -> list[Text]:
     """Mission progress."""
     mission = view.mission
     total = mission.total
     if not total:
-        return framed("Mission", Text("none loaded", style="bright_black"))
+        return [Text("none loaded", colours.muted)]
     done = total if mission.complete else min(total, (mission.current or 0))
-    grid = Table.grid(padding=(0, 2), expand=True)
-    grid.add_column(no_wrap=True)
-    grid.add_column(ratio=1)
-    grid.add_column(no_wrap=True, justify="right")
-    label = Text(mission.item_text or f"item {UNKNOWN}", style="bold")
     state = _MISSION_STATES.get(mission.state or 0, "")
     if mission.reached is not None and not mission.complete:
         state = f"reached {mission.reached}  {state}"
-    grid.add_row(
-        label,
-        ProgressBar(total=total, completed=done, complete_style="green", finished_style="bold green"),
-        Text(state, style="bold green" if mission.complete else ""),
-    )
-    return framed("Mission", grid)
+    label = mission.item_text or f"item {UNKNOWN}"
+    style = colours.good if mission.complete else colours.accent
+    line = Text(f"{label} ", f"bold {colours.text}", no_wrap=True, overflow="crop")
+    line.append_text(bar(done / total, max(3, width - len(label) - len(state) - 3), style, colours.muted))
+    line.append(f"  {state}", f"bold {colours.good}" if mission.complete else colours.text)
+    return [line]
 
 
-def messages_panel(view: VehicleView, width: int, lines: int) -> Panel:
+def messages_panel(view: VehicleView, _now_s: float, width: int, height: int, colours: Palette) -> list[Text]:
     """The latest status texts, newest at the bottom; long ones are wrapped."""
-    shown = [line for entry in view.texts for line in message_lines(entry, width - 4)]
-    last = shown[-max(1, lines) :]
-    return framed("Messages", Group(*last) if last else Text("none yet", style="bright_black"))
+    lines = [line for entry in view.texts[-height:] for line in message_lines(entry, width, colours)]
+    if not lines:
+        return [Text("none yet", colours.muted)]
+    return lines[-max(1, height) :]
 
 
-def message_lines(entry: StatusText, width: int) -> list[Text]:
+def severity_style(severity: int, colours: Palette) -> str:
+    """Return the style of a MAV_SEVERITY."""
+    bad, normal = colours.bad, colours.text
+    styles = (*[f"bold {bad}"] * 3, bad, colours.warning, colours.accent, normal, colours.muted)
+    return styles[min(severity, 7)]
+
+
+def message_lines(entry: StatusText, width: int, colours: Palette = DARK) -> list[Text]:
     """One status text: vehicle time, severity, text; further lines are indented."""
     severity = min(entry.severity, 7)
-    style = _SEVERITY_STYLES[severity]
-    head = Text(f"{clock_text(entry.vehicle_time_s):>7} ", style="bright_black", no_wrap=True)
-    head.append(f"{SEVERITIES[severity]:<6}", style=style or "green")
+    style = severity_style(severity, colours)
+    head = Text(f"{clock_text(entry.vehicle_time_s):>7} ", style=colours.muted, no_wrap=True)
+    head.append(f"{SEVERITIES[severity]:<6}", style=colours.good if severity == 6 else style)
     pieces = textwrap.wrap(entry.text, max(10, width - _MESSAGE_INDENT)) or [""]
     head.append(pieces[0], style=style)
     return [head, *(Text(" " * _MESSAGE_INDENT + piece, style=style, no_wrap=True) for piece in pieces[1:])]
-
-
-def clock_text(time_s: float | None) -> str:
-    """Format vehicle time as minutes and seconds."""
-    if time_s is None:
-        return UNKNOWN
-    minutes, seconds = divmod(time_s, 60)
-    return f"{int(minutes)}:{seconds:04.1f}"

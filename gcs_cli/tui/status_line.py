@@ -12,10 +12,10 @@ _LANDED = {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}
 _GOOD_LINK, _POOR_LINK = 0.98, 0.9
 
 
-def status_line(view: VehicleView, now_s: float, width: int, _height: int, colours: Palette) -> Text:
+def status_line(view: VehicleView, now_s: float, width: int, _height: int, colours: Palette) -> list[Text]:
     """Return the line, as much of it as ``width`` holds."""
     if view.identity is None:
-        return Text(" waiting for a vehicle", f"bold {colours.warning}")
+        return [Text(" waiting for a vehicle", f"bold {colours.warning}")]
     right = link_text(view, now_s, colours)
     left = Text(no_wrap=True, overflow="crop")
     left.append(f" {view.mode or 'unknown mode'} ", f"bold {colours.background} on {colours.accent}")
@@ -34,7 +34,7 @@ def status_line(view: VehicleView, now_s: float, width: int, _height: int, colou
     left.append(" " * max(1, width - len(left) - len(right)))
     left.append_text(right)
     left.truncate(width)
-    return left
+    return [left]
 
 
 def link_text(view: VehicleView, now_s: float, colours: Palette) -> Text:

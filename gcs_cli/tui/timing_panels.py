@@ -1,49 +1,39 @@
-"""Loop timing in the terminal view: a panel, or one line without room for it. Pure."""
+"""Loop timing in the terminal view: rates, execution time, lateness and overruns. Pure."""
 
 from __future__ import annotations
 
-from rich.console import Group
-from rich.panel import Panel
-from rich.table import Table
 from rich.text import Text
 
-from gcs_cli.tui.panels import UNKNOWN, bar, framed, number
-from gcs_cli.vehicle.view_types import LoopTiming
+from gcs_cli.tui.palette import Palette
+from gcs_cli.tui.panels import UNKNOWN, bar, number
+from gcs_cli.vehicle.view_types import LoopTiming, VehicleView
 
 
-def timing_panel(timing: LoopTiming | None, width: int) -> Panel:
-    """Loop rates, execution time over the period, lateness and overruns."""
+def timing_panel(view: VehicleView, _now_s: float, width: int, height: int, colours: Palette) -> list[Text]:
+    """Draw the timing of the loops; on three lines without room for a table."""
+    timing = view.timing
     if timing is None:
-        return framed("Loops", Text("no timing yet", style="bright_black"))
-    grid = Table.grid(padding=(0, 1))
-    grid.add_column(style="bright_black")
-    for _ in range(3):
-        grid.add_column(justify="right", no_wrap=True, min_width=6)
-    grid.add_row("µs", *(Text(name, style="bright_black") for name in ("mean", "p99", "max")))
+        return [Text("not sent by this vehicle", colours.muted)]
     period_us = 1e6 / timing.inner_hz if timing.inner_hz else None
-    for name, figures in _times(timing):
-        grid.add_row(name, *(Text(number(v, 0), style=_time_style(v, period_us)) for v in figures))
-    mean = timing.execution_mean_us
-    share = None if mean is None or period_us is None else mean / period_us
-    load = Text("load ", style="bright_black", no_wrap=True)
-    load.append_text(bar(share, max(4, width - 15), "green"))
-    load.append(f" {UNKNOWN if share is None else f'{share:.1%}':>5}", style="bold")
-    return framed("Loops", Group(_rates(timing), grid, load, _counts(timing)))
-
-
-def timing_line(timing: LoopTiming | None) -> Panel:
-    """The same on one line; in real time it shows lateness instead of the clock."""
-    if timing is None:
-        return framed("Loops", Text("no timing yet", style="bright_black"))
-    period_us = 1e6 / timing.inner_hz if timing.inner_hz else None
-    line = _rates(timing, with_clock=timing.lockstep)
-    for name, figures in _times(timing):
-        line.append(f"  {name} ", style="bright_black")
-        for index, value in enumerate(figures):
-            line.append(("/" if index else "") + number(value, 0), style=_time_style(value, period_us))
-    line.append(" µs  ", style="bright_black")
-    line.append_text(_counts(timing, with_ticks=timing.lockstep))
-    return framed("Loops", line)
+    lines = [_rates(timing, colours)]
+    if height >= 4 + len(_times(timing)):
+        lines.append(Text(f"{'µs':<5}{'mean':>8}{'p99':>8}{'max':>8}", colours.muted))
+        for name, figures in _times(timing):
+            line = Text(f"{name:<5}", colours.muted, no_wrap=True)
+            for value in figures:
+                line.append(f"{number(value, 0):>8}", _time_style(value, period_us, colours))
+            lines.append(line)
+        lines.append(_load(timing, period_us, width, colours))
+    else:
+        line = Text("", no_wrap=True, overflow="crop")
+        for name, figures in _times(timing):
+            line.append(f"{name} ", colours.muted)
+            for index, value in enumerate(figures):
+                line.append(("/" if index else "") + number(value, 0), _time_style(value, period_us, colours))
+            line.append(" ")
+        lines.append(line.append("µs", colours.muted))
+    lines.append(_counts(timing, colours))
+    return lines[:height]
 
 
 def _times(timing: LoopTiming) -> list[tuple[str, tuple[float | None, ...]]]:
@@ -52,29 +42,33 @@ def _times(timing: LoopTiming) -> list[tuple[str, tuple[float | None, ...]]]:
     return [("run", run)] if timing.lockstep else [("run", run), ("late", late)]
 
 
-def _rates(timing: LoopTiming, with_clock: bool = True) -> Text:
-    text = Text(no_wrap=True, overflow="ellipsis")
-    text.append(f"{number(timing.inner_hz, 0)}/{number(timing.outer_hz, 0)} Hz", style="bold")
-    if not with_clock:
-        return text
-    text.append(" lockstep" if timing.lockstep else " real time")
+def _load(timing: LoopTiming, period_us: float | None, width: int, colours: Palette) -> Text:
+    mean = timing.execution_mean_us
+    share = None if mean is None or period_us is None else mean / period_us
+    load = Text("load ", colours.muted, no_wrap=True)
+    load.append_text(bar(share, max(4, width - 13), colours.good, colours.muted))
+    return load.append(f" {UNKNOWN if share is None else f'{share:.1%}':>6}", f"bold {colours.text}")
+
+
+def _rates(timing: LoopTiming, colours: Palette) -> Text:
+    text = Text(no_wrap=True, overflow="crop")
+    text.append(f"{number(timing.inner_hz, 0)}/{number(timing.outer_hz, 0)} Hz", f"bold {colours.text}")
+    text.append(" lockstep" if timing.lockstep else " real time", colours.muted)
     if timing.real_time_factor is not None:
-        text.append(f" ×{timing.real_time_factor:.1f}", style="bold")
+        text.append(f" ×{timing.real_time_factor:.1f}", f"bold {colours.text}")
     return text
 
 
-def _counts(timing: LoopTiming, with_ticks: bool = True) -> Text:
-    text = Text("overruns ", style="bright_black", no_wrap=True, overflow="ellipsis")
-    text.append(f"{timing.overruns}", style="bold yellow" if timing.overruns else "bold")
+def _counts(timing: LoopTiming, colours: Palette) -> Text:
+    text = Text("overruns ", colours.muted, no_wrap=True, overflow="crop")
+    text.append(f"{timing.overruns}", f"bold {colours.warning if timing.overruns else colours.text}")
     if not timing.lockstep:
-        text.append(" missed ")
-        text.append(f"{timing.missed}", style="bold red" if timing.missed else "bold")
-    if with_ticks:
-        text.append(f" of {timing.ticks}")
-    return text
+        text.append(" missed ", colours.muted)
+        text.append(f"{timing.missed}", f"bold {colours.bad if timing.missed else colours.text}")
+    return text.append(f" of {timing.ticks}", colours.muted)
 
 
-def _time_style(value_us: float | None, period_us: float | None) -> str:
+def _time_style(value_us: float | None, period_us: float | None, colours: Palette) -> str:
     if value_us is None or period_us is None or value_us < 0.5 * period_us:
-        return "bold"
-    return "bold yellow" if value_us < period_us else "bold red"
+        return f"bold {colours.text}"
+    return f"bold {colours.warning if value_us < period_us else colours.bad}"

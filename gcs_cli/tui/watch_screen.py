@@ -2,56 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, TypeAlias, cast
-
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Container
-from textual.events import Click, Resize
+from textual.events import Click
 from textual.screen import Screen
 from textual.widget import Widget
 from textual.widgets import Footer
 
-from gcs_cli.tui.palette import Palette
+from gcs_cli.tui.drawing import Drawing, watch_app
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.status_line import status_line
 from gcs_cli.vehicle.view_types import VehicleView
-
-if TYPE_CHECKING:
-    from gcs_cli.tui.app import WatchApp
-
-Draw: TypeAlias = Callable[[VehicleView, float, int, int, Palette], Text]
-"""Draws a vehicle's state as of a time [s] in a number of columns and rows."""
-
-
-class Drawing(Widget):
-    """A widget whose content is a pure function of the vehicle's state; drawn again only if it changes."""
-
-    def __init__(self, draw: Draw, title: str = "", *, id: str | None = None) -> None:
-        super().__init__(id=id)
-        self._draw = draw
-        self._content = Text()
-        self.border_title = title or None
-
-    def show(self, view: VehicleView, now_s: float) -> None:
-        """Draw ``view``."""
-        width, height = self.content_size
-        if width <= 0 or height <= 0:
-            return
-        content = self._draw(view, now_s, width, height, watch_app(self).palette)
-        if content != self._content:
-            self._content = content
-            self.refresh()
-
-    def on_resize(self, _event: Resize) -> None:
-        """Draw in the new size."""
-        feed = watch_app(self).feed
-        self.show(feed.view, feed.now_s)
-
-    def render(self) -> Text:
-        """Return the content."""
-        return self._content
 
 
 class Tabs(Widget):
@@ -123,15 +85,13 @@ class WatchScreen(Screen[None]):
 
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the state of the selected vehicle; by default in each ``Drawing``."""
+        redraw = watch_app(self).redraws
         for drawing in self.query(Drawing):
-            drawing.show(view, now_s)
+            if redraw % drawing.every == 0:
+                drawing.show(view, now_s)
 
     def on_screen_resume(self) -> None:
         """Draw the state that arrived while another screen was open."""
-        feed = watch_app(self).feed
-        self.show(feed.view, feed.now_s)
-
-
-def watch_app(node: Widget) -> WatchApp:
-    """Return the application of a widget."""
-    return cast("WatchApp", node.app)
+        app = watch_app(self)
+        app.redraws = 0
+        self.show(app.feed.view, app.feed.now_s)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from flightstack.core.portable_math import euler_angles
+from flightstack.mavlink.dialect import mavlink
 from gcs_cli.vehicle.status_texts import add_piece, without_stale_piece
 from gcs_cli.vehicle.view_types import (
     AvailableMode,
@@ -37,6 +38,14 @@ _RESTART_S = 1.0
 """Step back of the vehicle's clock that no reordering of datagrams explains."""
 _ATTITUDE, _VELOCITY, _POSITION, _ALTITUDE, _CONSTANT = 1, 0b110, 1 << 4, 1 << 5, 1 << 7
 """Flags of ESTIMATOR_STATUS and EKF_STATUS_REPORT."""
+
+
+SENSOR_NAMES = {
+    bit: entry.name.removeprefix("MAV_SYS_STATUS_").removeprefix("SENSOR_").lower().replace("_", " ")
+    for bit, entry in mavlink.enums["MAV_SYS_STATUS_SENSOR"].items()
+    if bit.bit_count() == 1 and bit not in (_PREARM_CHECK, mavlink.MAV_SYS_STATUS_EXTENSION_USED)
+}
+"""Names of the sensors in SYS_STATUS, by bit."""
 
 
 def update(view: VehicleView, message: Any, now_s: float) -> VehicleView:
@@ -127,6 +136,7 @@ def _system(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     failed = enabled & ~message.onboard_control_sensors_health
     view = view._replace(
         healthy=not failed & ~_PREARM_CHECK,
+        unhealthy=tuple(name for bit, name in SENSOR_NAMES.items() if failed & bit),
         can_arm=not failed & _PREARM_CHECK if enabled & _PREARM_CHECK else None,
     )
     remaining = message.battery_remaining / 100 if 0 <= message.battery_remaining <= 100 else None
@@ -134,8 +144,16 @@ def _system(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     current = message.current_battery / 100 if message.current_battery >= 0 else None
     if remaining is None and voltage is None:
         return view._replace(battery=None)
+    if not view.armed or remaining is None:
+        view = view._replace(charge_at_arming=None)
+    elif view.charge_at_arming is None and view.time_s is not None:
+        view = view._replace(charge_at_arming=(view.time_s, remaining))
     time_s = None if view.battery is None else view.battery.time_remaining_s
     return view._replace(battery=Battery(remaining, voltage, current, time_s))
+
+
+def _fence(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    return view._replace(fence_breached=bool(message.breach_status))
 
 
 def _battery(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
@@ -291,6 +309,7 @@ _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "AVAILABLE_MODES": _available_mode,
     "SYS_STATUS": _system,
     "BATTERY_STATUS": _battery,
+    "FENCE_STATUS": _fence,
     "GPS_RAW_INT": _gnss,
     "ESTIMATOR_STATUS": _estimator_status,
     "EKF_STATUS_REPORT": _ekf_status,

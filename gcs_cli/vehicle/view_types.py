@@ -12,6 +12,8 @@ TEXTS_KEPT = 100
 LOST_AFTER_S = 5.0
 """Heartbeat timeout of a vehicle: five missed heartbeats."""
 
+_SMALLEST_USE = 0.02
+"""Consumption from which the remaining time is computed; charge is reported in steps of 0.01."""
 _POWEROFF, _TERMINATED = 7, 8  # MAV_STATE
 _FAILSAFE = (5, 6, _TERMINATED)  # MAV_STATE_CRITICAL, EMERGENCY and FLIGHT_TERMINATION
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
@@ -245,6 +247,9 @@ class VehicleView(NamedTuple):
     estimator: Estimator | None = None
     wind_ned_m_s: Vector | None = None
     """Velocity of the air."""
+    unhealthy: tuple[str, ...] = ()
+    """Names of the enabled sensors that the vehicle reports as unhealthy."""
+    fence_breached: bool = False
     attitude: Euler | None = None
     rates_frd_rad_s: Vector | None = None
     attitude_target: Euler | None = None
@@ -259,6 +264,8 @@ class VehicleView(NamedTuple):
     setpoint: Setpoint | None = None
     mission: Mission = Mission()
     battery: Battery | None = None
+    charge_at_arming: tuple[float, float] | None = None
+    """Vehicle time [s] and remaining charge, 0 to 1, when the vehicle armed."""
     rotor_rpm: tuple[float, ...] = ()
     rotor_peak_rpm: float = 0.0
     timing: LoopTiming | None = None
@@ -317,6 +324,18 @@ class VehicleView(NamedTuple):
     def powered_off(self) -> bool:
         """True if the vehicle has reported that it shuts down."""
         return self.system_status == _POWEROFF
+
+    @property
+    def battery_time_s(self) -> float | None:
+        """Remaining time of the battery: the vehicle's, else from the mean consumption since arming."""
+        if self.battery is None or self.battery.time_remaining_s is not None:
+            return None if self.battery is None else self.battery.time_remaining_s
+        left = self.battery.remaining
+        if left is None or self.charge_at_arming is None or self.time_s is None:
+            return None
+        armed_s, charge = self.charge_at_arming
+        used, elapsed_s = charge - left, self.time_s - armed_s
+        return left / used * elapsed_s if used >= _SMALLEST_USE and elapsed_s > 0.0 else None
 
     def silent_s(self, now_s: float) -> float | None:
         """Seconds since the last heartbeat; None before the first."""

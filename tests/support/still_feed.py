@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.history import History
+from gcs_cli.tui.message_log import MessageLog
 from gcs_cli.vehicle.view_types import VehicleView
 
 
 class StillFeed(Feed):
-    def __init__(self, view: VehicleView, now_s: float = 10.0) -> None:
-        self.history = History()
+    def __init__(self, view: VehicleView, now_s: float = 10.0, history: History | None = None) -> None:
+        self.history = history or History()
+        self.messages = MessageLog()
+        self.messages.follow(view)
         self.error = None
         self.shown = view
         self.time_s = now_s

@@ -30,7 +30,6 @@ LATER = (
     "sim_bridge.server.server",
     "sim_bridge.server.session",
     "gcs_cli.link.connection",
-    "gcs_cli.tui.watch_render",
 )
 """Modules that the programs import when they run."""
 

@@ -262,7 +262,7 @@ def _raw_frame(message_id: int, payload: bytes) -> Any:
 
 ardupilot_dialect()
 FOLDED = [
-    0, 1, 2, 24, 30, 32, 33, 42, 46, 74, 83, 85, 147, 168, 193, 230, 231, 242, 245, 253, 291, 435, 11030, 11031,
+    0, 1, 2, 24, 30, 32, 33, 42, 46, 74, 83, 85, 147, 162, 168, 193, 230, 231, 242, 245, 253, 291, 435, 11030, 11031,
     53002,
 ]  # fmt: skip
 
@@ -282,3 +282,41 @@ def test_the_list_of_folded_messages_is_whole() -> None:
     from gcs_cli.vehicle.vehicle_view import _FOLDS  # noqa: PLC0415
 
     assert {mavlink.mavlink_map[number].msgname for number in FOLDED} == set(_FOLDS)
+
+
+def test_unhealthy_sensors_are_named(vehicle: Vehicle) -> None:
+    present = mavlink.MAV_SYS_STATUS_SENSOR_GPS | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    view = vehicle.send(
+        mavlink.MAVLink_sys_status_message(
+            present, present, mavlink.MAV_SYS_STATUS_SENSOR_GPS, 0, 15_000, -1, 90, 0, 0, 0, 0, 0, 0
+        )
+    )
+    assert view.unhealthy == ("3d mag",)
+    assert view.healthy is False
+
+
+def test_battery_time_is_the_vehicles_own(vehicle: Vehicle) -> None:
+    vehicle.send(mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 15_000, -1, 90, 0, 0, 0, 0, 0, 0))
+    cells = [15_000] + [65535] * 9
+    message = mavlink.MAVLink_battery_status_message(0, 0, 0, 0, cells, -1, -1, -1, 90, 600)
+    assert vehicle.send(message).battery_time_s == 600.0
+    view = vehicle.send(mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 15_000, -1, 89, 0, 0, 0, 0, 0, 0))
+    assert view.battery_time_s == 600.0
+
+
+def test_charge_at_arming_is_kept_until_disarmed(vehicle: Vehicle) -> None:
+    def charge(percent: int) -> VehicleView:
+        message = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 15_000, -1, percent, 0, 0, 0, 0, 0, 0)
+        return vehicle.send(message)
+
+    vehicle.send(heartbeat(base=1 | 128))
+    vehicle.send(mavlink.MAVLink_system_time_message(0, 100_000))
+    assert charge(90).charge_at_arming == (100.0, 0.9)
+    vehicle.send(mavlink.MAVLink_system_time_message(0, 160_000))
+    assert charge(80).battery_time_s == pytest.approx(480.0)
+    vehicle.send(heartbeat())
+    assert charge(80).charge_at_arming is None
+
+
+def test_fence_breach_is_folded(vehicle: Vehicle) -> None:
+    assert vehicle.send(mavlink.MAVLink_fence_status_message(1, 1, 3, 0)).fence_breached

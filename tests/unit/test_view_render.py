@@ -2,136 +2,152 @@
 
 from __future__ import annotations
 
-import io
 import math
+from functools import partial
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rich.console import Console, RenderableType
+from rich.text import Text
 
-from gcs_cli.tui.horizon import heading_tape, horizon
+from gcs_cli.tui.compact import compact, waiting
+from gcs_cli.tui.drawing import Draw
+from gcs_cli.tui.flight_display import flight_display
+from gcs_cli.tui.health_panels import health_panel, link_panel
+from gcs_cli.tui.history import History
+from gcs_cli.tui.horizon import _SKY_CODE, _pixels, heading_tape
+from gcs_cli.tui.palette import DARK
+from gcs_cli.tui.panels import messages_panel, mission_panel, position_panel, power_panel
+from gcs_cli.tui.status_line import status_line
+from gcs_cli.tui.timing_panels import timing_panel
+from gcs_cli.tui.trends import trends_panel
 from gcs_cli.tui.watch_lines import state_line, text_line
-from gcs_cli.tui.watch_render import render
-from gcs_cli.vehicle.view_types import (
-    Battery,
-    Euler,
-    GeoPosition,
-    Identity,
-    LinkCounts,
-    LoopTiming,
-    Mission,
-    Setpoint,
-    StatusText,
-    Vector,
-    VehicleView,
-)
+from gcs_cli.vehicle.view_types import Battery, Euler, Mission, StatusText, Vector, VehicleView
+from tests.support.watch_states import BARE, FAILING, FULL, TIMING, flown_history
 
-TIMING = LoopTiming(41, 20500, 3, 2, 500, 100, 52.3, 13.2, 25.5, 130, 4, 5, 6, True)
-BARE = VehicleView(identity=Identity(1, 1, 2, 12), last_heartbeat_s=9.5)
-FULL = BARE._replace(
-    mode="MISSION",
-    armed=True,
-    landed_state=2,
-    attitude=Euler(0.2, -0.1, 1.3),
-    attitude_target=Euler(0.21, -0.1, 1.3),
-    position_ned_m=Vector(3.21, -4.2, -5.0),
-    velocity_ned_m_s=Vector(2.0, 1.0, 0.1),
-    geo=GeoPosition(47.397742, 8.545594, 493.0, 5.0),
-    home=GeoPosition(47.397742, 8.545594, 488.0, 0.0),
-    setpoint=Setpoint(Vector(3.33, -4.1, -5.0), Vector(2.1, 1.0, 0.0), 0.0),
-    mission=Mission(3, 7, 2, 3),
-    rotor_rpm=(2310.0, 2290.0, 2305.0, 2400.0),
-    rotor_peak_rpm=2850.0,
-    throttle=0.51,
-    timing=TIMING,
-    time_s=41.3,
-    texts=tuple(StatusText(i, i % 8, f"text number {i}", 1.0, i * 3.1) for i in range(8)),
-    text_count=8,
-    link=LinkCounts(1000, 3, 4, 9.9, 312.0, 9.0, 4),
-)
-SIZES = [(80, 24), (140, 40), (72, 20), (109, 50), (110, 20), (60, 15), (20, 5), (300, 100)]
+SIZES = [(34, 6), (80, 24), (50, 12), (20, 2), (7, 1), (120, 60)]
+PANELS = [
+    flight_display, position_panel, power_panel, health_panel, link_panel, mission_panel, timing_panel,
+    messages_panel, compact, status_line,
+]  # fmt: skip
 
 
-def drawn(picture: RenderableType, width: int, height: int) -> list[str]:
-    console = Console(
-        width=width,
-        height=height,
-        file=io.StringIO(),
-        force_terminal=True,
-        color_system=None,
-        legacy_windows=False,
-    )
-    console.print(picture, height=height, end="")
-    assert isinstance(console.file, io.StringIO)
-    return console.file.getvalue().removesuffix("\n").split("\n")
+def plain(lines: list[Text]) -> str:
+    return "\n".join(line.plain for line in lines)
 
 
-def screen(view: VehicleView, width: int = 80, height: int = 24, now_s: float = 10.0) -> str:
-    return "\n".join(drawn(render(view, now_s, width, height), width, height))
+def drawn(panel: Draw, view: VehicleView, width: int = 46, height: int = 8, now_s: float = 10.0) -> str:
+    return plain(panel(view, now_s, width, height, DARK))
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)
-@pytest.mark.parametrize("view", [FULL, BARE, VehicleView()], ids=["full", "bare", "none"])
-def test_it_fits_every_window(view: VehicleView, width: int, height: int) -> None:
-    lines = drawn(render(view, 10.0, width, height), width, height)
-    assert len(lines) <= height
-    assert max(len(line) for line in lines) <= width
-
-
-@pytest.mark.parametrize(("width", "height"), [(80, 24), (140, 40)])
-def test_it_shows_all_that_is_known(width: int, height: int) -> None:
-    text = screen(FULL, width, height)
-    for part in (
-        "MISSION", "ARMED", "in air", "0:41.3", "×52.3", "99.7%", "312 msg/s",  # header
-        "+11.5°", "-5.7°", "074°", "3.21", "3.33", "-4.20", "5.00", "2.24", "47.397742°",
-        "0–3000 rpm", "2310", "2400", "51%", "item 3 (last 6)", "reached 2", "active",
-        "500/100 Hz", "lockstep", "130", "overruns 3", "text number 7",
-    ):  # fmt: skip
-        assert part in text
-
-
-def test_unknown_values_are_dashes() -> None:
-    text = screen(BARE)
-    assert "battery  —" in text
-    assert "throttle —" in text
-    assert "none loaded" in text
+@pytest.mark.parametrize(
+    "view", [FULL, FAILING, BARE, VehicleView()], ids=["full", "failing", "bare", "none"]
+)
+@pytest.mark.parametrize("panel", PANELS)
+def test_a_panel_has_no_more_lines_than_its_height(
+    panel: Draw, view: VehicleView, width: int, height: int
+) -> None:
+    text = drawn(panel, view, width, height)
+    assert text.count("\n") < max(height, 3)
     assert "nan" not in text.lower()
 
 
-def test_battery_is_shown_when_measured() -> None:
-    assert "76% 12.1 V" in screen(FULL._replace(battery=Battery(0.76, 12.1, None)))
+@pytest.mark.parametrize(
+    ("panel", "parts"),
+    [
+        (status_line, ["MISSION", "ARMED", "in air", "0:41.3", "×52.3", "99.7%", "312 msg/s"]),
+        (flight_display, ["+11.5°", "-5.7°", "074°", "2.2 ▶", "◀ 5.0"]),
+        (position_panel, ["3.21", "3.33", "-4.20", "5.00", "2.24", "47.397742°"]),
+        (power_panel, ["76% 15.1 V 12.4 A 12:34 left", "51%", "2310", "2400", "0 to 3000 rpm"]),
+        (health_panel, ["none active", "3D fix  14 sats", "good  ratio 0.24", "4.0 m/s from NE 060°", "healthy"]),
+        (link_panel, ["312 msg/s", "0.30%, 3 of 1003", "2.4 ms"]),
+        (mission_panel, ["item 3 (last 6)", "reached 2", "active"]),
+        (timing_panel, ["500/100 Hz", "lockstep", "130", "overruns 3"]),
+        (messages_panel, ["text number 7", "DEBUG"]),
+    ],
+)  # fmt: skip
+def test_a_panel_shows_all_known_values(panel: Draw, parts: list[str]) -> None:
+    text = drawn(panel, FULL, 100 if panel is status_line else 52, 12)
+    for part in parts:
+        assert part in text
+
+
+def test_an_active_failsafe_is_shown_with_its_reason() -> None:
+    text = drawn(health_panel, FAILING)
+    assert "Failsafe: battery critical" in text
+    for part in ("no fix", "no velocity, position", "ratio 1.70", "bad: gps, 3d mag"):
+        assert part in text
+
+
+def test_a_fence_breach_without_action_is_shown() -> None:
+    assert "outside the fence" in drawn(health_panel, FULL._replace(fence_breached=True))
+
+
+def test_unknown_values_are_dashes() -> None:
+    assert "battery    —" in drawn(power_panel, BARE)
+    assert "none loaded" in drawn(mission_panel, BARE)
+    assert "wind       —" in drawn(health_panel, BARE)
+
+
+def test_all_rotors_fit_into_few_rows() -> None:
+    eight = FULL._replace(rotor_rpm=tuple(1000.0 + i for i in range(8)))
+    text = drawn(power_panel, eight, 40, 5)
+    assert all(str(1000 + i) in text for i in range(8))
 
 
 def test_real_time_shows_lateness_and_missed_deadlines() -> None:
-    text = screen(FULL._replace(timing=TIMING._replace(lockstep=False)))
+    text = drawn(timing_panel, FULL._replace(timing=TIMING._replace(lockstep=False)), height=3)
     assert "late 4/5/6" in text
     assert "missed 2" in text
 
 
 def test_a_lost_vehicle_is_shown() -> None:
-    assert "VEHICLE LOST for 8 s" in screen(FULL, now_s=17.5)
-    assert "LOST" not in screen(FULL, now_s=14.0)
+    assert "VEHICLE LOST for 8 s" in drawn(status_line, FULL, 80, now_s=17.5)
+    assert "LOST" not in drawn(status_line, FULL, 80, now_s=14.0)
 
 
 def test_a_vehicle_that_has_shut_down_is_not_lost() -> None:
-    text = screen(FULL._replace(system_status=7), now_s=60.0)
+    text = drawn(status_line, FULL._replace(system_status=7), 80, now_s=60.0)
     assert "SHUT DOWN" in text
     assert "LOST" not in text
 
 
 def test_waiting_names_the_link() -> None:
-    text = "\n".join(drawn(render(VehicleView(), 0.0, 80, 24, "UDP 127.0.0.1:14550"), 80, 24))
+    text = plain(waiting("UDP 127.0.0.1:14550", 80, 24, DARK))
     assert "Waiting" in text
     assert "UDP 127.0.0.1:14550" in text
 
 
 def test_long_messages_are_wrapped_and_the_newest_is_at_the_bottom() -> None:
     long = StatusText(8, 4, "refused because " + "very " * 20 + "unlikely", 1.0, 33.0)
-    text = screen(FULL._replace(texts=(*FULL.texts, long)))
+    text = drawn(messages_panel, FULL._replace(texts=(*FULL.texts, long)), 60, 7)
     lines = [line for line in text.splitlines() if "very" in line or "unlikely" in line]
     assert len(lines) > 1
     assert text.index("refused because") < text.index("unlikely")
+
+
+def test_battery_time_follows_from_the_consumption_since_arming() -> None:
+    view = FULL._replace(battery=Battery(0.8, 15.0, 9.0), charge_at_arming=(0.0, 0.9), time_s=60.0)
+    assert view.battery_time_s == pytest.approx(480.0)
+    assert view._replace(charge_at_arming=(0.0, 0.81)).battery_time_s is None
+
+
+def test_tape_marks_the_setpoint_and_centres_the_value() -> None:
+    rows = drawn(flight_display, FULL, 60, 14).splitlines()
+    middle = (len(rows) - 2) // 2
+    assert "2.2 ▶" in rows[middle]
+    assert "◀ 5.0" in rows[middle]
+    far = FULL._replace(setpoint=FULL.setpoint._replace(position_ned_m=Vector(0.0, 0.0, -300.0)))
+    assert "◂" in drawn(flight_display, far, 60, 14).splitlines()[0]
+
+
+def test_trends_show_the_newest_value_and_the_range() -> None:
+    series = partial(flown_history().series, system_id=1)
+    text = plain(trends_panel(series, 10.0, 40, 30, DARK))
+    assert "altitude 9.6 m  0.4 to 9.6" in text
+    assert "battery 14.1 V" in text
+    assert plain(trends_panel(History().series, 10.0, 40, 30, DARK)) == "no telemetry yet"
 
 
 @settings(max_examples=40)
@@ -152,17 +168,13 @@ def test_absurd_values_are_drawn(
         time_s=time_s,
         mission=Mission(item, 5, None, 9),
     )
-    lines = drawn(render(view, 10.0, 80, 24), 80, 24)
-    assert max(len(line) for line in lines) <= 80
+    for panel in PANELS:
+        drawn(panel, view, 80, 24)
 
 
 def _sky(attitude: Euler, width: int = 21, height: int = 10) -> list[list[bool]]:
     """Tell for each cell whether its upper pixel is sky."""
-    rows = []
-    for line in horizon(attitude, width, height).split("\n"):
-        colours = [line.get_style_at_offset(Console(), column).color for column in range(width)]
-        rows.append([colour is not None and colour.name == "#1f5fa8" for colour in colours])
-    return rows
+    return (_pixels(attitude, width, 2 * height)[::2] == _SKY_CODE).tolist()
 
 
 def test_horizon_level_has_sky_above_and_ground_below() -> None:
@@ -185,15 +197,16 @@ def test_horizon_rises_on_the_right_in_a_bank_to_the_right() -> None:
 
 
 def test_heading_tape_has_the_heading_in_the_middle() -> None:
-    assert heading_tape(math.radians(90.0), 21).plain[10] == "E"
-    assert heading_tape(math.radians(359.0), 21).plain[10] == "N"
+    assert heading_tape(math.radians(90.0), 11).plain[5] == "E"
+    assert heading_tape(math.radians(359.0), 11).plain[5] == "N"
+    assert heading_tape(math.radians(359.0), 21).plain[7:12] == " 359°"[:5]
     assert heading_tape(None, 5).plain == "  —  "
 
 
 def test_lines_for_pipes() -> None:
     assert state_line(FULL, 10.0) == (
         "0:41.3  MISSION  armed  N +3.21 E -4.20 up 5.00 m  2.24 m/s  roll +11.5° pitch -5.7° yaw 074°  "
-        "item 3 (last 6)  ×52.3"
+        "item 3 (last 6)  battery 76%  ×52.3"
     )
     assert state_line(VehicleView(), 0.0) == "waiting for a vehicle"
     assert state_line(FULL, 20.0) == "0:41.3 vehicle lost for 10 s"
@@ -202,6 +215,7 @@ def test_lines_for_pipes() -> None:
 
 
 def test_a_small_window_says_that_no_mission_is_loaded_and_shows_no_negative_zero() -> None:
-    text = screen(FULL._replace(position_ned_m=Vector(-0.01, 0.0, 0.0), mission=Mission(0, 0)), 40, 10)
-    assert "north east up 0.0 0.0 0.0 m" in text
-    assert "mission none loaded" in text
+    view = FULL._replace(position_ned_m=Vector(0.0, 0.0, 0.01), geo=None, mission=Mission(0, 0))
+    text = drawn(compact, view, 40, 10)
+    assert "altitude 0.0 m" in text
+    assert "mission  none loaded" in text

@@ -10,7 +10,7 @@ from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.screens import SCREENS
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.unit.test_view_render import FULL
+from tests.support.watch_states import FULL
 
 
 @pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.mode)
