@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+
+from gcs_cli.actions.action import Action
 from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.history import History
 from gcs_cli.tui.message_log import MessageLog
@@ -13,6 +16,11 @@ class StillFeed(Feed):
         self.history = history or History()
         self.messages = MessageLog()
         self.messages.follow(view)
+        self.notices = deque()
+        self.actions: list[Action] = []
+        """Actions that the user asked for."""
+        self.commands_all = False
+        self.others: list[VehicleView] = []
         self.error = None
         self.shown = view
         self.time_s = now_s
@@ -22,12 +30,23 @@ class StillFeed(Feed):
         return self.shown
 
     @property
+    def views(self) -> tuple[VehicleView, ...]:
+        return (self.shown, *self.others) if self.shown.identity is not None else ()
+
+    def select(self, system_id: int | None) -> None:
+        self.commands_all = system_id is None
+        self.shown = next((view for view in self.views if view.identity.system_id == system_id), self.shown)
+
+    @property
     def now_s(self) -> float:
         return self.time_s
 
     @property
     def link_name(self) -> str:
         return "UDP 127.0.0.1:14550"
+
+    def act(self, action: Action) -> None:
+        self.actions.append(action)
 
     def start(self) -> None:
         """Nothing runs."""
