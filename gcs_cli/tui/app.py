@@ -102,9 +102,9 @@ class WatchApp(App[None]):
         if state != self._state:  # other keys work
             self._state = state
             self.refresh_bindings()
-        screen = self.screen_stack[0]
-        if isinstance(screen, WatchScreen):
-            screen.show(view, self.feed.now_s)
+        screens = self.screen_stack  # empty while a mode begins
+        if screens and isinstance(screens[0], WatchScreen):
+            screens[0].show(view, self.feed.now_s)
             self.redraws += 1
 
     # -- what the user asks of the vehicle
