@@ -19,6 +19,7 @@ from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.order_form import OrderForm
 from gcs_cli.tui.orders import ORDERS, action_of, order_named
 from gcs_cli.tui.palette import Palette, palette_of
+from gcs_cli.tui.plot_fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.themes import THEMES
 from gcs_cli.tui.vehicle_list import ALL, VehicleList
@@ -60,6 +61,7 @@ class WatchApp(App[None]):
     def __init__(self, feed: Feed, mode: str = SCREENS[0].mode) -> None:
         super().__init__()
         self.feed = feed
+        self.plot_fields = PlotFields()
         self._first_mode = mode
         self.redraws = 0
         for theme in THEMES:

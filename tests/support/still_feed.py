@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
 
 from gcs_cli.actions.action import Action
+from gcs_cli.link.connection import Connection
 from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.history import History
 from gcs_cli.tui.message_log import MessageLog
@@ -24,6 +28,8 @@ class StillFeed(Feed):
         self.error = None
         self.shown = view
         self.time_s = now_s
+        self.jobs: list[tuple[Callable[[Connection], Any], Future[Any]]] = []
+        """Jobs that screens have submitted; a test sets their results."""
 
     @property
     def view(self) -> VehicleView:
@@ -44,6 +50,10 @@ class StillFeed(Feed):
     @property
     def link_name(self) -> str:
         return "UDP 127.0.0.1:14550"
+
+    def submit(self, job: Callable[[Connection], Any]) -> Future[Any]:
+        self.jobs.append((job, Future()))
+        return self.jobs[-1][1]
 
     def act(self, action: Action) -> None:
         self.actions.append(action)

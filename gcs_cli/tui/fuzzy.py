@@ -1,0 +1,57 @@
+"""Fuzzy search over names. Pure."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import NamedTuple
+
+_WHOLE, _BOUNDARY = 100.0, 20.0
+_BOUNDARIES = " ._[/"
+
+
+class Match(NamedTuple):
+    """A name with the positions of the letters that match."""
+
+    score: float
+    name: str
+    positions: tuple[int, ...]
+
+
+def search(query: str, names: Iterable[str]) -> list[Match]:
+    """Return the names that contain the letters of each word of ``query`` in order, best first."""
+    words = tuple(query.lower().split())
+    matches = [match for name in names if (match := _match(words, name)) is not None]
+    return sorted(matches, key=lambda match: (-match.score, match.name))
+
+
+def _match(words: tuple[str, ...], name: str) -> Match | None:
+    lower, score, positions = name.lower(), 0.0, set[int]()
+    for word in words:
+        found = _best(word, lower)
+        if found is None:
+            return None
+        score += found[0]
+        positions.update(found[1])
+    return Match(score - 0.1 * len(name), name, tuple(sorted(positions)))
+
+
+def _best(word: str, name: str) -> tuple[float, tuple[int, ...]] | None:
+    """Return score and positions of the shortest stretch of ``name`` with the letters of ``word`` in order."""
+    best: tuple[float, tuple[int, ...]] | None = None
+    for match in _pattern(word).finditer(name):
+        positions = tuple(match.start(group) for group in range(1, len(word) + 1))
+        gaps = positions[-1] - positions[0] + 1 - len(word)
+        score = (_WHOLE if not gaps else 50.0 - gaps) - positions[0] * 0.01
+        if positions[0] == 0 or name[positions[0] - 1] in _BOUNDARIES:
+            score += _BOUNDARY
+        if best is None or score > best[0]:
+            best = (score, positions)
+    return best
+
+
+@lru_cache(maxsize=64)
+def _pattern(word: str) -> re.Pattern[str]:
+    letters = ".*?".join(f"({re.escape(letter)})" for letter in word)
+    return re.compile(f"(?={letters})")
