@@ -44,17 +44,14 @@ class WatchApp(App[None]):
             Binding(entry.key, f"app.switch_mode('{entry.mode}')", entry.title, show=False)
             for entry in SCREENS
         ),
-        *(
-            Binding(order.key, f"order('{order.name}')", order.title, show=order.in_footer)
-            for order in ORDERS
-        ),
+        *(Binding(order.key, f"order('{order.name}')", order.title, show=False) for order in ORDERS),
         Binding("v", "vehicles", "Vehicles"),
         Binding("left_square_bracket", "next_vehicle(-1)", "Previous vehicle", show=False),
         Binding("right_square_bracket", "next_vehicle(1)", "Next vehicle", show=False),
-        Binding("question_mark", "keys", "Keys"),
         Binding("ctrl+p", "command_palette", "Commands", priority=True),
         Binding("ctrl+z", "suspend_process", "Suspend", show=False),
         Binding("q", "quit", "Quit"),
+        Binding("question_mark", "keys", "Keys"),
         Binding("ctrl+c", "quit", "Quit", show=False, priority=True),
     ]
 
