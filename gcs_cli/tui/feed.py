@@ -54,6 +54,8 @@ class Feed:
         self.messages = MessageLog()
         self.notices: deque[Notice] = deque(maxlen=20)
         """Lines for the user, which the application takes."""
+        self.commands_all = False
+        """True if actions go to all vehicles."""
         self.error: Exception | None = None
         """Error that ended the thread."""
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
@@ -69,7 +71,8 @@ class Feed:
     @property
     def views(self) -> tuple[VehicleView, ...]:
         """States of all vehicles on the link, by system id."""
-        return (self.view,) if self.view.identity is not None else ()
+        sessions = tuple(self._connection.fleet.sessions.values())
+        return tuple(sorted((session.view for session in sessions), key=lambda view: view.identity or ()))
 
     @property
     def now_s(self) -> float:
@@ -83,9 +86,8 @@ class Feed:
 
     def start(self) -> None:
         """Start to receive."""
-        session = self._connection.session
-        session.observe = self._observe
-        session.subscribe(ROTORS_AND_TIMING)
+        self._connection.fleet.observe = self._observe
+        self._connection.fleet.subscribe(ROTORS_AND_TIMING)
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._thread.start()
 
@@ -101,15 +103,18 @@ class Feed:
         self._jobs.append((job, future))
         return future
 
+    def select(self, system_id: int | None) -> None:
+        """Show and command the vehicle with this system id; None: command all."""
+        self.commands_all = system_id is None
+        if system_id is not None:
+            self.submit(lambda connection: connection.fleet.select(system_id))
+
     def act(self, action: Action) -> None:
         """Perform ``action``; the answer and the effect become notices and messages.
 
         A new action ends the wait for the effect of the former one.
         """
-        self.submit(lambda connection: self._begin(action, connection.session))
-
-    def select(self, system_id: int | None) -> None:
-        """Show and command the vehicle with this system id; None: command all."""
+        self.submit(lambda connection: self._begin(action, connection))
 
     def _observe(self, message: Message) -> None:
         self.history.record(message, self.now_s)
@@ -137,24 +142,31 @@ class Feed:
             future.set_result(job(self._connection))
         except Exception as error:
             future.set_exception(error)
-        finally:
-            if not self._running:
-                self._connection.session.subscribe(ROTORS_AND_TIMING)
 
-    def _begin(self, action: Action, session: Session) -> None:
-        former = self._running.pop(session.target[0], None)
+    def _begin(self, action: Action, connection: Connection) -> None:
+        if connection.is_recording:
+            self._say(connection.session, f"{action.name}: a recording takes no commands", Severity.WARNING)
+            return
+        sessions = connection.fleet.sessions.values() if self.commands_all else [connection.session]
+        for session in sessions:
+            self._begin_one(action, session)
+
+    def _begin_one(self, action: Action, session: Session) -> None:
+        system_id = session.target[0]
+        former = self._running.pop(system_id, None)
         if former is not None:
-            self._say(former.session, f"{former.run.action.name}: no longer followed", Severity.NOTICE)
+            session.detach(former.run)
+            self._say(session, f"{former.run.action.name}: no longer followed", Severity.NOTICE)
         run = ActionRun(action, lambda: session.view, self.now_s, session.own)
-        session.use(run)
-        self._running[session.target[0]] = _Running(session, run)
+        session.attach(run)
+        self._running[system_id] = _Running(session, run)
 
     def _follow(self, system_id: int) -> None:
         """Report the answer of the vehicle, then the effect."""
         session, run, is_announced = self._running[system_id]
         if run.result is not None:
             del self._running[system_id]
-            session.subscribe(ROTORS_AND_TIMING)
+            session.detach(run)
             self._say(session, result_text(run.action, run.result), severity_of(run.result))
         elif run.acknowledged and not is_announced:
             self._running[system_id] = _Running(session, run, is_announced=True)
@@ -162,7 +174,8 @@ class Feed:
 
     def _say(self, session: Session, text: str, severity: Severity) -> None:
         self.messages.say(session.view, text, severity)
-        self.notices.append(Notice(text, severity))
+        several = len(self.views) > 1
+        self.notices.append(Notice(f"{session.target[0]}: {text}" if several else text, severity))
 
 
 def result_text(action: Action, result: Result) -> str:
