@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any, NamedTuple, TypeVar
 
@@ -60,6 +60,7 @@ class Feed:
         """Error that ended the thread."""
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
         self._running: dict[int, _Running] = {}
+        self._rates_hz: Mapping[int, float] = ROTORS_AND_TIMING
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -87,7 +88,7 @@ class Feed:
     def start(self) -> None:
         """Start to receive."""
         self._connection.fleet.observe = self._observe
-        self._connection.fleet.subscribe(ROTORS_AND_TIMING)
+        self._connection.fleet.subscribe(self._rates_hz)
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._thread.start()
 
@@ -115,6 +116,12 @@ class Feed:
         A new action ends the wait for the effect of the former one.
         """
         self.submit(lambda connection: self._begin(action, connection))
+
+    def keep_rate(self, message_id: int, rate_hz: float | None) -> None:
+        """Request a stream again at this rate if it stops; not if the rate is 0 or None, the default."""
+        rates = {number: rate for number, rate in self._rates_hz.items() if number != message_id}
+        self._rates_hz = {**rates, message_id: rate_hz} if rate_hz else rates
+        self.submit(lambda connection: connection.fleet.subscribe(self._rates_hz))
 
     def _observe(self, message: Message) -> None:
         self.history.record(message, self.now_s)

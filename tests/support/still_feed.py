@@ -26,6 +26,7 @@ class StillFeed(Feed):
         self.commands_all = False
         self.others: list[VehicleView] = []
         self.error = None
+        self._rates_hz = {}
         self.shown = view
         self.time_s = now_s
         self.jobs: list[tuple[Callable[[Connection], Any], Future[Any]]] = []
