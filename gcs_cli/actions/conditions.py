@@ -85,12 +85,7 @@ def _landed_text(view: VehicleView) -> str:
 
 def _ready_text(view: VehicleView) -> str:
     check = {None: "not reported", True: "passed", False: "failed"}[view.can_arm]
-    place = (
-        "has no position"
-        if view.geo is None or (view.estimator and not view.estimator.has_position)
-        else "ok"
-    )
-    return f"pre-arm check {check}, estimator {place}"
+    return f"pre-arm check {check}, position {'known' if view.has_position else 'unknown'}"
 
 
 def is_ready(view: VehicleView) -> bool:

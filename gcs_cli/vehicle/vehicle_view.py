@@ -36,7 +36,7 @@ _NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
 _RESTART_S = 1.0
 """Step back of the vehicle's clock that no reordering of datagrams explains."""
-_ATTITUDE, _VELOCITY, _POSITION, _ALTITUDE, _CONSTANT = 1, 0b110, 1 << 4, 1 << 5, 1 << 7
+_ATTITUDE, _VELOCITY, _POSITION, _ALTITUDE = 1, 0b110, 1 << 4, 1 << 5
 """Flags of ESTIMATOR_STATUS and EKF_STATUS_REPORT."""
 
 
@@ -189,7 +189,7 @@ def _estimator(flags: int, ratios: Iterable[float]) -> Estimator:
     return Estimator(
         bool(flags & _ATTITUDE),
         flags & _VELOCITY == _VELOCITY,
-        bool(flags & _POSITION) and not flags & _CONSTANT,
+        bool(flags & _POSITION),
         bool(flags & _ALTITUDE),
         max(finite, default=None),
     )
