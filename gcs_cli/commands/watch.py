@@ -62,10 +62,10 @@ def watch(
         serve_view(serve, [*_link_arguments(context, link), "--screen", screen])
         return
     if once:
-        with connect_vehicle(context, link) as connection:
+        with connect_vehicle(context, link, takes_recording=True) as connection:
             _print_once(connection, screen)
         return
-    with open_link(context, link) as connection:
+    with open_link(context, link, takes_recording=True, shares=True) as connection:
         connection.session.subscribe(ROTORS_AND_TIMING)
         timeout_s = link_options(context, link).timeout
         try:
