@@ -63,7 +63,6 @@ def test_completion_imports_nothing_heavy(line: str, completion: str) -> None:
 
 
 LATE = (
-    "numpy",
     "numba",
     "scipy",
     "matplotlib",
