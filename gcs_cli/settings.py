@@ -44,7 +44,16 @@ FlownTimeoutOption = Annotated[
 ]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.", **IN_OUTPUT)]
 OpenOption = Annotated[bool, typer.Option("--open", help="Open the report afterwards.", **IN_OUTPUT)]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object a line.", **IN_OUTPUT)]
+
+
+def _json_before_too(context: typer.Context, given: bool) -> bool:
+    return given or settings_of(context).link.as_json
+
+
+JsonOption = Annotated[
+    bool,
+    typer.Option("--json", help="Print one JSON object a line.", callback=_json_before_too, **IN_OUTPUT),
+]
 SigningKeyOption = Annotated[
     Path | None,
     typer.Option(
