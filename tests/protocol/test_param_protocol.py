@@ -437,6 +437,7 @@ def test_integers_of_every_width_pass_in_both_encodings(kind: int, data: st.Data
     assert told is not None
     assert (told.value, told.is_integer, told.kind) == (number, True, kind)
     assert set_value(float(KINDS[4][1] + 1), 4, casts=casts) is None
+    assert parse_value(mavlink.MAVLink_param_value_message(b"P", NAN, kind, 1, 0), casts=True) is None
 
 
 def test_a_list_leaves_out_types_that_are_not_supported() -> None:
