@@ -89,7 +89,7 @@ def value_message(name: str, value: float, is_integer: bool, index: int, count: 
 
 
 def parse_value(message: Message, *, casts: bool = False) -> Parameter | None:
-    """Return the parameter of a PARAM_VALUE, or None for an unsupported type (64 bits).
+    """Return the parameter of a PARAM_VALUE, or None for a type of 64 bits or an integer that is not finite.
 
     ``casts``: integers are sent as the float of their value, as ArduPilot does, not in the bits of the float.
     """
@@ -99,7 +99,9 @@ def parse_value(message: Message, *, casts: bool = False) -> Parameter | None:
     elif kind not in _INTEGERS:
         return None
     elif casts:
-        value = float(round(message.param_value)) if math.isfinite(message.param_value) else math.nan
+        if not math.isfinite(message.param_value):
+            return None
+        value = float(round(message.param_value))
     else:
         value = float(_INTEGERS[kind].unpack(_FLOAT.pack(message.param_value))[0])
     return Parameter(message.param_id, value, kind != REAL32, message.param_index, message.param_count, kind)

@@ -119,7 +119,7 @@ def render_parameters(parameters: Iterable[Parameter], system_id: int, component
         "# Vehicle-Id Component-Id Name Value Type",
     ]
     for parameter in parameters:
-        kind = INT32 if parameter.is_integer else REAL32
+        kind = parameter.kind or (INT32 if parameter.is_integer else REAL32)
         value = number_text(parameter.value)
         lines.append(f"{system_id}\t{component_id}\t{parameter.name}\t{value}\t{kind}")
     return "\n".join(lines) + "\n"

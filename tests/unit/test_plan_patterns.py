@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.plan import Command, Frame, MissionItem, Plan, check_mission
+from flightstack.plan import DEFAULT_LIMITS, Command, Frame, MissionItem, Plan, check_mission
 from gcs_cli.plans import patterns
+from gcs_cli.plans.check import limits_of, plan_problems
 from gcs_cli.plans.drawing import draw, places_of
 from gcs_cli.plans.itinerary import flown_order, itinerary
 from gcs_cli.plans.page import plan_page
@@ -164,3 +166,16 @@ def test_the_page_holds_charts_items_and_problems() -> None:
     assert "item 1: is outside the geofence" in page
     assert page.count('data-chart="') == 3
     assert "NAV_WAYPOINT" in page
+
+
+def test_a_foreign_vehicle_is_checked_against_its_geofence_alone() -> None:
+    spline = item(82, 20.0, 0.0, 5.0)
+    plan = Plan((spline, replace(spline, x=spline.x + 10_000)), HOME)
+    fence = (circle((0.0, 0.0), 50.0),)
+    assert [problem.seq for problem in plan_problems(plan, HOME, fence=fence)] == [0, 1]
+    assert [problem.seq for problem in plan_problems(plan, HOME, fence=fence, is_foreign=True)] == [1]
+
+
+def test_limits_come_from_the_parameters_of_the_vehicle() -> None:
+    limits = limits_of({"MIS_DIST_WPS": 30.0, "GF_MAX_VER_DIST": 0.0})
+    assert (limits.max_distance_m, limits.max_altitude_m) == (30.0, DEFAULT_LIMITS.max_altitude_m)
