@@ -86,6 +86,8 @@ def test_addresses_are_those_of_the_instance() -> None:
         "altitude_m": DEFAULT_HOME.altitude_m,
     }
     assert "gcs --instance 1 status" in ready_text(second)
+    (signed,) = vehicles_of(SimOptions(signing_key=Path("my key")))
+    assert "gcs --signing-key 'my key' status" in ready_text(signed)
 
 
 def test_the_default_speed_is_real_time() -> None:
