@@ -235,8 +235,8 @@ class Connection:
             )
         reason = f" ({self._line.problem})" if self._line.problem else ""
         return (
-            f"no vehicle {way} {self.endpoint} within {timeout_s:g} s{reason}: start `sim-bridge` and "
-            "`flightstack`, or give its address with --connect"
+            f"no vehicle {way} {self.endpoint} within {timeout_s:g} s{reason}: start one with `gcs sim`, "
+            "or give its address with --connect"
         )
 
     def command(self, command: Command, name: str) -> None:

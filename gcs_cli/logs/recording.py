@@ -109,7 +109,7 @@ class Recording:
         """Return a time of the log as seconds since its start."""
         return (time_us - self.start_us) * 1e-6
 
-    def unix_ns(self, time_us: int) -> int:
+    def unix_ns(self, time_us: int | np.int64) -> int:
         """Return a time of the log as ns since 1970; the log starts in 1970 if its date is unknown."""
         return (int(time_us) + (self.epoch_us or 0)) * 1000
 

@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.fields import whole
 from flightstack.mavlink.ftp_messages import FtpError, FtpMessage, Opcode, Packet, next_sequence, read_packet
 from flightstack.mavlink.link import Link, Message, is_for
 from flightstack.transports.vehicle_ports import Place
@@ -21,6 +22,7 @@ PEER_TIMEOUT_S = 15.0
 MAX_PEERS = 32
 PARAMETERS_PER_POLL = 40
 SPEEDS = (0.1, 1000.0)
+_MAX_ID = 0xFF_FFFF
 TEXT = b"Command refused: this is the replay of a log"
 _QUIET = {
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_CMD_GET_MESSAGE_INTERVAL,
@@ -177,10 +179,8 @@ class ReplayVehicle:
         self._say(peer, mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_WARNING, TEXT))
 
     def _on_command(self, message: Message, peer: Place) -> None:
-        result = mavlink.MAV_RESULT_DENIED
-        if message.command == mavlink.MAV_CMD_REQUEST_MESSAGE and self._send_requested(
-            int(message.param1), peer
-        ):
+        result, asks = mavlink.MAV_RESULT_DENIED, message.command == mavlink.MAV_CMD_REQUEST_MESSAGE
+        if asks and self._send_requested(whole(message.param1, 0, _MAX_ID), peer):
             result = mavlink.MAV_RESULT_ACCEPTED
         sender = message.get_srcSystem(), message.get_srcComponent()
         self._say(peer, mavlink.MAVLink_command_ack_message(message.command, result, 255, 0, *sender))
@@ -199,6 +199,8 @@ class ReplayVehicle:
         return found is not None
 
     def _on_parameter_list(self, _: Message, peer: Place) -> None:
+        others = (entry for entry in self._parameters if entry[0] != peer)  # a repeated request begins anew
+        self._parameters = deque(others)
         self._parameters.extend((peer, message) for message in self._playback.parameters)
 
     def _on_parameter_read(self, message: Message, peer: Place) -> None:

@@ -41,7 +41,9 @@ def output_of(*arguments: str, **environment: str) -> str:
     return result.stdout
 
 
-@pytest.mark.parametrize("words", [[], ["param"], ["pil"], ["fly"], ["test"], ["pil", "fly"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "words", [[], ["param"], ["pil"], ["fly"], ["sim"], ["log"], ["test"], ["pil", "fly"]], ids=" ".join
+)
 def test_help_imports_nothing_heavy(words: list[str]) -> None:
     assert f"Usage: {' '.join(['gcs', *words])}" in output_of(*words, "--help")
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+import random
+import re
+import struct
 from collections import Counter
+from typing import Any
 
 import numpy as np
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.frames import pack_frame
 from flightstack.mavlink.link import Link, Message
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.session import Session
@@ -18,7 +23,7 @@ from gcs_cli.logs.ulog_reader import read_ulog
 from gcs_cli.replay.keys import names_of
 from gcs_cli.replay.playback import Playback, TlogPlayback
 from gcs_cli.replay.replay_run import apply_keys
-from gcs_cli.replay.replay_vehicle import ReplayVehicle
+from gcs_cli.replay.replay_vehicle import _ANSWERS, ReplayVehicle
 from gcs_cli.replay.ulog_playback import UlogPlayback
 from tests.support.sample_logs import small_tlog, small_ulog
 
@@ -172,6 +177,35 @@ def test_parameters_of_the_log_are_served(log: str, request: pytest.FixtureReque
     read = mavlink.MAVLink_param_request_read_message(*playback.vehicle, b"MPC_XY_CRUISE", -1)
     (value,) = (message for message in client.ask(read) if message.get_type() == "PARAM_VALUE")
     assert value.param_value == {"tlog": 5.0, "ulog": 3.0}[log]
+
+
+@pytest.mark.parametrize("log", ["tlog", "ulog"])
+def test_any_content_of_a_message_is_answered_or_ignored(log: str, request: pytest.FixtureRequest) -> None:
+    playback: Playback = request.getfixturevalue(log)
+    client = Client(ReplayVehicle(playback, [STATION], 0.0))
+    rng = random.Random(1)
+    kinds = [kind for kind in mavlink.mavlink_map.values() if kind.msgname in _ANSWERS]
+    assert len(kinds) == len(_ANSWERS)
+    for number in range(600):
+        kind = kinds[number % len(kinds)]
+        payload = bytearray(rng.choice((rng.randbytes(kind.unpacker.size), b"\xff" * kind.unpacker.size)))
+        for name, value in (("target_system", playback.vehicle.system), ("target_component", 1)):
+            if name in kind.ordered_fieldnames:  # each is one byte, behind the longer fields
+                payload[offset_of(kind, name)] = value
+        if kind.msgname == "COMMAND_LONG":
+            payload[28:30] = mavlink.MAV_CMD_REQUEST_MESSAGE.to_bytes(2, "little")
+        frame = pack_frame(
+            kind.id, bytes(payload).rstrip(b"\0") or b"\0", kind.crc_extra, number % 256, 255, 190
+        )
+        client.vehicle.receive(frame, STATION, 0.0)
+        client.vehicle.poll(0.0)
+
+
+def offset_of(kind: Any, name: str) -> int:
+    """Return the place of a field in the payload."""
+    place = kind.ordered_fieldnames.index(name)
+    codes = re.findall(r"\d*[a-zA-Z]", kind.unpacker.format)
+    return struct.calcsize("<" + "".join(codes[:place]))
 
 
 def test_a_new_peer_gets_telemetry_until_it_is_silent(tlog: Playback) -> None:
