@@ -59,6 +59,7 @@ class Feed:
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
         self._running: dict[int, _Running] = {}
         self._stopping = threading.Event()
+        self._order = threading.Event()
         self._thread: threading.Thread | None = None
 
     @property
@@ -106,7 +107,18 @@ class Feed:
 
         A new action ends the wait for the effect of the former one.
         """
+        self._order.set()
         self.submit(lambda connection: self._begin(action, connection.session))
+
+    @property
+    def order_waits(self) -> bool:
+        """True if an action waits for the end of a job."""
+        return self._order.is_set()
+
+    def tell(self, text: str, severity: Severity = Severity.NOTICE) -> None:
+        """Show a line for a moment, and keep it among the messages."""
+        self.notices.append(Notice(text, severity))
+        self.submit(lambda connection: self.messages.say(connection.session.view, text, severity))
 
     def select(self, system_id: int | None) -> None:
         """Show and command the vehicle with this system id; None: command all."""
@@ -142,6 +154,7 @@ class Feed:
                 self._connection.session.subscribe(ROTORS_AND_TIMING)
 
     def _begin(self, action: Action, session: Session) -> None:
+        self._order.clear()
         former = self._running.pop(session.target[0], None)
         if former is not None:
             self._say(former.session, f"{former.run.action.name}: no longer followed", Severity.NOTICE)

@@ -31,4 +31,7 @@ SCREENS = (
     ScreenEntry(
         "messages", "5", "Messages", "gcs_cli.tui.messages_screen:MessagesScreen", "texts of the vehicle"
     ),
+    ScreenEntry(
+        "parameters", "7", "Parameters", "gcs_cli.tui.param_screen:ParamScreen", "search, edit, compare, save"
+    ),
 )
