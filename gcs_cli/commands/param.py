@@ -14,13 +14,13 @@ from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.mavlink.param_values import Parameter
 from flightstack.params.param_file import is_parameter_name
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.errors import FAILED, USAGE, CliError
+from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
 from gcs_cli.transfers import param_calls
-from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, load_parameters, number_text, render_parameters
+from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, load_parameters, render_parameters
 from gcs_cli.vehicle.param_search import search_parameters
 from gcs_cli.vehicle.param_table import (
     change_line,
@@ -177,33 +177,15 @@ def load(
     """Set the parameters that a file has; the others stay as they are."""
     wanted = load_parameters(file)
     with connect_vehicle(context, link) as connection:
-        failures, changed = _set_all(connection, wanted)
+        present = {parameter.name: parameter for parameter in param_calls.fetch_all(connection)}
+        result = param_calls.change_all(connection, wanted, present)
+    changed = len(result.changed)
     sentence = f"{changed} of {len(wanted)} parameters changed"
     output_of(context, link).say("loaded", sentence, file=str(file), changed=changed, parameters=len(wanted))
-    for failure in failures:
+    for failure in result.failures:
         typer.echo(f"gcs: {failure}", err=True)
-    if failures:
-        raise CliError(f"{len(failures)} parameters of {file} were not set")
-
-
-def _set_all(connection: Connection, wanted: dict[str, float]) -> tuple[list[str], int]:
-    """Set the parameters that differ; return the failures, and the number of changed ones."""
-    present = {parameter.name: parameter for parameter in param_calls.fetch_all(connection)}
-    failures: list[str] = []
-    changed = 0
-    for name, value in wanted.items():
-        if name in present and number_text(present[name].value) == number_text(value):
-            continue
-        try:
-            if name not in present:
-                raise CliError(f"{name}: the vehicle has no such parameter")
-            param_calls.change(connection, name, value)
-            changed += 1
-        except CliError as error:
-            if error.exit_code != FAILED:
-                raise
-            failures.append(str(error))
-    return failures, changed
+    if result.failures:
+        raise CliError(f"{len(result.failures)} parameters of {file} were not set")
 
 
 @app.command()
