@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -23,10 +24,11 @@ _STYLES = ("cyan", "yellow", "green", "magenta", "blue", "red", "white")
 def field_figure(recording: Recording, fields: Sequence[Field], begin_s: float, end_s: float) -> Figure:
     """Return a figure with a panel for each topic."""
     panels: dict[str, list[Series]] = {}
-    for field in fields:
-        time_s, values = field_samples(recording, field, begin_s, end_s)
-        curves = panels.setdefault(field.topic.name, [])
-        curves.append(Series(field.name, time_s, values, nth_colour(len(curves))))
+    names = Counter(field.name for field in fields)
+    for index, field in enumerate(fields):  # one legend for all panels: no name and no colour twice
+        name = field.name if names[field.name] == 1 else field.label
+        series = Series(name, *field_samples(recording, field, begin_s, end_s), nth_colour(index))
+        panels.setdefault(field.topic.name, []).append(series)
     return Figure(
         name="fields",
         title=recording.source,

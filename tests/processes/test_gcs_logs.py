@@ -46,6 +46,7 @@ def test_log_plot_prints_samples_as_json(logs: Path) -> None:
     assert line["name"] == "ATTITUDE.yaw"
     assert len(line["values"]) == len(line["time_s"]) == 10
     assert all(1.0 <= at_s <= 2.0 for at_s in line["time_s"])
+    assert gcs("log", "plot", logs / "b.tlog", "ATTITUDE.yaw", "--from", 2, "--to", 1).returncode == 2
 
 
 def test_report_of_a_log_alone(logs: Path) -> None:

@@ -22,7 +22,7 @@ from gcs_cli.logs.export_mcap import foxglove_channels, topic_channels
 from gcs_cli.logs.fields import find_fields
 from gcs_cli.logs.info import info_lines
 from gcs_cli.logs.motion import motion_of
-from gcs_cli.logs.plot import terminal_panel
+from gcs_cli.logs.plot import field_figure, terminal_panel
 from gcs_cli.logs.reader import read_log
 from gcs_cli.logs.recording import TLOG, ULOG, Recording
 from gcs_cli.logs.scene import enu_positions, enu_quaternions
@@ -215,6 +215,16 @@ def product(p: object, q: object) -> list[float]:
         a * y - b * z + c * w + d * x,
         a * z + b * y - c * x + d * w,
     ]
+
+
+def test_curves_of_one_legend_differ_in_name_and_colour(ulog: Recording) -> None:
+    labels = ("vehicle_attitude.q[0]", "attitude_reference.q[0]", "vehicle_local_position.z")
+    fields = [field for label in labels for field in find_fields(ulog, label)]
+    figure = field_figure(ulog, fields, 0.0, 10.0)
+    curves = [series for panel in figure.panels for series in panel.series]
+    assert [series.name for series in curves] == [labels[0], labels[1], "z"]
+    assert len({series.colour for series in curves}) == 3
+    assert [panel.title for panel in figure.panels] == [label.partition(".")[0] for label in labels]
 
 
 def test_terminal_plot_has_the_extremes_at_its_edges() -> None:
