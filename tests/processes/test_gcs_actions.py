@@ -70,7 +70,7 @@ def test_arducopter_is_flown_from_the_command_line() -> None:
 def test_a_refusal_is_an_object_in_json_and_a_sentence_on_stderr() -> None:
     result = told(FakeVehicle(refusals={ARM: "Command refused: no valid position yet"}), "arm", "--json")
     facts = json.loads(result.stdout)
-    assert (facts["event"], facts["state"]) == ("arm", "refused")
+    assert (facts["event"], facts["exit_code"]) == ("error", 1)
     assert result[1:] == ("gcs: arming refused: no valid position yet\n", 1)
 
 
