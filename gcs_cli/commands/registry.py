@@ -78,7 +78,7 @@ class MissionGroup(LazyGroup):
     """``gcs mission``."""
 
     lazy = {  # noqa: RUF012
-        "new": LazyCommand(_PLANS, "Write a mission of a pattern."),
+        "new": LazyCommand("gcs_cli.commands.mission_new", "Write a mission of a pattern."),
         "check": LazyCommand(
             _PLANS,
             "Check a file as the vehicle does: without a vehicle, or with one's geofence, home and parameters.",

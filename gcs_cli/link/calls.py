@@ -93,10 +93,10 @@ class Call:
                 self._text_due_s = now_s + TEXT_WAIT_S
             if now_s < self._text_due_s:
                 return None
-        item = self._refused_item(result) if isinstance(result, Failed) else ""
         reason = text or result.reason
-        if item and "item" not in text.lower():
-            reason = f"{item}: {reason}"
+        if isinstance(result, Failed) and not (text and (result.is_whole or "item" in text.lower())):
+            item = self._refused_item(result)
+            reason = f"{item}: {reason}" if item else reason
         return Answer(False, reason, result=result.result or 0)
 
     def _refused_item(self, failed: Failed) -> str:
