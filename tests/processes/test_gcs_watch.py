@@ -234,7 +234,7 @@ def test_a_browser_shows_the_view_and_commands_the_vehicle(tmp_path: Path) -> No
             assert all(name.startswith(url) for name in loaded.split())
             while not vehicle.armed:  # a key before the heartbeat has no effect
                 for key in "Ay":
-                    await page.press(key)
+                    await page.type(key)
                     await asyncio.sleep(0.5)
 
     with (

@@ -47,10 +47,10 @@ class Page:
         while not await self.value(script):
             assert time.monotonic() < end_s, script
 
-    async def press(self, key: str) -> None:
-        """Type a character."""
-        await self.call("Input.dispatchKeyEvent", type="keyDown", key=key, text=key)
-        await self.call("Input.dispatchKeyEvent", type="keyUp", key=key)
+    async def type(self, text: str) -> None:
+        """Type into the terminal of the page."""
+        await self.value("document.querySelector('textarea').focus()")
+        await self.call("Input.insertText", text=text)
 
 
 @contextmanager

@@ -14,9 +14,10 @@ from gcs_cli.tui.feed import Notice
 from gcs_cli.tui.orders import ORDERS, Field, FieldError
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView
+from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.support.watch_states import BARE, FULL
+from tests.support.watch_states import BARE, FULL, flown_history
 
 GROUNDED = FULL._replace(armed=False, landed_state=1)
 Story = Callable[[WatchApp, Pilot], Awaitable[None]]
@@ -270,3 +271,18 @@ def test_vehicles_are_listed_selected_and_commanded_together() -> None:
         assert app.feed.view.identity.system_id == 7
 
     play(story, size=(120, 24))
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 35), (200, 50)], ids=str)
+@pytest.mark.parametrize("entry", [SCREENS[0], SCREENS[-1]], ids=lambda entry: entry.mode)
+def test_screens_look_like_their_pictures(entry: ScreenEntry, size: tuple[int, int]) -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.history = flown_history()
+        await pilot.press(entry.key)
+        await pilot.pause()
+        app.redraws = 0
+        app.redraw()
+        await pilot.pause()
+        check_picture(f"{entry.mode}-{size[0]}x{size[1]}", shown(app))
+
+    play(story, size=size)
