@@ -87,7 +87,7 @@ def download(
 @app.command()
 @expand_options
 def verify(context: typer.Context, link: LinkOptions, file: AnyPlanArgument) -> None:
-    """Compare the vehicle's plan with a file, item by item; exit with 1 if they differ.
+    """Compare the vehicle's plan with a file; exit 1 if they differ.
 
     Compares the mission, and geofence and rally points if the file has any.
     """
@@ -145,5 +145,5 @@ def jump(
     options: ActionOptions,
     seq: Annotated[int, typer.Argument(metavar="N", min=0, max=65_535, help="Number of the item, from 0.")],
 ) -> None:
-    """Make an item of the mission the current one; a mission in flight continues there."""
+    """Make an item the current one; a mission in flight goes there."""
     run_action(context, link, options, in_mission.jump(seq))

@@ -49,7 +49,7 @@ def convert(
     overwrite: OverwriteOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Convert a plan to the format of another file, and name what that format cannot hold."""
+    """Convert a plan, and name what the new format cannot hold."""
     check_suffix(out)
     check_new(out, overwrite)
     plan = load_any(source, altitude)
@@ -70,7 +70,9 @@ def check(
     file: AnyPlanArgument,
     vehicle: VehicleOption = False,
 ) -> None:
-    """Check a file as the vehicle does: without a vehicle, or with one's geofence, home and parameters.
+    """Check a file as the vehicle does.
+
+    Without a vehicle, or with one's geofence, home and parameters.
 
     Checks geofence, mission and rally points, and names all items that are refused.
     """
@@ -136,7 +138,7 @@ def show(
     altitude: AltitudeOption = DEFAULT_ALTITUDE_M,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Show a plan: its items with distances, headings and times, and a drawing."""
+    """Show a plan: a table of its items, and a drawing."""
     if html is not None:
         check_new(html, overwrite)
     if file is None:

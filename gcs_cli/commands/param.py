@@ -50,7 +50,7 @@ def list_parameters(
         ),
     ] = "*",
 ) -> None:
-    """List the parameters; highlight those that are not at their default."""
+    """List the parameters; highlight those not at their default."""
     with connect_vehicle(context, link) as connection:
         found = matching(param_calls.fetch_all(connection), pattern)
         infos = param_calls.fetch_metadata(connection) if found else {}
@@ -69,7 +69,7 @@ def search(
     ],
     most: Annotated[int, typer.Option("--most", metavar="N", min=1, help="Largest number of results.")] = 20,
 ) -> None:
-    """Search names and descriptions of parameters, the best match first; misspelt words match too."""
+    """Search names and descriptions; misspelt words match too."""
     with connect_vehicle(context, link) as connection:
         parameters = param_calls.fetch_all(connection)
         infos = param_calls.fetch_metadata(connection)

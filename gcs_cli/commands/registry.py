@@ -81,26 +81,18 @@ class MissionGroup(LazyGroup):
         "new": LazyCommand("gcs_cli.commands.mission_new", "Write a mission of a pattern."),
         "check": LazyCommand(
             _PLANS,
-            "Check a file as the vehicle does: without a vehicle, or with one's geofence, home and parameters.",
+            "Check a file as the vehicle does.",
         ),
-        "show": LazyCommand(
-            _PLANS, "Show a plan: its items with distances, headings and times, and a drawing."
-        ),
-        "convert": LazyCommand(
-            _PLANS, "Convert a plan to the format of another file, and name what that format cannot hold."
-        ),
+        "show": LazyCommand(_PLANS, "Show a plan: a table of its items, and a drawing."),
+        "convert": LazyCommand(_PLANS, "Convert a plan, and name what the new format cannot hold."),
         "upload": LazyCommand(_MISSION, "Replace the vehicle's mission by that of a file."),
         "download": LazyCommand(_MISSION, "Download the vehicle's mission, geofence and rally points."),
-        "verify": LazyCommand(
-            _MISSION, "Compare the vehicle's plan with a file, item by item; exit with 1 if they differ."
-        ),
+        "verify": LazyCommand(_MISSION, "Compare the vehicle's plan with a file; exit 1 if they differ."),
         "clear": LazyCommand(_MISSION, "Remove the vehicle's mission, geofence or rally points."),
         "start": LazyCommand(_MISSION, "Start the mission; the vehicle arms for it."),
         "pause": LazyCommand(_MISSION, "Pause the mission: the vehicle holds its position."),
         "resume": LazyCommand(_MISSION, "Resume a paused mission at its current item."),
-        "jump": LazyCommand(
-            _MISSION, "Make an item of the mission the current one; a mission in flight continues there."
-        ),
+        "jump": LazyCommand(_MISSION, "Make an item the current one; a mission in flight goes there."),
     }
 
 
@@ -132,10 +124,10 @@ class ParamGroup(LazyGroup):
     """``gcs param``."""
 
     lazy = {  # noqa: RUF012
-        "list": LazyCommand(_PARAM, "List the parameters; highlight those that are not at their default."),
+        "list": LazyCommand(_PARAM, "List the parameters; highlight those not at their default."),
         "search": LazyCommand(
             _PARAM,
-            "Search names and descriptions of parameters, the best match first; misspelt words match too.",
+            "Search names and descriptions; misspelt words match too.",
         ),
         "get": LazyCommand(_PARAM, "Show parameters with their metadata."),
         "set": LazyCommand(_PARAM, "Set a parameter."),
