@@ -68,7 +68,7 @@ def find_mode(view: VehicleView, name: str) -> int | None:
 def mode_choices(view: VehicleView) -> dict[str, int]:
     """Return the modes that a user may select, by name: those that the vehicle lists, else the autopilot's."""
     autopilot, kind = view.autopilot, view.vehicle_type
-    if view.modes:
+    if view.modes and len(view.modes) >= view.mode_total:
         listed = {mode.number: mode.label.upper() for mode in view.modes if mode.is_selectable}
         return {autopilot.mode_name(kind, number) or label: number for number, label in listed.items()}
     names = autopilot.mode_names(kind)
@@ -168,3 +168,11 @@ def reboot() -> Action:
         )
 
     return Action("reboot", plan, "rebooting", "rebooted")
+
+
+def set_message_rate(message_id: int, name: str, rate_hz: float | None) -> Action:
+    """Request a message at a rate; 0 stops it, None is the vehicle's default. No vehicle reports the effect."""
+    rate = "its default rate" if rate_hz is None else f"{rate_hz:g} Hz" if rate_hz else "no rate: stopped"
+    step = Step(f"rate of {name}", common_commands.message_interval(message_id, rate_hz), None)
+    facts = {"message": name, "rate_hz": rate_hz}
+    return Action("message rate", lambda _view: (step,), f"{name} at {rate}", f"{name} at {rate}", facts)

@@ -51,6 +51,11 @@ def set_home(latitude_deg: float, longitude_deg: float, altitude_amsl_m: float) 
     return VehicleCommand(mavlink.MAV_CMD_DO_SET_HOME, params, mavlink.MAV_FRAME_GLOBAL)
 
 
+def set_mission_current(seq: int) -> VehicleCommand:
+    """Return the command that makes an item, in the vehicle's numbers, the current one."""
+    return VehicleCommand(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, (float(seq),))
+
+
 def inject_failure(unit: int, failure: int, instance: int) -> VehicleCommand:
     """Return the command that injects a failure; instance 0 means all."""
     return VehicleCommand(mavlink.MAV_CMD_INJECT_FAILURE, (float(unit), float(failure), float(instance)))
@@ -59,6 +64,12 @@ def inject_failure(unit: int, failure: int, instance: int) -> VehicleCommand:
 def request_message(message_id: int, parameter: float = 0.0) -> VehicleCommand:
     """Return the request for one message."""
     return VehicleCommand(mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id), parameter))
+
+
+def message_interval(message_id: int, rate_hz: float | None) -> VehicleCommand:
+    """Return the request for a stream; a rate of 0 stops it, None is the vehicle's default."""
+    interval_us = 0.0 if rate_hz is None else 1e6 / rate_hz if rate_hz > 0.0 else -1.0
+    return VehicleCommand(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (float(message_id), interval_us))
 
 
 def custom_mode(*numbers: float) -> VehicleCommand:

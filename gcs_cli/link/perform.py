@@ -39,8 +39,6 @@ def perform(connection: Connection, action: Action, output: Output, *, waits: bo
         session.use(None)
     result = run.result
     if not result.ok:
-        if output.as_json:
-            _say(output, action, "", state=result.outcome.value, reason=result.sentence)
         raise CliError(result.sentence, EXIT_CODES[result.outcome])
     if not (announced and result.outcome is Outcome.ACKNOWLEDGED):
         after = f" after {result.elapsed_s:.1f} s" if announced else ""

@@ -61,3 +61,13 @@ OPTIONAL_PLAN = typer.Argument(
 )
 PlanArgument = Annotated[Path, PLAN_ARGUMENT]
 AnyPlanArgument = Annotated[Path, ANY_PLAN_ARGUMENT]
+AltitudeOption = Annotated[
+    float,
+    typer.Option(
+        "--altitude",
+        metavar="METRES",
+        min=0.1,
+        max=10_000.0,
+        help="Altitude above home of points without one.",
+    ),
+]

@@ -60,6 +60,12 @@ def say_downloaded(output: Output, plan: Plan, file: Path | None, kinds: tuple[M
                 items=count,
                 file=None if file is None else str(file),
             )
+    if file is not None:
+        say_lost(output, lost, file)
+
+
+def say_lost(output: Output, lost: str, file: Path) -> None:
+    """Print what the format of ``file`` does not hold, if anything."""
     if lost:
         output.say("lost", f"lost in {file}: {lost}", file=str(file), lost=lost)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any, NamedTuple, TypeVar
 
@@ -60,7 +60,9 @@ class Feed:
         """Error that ended the thread."""
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
         self._running: dict[int, _Running] = {}
+        self._rates_hz: Mapping[int, float] = ROTORS_AND_TIMING
         self._stopping = threading.Event()
+        self._order = threading.Event()
         self._thread: threading.Thread | None = None
 
     @property
@@ -87,7 +89,7 @@ class Feed:
     def start(self) -> None:
         """Start to receive."""
         self._connection.fleet.observe = self._observe
-        self._connection.fleet.subscribe(ROTORS_AND_TIMING)
+        self._connection.fleet.subscribe(self._rates_hz)
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._thread.start()
 
@@ -114,7 +116,24 @@ class Feed:
 
         A new action ends the wait for the effect of the former one.
         """
+        self._order.set()
         self.submit(lambda connection: self._begin(action, connection))
+
+    @property
+    def order_waits(self) -> bool:
+        """True if an action waits for the end of a job."""
+        return self._order.is_set()
+
+    def tell(self, text: str, severity: Severity = Severity.NOTICE) -> None:
+        """Show a line for a moment, and keep it among the messages."""
+        self.notices.append(Notice(text, severity))
+        self.submit(lambda connection: self.messages.say(connection.session.view, text, severity))
+
+    def keep_rate(self, message_id: int, rate_hz: float | None) -> None:
+        """Request a stream again at this rate if it stops; not if the rate is 0 or None, the default."""
+        rates = {number: rate for number, rate in self._rates_hz.items() if number != message_id}
+        self._rates_hz = {**rates, message_id: rate_hz} if rate_hz else rates
+        self.submit(lambda connection: connection.fleet.subscribe(self._rates_hz))
 
     def _observe(self, message: Message) -> None:
         self.history.record(message, self.now_s)
@@ -144,6 +163,7 @@ class Feed:
             future.set_exception(error)
 
     def _begin(self, action: Action, connection: Connection) -> None:
+        self._order.clear()
         if connection.is_recording:
             self._say(connection.session, f"{action.name}: a recording takes no commands", Severity.WARNING)
             return

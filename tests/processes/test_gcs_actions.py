@@ -11,6 +11,7 @@ from contextlib import contextmanager
 import pytest
 
 from flightstack.transports.udp import UdpSocket
+from gcs_cli.actions.run import ActionRun
 from tests.support.commands import Ended, gcs
 from tests.support.fake_arducopter import FakeArduCopter
 from tests.support.fake_vehicle import ARM, LAND_NOW, FakeVehicle, serve
@@ -70,7 +71,7 @@ def test_arducopter_is_flown_from_the_command_line() -> None:
 def test_a_refusal_is_an_object_in_json_and_a_sentence_on_stderr() -> None:
     result = told(FakeVehicle(refusals={ARM: "Command refused: no valid position yet"}), "arm", "--json")
     facts = json.loads(result.stdout)
-    assert (facts["event"], facts["state"]) == ("arm", "refused")
+    assert (facts["event"], facts["exit_code"]) == ("error", 1)
     assert result[1:] == ("gcs: arming refused: no valid position yet\n", 1)
 
 
@@ -81,6 +82,20 @@ def test_land_ends_when_the_vehicle_has_disarmed() -> None:
     assert result.returncode == 0
     assert result.stdout.startswith("landing\nlanded and disarmed after ")
     assert vehicle.commands[-1][0] == LAND_NOW
+
+
+def test_an_interrupted_action_says_that_the_vehicle_continues(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(_run: ActionRun, _view: object, _now_s: float) -> None:
+        raise KeyboardInterrupt
+
+    vehicle = FakeVehicle()
+    vehicle.armed = True
+    monkeypatch.setattr(ActionRun, "_await_effect", interrupt)
+    result = told(vehicle, "land")
+    assert (result.stderr, result.returncode) == (
+        "gcs: interrupted while landing: the vehicle continues\n",
+        1,
+    )
 
 
 @pytest.mark.parametrize("arguments", [["terminate"], ["disarm", "--force"]])

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import flightstack
+from flightstack.mavlink.dialect import mavlink
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.__main__ import main
 from gcs_cli.clients.command_client import CommandClient, CommandTiming
@@ -241,6 +242,15 @@ def test_download_of_all_logs_goes_on_after_one_that_exists(
     assert grown.read_bytes() == b"new"
 
 
+def test_logs_of_ardupilot_are_named_bin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_calls, "fetch_list", lambda _: (LogEntry(1, 3, 0),))
+    monkeypatch.setattr(log_calls, "fetch_files", lambda _: ())
+    monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
+    vehicle = FakeVehicle(autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
+    assert told(vehicle, "log", "download", "-o", tmp_path).returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["log_1.bin"]
+
+
 def test_a_vehicle_without_geofence_is_downloaded_from() -> None:
     vehicle = FakeVehicle(unknown_types=(1, 2))
     result = told(vehicle, "mission", "download")
@@ -273,6 +283,7 @@ def test_status_as_json() -> None:
     assert facts["battery_remaining"] is None
     assert result.returncode == 0
     lines = told(FakeVehicle(), "status").stdout.splitlines()
+    assert facts.pop("event") == "status"
     assert len(lines) == len(facts)
 
 
@@ -365,7 +376,7 @@ def test_wrong_usage_is_one_sentence_and_exit_code_2(arguments: list[str], said:
 
 
 def test_an_interrupted_wait_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(*_: object) -> None:
+    def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Connection, "wait_for_vehicle", interrupt)

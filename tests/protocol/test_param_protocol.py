@@ -126,8 +126,8 @@ def test_a_full_list_takes_well_under_a_second_and_goes_in_portions() -> None:
     while world.step():
         sent.append(len(world.stations["gcs"].got))
     assert len(world.stations["gcs"].got) == 201
-    assert world.now_s - 100.0 < 0.25  # measured: 0.20 s
-    assert max(after - before for before, after in pairwise(sent)) <= 10
+    assert world.now_s - 100.0 < 0.13  # measured: 0.10 s
+    assert max(after - before for before, after in pairwise(sent)) <= 20
 
 
 def test_many_lists_at_once_share_the_step() -> None:
@@ -331,16 +331,20 @@ def test_a_silent_vehicle_is_given_up() -> None:
         assert isinstance(result, ParamFailed)
         assert result.silent
         assert "system 1" in result.reason
-    assert world.now_s - 100.0 == pytest.approx(3 * 21 * 0.5)
+    assert world.now_s - 100.0 == pytest.approx(21 * 0.5 + 2 * 8 * 0.25)
 
 
-def test_a_vehicle_that_knows_no_param_error_is_told_by_the_value_it_keeps() -> None:
-    world = world_of()
-    station = world.stations["gcs"]
+def ignore_errors(station: Station) -> None:
+    """Let PARAM_ERROR not arrive, as with a vehicle that does not send it."""
     receive = station.client.receive
     station.client.receive = lambda message, now_s: (  # type: ignore[method-assign]
         None if message.get_type() == "PARAM_ERROR" else receive(message, now_s)
     )
+
+
+def test_a_vehicle_that_knows_no_param_error_is_told_by_the_value_it_keeps() -> None:
+    world = world_of()
+    ignore_errors(world.stations["gcs"])
     assert world.set("gcs", "P001_", 2000.0) == ParamFailed("the vehicle keeps 0.1", None, False)
 
 

@@ -172,3 +172,19 @@ def test_position_conditions_have_a_radius(world: World) -> None:
     near = f"position={geo.latitude_deg + 5e-5:.7f},{geo.longitude_deg:.7f}"  # 5.6 m away
     assert not parse_condition(near).holds(seen(world))
     assert parse_condition(f"{near},10").holds(seen(world))
+
+
+def test_a_generic_vehicle_takes_off_holds_and_lands_by_standard_commands() -> None:
+    """The vehicle names no modes, and its altitudes are above home."""
+    with World(params={"FS_AUTOPILOT": 1}, telemetry=True) as world:
+        world.run_for(2.0)
+        assert seen(world).autopilot.name == "generic"
+        assert perform(world, in_flight.takeoff(4.0))[:2] == (Outcome.DONE, "at 4 m")
+        assert world.state.altitude_m == pytest.approx(4.0, abs=0.6)
+        home = seen(world).home
+        assert home is not None
+        north_deg = home.latitude_deg + 10.0 / 111_195.0
+        assert perform(world, in_flight.goto(north_deg, home.longitude_deg)).ok
+        assert perform(world, in_flight.hold()).ok
+        assert perform(world, in_flight.yaw(180.0)).ok
+        assert perform(world, in_flight.land())[:2] == (Outcome.DONE, "landed and disarmed")
