@@ -93,7 +93,7 @@ def _angles(angles: Euler | None, width: int, colours: Palette, style: str, labe
         degrees = None if angles is None else math.degrees(angles[index])
         shown = UNKNOWN
         if degrees is not None:
-            shown = f"{round(degrees) % 360:03d}°" if index == 2 else f"{degrees:+.1f}°"
+            shown = f"{round(degrees) % 360:03d}°" if index == 2 else f"{round(degrees, 1) + 0.0:+.1f}°"
         text.append(f"{name} ", colours.muted)
         text.append(shown, style)
         text.append(gap if index < 2 else "")

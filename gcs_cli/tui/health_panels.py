@@ -16,14 +16,14 @@ _COMPASS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 
 
 def health_panel(view: VehicleView, _now_s: float, width: int, height: int, colours: Palette) -> list[Text]:
-    """Active failsafes first, then GNSS, estimator, wind and sensors."""
+    """Active failsafes and bad sensors first, then GNSS, estimator and wind."""
     lines = [
         _failsafe(view, colours),
         _gnss(view, width, colours),
         _estimator(view, colours),
         _wind(view, colours),
-        _sensors(view, colours),
     ]
+    lines.insert(1 if view.unhealthy else len(lines), _sensors(view, colours))
     return lines[:height]
 
 

@@ -52,7 +52,7 @@ def status_line(
 
 
 def link_text(view: VehicleView, now_s: float, colours: Palette) -> Text:
-    """Return the link quality; the reason if the vehicle is gone."""
+    """Return share of received messages, rate and round trip of the link; the reason if the vehicle is gone."""
     alarm = f"bold {colours.background} on "
     if view.powered_off:
         return Text(" SHUT DOWN ", alarm + colours.warning)
@@ -63,6 +63,8 @@ def link_text(view: VehicleView, now_s: float, colours: Palette) -> Text:
         colours.good if quality >= _GOOD_LINK else colours.warning if quality >= _POOR_LINK else colours.bad
     )
     text = Text("● ", style)
-    text.append("link 100%" if quality == 1.0 else f"link {quality:.1%}", f"bold {colours.text}")
+    text.append("100%" if quality == 1.0 else f"{quality:.1%}", f"bold {colours.text}")
     text.append(f"  {number(view.link.rate_hz, 0)} msg/s ", colours.muted)
+    if view.link.round_trip_s is not None:
+        text.append(f" {1e3 * view.link.round_trip_s:.0f} ms ", colours.muted)
     return text
