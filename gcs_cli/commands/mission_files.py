@@ -14,13 +14,13 @@ from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.config import DEFAULT_HOME, parse_home
-from flightstack.plan import DEFAULT_LIMITS, Limits, MissionItem, Plan
+from flightstack.plan import Plan
 from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.output import Output
 from gcs_cli.plans import patterns
 from gcs_cli.plans.areas import area_rings, line_of
-from gcs_cli.plans.check import limits_of, plan_problems
+from gcs_cli.plans.check import plan_problems
 from gcs_cli.plans.drawing import draw, places_of
 from gcs_cli.plans.formats.files import DEFAULT_ALTITUDE_M, SUFFIXES, check_suffix, load_any, save_any
 from gcs_cli.plans.itinerary import home_of_items, itinerary
@@ -30,7 +30,7 @@ from gcs_cli.plans.table import item_facts, itinerary_facts, mission_table, plac
 from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption, output_of
 from gcs_cli.transfers.plan_files import OPTIONAL_PLAN, AnyPlanArgument
 from gcs_cli.transfers.plan_parts import plan_parts
-from gcs_cli.transfers.vehicle_plans import download_plan, limit_parameters
+from gcs_cli.transfers.vehicle_plans import download_plan, problems_on_vehicle
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
@@ -221,10 +221,11 @@ def check(
     Checks geofence, mission and rally points, and names all items that are refused.
     """
     plan = load_any(file)
-    home, limits, fence = home_of_items(plan.items, plan.home), DEFAULT_LIMITS, None
     if _uses_vehicle(link, vehicle):
-        home, limits, fence = _vehicle_limits(context, link, plan)
-    problems = list(plan_problems(plan, home, limits, fence))
+        with connect_vehicle(context, link) as connection:
+            problems = problems_on_vehicle(connection, plan)
+    else:
+        problems = list(plan_problems(plan, home_of_items(plan.items, plan.home)))
     output = output_of(context, link)
     for problem in problems:
         output.say("problem", f"{problem.part}: {problem.reason}", **problem._asdict())
@@ -241,16 +242,6 @@ def check(
 
 def _uses_vehicle(link: LinkOptions, vehicle: bool) -> bool:
     return vehicle or link.connect is not None or link.instance is not None
-
-
-def _vehicle_limits(
-    context: typer.Context, link: LinkOptions, plan: Plan
-) -> tuple[GeoPoint, Limits, tuple[MissionItem, ...]]:
-    """Return home, limits and geofence of the vehicle."""
-    with connect_vehicle(context, link) as connection:
-        stored = download_plan(connection, with_home=True)
-        parameters = limit_parameters(connection)
-    return home_of_items(plan.items, stored.home or plan.home), limits_of(parameters), stored.fence
 
 
 @app.command()

@@ -7,7 +7,8 @@ from flightstack.plan import MissionType, Plan
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
-from gcs_cli.plans.check import LIMIT_PARAMETERS
+from gcs_cli.plans.check import LIMIT_PARAMETERS, Problem, limits_of, plan_problems
+from gcs_cli.plans.itinerary import home_of_items
 from gcs_cli.transfers import param_calls
 
 _HOME_WAIT_S = 3.0
@@ -41,3 +42,11 @@ def limit_parameters(connection: Connection) -> dict[str, float]:
             if error.exit_code != FAILED:
                 raise
     return found
+
+
+def problems_on_vehicle(connection: Connection, plan: Plan) -> list[Problem]:
+    """Return the problems of ``plan`` with the vehicle's home, geofence and limits; raise CliError."""
+    stored = download_plan(connection, with_home=True, kinds=(MissionType.FENCE,))
+    parameters = limit_parameters(connection)
+    home = home_of_items(plan.items, stored.home or plan.home)
+    return list(plan_problems(plan, home, limits_of(parameters), stored.fence))
