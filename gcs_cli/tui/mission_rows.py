@@ -20,6 +20,8 @@ from gcs_cli.vehicle.view_types import VehicleView
 _POSITIONS_FROM = 108
 """Width from which a row shows latitude and longitude."""
 
+_WIDEST = 130
+
 
 class Progress(NamedTuple):
     """Where the vehicle is in the mission; None if unknown or not in flight."""
@@ -81,22 +83,22 @@ def to_go(table: MissionTable, seq: int, progress: Progress) -> tuple[float, flo
 
 def mission_columns(width: int, *, in_flight: bool) -> list[Column]:
     """Return the columns for a width."""
-    goal = "to go" if in_flight else "from start"
+    goal = "to go" if in_flight else "total"
     columns = [
         Column("", 1),
         Column("item", 4, True),
         Column("command", 17),
         Column("leg", 8, True),
-        Column("heading", 7, True),
-        Column("altitude", 10, True),
-        Column("parameters", 8),
-        Column(goal, 10, True),
+        Column("to", 4, True),
+        Column("altitude", 9, True),
+        Column("parameters", 9),
+        Column(goal, 8, True),
         Column("time", 7, True),
     ]
     if width >= _POSITIONS_FROM:
         columns[2] = columns[2]._replace(width=22)
         columns[3:3] = [Column("latitude", 11, True), Column("longitude", 12, True)]
-    return stretched(columns, width - 1, len(columns) - 3)
+    return stretched(columns, min(width, _WIDEST), len(columns) - 3)
 
 
 def mission_row(
