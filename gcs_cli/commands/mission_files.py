@@ -12,11 +12,11 @@ from rich.console import Console
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
-from flightstack.plan import DEFAULT_LIMITS, Plan
+from flightstack.plan import Plan
 from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.output import Output
-from gcs_cli.plans.check import Problem, limits_of, plan_problems
+from gcs_cli.plans.check import plan_problems
 from gcs_cli.plans.drawing import draw, places_of
 from gcs_cli.plans.formats.files import DEFAULT_ALTITUDE_M, SUFFIXES, check_suffix, load_any, save_any
 from gcs_cli.plans.itinerary import home_of_items, itinerary
@@ -26,7 +26,7 @@ from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption, output_of
 from gcs_cli.transfers.plan_files import OPTIONAL_PLAN, AltitudeOption, AnyPlanArgument
 from gcs_cli.transfers.plan_parts import plan_parts
 from gcs_cli.transfers.plan_transfers import say_lost
-from gcs_cli.transfers.vehicle_plans import download_plan, limit_parameters
+from gcs_cli.transfers.vehicle_plans import download_plan, problems_on_vehicle
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
@@ -78,7 +78,11 @@ def check(
     """
     plan, output = load_any(file), output_of(context, link)
     if _uses_vehicle(link, vehicle):
-        problems = _problems_of_vehicle(context, link, plan, output)
+        with connect_vehicle(context, link) as connection:
+            problems, unchecked = problems_on_vehicle(connection, plan)
+            autopilot = connection.session.view.autopilot.name
+        if unchecked:
+            output.say("limited", unchecked, autopilot=autopilot)
     else:
         problems = list(plan_problems(plan, home_of_items(plan.items, plan.home)))
     for problem in problems if output.as_json or len(problems) > 1 else ():
@@ -98,25 +102,6 @@ def check(
 
 def _uses_vehicle(link: LinkOptions, vehicle: bool) -> bool:
     return vehicle or link.connect is not None or link.instance is not None
-
-
-def _problems_of_vehicle(
-    context: typer.Context, link: LinkOptions, plan: Plan, output: Output
-) -> list[Problem]:
-    """Return the problems of ``plan`` with home, limits and geofence of the vehicle."""
-    with connect_vehicle(context, link) as connection:
-        stored = download_plan(connection, with_home=True)
-        autopilot = connection.session.view.autopilot
-        is_foreign = not autopilot.stores_items_exactly
-        limits = DEFAULT_LIMITS if is_foreign else limits_of(limit_parameters(connection))
-    if is_foreign:
-        output.say(
-            "limited",
-            f"only the geofence is checked: the commands of {autopilot.title} are not known",
-            autopilot=autopilot.name,
-        )
-    home = home_of_items(plan.items, stored.home or plan.home)
-    return list(plan_problems(plan, home, limits, stored.fence, is_foreign=is_foreign))
 
 
 @app.command()

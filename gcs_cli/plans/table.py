@@ -64,7 +64,7 @@ def mission_table(items: Sequence[MissionItem], flight: Itinerary) -> Table:
             any_command_name(item.command),
             "" if place is None else f"{place[0]:.7f}",
             "" if place is None else f"{place[1]:.7f}",
-            _altitude(item),
+            altitude_text(item),
             "" if stop is None or stop.leg_m < 0.05 else f"{stop.leg_m:.1f} m",
             "" if stop is None or stop.heading_deg is None else f"{stop.heading_deg:03.0f}°",
             "not reached"
@@ -85,7 +85,7 @@ def places_table(items: Sequence[MissionItem]) -> Table:
     for seq, item in enumerate(items):
         latitude, longitude = item.position_deg or (math.nan, math.nan)
         table.add_row(
-            str(seq), any_command_name(item.command), f"{latitude:.7f}", f"{longitude:.7f}", _altitude(item),
+            str(seq), any_command_name(item.command), f"{latitude:.7f}", f"{longitude:.7f}", altitude_text(item),
             parameters_text(item),
         )  # fmt: skip
     return table
@@ -123,7 +123,8 @@ def clock(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
 
 
-def _altitude(item: MissionItem) -> str:
+def altitude_text(item: MissionItem) -> str:
+    """Return the altitude of an item with its unit; empty without one."""
     if item.position_deg is None and not (item.command == Command.NAV_TAKEOFF and math.isfinite(item.z)):
         return ""
     if math.isnan(item.z):

@@ -7,16 +7,18 @@ from pathlib import Path
 
 from flightstack.plan import MissionItem, MissionType, Plan
 from gcs_cli.errors import FAILED, CliError, VehicleLostError
+from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
-from gcs_cli.plans.compare import Tolerance, differences
+from gcs_cli.plans.compare import Difference, Tolerance, differences
 from gcs_cli.plans.formats.files import save_any
 from gcs_cli.plans.names import any_command_name
 from gcs_cli.plans.table import item_facts
-from gcs_cli.transfers.plan_parts import PlanPart, Uploads, plan_parts
+from gcs_cli.transfers.plan_parts import PlanPart, Uploads, parts_to_send, plan_parts
+from gcs_cli.transfers.vehicle_plans import download_plan
 
 
-def complete_upload(connection: Connection, uploads: Uploads, file: Path) -> None:
+def complete_upload(connection: Connection, uploads: Uploads, file: Path | str) -> None:
     """Run an upload to its end; if it ends early, raise CliError with the plans that the vehicle holds."""
 
     def name() -> str:
@@ -30,6 +32,26 @@ def complete_upload(connection: Connection, uploads: Uploads, file: Path) -> Non
         raise CliError(f"{name()}: interrupted; {uploads.state}") from None
     except OSError as error:
         raise CliError(f"{name()}: {error.strerror or error}; {uploads.state}") from None
+
+
+def compare_with_vehicle(
+    connection: Connection, plan: Plan
+) -> tuple[list[tuple[PlanPart, Difference]], list[PlanPart]]:
+    """Read the vehicle's plan back; return the differences from ``plan``, and the parts without any.
+
+    Compares the mission, and geofence and rally points if the plan has any. Raise CliError.
+    """
+    parts = parts_to_send(plan)
+    stored = download_plan(connection, with_home=False, kinds=tuple(part.kind for part in parts))
+    held = {part.kind: part.items for part in plan_parts(stored)}
+    tolerance = calls.storage_tolerance(connection.session)
+    found = [
+        (part, difference)
+        for part in parts
+        for difference in differences(part.items, held[part.kind], tolerance)
+    ]
+    differing = {part.kind for part, _ in found}
+    return found, [part for part in parts if part.kind not in differing]
 
 
 def say_uploaded(output: Output, parts: Sequence[PlanPart], uploads: Uploads) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from flightstack.core.geodesy import GeoPoint
-from flightstack.plan import MissionType, Plan
+from flightstack.plan import DEFAULT_LIMITS, MissionType, Plan
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
-from gcs_cli.plans.check import LIMIT_PARAMETERS
+from gcs_cli.plans.check import LIMIT_PARAMETERS, Problem, limits_of, plan_problems
+from gcs_cli.plans.itinerary import home_of_items
 from gcs_cli.transfers import param_calls
 
 _HOME_WAIT_S = 3.0
@@ -41,3 +42,18 @@ def limit_parameters(connection: Connection) -> dict[str, float]:
             if error.exit_code != FAILED:
                 raise
     return found
+
+
+def problems_on_vehicle(connection: Connection, plan: Plan) -> tuple[list[Problem], str]:
+    """Return the problems of ``plan`` with the vehicle's home, geofence and limits, and what could not be checked.
+
+    Raise CliError.
+    """
+    stored = download_plan(connection, with_home=True, kinds=(MissionType.FENCE,))
+    autopilot = connection.session.view.autopilot
+    is_foreign = not autopilot.stores_items_exactly
+    limits = DEFAULT_LIMITS if is_foreign else limits_of(limit_parameters(connection))
+    home = home_of_items(plan.items, stored.home or plan.home)
+    found = list(plan_problems(plan, home, limits, stored.fence, is_foreign=is_foreign))
+    unchecked = f"only the geofence is checked: the commands of {autopilot.title} are not known"
+    return found, unchecked if is_foreign else ""

@@ -19,6 +19,7 @@ from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.order_form import OrderForm
 from gcs_cli.tui.orders import ORDERS, action_of, order_named
 from gcs_cli.tui.palette import Palette, palette_of
+from gcs_cli.tui.plan_fetcher import PlanFetcher
 from gcs_cli.tui.plot_fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.themes import THEMES
@@ -59,6 +60,10 @@ class WatchApp(App[None]):
         super().__init__()
         self.feed = feed
         self.plot_fields = PlotFields()
+        self.plans = PlanFetcher(feed)
+        """The plans of the selected vehicle, for all screens."""
+        self.unsaved: dict[str, str] = {}
+        """What would be lost at the end, by screen, each a sentence."""
         self._first_mode = mode
         self.redraws = 0
         for theme in THEMES:
@@ -90,6 +95,8 @@ class WatchApp(App[None]):
 
     def redraw(self) -> None:
         """Draw the newest state on the visible screen; end if the link failed."""
+        if not self.is_running:  # the screens are being removed
+            return
         if self.feed.error is not None:
             self.exit(return_code=1)
             return
@@ -116,6 +123,20 @@ class WatchApp(App[None]):
         if action in ("vehicles", "next_vehicle"):
             return len(self.feed.views) > 1
         return True
+
+    @work(exclusive=True, group="quit")
+    async def _ask_to_quit(self) -> None:
+        if await self.push_screen_wait(
+            Confirm("\n".join(self.unsaved.values()) + "\nQuit all the same?", "Quit")
+        ):
+            self.exit()
+
+    async def action_quit(self) -> None:
+        """Quit; ask first if something would be lost. A second Ctrl-C quits."""
+        if self.unsaved and not isinstance(self.screen, Confirm):
+            self._ask_to_quit()
+        else:
+            self.exit()
 
     @work(exclusive=True, group="order")
     async def action_order(self, name: str) -> None:

@@ -54,7 +54,6 @@ class MapScreen(WatchScreen):
     def __init__(self, mode: str) -> None:
         super().__init__(mode)
         self._model = MapModel()
-        self._plans: PlanFetcher | None = None
 
     def compose_body(self) -> ComposeResult:
         """Yield the map and the line below."""
@@ -69,9 +68,7 @@ class MapScreen(WatchScreen):
     @property
     def plans(self) -> PlanFetcher:
         """The plans of the vehicle."""
-        if self._plans is None:
-            self._plans = PlanFetcher(watch_app(self).feed)
-        return self._plans
+        return watch_app(self).plans
 
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the map, and download the plans if they changed."""

@@ -108,6 +108,12 @@ class ParamScreen(JobScreen):
             self.action_update()
         self._show_state()
 
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Return False for keys that have no effect now."""
+        if action in ("search", "changed_only", "edit", "reset", "save", "load", "compare"):
+            return bool(self._params.parameters)
+        return True
+
     def _show_state(self) -> None:
         colours, params = watch_app(self).palette, self._params
         left = Text(no_wrap=True, end="")
@@ -132,6 +138,7 @@ class ParamScreen(JobScreen):
         """Show new parameters; the cursor stays at its parameter."""
         self._params, self._references = params, params.references
         self._filter()
+        self.refresh_bindings()
 
     def _filter(self, *, keeps: bool = True) -> None:
         rows = self.rows
@@ -268,8 +275,7 @@ class ParamScreen(JobScreen):
     async def action_save(self) -> None:
         """Write all parameters to a file."""
         identity = watch_app(self).feed.view.identity
-        if identity is None or not self._params.parameters:
-            self.notify("there are no parameters yet", severity="warning")
+        if identity is None:
             return
         path = await self.ask_file("Save all parameters", "vehicle.params", (), is_new=True)
         if path is None:

@@ -27,6 +27,13 @@ class ScreenEntry(NamedTuple):
 SCREENS = (
     ScreenEntry("fly", "1", "Fly", "gcs_cli.tui.fly_screen:FlyScreen", "attitude, position, battery, link"),
     ScreenEntry("map", "2", "Map", "gcs_cli.tui.map_screen:MapScreen", "plan, track and vehicles from above"),
+    ScreenEntry(
+        "mission",
+        "3",
+        "Mission",
+        "gcs_cli.tui.mission_screen:MissionScreen",
+        "items, edits, upload, progress",
+    ),
     ScreenEntry("plot", "4", "Plot", "gcs_cli.tui.plot_screen:PlotScreen", "telemetry fields over time"),
     ScreenEntry(
         "messages", "5", "Messages", "gcs_cli.tui.messages_screen:MessagesScreen", "texts of the vehicle"

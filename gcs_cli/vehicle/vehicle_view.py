@@ -34,7 +34,7 @@ _RATE_WINDOW_S = 1.0
 _MOST_ROTORS = 16
 _NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
-_RESTART_S = 1.0
+_RESTART_S = 0.25
 """Step back of the vehicle's clock that no reordering of datagrams explains."""
 _ATTITUDE, _VELOCITY, _POSITION, _ALTITUDE = 1, 0b110, 1 << 4, 1 << 5
 """Flags of ESTIMATOR_STATUS and EKF_STATUS_REPORT."""

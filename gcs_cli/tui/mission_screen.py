@@ -1,0 +1,365 @@
+"""The screen Mission: the items with their progress, edits, files, upload and control of the flight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import ClassVar
+
+from rich.text import Text
+from textual import on, work
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.widgets import Static
+
+from flightstack.core.enums import Severity
+from flightstack.core.geodesy import GeoPoint
+from flightstack.plan import MissionItem, Plan
+from gcs_cli.errors import CliError
+from gcs_cli.link.connection import Connection
+from gcs_cli.plans import edit
+from gcs_cli.plans.formats.files import SUFFIXES, load_any, save_any
+from gcs_cli.plans.names import any_command_name
+from gcs_cli.transfers import mission_control, plan_transfers
+from gcs_cli.transfers.plan_parts import Uploads
+from gcs_cli.transfers.vehicle_plans import problems_on_vehicle
+from gcs_cli.tui.drawing import watch_app
+from gcs_cli.tui.entry_form import EntryForm
+from gcs_cli.tui.item_form import item_entries, item_of_texts, new_item
+from gcs_cli.tui.job_screen import JobScreen, some_of
+from gcs_cli.tui.mission_draft import MissionDraft
+from gcs_cli.tui.mission_rows import (
+    MissionTable,
+    Progress,
+    mission_columns,
+    mission_progress,
+    mission_row,
+    mission_table,
+    summary,
+)
+from gcs_cli.tui.row_list import RowList, title_text
+from gcs_cli.vehicle.view_types import VehicleView
+
+_ALTITUDE_M = 5.0
+
+
+class MissionScreen(JobScreen):
+    """The list follows the vehicle's mission until it is edited; then it stays until it is uploaded or dropped."""
+
+    BINDINGS: ClassVar = [
+        Binding("enter,e", "edit", "Edit", key_display="⏎"),
+        Binding("a", "add", "Add"),
+        Binding("d,delete", "delete", "Delete", key_display="d"),
+        Binding("z", "undo", "Undo"),
+        Binding("u", "upload", "Upload"),
+        Binding("j", "jump", "Jump"),
+        Binding("p", "pause", "Pause"),
+        Binding("s", "start", "Start"),
+        Binding("o", "load", "Load"),
+        Binding("w", "save", "Save"),
+        Binding("K,shift+up", "shift(-1)", "Move", key_display="J K"),
+        Binding("J,shift+down", "shift(1)", "Move down", show=False),
+        Binding("c", "verify", "Verify"),
+        Binding("g", "download", "Download"),
+    ]
+
+    def __init__(self, mode: str) -> None:
+        super().__init__(mode)
+        self.draft = MissionDraft()
+        self._table = mission_table(Plan(()), None)
+        self._shown: object = None
+        self._keys: object = None
+        self._progress = Progress()
+
+    def compose_body(self) -> ComposeResult:
+        """Yield the line of state and the table."""
+        yield Static(id="mission-state")
+        with Vertical(id="mission-table"):
+            yield Static(id="mission-titles")
+            yield RowList(id="mission-rows")
+
+    def on_mount(self) -> None:
+        """Put the cursor into the table."""
+        self.rows.focus()
+
+    @property
+    def rows(self) -> RowList:
+        """The table."""
+        return self.query_one(RowList)
+
+    @property
+    def items(self) -> edit.Items:
+        """The items of the edited mission."""
+        return self.draft.plan.items
+
+    def show(self, view: VehicleView, now_s: float) -> None:
+        """Download the plans if they changed on the vehicle; draw the list and the progress."""
+        super().show(view, now_s)
+        if not self.query(RowList):  # resumed before it was composed
+            return
+        app = watch_app(self)
+        system_id = None if view.identity is None else view.identity.system_id
+        streams = app.feed.history.streams(system_id)
+        current = [stream.last for stream in streams if stream.name == "MISSION_CURRENT"]
+        if not self.doing:
+            app.plans.update(view, current[0] if current else None)
+        if not app.plans.loading:
+            self.draft = self.draft.followed(app.plans.plan)
+        self._redraw()
+
+    def _redraw(self) -> None:
+        """Draw what changed."""
+        app = watch_app(self)
+        view = app.feed.view
+        home = None if view.home is None else GeoPoint(*view.home[:3])
+        if self._table.items is not self.items or (home is not None and self._table.home != home):
+            self._table = mission_table(self.draft.plan, home)
+        table = self._table
+        self._progress = Progress() if self.draft.is_changed else mission_progress(table, view)
+        keys = (bool(self.items), bool(self.draft.past), self.draft.is_changed, view.armed)
+        if keys != self._keys:
+            self._keys = keys
+            self.refresh_bindings()
+        shown = (table.items, table.home, self._progress, self.rows.size, app.theme)
+        if shown != self._shown:
+            self._shown = shown
+            in_flight = self._progress.left_m is not None
+            self._draw_table(table, self._progress, in_flight=in_flight)
+        self._show_state()
+        if self.draft.is_changed:
+            app.unsaved[self.mode] = "The edited mission is not uploaded."
+        else:
+            app.unsaved.pop(self.mode, None)
+
+    def _draw_table(self, table: MissionTable, progress: Progress, *, in_flight: bool) -> None:
+        colours = watch_app(self).palette
+        columns = mission_columns(self.rows.size.width, in_flight=in_flight)
+        self.query_one("#mission-titles", Static).update(title_text(columns, colours.muted))
+
+        def draw(seq: int, _width: int) -> Text:
+            return mission_row(table, seq, progress, columns, colours)
+
+        self.rows.show_rows(len(table.items), draw)
+
+    def _show_state(self) -> None:
+        app = watch_app(self)
+        colours, plans, draft = app.palette, app.plans, self.draft
+        left = Text(no_wrap=True, end="")
+        if draft.is_changed:
+            left.append(" NOT UPLOADED ", f"bold {colours.background} on {colours.warning}")
+            left.append(" ")
+        left.append(summary(self._table, self._progress), colours.text)
+        parts = [f"{len(draft.plan.fence)} fence items"] if draft.plan.fence else []
+        parts += [f"{len(draft.plan.rally)} rally points"] if draft.plan.rally else []
+        right = Text(", ".join(parts), colours.muted)
+        if self.doing:
+            right = Text(self.doing_text, colours.accent)
+        elif plans.problem:
+            right = Text(plans.problem, colours.bad)
+        elif plans.loading:
+            right = Text(f"downloading the {plans.loading}", colours.accent)
+        self.show_line("mission-state", left, right)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Return False for keys that have no effect now."""
+        if action in ("edit", "delete", "shift", "verify", "save"):
+            return bool(self.items)
+        if action == "undo":
+            return bool(self.draft.past)
+        if action == "jump":
+            return bool(self.items) and not self.draft.is_changed
+        if action == "pause":
+            return watch_app(self).feed.view.armed
+        return True
+
+    # -- edits
+
+    def _edit(self, items: edit.Items, seq: int) -> None:
+        self.draft = self.draft.edited(items)
+        self._redraw()
+        self.rows.select(seq)
+
+    async def _ask_item(self, title: str, item: MissionItem, first: int = 0) -> MissionItem | None:
+        form = EntryForm(title, item_entries(item), partial(item_of_texts, item), first)
+        changed: MissionItem | None = await self.app.push_screen_wait(form)
+        return changed
+
+    @on(RowList.Chosen)
+    def _chosen(self) -> None:
+        self.action_edit()
+
+    @work
+    async def action_edit(self) -> None:
+        """Change the fields of the selected item."""
+        seq, items = self.rows.cursor, self.items
+        if not items:
+            return
+        item = await self._ask_item(f"Item {seq}", items[seq])
+        if item is not None and item != items[seq]:
+            self._edit((*items[:seq], item, *items[seq + 1 :]), seq)
+
+    @work
+    async def action_add(self) -> None:
+        """Add an item after the selected one."""
+        items = self.items
+        seq = min(self.rows.cursor + 1, len(items))
+        before = [item for item in items[:seq] if item.position_deg is not None]
+        geo = watch_app(self).feed.view.geo
+        place = before[-1].position_deg if before else None if geo is None else geo[:2]
+        altitude_m = before[-1].z if before else _ALTITUDE_M
+        item = await self._ask_item(f"New item {seq}", new_item(place, altitude_m))
+        if item is not None:
+            self._edit(edit.add(items, seq, item), seq)
+
+    def action_delete(self) -> None:
+        """Delete the selected item."""
+        if self.items:
+            seq = self.rows.cursor
+            self._edit(edit.delete(self.items, seq), seq)
+
+    def action_shift(self, step: int) -> None:
+        """Move the selected item up or down."""
+        seq = self.rows.cursor
+        if self.items and 0 <= seq + step < len(self.items):
+            self._edit(edit.move(self.items, seq, seq + step), seq + step)
+
+    def action_undo(self) -> None:
+        """Undo the last edit."""
+        self.draft = self.draft.undone()
+        self._redraw()
+
+    # -- files
+
+    async def _may_drop(self) -> bool:
+        return not self.draft.is_changed or await self.ask("Drop the edits that are not uploaded?", "Drop")
+
+    @work
+    async def action_load(self) -> None:
+        """Edit the plan of a file."""
+        if not await self._may_drop():
+            return
+        path = await self.ask_file("Load a plan", "", SUFFIXES, is_new=False)
+        plan = None if path is None else self.attempt(partial(load_any, path))
+        if path is not None and plan is not None:
+            self.draft = self.draft.loaded(plan)
+            self._redraw()
+            self.rows.select(0)
+            watch_app(self).feed.tell(f"{len(plan.items)} items loaded from {path}: u uploads them")
+
+    @work
+    async def action_save(self) -> None:
+        """Write the plan to a file, in the format of its suffix."""
+        path = await self.ask_file("Save the plan", "mission.plan", SUFFIXES, is_new=True)
+        lost = None if path is None else self.attempt(partial(save_any, path, self.draft.plan))
+        if lost is not None:
+            what = f"{len(self.items)} items saved to {path}"
+            severity = Severity.WARNING if lost else Severity.NOTICE
+            watch_app(self).feed.tell(f"{what}; lost: {lost}" if lost else what, severity)
+
+    # -- exchange with the vehicle
+
+    @work
+    async def action_upload(self) -> None:
+        """Check the plan, upload it, and compare the vehicle's with it."""
+        plan = self.draft.to_upload()
+        found = await self.run_job("checking", partial(problems_on_vehicle, plan=plan))
+        if found is None:
+            return
+        problems, unchecked = found
+        if unchecked:
+            watch_app(self).feed.tell(unchecked)
+        if problems:
+            lines = some_of([f"{problem.part}: {problem.reason}" for problem in problems])
+            if not await self.ask(f"The vehicle would refuse the plan:\n{lines}\n\nUpload it?", "Upload"):
+                return
+        view = watch_app(self).feed.view
+        if view.armed and not await self.ask("The vehicle is armed. Replace its mission?", "Replace"):
+            return
+        said = await self.run_job("uploading", partial(self._upload, plan=plan))
+        if said is not None:
+            self.draft = self.draft.uploaded() if self.draft.to_upload() == plan else self.draft
+            watch_app(self).plans.reload()
+            watch_app(self).feed.tell(said)
+            self._redraw()
+
+    def _upload(self, connection: Connection, plan: Plan) -> str:
+        uploads = Uploads(connection.session, plan, restores=True, interrupted=lambda: self._note(uploads))
+        plan_transfers.complete_upload(connection, uploads, "the edited plan")
+        self.show_progress(0, 0)
+        return f"uploaded: {self._compare(connection, plan)}"
+
+    def _note(self, uploads: Uploads) -> str:
+        self.show_progress(*uploads.progress)
+        return ""
+
+    def _compare(self, connection: Connection, plan: Plan) -> str:
+        """Return the parts that are equal on the vehicle; raise CliError with the differences."""
+        differing, equal = plan_transfers.compare_with_vehicle(connection, plan)
+        if differing:
+            lines = [f"{part.name}: {difference.sentence}" for part, difference in differing]
+            raise CliError(f"the vehicle's plan differs: {some_of(lines)}")
+        return ", ".join(f"{part.name} of {len(part.items)} items equal" for part in equal)
+
+    @work
+    async def action_verify(self) -> None:
+        """Compare the vehicle's plan with the list."""
+        plan = self.draft.to_upload()
+        said = await self.run_job("reading back", lambda connection: self._compare(connection, plan))
+        if said is not None:
+            watch_app(self).feed.tell(f"verified: {said}")
+
+    @work
+    async def action_download(self) -> None:
+        """Show the vehicle's plan; drop the edits."""
+        if await self._may_drop():
+            self.draft = MissionDraft()
+            watch_app(self).plans.reload()
+
+    async def _control(self, doing: str, job: Callable[[Connection], str]) -> None:
+        said = await self.run_job(doing, job)
+        if said is not None:
+            watch_app(self).feed.tell(said)
+
+    @work
+    async def action_jump(self) -> None:
+        """Make the selected item the current one."""
+        seq = self.rows.cursor
+        name = any_command_name(self.items[seq].command)
+        if watch_app(self).feed.view.armed and not await self.ask(f"Fly to item {seq} ({name})?", "Jump"):
+            return
+
+        def job(connection: Connection) -> str:
+            mission_control.jump(connection, seq)
+            return f"item {seq} is the current one"
+
+        await self._control(f"jumping to item {seq}", job)
+
+    @work
+    async def action_pause(self) -> None:
+        """Hold the position."""
+
+        def job(connection: Connection) -> str:
+            seq = mission_control.pause(connection)
+            return "mission paused" if seq is None else f"mission paused at item {seq}"
+
+        await self._control("pausing", job)
+
+    @work
+    async def action_start(self) -> None:
+        """Start the mission on the ground, or resume it in the air."""
+        view = watch_app(self).feed.view
+        if view.armed:
+
+            def resume(connection: Connection) -> str:
+                seq = mission_control.resume(connection)
+                return "mission resumed" if seq is None else f"mission resumed at item {seq}"
+
+            await self._control("resuming", resume)
+        elif await self.ask("Start the mission? The vehicle arms and takes off.", "Start"):
+
+            def start(connection: Connection) -> str:
+                mission_control.start(connection)
+                return "mission started"
+
+            await self._control("starting", start)
