@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+
+from gcs_cli.actions.action import Action
 from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.history import History
 from gcs_cli.tui.message_log import MessageLog
@@ -13,6 +16,9 @@ class StillFeed(Feed):
         self.history = history or History()
         self.messages = MessageLog()
         self.messages.follow(view)
+        self.notices = deque()
+        self.actions: list[Action] = []
+        """Actions that the user asked for."""
         self.error = None
         self.shown = view
         self.time_s = now_s
@@ -28,6 +34,9 @@ class StillFeed(Feed):
     @property
     def link_name(self) -> str:
         return "UDP 127.0.0.1:14550"
+
+    def act(self, action: Action) -> None:
+        self.actions.append(action)
 
     def start(self) -> None:
         """Nothing runs."""
