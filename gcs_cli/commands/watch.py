@@ -101,7 +101,14 @@ def _print_once(connection: Connection, screen: str) -> None:
 
     def is_full() -> bool:
         view = connection.session.view
-        known = (view.attitude, view.position_ned_m, view.geo, view.mission.current, view.battery, view.gnss)
+        known = (
+            view.attitude,
+            view.position_ned_m,
+            view.geo,
+            view.mission.current,
+            view.battery,
+            view.timing,
+        )
         return all(part is not None for part in known)
 
     print_once(feed, screen, shutil.get_terminal_size(), is_full, GATHER_S)

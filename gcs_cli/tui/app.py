@@ -80,6 +80,7 @@ class WatchApp(App[None]):
         """Start the link and the redrawing; end in order if the terminal or the system asks for it."""
         for number in _ENDING_SIGNALS:
             asyncio.get_running_loop().add_signal_handler(number, self.exit)
+        self.app_resume_signal.subscribe(self, lambda _app: self.refresh())  # after Ctrl-Z and fg
         self.feed.start()
         self.switch_mode(self._first_mode)
         self.set_interval(1 / REDRAWS_HZ, self.redraw)
