@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -34,3 +36,12 @@ def plain(value: Any) -> Any:
         listed = value.tolist() if hasattr(value, "tolist") else value
         return [plain(entry) for entry in listed] if isinstance(listed, Sequence) else plain(listed)
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def can_draw() -> bool:
+    """Return True if the output is a terminal that can draw, or a browser of textual-serve."""
+    if "TEXTUAL_DRIVER" in os.environ:
+        return True
+    return (
+        sys.stdout is not None and sys.stdout.isatty() and os.environ.get("TERM") not in ("dumb", "unknown")
+    )

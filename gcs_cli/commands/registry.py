@@ -8,6 +8,7 @@ import typer
 
 from flightstack.process.command_line import HELP_FLAGS, make_app
 from gcs_cli.lazy_group import LazyCommand, LazyGroup
+from gcs_cli.output import can_draw
 
 _ACTIONS = "gcs_cli.commands.actions"
 _MISSION = "gcs_cli.commands.mission"
@@ -48,11 +49,15 @@ class GcsGroup(LazyGroup):
         "reboot": LazyCommand(_ACTIONS, "Reboot the vehicle, which must be on the ground."),
         "wait": LazyCommand("gcs_cli.commands.wait", "Wait until the vehicle is in a state."),
         "status": LazyCommand("gcs_cli.commands.status", "Show the state of the vehicle."),
-        "watch": LazyCommand("gcs_cli.commands.watch", "Watch the vehicle; q or Ctrl-C ends."),
+        "watch": LazyCommand("gcs_cli.commands.watch", "Watch and command the vehicle; q or Ctrl-C ends."),
         "perf": LazyCommand("gcs_cli.commands.perf", "Show the timing of the flight stack's loops."),
         "replay": LazyCommand("gcs_cli.commands.replay", "Draw a flight: pictures, a film, or a window."),
         "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),
     }
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Insert ``watch`` if nothing is given in a terminal."""
+        return super().parse_args(ctx, args or (["watch"] if can_draw() else []))
 
 
 class MissionGroup(LazyGroup):

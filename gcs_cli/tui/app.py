@@ -1,26 +1,36 @@
-"""The application of ``gcs watch``: screens by key, redrawing, and the thread of the link."""
+"""The application of ``gcs watch``: screens by key, redrawing, and what the user asks of the vehicle."""
 
 from __future__ import annotations
 
+import asyncio
+import signal
 from collections.abc import Callable, Iterable
-from typing import Any, ClassVar
+from functools import partial
+from typing import Any, ClassVar, Literal
 
+from textual import work
 from textual.app import App, SystemCommand
 from textual.binding import Binding
 from textual.screen import Screen
 
+from flightstack.core.enums import Severity
+from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.feed import Feed
+from gcs_cli.tui.order_form import OrderForm
+from gcs_cli.tui.orders import ORDERS, action_of, order_named
 from gcs_cli.tui.palette import Palette, palette_of
 from gcs_cli.tui.plot_fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.themes import THEMES
+from gcs_cli.tui.vehicle_list import ALL, VehicleList
 from gcs_cli.tui.watch_screen import WatchScreen
 
 REDRAWS_HZ = 8.0
+_ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class WatchApp(App[None]):
-    """Shows the vehicle of ``feed`` until the user quits."""
+    """Shows the vehicles of ``feed`` until the user quits, or the link fails: then ``feed.error`` is set."""
 
     TITLE = "gcs watch"
     CSS_PATH = "watch.tcss"
@@ -34,19 +44,31 @@ class WatchApp(App[None]):
             Binding(entry.key, f"app.switch_mode('{entry.mode}')", entry.title, show=False)
             for entry in SCREENS
         ),
+        *(
+            Binding(order.key, f"order('{order.name}')", order.title, show=order.in_footer)
+            for order in ORDERS
+        ),
+        Binding("v", "vehicles", "Vehicles"),
+        Binding("left_square_bracket", "next_vehicle(-1)", "Previous vehicle", show=False),
+        Binding("right_square_bracket", "next_vehicle(1)", "Next vehicle", show=False),
+        Binding("question_mark", "keys", "Keys"),
         Binding("ctrl+p", "command_palette", "Commands", priority=True),
+        Binding("ctrl+z", "suspend_process", "Suspend", show=False),
         Binding("q", "quit", "Quit"),
+        Binding("ctrl+c", "quit", "Quit", show=False, priority=True),
     ]
 
-    def __init__(self, feed: Feed) -> None:
+    def __init__(self, feed: Feed, mode: str = SCREENS[0].mode) -> None:
         super().__init__()
         self.feed = feed
         self.plot_fields = PlotFields()
+        self._first_mode = mode
         self.redraws = 0
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = THEMES[0].name
         self._palette: tuple[str, Palette] | None = None
+        self._state: tuple[object, ...] = ()
 
     @property
     def palette(self) -> Palette:
@@ -57,8 +79,12 @@ class WatchApp(App[None]):
         return self._palette[1]
 
     def on_mount(self) -> None:
-        """Start the link and the redrawing."""
+        """Start the link and the redrawing; end in order if the terminal or the system asks for it."""
+        for number in _ENDING_SIGNALS:
+            asyncio.get_running_loop().add_signal_handler(number, self.exit)
+        self.app_resume_signal.subscribe(self, lambda _app: self.refresh())  # after Ctrl-Z and fg
         self.feed.start()
+        self.switch_mode(self._first_mode)
         self.set_interval(1 / REDRAWS_HZ, self.redraw)
 
     def on_unmount(self) -> None:
@@ -66,21 +92,86 @@ class WatchApp(App[None]):
         self.feed.stop()
 
     def redraw(self) -> None:
-        """Draw the newest state on the visible screen; raise the error that ended the link."""
+        """Draw the newest state on the visible screen; end if the link failed."""
         if self.feed.error is not None:
-            raise self.feed.error
+            self.exit(return_code=1)
+            return
+        view = self.feed.view
+        while self.feed.notices:
+            notice = self.feed.notices.popleft()
+            self.notify(notice.text, severity=_toast_severity(notice.severity), markup=False)
+        state = (view.identity, view.armed, view.landed_state, len(self.feed.views))
+        if state != self._state:  # other keys work
+            self._state = state
+            self.refresh_bindings()
         screen = next(iter(self._screen_stack), None)  # empty while the application ends
         if isinstance(screen, WatchScreen):
-            screen.show(self.feed.view, self.feed.now_s)
+            screen.show(view, self.feed.now_s)
             self.redraws += 1
+
+    # -- what the user asks of the vehicle
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Return False for keys that have no effect now."""
+        if action == "order":
+            view = self.feed.view
+            return view.identity is not None and order_named(str(parameters[0])).applies(view)
+        if action in ("vehicles", "next_vehicle"):
+            return len(self.feed.views) > 1
+        return True
+
+    @work(exclusive=True, group="order")
+    async def action_order(self, name: str) -> None:
+        """Ask for the values of an order, and for its confirmation if it is dangerous; then perform it."""
+        order, view = order_named(name), self.feed.view
+        values: list[Any] | None = []
+        if order.fields:
+            values = await self.push_screen_wait(OrderForm(order, view))
+        if values is None:
+            return
+        question = order.question(view)
+        if question and not await self.push_screen_wait(Confirm(question, order.title)):
+            return
+        self.feed.act(action_of(order, values, self.feed.view))
+
+    @work(exclusive=True, group="vehicles")
+    async def action_vehicles(self) -> None:
+        """Select the vehicle to show and to command, or all for commands."""
+        chosen = await self.push_screen_wait(VehicleList(self.feed.views, self.feed.now_s))
+        if chosen is not None:
+            self.feed.select(None if chosen == ALL else chosen)
+
+    def action_next_vehicle(self, step: int) -> None:
+        """Select the next vehicle by system id."""
+        ids = [view.identity.system_id for view in self.feed.views if view.identity is not None]
+        current = self.feed.view.identity
+        if current is not None and current.system_id in ids:
+            self.feed.select(ids[(ids.index(current.system_id) + step) % len(ids)])
+
+    def action_keys(self) -> None:
+        """Show or hide the panel of all keys."""
+        if self.screen.query("HelpPanel"):
+            self.action_hide_help_panel()
+        else:
+            self.action_show_help_panel()
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
         """Yield the entries of the command palette."""
+        for order in ORDERS:
+            if self.check_action("order", (order.name,)):
+                yield SystemCommand(
+                    order.title, f"{order.help} ({order.key})", partial(self.action_order, order.name)
+                )
         for entry in SCREENS:
             yield SystemCommand(
-                f"Show {entry.title}", f"{entry.summary} ({entry.key})", lambda m=entry.mode: self._open(m)
+                f"Show {entry.title}", f"{entry.summary} ({entry.key})", partial(self.switch_mode, entry.mode)
             )
+        if len(self.feed.views) > 1:
+            yield SystemCommand("Vehicles", "Select a vehicle, or all (v)", self.action_vehicles)
         yield from super().get_system_commands(screen)
 
-    def _open(self, mode: str) -> None:
-        self.switch_mode(mode)
+
+def _toast_severity(severity: int) -> Literal["information", "warning", "error"]:
+    if severity > Severity.WARNING:
+        return "information"
+    return "warning" if severity == Severity.WARNING else "error"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from typing import TYPE_CHECKING, TypeAlias, cast
 
 from rich.segment import Segment
@@ -39,6 +39,7 @@ class Drawing(Widget):
         self._draw = draw
         self._lines: list[Text] = []
         self._strips: list[Strip] = []
+        self._background = Style()
         self.border_title = title or None
 
     def show(self, view: VehicleView, now_s: float) -> None:
@@ -47,6 +48,9 @@ class Drawing(Widget):
         if width <= 0 or height <= 0:
             return
         lines = self._draw(view, now_s, width, height, watch_app(self).palette)
+        background = self.rich_style
+        if background != self._background:
+            self._background, self._lines, self._strips = background, [], []
         strips = []
         changed = []
         for y, (new, old) in enumerate(zip_longest(lines, self._lines)):
@@ -55,7 +59,7 @@ class Drawing(Widget):
                 continue
             changed.append(Region(0, y, width, 1))
             if new is not None:
-                strips.append(strip_of(new).adjust_cell_length(width))
+                strips.append(strip_of(new, background).adjust_cell_length(width, background))
         self._lines, self._strips = lines, strips
         if changed:
             self.refresh(*changed)
@@ -67,27 +71,28 @@ class Drawing(Widget):
 
     def render_line(self, y: int) -> Strip:
         """Return a line of the content."""
-        return self._strips[y] if y < len(self._strips) else Strip.blank(self.content_size.width)
+        return (
+            self._strips[y]
+            if y < len(self._strips)
+            else Strip.blank(self.content_size.width, self.rich_style)
+        )
 
 
-def strip_of(line: Text) -> Strip:
-    """Return the segments of a line, whose spans are in order and do not overlap, as ``append`` makes them."""
-    plain, base = line.plain, style_of(line.style)
-    segments, at = [], 0
-    for start, end, style in line.spans:
-        if start > at:
-            segments.append(Segment(plain[at:start], base))
-        segments.append(Segment(plain[max(at, start) : end], base + style_of(style)))
-        at = max(at, end)
-    if at < len(plain):
-        segments.append(Segment(plain[at:], base))
-    return Strip([segment for segment in segments if segment.text])
+def strip_of(line: Text, base: Style) -> Strip:
+    """Return the segments of a line over the style ``base``; a later span covers an earlier one."""
+    plain, spans = line.plain, line.spans
+    edges = sorted({0, len(plain), *(span.start for span in spans), *(span.end for span in spans)})
+    segments = []
+    for start, end in pairwise(edge for edge in edges if edge <= len(plain)):
+        styles = [span.style for span in spans if span.start <= start and span.end >= end]
+        segments.append(Segment(plain[start:end], _combined(base, line.style, *styles)))
+    return Strip(segments)
 
 
 @cache
-def style_of(style: str | Style) -> Style:
-    """Return rich's style of a description such as ``bold red``."""
-    return Style.parse(style) if isinstance(style, str) else style
+def _combined(base: Style, *styles: str | Style) -> Style:
+    parsed = (Style.parse(style) if isinstance(style, str) else style for style in styles)
+    return sum(parsed, start=base)
 
 
 def watch_app(node: Widget) -> WatchApp:

@@ -6,35 +6,58 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
+from flightstack.core.enums import Severity
 from flightstack.mavlink.link import Message
+from gcs_cli.actions.action import Action
+from gcs_cli.actions.run import ActionRun, Outcome, Result
 from gcs_cli.link.connection import Connection
+from gcs_cli.link.session import Session
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.tui.history import History
 from gcs_cli.tui.message_log import MessageLog
 from gcs_cli.vehicle.view_types import VehicleView
 
-Result = TypeVar("Result")
+Value = TypeVar("Value")
 
 GATHER_S = 0.02
 """Messages are received in batches of this time, except during a job: one wake-up costs as much as one message."""
 _STEP_S = 0.05
+_JOIN_S = 1.0
+"""Longest wait for a job at the end."""
+
+
+class Notice(NamedTuple):
+    """A line to show for a moment: the progress or the end of an action."""
+
+    text: str
+    severity: int
+
+
+class _Running(NamedTuple):
+    session: Session
+    run: ActionRun
+    is_announced: bool = False
 
 
 class Feed:
     """Runs ``connection`` in a thread between ``start`` and ``stop``.
 
-    Only this thread uses the connection: a screen that exchanges messages gives a job to ``submit``.
+    Only this thread uses the connection: a screen that exchanges messages gives a job to ``submit``, and an action to
+    ``act``.
     """
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self.history = History()
         self.messages = MessageLog()
+        self.notices: deque[Notice] = deque(maxlen=20)
+        """Lines for the user, which the application takes."""
         self.error: Exception | None = None
         """Error that ended the thread."""
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
+        self._running: dict[int, _Running] = {}
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -70,13 +93,23 @@ class Feed:
         """End the thread; pending jobs are cancelled."""
         self._stopping.set()
         if self._thread is not None:
-            self._thread.join()
+            self._thread.join(_JOIN_S)
 
-    def submit(self, job: Callable[[Connection], Result]) -> Future[Result]:
+    def submit(self, job: Callable[[Connection], Value]) -> Future[Value]:
         """Run ``job`` in the thread of the link; messages are received while it waits on the connection."""
-        future: Future[Result] = Future()
+        future: Future[Value] = Future()
         self._jobs.append((job, future))
         return future
+
+    def act(self, action: Action) -> None:
+        """Perform ``action``; the answer and the effect become notices and messages.
+
+        A new action ends the wait for the effect of the former one.
+        """
+        self.submit(lambda connection: self._begin(action, connection.session))
+
+    def select(self, system_id: int | None) -> None:
+        """Show and command the vehicle with this system id; None: command all."""
 
     def _observe(self, message: Message) -> None:
         self.history.record(message, self.now_s)
@@ -89,6 +122,8 @@ class Feed:
                 self._connection.step(self.now_s + _STEP_S)
                 for view in self.views:
                     self.messages.follow(view)
+                for system_id in list(self._running):
+                    self._follow(system_id)
         except Exception as error:
             self.error = error
         finally:
@@ -103,4 +138,44 @@ class Feed:
         except Exception as error:
             future.set_exception(error)
         finally:
-            self._connection.session.subscribe(ROTORS_AND_TIMING)
+            if not self._running:
+                self._connection.session.subscribe(ROTORS_AND_TIMING)
+
+    def _begin(self, action: Action, session: Session) -> None:
+        former = self._running.pop(session.target[0], None)
+        if former is not None:
+            self._say(former.session, f"{former.run.action.name}: no longer followed", Severity.NOTICE)
+        run = ActionRun(action, lambda: session.view, self.now_s, session.own)
+        session.use(run)
+        self._running[session.target[0]] = _Running(session, run)
+
+    def _follow(self, system_id: int) -> None:
+        """Report the answer of the vehicle, then the effect."""
+        session, run, is_announced = self._running[system_id]
+        if run.result is not None:
+            del self._running[system_id]
+            session.subscribe(ROTORS_AND_TIMING)
+            self._say(session, result_text(run.action, run.result), severity_of(run.result))
+        elif run.acknowledged and not is_announced:
+            self._running[system_id] = _Running(session, run, is_announced=True)
+            self._say(session, f"accepted: {run.action.doing}", Severity.NOTICE)
+
+    def _say(self, session: Session, text: str, severity: Severity) -> None:
+        self.messages.say(session.view, text, severity)
+        self.notices.append(Notice(text, severity))
+
+
+def result_text(action: Action, result: Result) -> str:
+    """Return how an action ended, and when its effect was seen."""
+    if result.outcome is Outcome.DONE:
+        return f"{result.sentence} after {result.elapsed_s:.1f} s"
+    if result.outcome is Outcome.ACKNOWLEDGED:
+        return f"accepted: {action.doing}"
+    return result.sentence
+
+
+def severity_of(result: Result) -> Severity:
+    """Return the severity of the end of an action."""
+    if result.ok:
+        return Severity.NOTICE
+    return Severity.WARNING if result.outcome is Outcome.ENDED else Severity.ERROR

@@ -49,7 +49,13 @@ def _failsafe(view: VehicleView, colours: Palette) -> Text:
     if not view.in_failsafe:
         return row_of("failsafe", "none active", colours.good, colours)
     reasons = [entry.text for entry in view.texts if entry.severity <= Severity.WARNING]
-    state = "flight terminated" if view.terminated else reasons[-1] if reasons else "active"
+    state = (
+        "flight terminated"
+        if view.terminated
+        else reasons[-1].removeprefix("Failsafe: ")
+        if reasons
+        else "active"
+    )
     return row_of("failsafe", state, f"bold {colours.bad}", colours)
 
 

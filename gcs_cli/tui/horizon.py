@@ -49,7 +49,7 @@ def _pixels(attitude: Euler | None, width: int, rows: int) -> _Codes:
     along = np.abs(right * cos_roll + up * sin_roll)
     elevation = up * cos_roll - right * sin_roll + math.degrees(attitude.pitch_rad)
     step = np.round(elevation / _LADDER_STEP_DEG) * _LADDER_STEP_DEG
-    near = np.abs(elevation - step) < scale / 2
+    near = (elevation - step >= -scale / 2) & (elevation - step < scale / 2)
     codes = np.where(elevation > 0.0, _SKY_CODE, _GROUND_CODE).astype(np.uint8)
     codes[near & (along < np.where(step % 20, _SHORT_DEG, _LONG_DEG))] = _LADDER_CODE
     codes[near & (step == 0.0)] = _LINE_CODE

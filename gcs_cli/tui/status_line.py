@@ -21,6 +21,8 @@ def status_line(view: VehicleView, now_s: float, width: int, _height: int, colou
     left.append(f" {view.mode or 'unknown mode'} ", f"bold {colours.background} on {colours.accent}")
     armed = colours.bad if view.armed else colours.good
     left.append(" ARMED " if view.armed else " DISARMED ", f"bold {colours.background} on {armed}")
+    if view.in_failsafe:
+        left.append(" FAILSAFE ", f"bold {colours.background} on {colours.warning}")
     parts = [
         (f" {_LANDED.get(view.landed_state, '')}", colours.text),
         (f"  {view.identity.kind} {view.identity.system_id}", colours.muted),

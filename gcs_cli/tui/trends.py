@@ -48,16 +48,16 @@ def trends_panel(
     if not known:
         return [Text("no telemetry yet", colours.muted)]
     shown = known[: max(1, height // 3)]
-    rows = max(1, min(6, height // len(shown) - 1))
+    rows, rest = divmod(height, len(shown))
     lines: list[Text] = []
-    for trend, found in shown:
+    for index, (trend, found) in enumerate(shown):
         values = found.values * trend.factor
         columns = _columns(found.times_s, values, now_s, width)
         low, high = _range(columns, trend.smallest_span)
         title = Text(f"{trend.title} ", colours.muted, no_wrap=True)
         title.append(f"{number(float(values[-1]), 1)} {trend.unit}", f"bold {colours.text}")
         title.append(f"  {number(low, 1)} to {number(high, 1)}", colours.muted)
-        lines += [title, *curve(columns, low, high, rows, colours.accent)]
+        lines += [title, *curve(columns, low, high, max(1, rows - 1 + (index < rest)), colours.sky)]
     return lines[:height]
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
+from gcs_cli.actions.action import Action
 from gcs_cli.link.connection import Connection
 from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.history import History
@@ -18,6 +20,9 @@ class StillFeed(Feed):
         self.history = history or History()
         self.messages = MessageLog()
         self.messages.follow(view)
+        self.notices = deque()
+        self.actions: list[Action] = []
+        """Actions that the user asked for."""
         self.error = None
         self.shown = view
         self.time_s = now_s
@@ -39,6 +44,9 @@ class StillFeed(Feed):
     def submit(self, job: Callable[[Connection], Any]) -> Future[Any]:
         self.jobs.append((job, Future()))
         return self.jobs[-1][1]
+
+    def act(self, action: Action) -> None:
+        self.actions.append(action)
 
     def start(self) -> None:
         """Nothing runs."""

@@ -75,7 +75,7 @@ def test_a_panel_shows_all_known_values(panel: Draw, parts: list[str]) -> None:
 
 def test_an_active_failsafe_is_shown_with_its_reason() -> None:
     text = drawn(health_panel, FAILING)
-    assert "Failsafe: battery critical" in text
+    assert "battery critical, return" in text
     for part in ("no fix", "no velocity, position", "ratio 1.70", "bad: gps, 3d mag"):
         assert part in text
 
@@ -100,6 +100,11 @@ def test_real_time_shows_lateness_and_missed_deadlines() -> None:
     text = drawn(timing_panel, FULL._replace(timing=TIMING._replace(lockstep=False)), height=3)
     assert "late 4/5/6" in text
     assert "missed 2" in text
+
+
+def test_an_active_failsafe_is_on_every_screen() -> None:
+    assert "FAILSAFE" in drawn(status_line, FAILING, 80)
+    assert "FAILSAFE" not in drawn(status_line, FULL, 80)
 
 
 def test_a_lost_vehicle_is_shown() -> None:

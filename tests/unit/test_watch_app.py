@@ -3,40 +3,247 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 
 import pytest
+from textual.pilot import Pilot
 
+from flightstack.core.enums import Severity
 from gcs_cli.tui.app import WatchApp
-from gcs_cli.tui.screens import SCREENS
+from gcs_cli.tui.feed import Notice
+from gcs_cli.tui.orders import ORDERS, Field, FieldError
+from gcs_cli.tui.screens import SCREENS, ScreenEntry
+from gcs_cli.vehicle.view_types import VehicleView
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.support.watch_states import FULL
+from tests.support.watch_states import BARE, FULL
+
+GROUNDED = FULL._replace(armed=False, landed_state=1)
+Story = Callable[[WatchApp, Pilot], Awaitable[None]]
+
+
+def play(story: Story, view: VehicleView = FULL, size: tuple[int, int] = (80, 24)) -> StillFeed:
+    """Run the application with ``story``; return its feed."""
+    feed = StillFeed(view)
+
+    async def run() -> None:
+        app = WatchApp(feed)
+        async with app.run_test(size=size, notifications=True) as pilot:
+            await pilot.pause()
+            await story(app, pilot)
+
+    asyncio.run(run())
+    return feed
+
+
+def asked(feed: StillFeed) -> list[str]:
+    return [action.name for action in feed.actions]
 
 
 @pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.mode)
-def test_a_digit_opens_a_screen(entry: object) -> None:
-    async def run() -> None:
-        app = WatchApp(StillFeed(FULL))
-        async with app.run_test() as pilot:
-            await pilot.press(entry.key)
-            await pilot.pause()
-            assert app.current_mode == entry.mode
-            assert f"{entry.key} {entry.title}" in shown(app)[1]
-            assert shown(app)[-1].endswith("q Quit")
+def test_a_digit_opens_a_screen(entry: ScreenEntry) -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press(entry.key)
+        await pilot.pause()
+        assert app.current_mode == entry.mode
+        assert f"{entry.key} {entry.title}" in shown(app)[1]
+        assert shown(app)[-1].endswith("q Quit")
 
-    asyncio.run(run())
+    play(story, size=(120, 24))
 
 
 @pytest.mark.parametrize("entry", SCREENS, ids=lambda entry: entry.mode)
 @pytest.mark.parametrize("size", [(20, 5), (80, 24), (200, 50)], ids=str)
-def test_every_screen_survives_any_size(entry: object, size: tuple[int, int]) -> None:
-    async def run() -> None:
-        app = WatchApp(StillFeed(FULL))
-        async with app.run_test(size=size) as pilot:
-            await pilot.press(entry.key)
-            await pilot.resize_terminal(20, 5)
-            await pilot.resize_terminal(*size)
-            await pilot.pause()
-            assert len(shown(app)) == size[1]
+def test_every_screen_survives_any_size(entry: ScreenEntry, size: tuple[int, int]) -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press(entry.key)
+        await pilot.resize_terminal(20, 5)
+        await pilot.resize_terminal(*size)
+        await pilot.pause()
+        assert len(shown(app)) == size[1]
 
-    asyncio.run(run())
+    play(story, size=size)
+
+
+def test_a_click_on_a_tab_opens_its_screen() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        at = shown(app)[1].index("Messages")
+        await pilot.click("#tabs", offset=(at, 0))
+        await pilot.pause()
+        assert app.current_mode == "messages"
+
+    play(story, size=(120, 24))
+
+
+def test_waiting_for_a_vehicle_names_the_link() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        text = "\n".join(shown(app))
+        assert "Waiting for a vehicle's heartbeat" in text
+        assert "UDP 127.0.0.1:14550" in text
+        assert "Arm" not in shown(app)[-1]
+
+    play(story, VehicleView())
+
+
+def test_the_footer_shows_the_keys_that_work_now() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        assert all(word in shown(app)[-1] for word in ("D Disarm", "L Land", "R Return", "H Hold"))
+        assert "Take off" not in shown(app)[-1]
+        app.feed.shown = GROUNDED
+        app.redraw()
+        await pilot.pause()
+        assert all(word in shown(app)[-1] for word in ("A Arm", "T Take off"))
+        assert "Land" not in shown(app)[-1]
+
+    play(story, size=(120, 24))
+
+
+def test_a_safe_order_is_performed_at_once() -> None:
+    async def story(_app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("H")
+        await pilot.pause()
+
+    assert asked(play(story)) == ["hold"]
+
+
+@pytest.mark.parametrize(
+    ("key", "view", "name"), [("A", GROUNDED, "arm"), ("D", FULL, "disarm"), ("X", FULL, "terminate")]
+)
+def test_a_dangerous_order_asks_first(key: str, view: VehicleView, name: str) -> None:
+    async def refuse(_app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press(key)
+        await pilot.pause()
+        await pilot.press("enter")  # the harmless answer is selected
+        await pilot.pause()
+
+    async def confirm(_app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press(key)
+        await pilot.pause()
+        await pilot.press("y")
+        await pilot.pause()
+
+    assert asked(play(refuse, view)) == []
+    assert asked(play(confirm, view)) == [name]
+
+
+def test_a_disarm_on_the_ground_does_not_ask() -> None:
+    async def story(_app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("D")
+        await pilot.pause()
+
+    feed = play(story, FULL._replace(landed_state=1))
+    assert feed.actions[0].facts == {"force": False}
+
+
+def test_a_form_asks_for_values_and_names_what_is_wrong() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("T")
+        await pilot.pause()
+        await pilot.press("backspace", *"high", "enter")
+        await pilot.pause()
+        assert "altitude: high is not a number" in "\n".join(shown(app))
+        await pilot.press(*["backspace"] * 4, *"12", "enter")
+        await pilot.pause()
+
+    feed = play(story, GROUNDED)
+    assert [action.facts for action in feed.actions] == [{"altitude_m": 12.0}]
+
+
+def test_escape_leaves_a_form_without_an_order() -> None:
+    async def story(_app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("G")
+        await pilot.pause()
+        await pilot.press("4", "escape")
+        await pilot.pause()
+
+    assert asked(play(story)) == []
+
+
+def test_orders_are_in_the_command_palette() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("ctrl+p")
+        await pilot.pause()
+        await pilot.press(*"hold")
+        await pilot.pause(0.5)
+        await pilot.press("enter", "enter")
+        await pilot.pause()
+
+    assert asked(play(story)) == ["hold"]
+
+
+def test_notices_become_toasts() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.notices.append(Notice("takeoff refused: no home position", Severity.ERROR))
+        app.redraw()
+        await pilot.pause()
+        assert "no home position" in "\n".join(shown(app))
+
+    play(story, size=(120, 40))
+
+
+def test_keys_without_a_vehicle_do_nothing() -> None:
+    async def story(_app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("L", "H", "X", "y")
+        await pilot.pause()
+
+    assert asked(play(story, VehicleView())) == []
+
+
+def test_a_lost_link_ends_the_application() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.error = OSError("gone")
+        app.redraw()
+        await pilot.pause()
+        assert app.return_code == 1
+
+    play(story)
+
+
+def test_messages_are_filtered_by_severity_and_searched() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await pilot.press("5")
+        await pilot.pause()
+        assert "text number 7" in "\n".join(shown(app))
+        await pilot.press("s", "s")
+        await pilot.pause()
+        text = "\n".join(shown(app))
+        assert "warnings and worse: 5 of 8" in text
+        assert "text number 5" not in text
+        await pilot.press("slash", *"number 2")
+        await pilot.pause()
+        text = "\n".join(shown(app))
+        assert "1 of 8" in text
+        assert "text number 3" not in text
+        await pilot.press("escape")
+        await pilot.pause()
+        assert "5 of 8" in "\n".join(shown(app))
+
+    play(story)
+
+
+def test_keys_of_orders_and_screens_are_unique() -> None:
+    keys = [order.key for order in ORDERS] + [entry.key for entry in SCREENS]
+    assert len(keys) == len(set(keys))
+    assert all(order.key.isupper() for order in ORDERS)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("", "altitude: give a value"), ("x", "altitude: x is not a number"), ("99", "altitude: give 1 to 9")],
+)
+def test_a_field_names_an_invalid_value(text: str, said: str) -> None:
+    with pytest.raises(FieldError, match=said):
+        Field("altitude", smallest=1.0, largest=9.0).parse(text, BARE)
+
+
+def test_a_theme_changes_the_colours_of_drawings() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        dark = app.palette
+        app.theme = "gcs-light"
+        await pilot.pause()
+        assert app.palette.background != dark.background
+        app.theme = "nord"
+        await pilot.pause()
+        assert app.palette.text.startswith("#")
+
+    play(story)
