@@ -168,3 +168,11 @@ def reboot() -> Action:
         )
 
     return Action("reboot", plan, "rebooting", "rebooted")
+
+
+def set_message_rate(message_id: int, name: str, rate_hz: float | None) -> Action:
+    """Request a message at a rate; 0 stops it, None is the vehicle's default. No vehicle reports the effect."""
+    rate = "its default rate" if rate_hz is None else f"{rate_hz:g} Hz" if rate_hz else "no rate: stopped"
+    step = Step(f"rate of {name}", common_commands.message_interval(message_id, rate_hz), None)
+    facts = {"message": name, "rate_hz": rate_hz}
+    return Action("message rate", lambda _view: (step,), f"{name} at {rate}", f"{name} at {rate}", facts)

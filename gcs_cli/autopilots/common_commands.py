@@ -61,6 +61,12 @@ def request_message(message_id: int, parameter: float = 0.0) -> VehicleCommand:
     return VehicleCommand(mavlink.MAV_CMD_REQUEST_MESSAGE, (float(message_id), parameter))
 
 
+def message_interval(message_id: int, rate_hz: float | None) -> VehicleCommand:
+    """Return the request for a stream; a rate of 0 stops it, None is the vehicle's default."""
+    interval_us = 0.0 if rate_hz is None else 1e6 / rate_hz if rate_hz > 0.0 else -1.0
+    return VehicleCommand(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, (float(message_id), interval_us))
+
+
 def custom_mode(*numbers: float) -> VehicleCommand:
     """Return DO_SET_MODE with the custom mode, or PX4's main and sub mode."""
     return VehicleCommand(mavlink.MAV_CMD_DO_SET_MODE, (_CUSTOM_MODE, *numbers))

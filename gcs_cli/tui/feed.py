@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any, NamedTuple, TypeVar
 
@@ -58,6 +58,7 @@ class Feed:
         """Error that ended the thread."""
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
         self._running: dict[int, _Running] = {}
+        self._rates_hz: Mapping[int, float] = ROTORS_AND_TIMING
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -85,7 +86,7 @@ class Feed:
         """Start to receive."""
         session = self._connection.session
         session.observe = self._observe
-        session.subscribe(ROTORS_AND_TIMING)
+        self._subscribe(session)
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._thread.start()
 
@@ -108,8 +109,19 @@ class Feed:
         """
         self.submit(lambda connection: self._begin(action, connection.session))
 
+    def keep_rate(self, message_id: int, rate_hz: float | None) -> None:
+        """Request a stream again at this rate if it stops; not if the rate is 0 or None, the default."""
+        rates = {number: rate for number, rate in self._rates_hz.items() if number != message_id}
+        self._rates_hz = {**rates, message_id: rate_hz} if rate_hz else rates
+
     def select(self, system_id: int | None) -> None:
         """Show and command the vehicle with this system id; None: command all."""
+
+    def _subscribe(self, session: Session) -> None:
+        if self._rates_hz:
+            session.subscribe(self._rates_hz)
+        else:
+            session.use(None)
 
     def _observe(self, message: Message) -> None:
         self.history.record(message, self.now_s)
@@ -139,7 +151,7 @@ class Feed:
             future.set_exception(error)
         finally:
             if not self._running:
-                self._connection.session.subscribe(ROTORS_AND_TIMING)
+                self._subscribe(self._connection.session)
 
     def _begin(self, action: Action, session: Session) -> None:
         former = self._running.pop(session.target[0], None)
@@ -154,7 +166,7 @@ class Feed:
         session, run, is_announced = self._running[system_id]
         if run.result is not None:
             del self._running[system_id]
-            session.subscribe(ROTORS_AND_TIMING)
+            self._subscribe(session)
             self._say(session, result_text(run.action, run.result), severity_of(run.result))
         elif run.acknowledged and not is_announced:
             self._running[system_id] = _Running(session, run, is_announced=True)

@@ -20,6 +20,8 @@ MOST_STREAMS = 500
 """Message types kept; further ones, of garbage or of many vehicles, are not recorded."""
 _FIRST_ROWS = 256
 _RATE_WINDOW_S = 3.0
+_RATE_ROWS, _LEAST_RATE_ROWS = 3_000, 4
+_LEAST_SILENCE_S, _SILENT_PERIODS = 1.0, 3.0
 _TEXT_TYPES = ("char",)
 
 
@@ -62,6 +64,11 @@ class Stream:
         self.last = message
         self.count += 1
 
+    @property
+    def last_s(self) -> float:
+        """Time of the last message."""
+        return float(self._rows[(self.count - 1) % ROWS_KEPT, 0])
+
     def column(self, index: int) -> NDArray[np.float64]:
         """Return a copy of the times (column 0) or of a field, oldest first."""
         if self.count <= ROWS_KEPT:
@@ -70,11 +77,13 @@ class Stream:
         return np.concatenate((self._rows[at:, index], self._rows[:at, index]))
 
     def rate_hz(self, now_s: float) -> float:
-        """Return the rate over the last seconds."""
-        recent = self.column(0)[-3_000:]
-        started = recent[0] if len(recent) else now_s
-        window_s = min(_RATE_WINDOW_S, max(1.0, now_s - started))
-        return float(np.count_nonzero(recent > now_s - window_s)) / window_s
+        """Return the rate over the last seconds, of slow streams over the last periods; 0 if the stream stopped."""
+        times_s = self.column(0)[-_RATE_ROWS:]
+        first = min(int(np.searchsorted(times_s, now_s - _RATE_WINDOW_S)), len(times_s) - _LEAST_RATE_ROWS)
+        recent = times_s[max(0, first) :]
+        period_s = float(recent[-1] - recent[0]) / max(1, len(recent) - 1)
+        is_stopped = now_s - recent[-1] > max(_LEAST_SILENCE_S, _SILENT_PERIODS * period_s)
+        return 0.0 if is_stopped or period_s <= 0.0 else 1.0 / period_s
 
 
 def _numeric_fields(message: Message) -> tuple[list[str], list[tuple[str, int]], list[str]]:

@@ -102,7 +102,7 @@ class PlotScreen(WatchScreen):
         Binding("shift+left", "cursor(-10)", "Cursor far left", show=False),
         Binding("shift+right", "cursor(10)", "Cursor far right", show=False),
         Binding("escape", "hide_cursor", "Hide cursor", show=False),
-        Binding("c", "clear", "Clear"),
+        Binding("c", "clear", "Clear", show=False),
     ]
 
     def __init__(self, mode: str) -> None:

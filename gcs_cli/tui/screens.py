@@ -31,4 +31,11 @@ SCREENS = (
     ScreenEntry(
         "messages", "5", "Messages", "gcs_cli.tui.messages_screen:MessagesScreen", "texts of the vehicle"
     ),
+    ScreenEntry(
+        "inspector",
+        "6",
+        "Inspector",
+        "gcs_cli.tui.inspector_screen:InspectorScreen",
+        "every message with its fields",
+    ),
 )

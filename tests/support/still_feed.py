@@ -24,6 +24,7 @@ class StillFeed(Feed):
         self.actions: list[Action] = []
         """Actions that the user asked for."""
         self.error = None
+        self._rates_hz = {}
         self.shown = view
         self.time_s = now_s
         self.jobs: list[tuple[Callable[[Connection], Any], Future[Any]]] = []

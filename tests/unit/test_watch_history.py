@@ -73,3 +73,14 @@ def test_rate_falls_to_zero_when_a_stream_stops() -> None:
     (stream,) = history.streams(1)
     assert history.rate_hz(stream, 9.9) == pytest.approx(10.0, abs=0.4)
     assert history.rate_hz(stream, 20.0) == 0.0
+
+
+def test_rate_of_a_slow_stream_is_measured_between_its_messages() -> None:
+    history = History()
+    message = attitude(0.0)
+    for step in range(4):
+        history.record(message, 2.0 * step)
+        (stream,) = history.streams(1)
+        rates = [history.rate_hz(stream, 2.0 * step + late_s) for late_s in (0.0, 0.5, 1.9)]
+        assert rates == ([0.5] * 3 if step else [0.0] * 3)
+    assert history.rate_hz(stream, 13.0) == 0.0
