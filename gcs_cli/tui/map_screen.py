@@ -21,6 +21,9 @@ from gcs_cli.tui.plan_fetcher import PlanFetcher
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
 
+_EVERY = 2
+"""Drawn in one of so many redraws, and at once when the user moves the map."""
+
 
 class MapScreen(WatchScreen):
     """The map, and below it the legend and the place under the cursor."""
@@ -66,7 +69,7 @@ class MapScreen(WatchScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the map, and download the plans if they changed."""
         super().show(view, now_s)
-        if not self.query(MapWidget):  # resumed before it was composed
+        if not self.query(MapWidget) or watch_app(self).redraws % _EVERY:
             return
         history = watch_app(self).feed.history
         system_id = None if view.identity is None else view.identity.system_id

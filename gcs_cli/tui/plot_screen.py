@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -18,6 +19,11 @@ from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
 
 _SPANS_S = (5.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0)
+
+_EVERY = 2
+"""Drawn in one of so many redraws, and at once when the user moves the cursor."""
+
+_LONGEST_STEP_S = 1.0
 
 
 class PlotWidget(CanvasWidget):
@@ -38,6 +44,11 @@ class PlotWidget(CanvasWidget):
             return span
         gutter = gutter_of(self.curves, span, self.size.height)
         return span._replace(cursor_s=cell_time(self.cursor_column, span, gutter, self.size.width))
+
+    def step_end(self, now_s: float) -> float:
+        """Return the last whole step of the time axis: curves move by whole cells, so that they do not flicker."""
+        step_s = min(_LONGEST_STEP_S, _SPANS_S[self.span_index] / max(1, self.size.width))
+        return math.ceil(now_s / step_s) * step_s
 
     def redraw(self) -> None:
         """Draw the curves."""
@@ -126,14 +137,16 @@ class PlotScreen(WatchScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the curves up to now, unless paused."""
         super().show(view, now_s)
-        if not self._is_paused and self.query(PlotWidget):
+        if self._is_paused or not self.query(PlotWidget) or watch_app(self).redraws % _EVERY:
+            return
+        if self.plot.step_end(now_s) > self.plot.end_s or watch_app(self).redraws == 0:
             self._load()
 
     def _load(self) -> None:
         feed = watch_app(self).feed
         identity = feed.view.identity
         if not self._is_paused:
-            self.plot.end_s = feed.now_s
+            self.plot.end_s = max(self.plot.end_s, self.plot.step_end(feed.now_s))
         self.plot.curves = self.fields.curves(feed.history, None if identity is None else identity.system_id)
         self.plot.redraw()
 

@@ -39,9 +39,11 @@ def drive(
             screen = app.screen
             assert isinstance(screen, MapScreen)
             for items in PLANS:
+                app.redraws = 0
                 screen.show(view, 10.0)
                 if app.feed.jobs and not app.feed.jobs[-1][1].done():
                     app.feed.jobs[-1][1].set_result(items)
+            app.redraws = 0
             screen.show(view, 10.0)
             await pilot.pause()
             await story(pilot, app, screen)
@@ -147,12 +149,15 @@ def test_go_there_needs_a_place():
 def test_failed_download_is_shown_below_the_map():
     async def story(pilot, app, screen):
         await pilot.press("u")
+        app.redraws = 0
         screen.show(VIEW, 10.0)
         app.feed.jobs[-1][1].set_exception(CliError("download of the mission: no answer", FAILED))
         for _ in range(3):
+            app.redraws = 0
             screen.show(VIEW, 10.0)
             if not app.feed.jobs[-1][1].done():
                 app.feed.jobs[-1][1].set_result(())
+        app.redraws = 0
         screen.show(VIEW, 10.0)
         await pilot.pause()
         assert shown(app)[-2].startswith("download of the mission: no answer")
