@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from benchmarks import step_costs
 from benchmarks.emulated import Flown
 from benchmarks.ground_load import Seen
 from benchmarks.measure import Figure, short
@@ -116,6 +117,9 @@ def _costs(results: dict[str, Any]) -> str:
         for part, cost in costs
         if not part.is_floor
     )
+    by_name = {part.name: cost.median for part, cost in costs}
+    ratio = by_name[step_costs.PACK_BY_PYMAVLINK] / by_name[step_costs.PACK]
+    rows.append(("  telemetry: pymavlink's time, times ours", short(ratio, 2)))
     return table("PARTS OF A STEP, 500 and 100 Hz", ("", "µs each", "a step", "µs a step"), rows)
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -12,18 +14,22 @@ from benchmarks.measure import Figure, interleaved_us
 from benchmarks.one_process import Station, flying
 from flightstack.core.contract import MAX_ROTORS, LoopRow, Vector3
 from flightstack.mavlink.dialect import LAYOUT_BY_NAME, mavlink
-from flightstack.mavlink.link import Link
+from flightstack.mavlink.link import Link, Message
+from flightstack.mavlink.packed import Packing
 from flightstack.params.vehicle import Vehicle
+from flightstack.services.telemetry.motion import PACKINGS
 from flightstack.services.telemetry.streams import GROUND_RATES_HZ
 from flightstack.services.telemetry.telemetry import MAKERS
 from flightstack.simulator_link.hot_frames import ARMED_FLAG, ActuatorsFrame, PlantStateFrame
 from flightstack.testing import World
+from flightstack.vehicle.status import VehicleStatus
 from sim_bridge.plant.compiled_plant import CompiledPlant
 from sim_bridge.plant.plant import InitialState, PlantOptions
 from sim_bridge.server.endpoint import FlightStackEndpoint
 from sim_bridge.simulator import Simulator
 
 Call = Callable[[], object]
+PACK, PACK_BY_PYMAVLINK = "telemetry: pack and frame values", "telemetry: the same by pymavlink"
 
 
 class Part(NamedTuple):
@@ -100,25 +106,57 @@ def _pymavlink_codec() -> Call:
     return exchange
 
 
-def _telemetry(world: World) -> tuple[Call, Call, Call]:
-    """Make, encode and decode the mix of messages of one second, message by message in turns."""
-    status = world.engine.stack.status()
+class _Turns:
+    """Calls the members of a list in turns."""
+
+    def __init__(self, calls: list[Call]) -> None:
+        self._next = itertools.cycle(calls).__next__
+
+    def __call__(self) -> None:
+        self._next()()
+
+
+def _telemetry(world: World) -> tuple[Call, Call, Call, Call]:
+    """Return calls for the mix of messages of one second, message by message in turns.
+
+    They make a message of the status and its frame; pack and frame the values of a message by its format, and by
+    pymavlink; decode a frame.
+    """
+    status, link, station = world.engine.stack.status(), Link(1, 1), Link(255, 190)
     turns = [number for number, rate in GROUND_RATES_HZ.items() for _ in range(max(1, round(rate)))]
-    makers = [MAKERS[number] for number in turns]
-    messages = [make(status) for make in makers]
-    link, station = Link(1, 1), Link(255, 190)
-    frames = [link.encode(message) for message in messages]
-    at = [0]
-
-    def turn() -> int:
-        at[0] = (at[0] + 1) % len(turns)
-        return at[0]
-
+    frames = [link.encode(MAKERS[number](status)) for number in turns]
+    formats = {packing.message_id: packing for packing in PACKINGS}
+    packs: list[Call] = []
+    by_pymavlink: list[Call] = []
+    for number, frame in zip(turns, frames, strict=True):
+        if number in formats:
+            (message,) = station.decode(frame)
+            fields = [getattr(message, name) for name in message.fieldnames]
+            values = [value for field in fields for value in (field if isinstance(field, list) else [field])]
+            packs.append(partial(_pack_by_format, link, formats[number], values))
+            by_pymavlink.append(partial(_pack_by_pymavlink, link, type(message), fields))
     return (
-        lambda: makers[turn()](status),
-        lambda: link.encode(messages[turn()]),
-        lambda: list(station.decode(frames[turn()])),
+        _Turns([partial(_make, link, MAKERS[number], status) for number in turns]),
+        _Turns(packs),
+        _Turns(by_pymavlink),
+        _Turns([partial(_decode, station, frame) for frame in frames]),
     )
+
+
+def _make(link: Link, maker: Callable[[VehicleStatus], Message], status: VehicleStatus) -> None:
+    link.encode(maker(status))
+
+
+def _pack_by_format(link: Link, packing: Packing, values: list[float]) -> None:
+    link.encode(packing(*values))
+
+
+def _pack_by_pymavlink(link: Link, kind: type[Message], fields: list[object]) -> None:
+    link.encode(kind(*fields))
+
+
+def _decode(station: Link, frame: bytes) -> None:
+    list(station.decode(frame))
 
 
 def _log(world: World) -> Call:
@@ -150,7 +188,7 @@ def parts() -> list[Part]:
     hovering = _hovering(stack.vehicle)
     sim_link = FlightStackEndpoint(hovering, stack.vehicle, stack.area.home)
     sim_link.receive(memoryview(link.initial_requests(stack.rates.interval_us)))
-    make, encode, decode = _telemetry(world)
+    make, pack, pack_by_pymavlink, decode = _telemetry(world)
     messages_per_step = sum(GROUND_RATES_HZ.values()) / 500.0
 
     def simulator_side() -> None:
@@ -189,8 +227,9 @@ def parts() -> list[Part]:
         Part("simulator, without its socket", simulator_side, 1.0, False),
         Part("flight stack's end of the simulator link", stack_side, 1.0, False),
         Part("both and the autopilot's tick with its log, holding", _holding(), 1.0, False),
-        Part("telemetry: make a message", make, messages_per_step, False),
-        Part("telemetry: encode it (pymavlink)", encode, messages_per_step, False),
+        Part("telemetry: a message, from status to frame", make, messages_per_step, False),
+        Part(PACK, pack, messages_per_step, False),
+        Part(PACK_BY_PYMAVLINK, pack_by_pymavlink, messages_per_step, False),
         Part("ground station: decode it (pymavlink)", decode, messages_per_step, False),
     ]
 

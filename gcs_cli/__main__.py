@@ -9,9 +9,10 @@ import typer
 
 from flightstack.core.errors import ConfigError
 from flightstack.process.command_line import UsageError, Version, expand_options, make_app, usage_sentence
-from flightstack.process.console import complain, drop, replace_unencodable
+from flightstack.process.console import complain, drop, replace_unencodable, say
 from gcs_cli.commands.registry import GcsGroup, add_groups
 from gcs_cli.errors import DONE, FAILED, USAGE, CliError
+from gcs_cli.output import error_line
 from gcs_cli.settings import LinkOptions, Settings, SigningKeyOption
 
 app = make_app(
@@ -39,7 +40,10 @@ def options(
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the command line; return the exit code."""
+    """Run the command line; return the exit code.
+
+    An error is one sentence on stderr; with ``--json`` it is also an object on stdout.
+    """
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the terminal is restored
     replace_unencodable()
     try:
@@ -68,6 +72,8 @@ def main(argv: list[str] | None = None) -> int:
     except ConfigError as error:
         sentence, code = str(error), USAGE
     complain(f"gcs: {sentence}")
+    if "--json" in (sys.argv[1:] if argv is None else argv):
+        say(error_line(sentence, code))
     return code
 
 

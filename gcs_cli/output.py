@@ -26,6 +26,11 @@ class Output:
             typer.echo(sentence)
 
 
+def error_line(sentence: str, exit_code: int) -> str:
+    """Return the JSON object of an error that ended a command."""
+    return json.dumps({"event": "error", "message": sentence, "exit_code": exit_code})
+
+
 def plain(value: Any) -> Any:
     """Return ``value`` as JSON can hold it: NumPy's numbers as Python's, NaN and infinity as None."""
     if isinstance(value, Mapping):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,16 +11,24 @@ import typer
 
 from flightstack.core.port_numbers import INSTANCES, system_id
 from flightstack.process.command_line import IN_LINKS, IN_OUTPUT
+from gcs_cli.config_file import (
+    LARGEST_SYSTEM_ID,
+    LONGEST_TIMEOUT_S,
+    SHORTEST_TIMEOUT_S,
+    Config,
+    load_config,
+)
 from gcs_cli.link.endpoint import (
     DEFAULT_CONNECTION,
-    VEHICLE_CONNECTION,
+    FORMS,
     VehicleEndpoint,
     parse_endpoint,
     vehicle_connection,
 )
+from gcs_cli.output import Output
 
 DEFAULT_TIMEOUT_S = 5.0
-_TIMEOUT: dict[str, Any] = {"metavar": "SECONDS", "min": 0.1, "max": 86_400.0}
+_TIMEOUT: dict[str, Any] = {"metavar": "SECONDS", "min": SHORTEST_TIMEOUT_S, "max": LONGEST_TIMEOUT_S}
 _INSTANCE: dict[str, Any] = {"metavar": "N", "min": 0, "max": INSTANCES - 1, "show_default": False}
 
 FlownInstanceOption = Annotated[
@@ -32,7 +41,7 @@ FlownTimeoutOption = Annotated[
 ]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.", **IN_OUTPUT)]
 OpenOption = Annotated[bool, typer.Option("--open", help="Open the report afterwards.", **IN_OUTPUT)]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.", **IN_OUTPUT)]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object a line.", **IN_OUTPUT)]
 SigningKeyOption = Annotated[
     Path | None,
     typer.Option(
@@ -48,15 +57,15 @@ SigningKeyOption = Annotated[
 
 @dataclass(frozen=True)
 class LinkOptions:
-    """The vehicle to connect to; None: not given."""
+    """The vehicle to connect to, and the form of the output; None: not given."""
 
     connect: Annotated[
         str | None,
         typer.Option(
             "--connect",
             metavar="LINK",
-            help="Address of the vehicle: udp:PORT, udpin:HOST:PORT or udpout:HOST:PORT.  "
-            f"[default: {DEFAULT_CONNECTION}, or {VEHICLE_CONNECTION} while another program listens there]",
+            help=f"Address of the vehicle: {FORMS}. Also in GCS_CONNECT and the configuration file.  "
+            f"[default: {DEFAULT_CONNECTION}, or where else a vehicle of this machine answers]",
             show_default=False,
         ),
     ] = None
@@ -75,6 +84,18 @@ class LinkOptions:
             "--instance", help="Command the vehicle of `flightstack --instance N`, and no other.", **_INSTANCE
         ),
     ] = None
+    system: Annotated[
+        int | None,
+        typer.Option(
+            "--system",
+            metavar="ID",
+            min=1,
+            max=LARGEST_SYSTEM_ID,
+            help="Command the vehicle with this MAVLink system id; needed if there are several on the link.",
+            show_default=False,
+        ),
+    ] = None
+    as_json: JsonOption = False
 
     @property
     def endpoint(self) -> VehicleEndpoint:
@@ -84,8 +105,15 @@ class LinkOptions:
         return parse_endpoint(DEFAULT_CONNECTION if self.connect is None else self.connect)
 
     @property
+    def is_default(self) -> bool:
+        """True if the user named no link."""
+        return self.connect is None and self.instance is None
+
+    @property
     def system_id(self) -> int | None:
         """System id of the vehicle; None for any."""
+        if self.system is not None:
+            return self.system
         return None if self.instance is None else system_id(self.instance)
 
     @property
@@ -108,11 +136,43 @@ def settings_of(context: typer.Context) -> Settings:
     return Settings() if found is None else found
 
 
-def link_options(context: typer.Context, given: LinkOptions) -> LinkOptions:
+def given_options(context: typer.Context, given: LinkOptions) -> LinkOptions:
     """Return the options ``given`` after the command, completed by those before it."""
     before = settings_of(context).link
     return LinkOptions(
         before.connect if given.connect is None else given.connect,
         before.timeout if given.timeout is None else given.timeout,
         before.instance if given.instance is None else given.instance,
+        before.system if given.system is None else given.system,
+        before.as_json or given.as_json,
     )
+
+
+def link_options(context: typer.Context, given: LinkOptions) -> LinkOptions:
+    """Return the link to use: options before the environment before the configuration file; raise ConfigError."""
+    return completed(given_options(context, given), os.environ.get("GCS_CONNECT") or None, load_config())
+
+
+def completed(link: LinkOptions, connect: str | None, config: Config) -> LinkOptions:
+    """Return ``link`` with missing values from the environment's ``connect`` and the configuration file.
+
+    An instance is an address too: other addresses do not replace it.
+    """
+    if link.is_default:
+        link = replace(link, connect=connect or config.connect)
+    return replace(
+        link,
+        timeout=config.timeout if link.timeout is None else link.timeout,
+        system=config.system if link.system_id is None else link.system,
+    )
+
+
+def signing_key_of(context: typer.Context) -> Path | None:
+    """Return the file of the signing key, of the option or the configuration file; raise ConfigError."""
+    return settings_of(context).signing_key or load_config().signing_key
+
+
+def output_of(context: typer.Context, given: LinkOptions | bool) -> Output:
+    """Return the output in the form that ``given``, or an option before the command, asks for."""
+    as_json = given if isinstance(given, bool) else given.as_json
+    return Output(as_json or settings_of(context).link.as_json)

@@ -6,13 +6,41 @@ from pathlib import Path
 
 import typer
 
+from flightstack.core.port_numbers import api_client_port, tcp_port
 from flightstack.mavlink.signing import LinkSigning
 from flightstack.process.console import complain
 from flightstack.process.signing_file import open_shared_signing
-from gcs_cli.errors import PortInUseError
+from gcs_cli.errors import USAGE, CliError, PortInUseError
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.endpoint import VEHICLE_CONNECTION, parse_endpoint
-from gcs_cli.settings import LinkOptions, link_options, settings_of
+from gcs_cli.link.endpoint import (
+    LOOPBACK,
+    RECORDING,
+    SERIAL,
+    TCP,
+    TCP_IN,
+    UDP_IN,
+    VEHICLE_CONNECTION,
+    VehicleEndpoint,
+    parse_endpoint,
+)
+from gcs_cli.link.lines import Line
+from gcs_cli.link.opening import SeveralLines, open_line, opened_lines
+from gcs_cli.link.share import open_shared
+from gcs_cli.settings import LinkOptions, link_options, signing_key_of
+
+OTHER_CONNECTIONS = (
+    VEHICLE_CONNECTION,
+    f"udpin:{LOOPBACK}:{api_client_port(0)}",
+    f"tcp:{LOOPBACK}:{tcp_port(0)}",
+)
+"""Where a vehicle of this machine may answer that sends to another ground station at the default port, or to none.
+
+Our vehicle answers any client at its own port. PX4 answers one client there, and sends to the port of API clients.
+ArduPilot's simulation listens on TCP.
+"""
+
+SHARED_KINDS = (UDP_IN, TCP, TCP_IN, SERIAL)
+"""Kinds of links that one process at a time can open."""
 
 
 def open_signing(key: Path | None) -> LinkSigning | None:
@@ -20,28 +48,67 @@ def open_signing(key: Path | None) -> LinkSigning | None:
     return None if key is None else open_shared_signing(key, "gcs")
 
 
-def open_link(context: typer.Context, options: LinkOptions) -> Connection:
+def open_link(
+    context: typer.Context,
+    options: LinkOptions,
+    *,
+    takes_recording: bool = False,
+    in_real_time: bool = True,
+    shares: bool = False,
+) -> Connection:
     """Open the link to the vehicle; raise CliError.
 
-    If another ground station listens on the default port, connect to the vehicle's own port.
+    If another ``gcs`` shares the link, use it. If another ground station listens on the default port, search the
+    vehicle at ``OTHER_CONNECTIONS``. A command that only shows what the vehicle sends ``takes_recording``-s, played in
+    real time or at once. A command that runs long ``shares`` its link.
     """
     link = link_options(context, options)
-    signing = open_signing(settings_of(context).signing_key)
+    endpoint = link.endpoint
+    if endpoint.kind == RECORDING and not takes_recording:
+        raise CliError(f"{command_name(context)}: {endpoint} is a recording, which takes no commands", USAGE)
+    signing = open_signing(signing_key_of(context))
+    line = open_shared(endpoint) if endpoint.kind in SHARED_KINDS else None
+    if line is None and link.is_default:
+        endpoint, line = _default_line(endpoint)
+    connection = Connection(
+        endpoint, signing=signing, system_id=link.system_id, line=line, in_real_time=in_real_time
+    )
+    if shares and endpoint.kind in SHARED_KINDS:
+        connection.share()
+    return connection
+
+
+def _default_line(endpoint: VehicleEndpoint) -> tuple[VehicleEndpoint, Line]:
+    others = [parse_endpoint(text) for text in OTHER_CONNECTIONS]
     try:
-        return Connection(link.endpoint, signing=signing, system_id=link.system_id)
+        return endpoint, SeveralLines({endpoint: open_line(endpoint)}, later=others)
     except PortInUseError as error:
-        if link.connect is not None:
-            raise
-        vehicle = parse_endpoint(VEHICLE_CONNECTION)
-        complain(f"gcs: {error.port} is in use: connecting to the vehicle at {vehicle}")
-        return Connection(vehicle, signing=signing)
+        complain(f"gcs: {error.port} is in use: trying {', '.join(str(other) for other in others)}")
+        return others[0], SeveralLines(opened_lines(others))
 
 
-def connect_vehicle(context: typer.Context, options: LinkOptions) -> Connection:
-    """Open the link and wait for the vehicle; raise CliError."""
-    connection = open_link(context, options)
+def command_name(context: typer.Context) -> str:
+    """Return the words of the command, such as ``mission upload``."""
+    return context.command_path.partition(" ")[2] or context.command_path
+
+
+def connect_vehicle(
+    context: typer.Context,
+    options: LinkOptions,
+    *,
+    takes_recording: bool = False,
+    in_real_time: bool = True,
+    shares: bool = False,
+) -> Connection:
+    """Open the link and wait for the vehicle; raise CliError that names the command."""
+    connection = open_link(
+        context, options, takes_recording=takes_recording, in_real_time=in_real_time, shares=shares
+    )
     try:
         connection.wait_for_vehicle(link_options(context, options).timeout_s)
+    except CliError as error:
+        connection.close()
+        raise CliError(f"{command_name(context)}: {error}", error.exit_code) from None
     except BaseException:
         connection.close()
         raise

@@ -154,7 +154,8 @@ def commands_of(app: typer.Typer) -> Iterator[tuple[str, CommandInfo]]:
     lazy = getattr(app.info.cls, "lazy", {})
     for module in dict.fromkeys(command.module for command in lazy.values()):
         loaded = dict(commands_of(import_module(module).app))
-        yield from ((name, loaded[name]) for name in lazy if lazy[name].module == module)
+        names = (name for name, command in lazy.items() if command.module == module and not command.hidden)
+        yield from ((name, loaded[name]) for name in names)
     for command in app.registered_commands:
         if command.callback is not None and not command.hidden:
             yield command.name or command.callback.__name__.replace("_", "-"), command

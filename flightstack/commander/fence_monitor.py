@@ -67,7 +67,7 @@ class FenceMonitor(FenceEvaluator):
 
     def update(self, state: FloatArray, time_us: int) -> bool:
         """Evaluate ``state`` (13,) once per outer tick and count breaches; return True if a limit is broken."""
-        before = self.flags
+        before = self._flags
         flags = self.step(state)
         if flags != before and flags:
             number, latest_us, _ = self.breaches

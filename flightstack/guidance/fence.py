@@ -190,6 +190,7 @@ class FenceEvaluator:
     def __init__(self) -> None:
         self._limits: RecordArray = np.zeros(1, LIMITS)
         self._breach = _no_breach()
+        self._flags = 0  # of ``_breach``: reading a record takes longer
         self.configure(NO_FENCE)
 
     def configure(
@@ -213,11 +214,12 @@ class FenceEvaluator:
 
     def step(self, state: FloatArray) -> int:
         """Evaluate ``state`` (13,), once per outer tick; return the flags of ``FenceBreach``."""
-        if not self.is_active:
-            self._breach["flags"] = 0
-            return 0
-        fence_step(self._areas, self._vertices, self._groups, self._limits, state, self._breach)
-        return int(self._breach["flags"][0])
+        if self.is_active:
+            fence_step(self._areas, self._vertices, self._groups, self._limits, state, self._breach)
+            self._flags = int(self._breach["flags"][0])
+        elif self._flags:
+            self._breach["flags"] = self._flags = 0
+        return self._flags
 
     def flags_at(self, state: FloatArray) -> int:
         """Return the flags that ``step`` would return for ``state`` (13,), without a change of the evaluator."""
@@ -228,9 +230,14 @@ class FenceEvaluator:
         return int(breach["flags"][0])
 
     @property
+    def is_breached(self) -> bool:
+        """True if a limit is breached."""
+        return self._flags != 0
+
+    @property
     def flags(self) -> FenceBreach:
         """Breached limits."""
-        return FenceBreach(int(self._breach["flags"][0]))
+        return FenceBreach(self._flags)
 
     @property
     def margin_m(self) -> float:

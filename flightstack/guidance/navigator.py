@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -90,14 +92,23 @@ class Navigator:
         self._levelling_target = np.zeros(ATTITUDE_TARGET_SIZE)
         self._rest = direct(rest_kernel, state, self._trajectory, self._land, self.setpoint)
         self._level = direct(levelling_kernel, target, 1.0, 1.0, self._levelling_target)
-        self._fly_stream = direct(
-            stream_kernel, 0, state, self._trajectory, self._stream, self._land, target,
-            self._params_array, self._dt_s, self.setpoint, self.attitude_target,
-        )  # fmt: skip
         self._fly_goal = direct(
             goal_kernel, 0, state, self._trajectory, self._mission, self._plan, self._jumps_left, self._mode_target,
             self._land, target, self._params_array, self._dt_s, self.setpoint,
         )  # fmt: skip
+
+    @cached_property
+    def _fly_stream(self) -> Callable[..., Any]:
+        """The kernel of modes that follow a stream. In lockstep, its compilation takes no time of the vehicle."""
+        state, target = np.zeros(STATE_SIZE), np.zeros(ATTITUDE_TARGET_SIZE)
+        return direct(
+            stream_kernel, 0, state, self._trajectory, self._stream, self._land, target,
+            self._params_array, self._dt_s, self.setpoint, self.attitude_target,
+        )  # fmt: skip
+
+    def warm_up_streams(self) -> None:
+        """Compile the kernel of modes that follow a stream, or load it from the cache, before its first use."""
+        self._fly_stream  # noqa: B018
 
     # ------------------------------------------------------------------ parameters
 

@@ -26,12 +26,16 @@ for _layout in LAYOUTS:
 
 
 @cache
-def add_ardupilot_messages() -> None:
-    """Register the messages that only ArduPilot's dialect has. Its import takes 0.1 s: call it for such a vehicle."""
+def ardupilot_dialect() -> Any:
+    """Return pymavlink's module of ardupilotmega.xml, and register the messages that only it has.
+
+    The import takes 0.1 s: call this once an ArduPilot vehicle is heard.
+    """
     from pymavlink.dialects.v20 import ardupilotmega  # noqa: PLC0415
 
     for number, kind in ardupilotmega.mavlink_map.items():
         mavlink.mavlink_map.setdefault(number, kind)
+    return ardupilotmega
 
 
 EscStatus: Any = mavlink.mavlink_map[LAYOUT_BY_NAME["ESC_STATUS"].message_id]
@@ -52,6 +56,6 @@ __all__ = [
     "FsActuators",
     "FsLoopTiming",
     "FsPlantState",
-    "add_ardupilot_messages",
+    "ardupilot_dialect",
     "mavlink",
 ]

@@ -38,9 +38,11 @@ COUNTERS = frozenset({
 
 def whole(value: float, low: int, high: int) -> int:
     """Round to an integer in [low, high], saturated; 0 for a value that is not finite."""
-    if not isinstance(value, int) and not math.isfinite(value):
+    try:
+        number = round(value)
+    except (ValueError, OverflowError):
         return 0
-    return max(low, min(high, round(value)))
+    return number if low <= number <= high else low if number < low else high
 
 
 def int16(value: float) -> int:

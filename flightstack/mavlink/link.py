@@ -17,10 +17,11 @@ from flightstack.mavlink.frames import (
     message_id_of,
     pack_frame,
 )
+from flightstack.mavlink.packed import PackedMessage
 from flightstack.mavlink.signing import LinkSigning
 
 Message: TypeAlias = Any
-"""A pymavlink message object."""
+"""A pymavlink message object, or a ``PackedMessage`` to send."""
 
 SILENT_AFTER_S = 5.0
 """Timeout of a peer without valid messages: five missed heartbeats."""
@@ -54,6 +55,9 @@ class Link:
 
         Out-of-range values are fitted in ``message`` (``fields.fit``).
         """
+        if message.__class__ is PackedMessage:
+            packing = message.packing
+            return self._frame(packing.message_id, message.payload, packing.crc_extra)
         try:
             frame: bytes = message.pack(self._codec)
         except PACKING_ERRORS:
@@ -61,28 +65,32 @@ class Link:
             frame = message.pack(self._codec)
         self._codec.seq = (self._codec.seq + 1) % 256
         self.sent += 1
-        return self._outgoing(bytes(frame), message)
+        return self._outgoing(bytes(frame), message.crc_extra)
 
-    def _outgoing(self, frame: bytes, message: Message) -> bytes:
-        return frame if self._signing is None else self._signing.outgoing(frame, message.crc_extra)
+    def _frame(self, message_id: int, payload: bytes, crc_extra: int) -> bytes:
+        codec = self._codec
+        frame = pack_frame(message_id, payload, crc_extra, codec.seq, codec.srcSystem, codec.srcComponent)
+        codec.seq = (codec.seq + 1) % 256
+        self.sent += 1
+        return self._outgoing(frame, crc_extra)
+
+    def _outgoing(self, frame: bytes, crc_extra: int) -> bytes:
+        return frame if self._signing is None else self._signing.outgoing(frame, crc_extra)
 
     def encode_shared(self, message: Message) -> bytes:
         """Return the frame of an unchanged message that is sent on several links.
 
         The first link packs the payload; the others add header and checksum only.
         """
-        codec = self._codec
+        if message.__class__ is PackedMessage:
+            return self.encode(message)
         payload: bytes | None = message.get_payload()
         packed = (
             payload is not None and len(payload) == message.get_header().mlen
         )  # false for a received message
         if payload is None or not packed:
             return self.encode(message)
-        number = message.get_msgId()  # ``id`` may be a field
-        frame = pack_frame(number, payload, message.crc_extra, codec.seq, codec.srcSystem, codec.srcComponent)
-        codec.seq = (codec.seq + 1) % 256
-        self.sent += 1
-        return self._outgoing(frame, message)
+        return self._frame(message.get_msgId(), payload, message.crc_extra)  # ``id`` may be a field
 
     def is_authentic(self, message: Message) -> bool:
         """Return True if a decoded message carried the signature that this link requires, if any."""

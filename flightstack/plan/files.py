@@ -21,6 +21,11 @@ def load_plan(path: str | Path) -> Plan:
     Raise ConfigError with file, item, field, value and allowed range.
     """
     path = Path(path)
+    return plan_of_text(read_text(path), path)
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a plan file; raise ConfigError if it cannot be read, is too large or is not text."""
     try:
         with path.open("rb") as file:
             data = file.read(MAX_FILE_BYTES + 1)
@@ -30,9 +35,13 @@ def load_plan(path: str | Path) -> Plan:
     if len(data) > MAX_FILE_BYTES:
         raise ConfigError(path, "", f"is larger than the allowed {MAX_FILE_BYTES // 1_000_000} MB")
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ConfigError(path, "", "is neither a .plan nor a .waypoints file: it is not text") from error
+        raise ConfigError(path, "", "is not a plan file: it is not text") from error
+
+
+def plan_of_text(text: str, path: Path) -> Plan:
+    """Parse the text of a ``.plan`` or ``QGC WPL 110`` file; raise ConfigError."""
     if text.startswith("QGC WPL"):
         return read_waypoints(text, path)
     if path.suffix in WAYPOINTS_SUFFIXES:

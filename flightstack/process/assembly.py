@@ -46,10 +46,12 @@ from flightstack.vehicle.parameters import (
 from flightstack.vehicle.status import VehicleStatus, vehicle_info, vehicle_status
 
 _KERNELS = (
-    "inner_kernel", "outer_kernel", "rest_kernel", "levelling_kernel", "stream_kernel", "goal_kernel",
-    "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading",
+    "inner_kernel", "outer_kernel", "rest_kernel", "levelling_kernel", "goal_kernel",
+    "follow_rotors", "detect", "fence_step", "store_outer_row", "outer_heading", "euler_rad",
 )  # fmt: skip
 _LOOP_KERNELS = ("inner_kernel", "outer_kernel")
+_REAL_TIME_KERNELS = ("stream_kernel",)
+"""Kernels that a vehicle in lockstep compiles or loads at their first use."""
 
 
 LoopsMaker: TypeAlias = Callable[[str, LoopsSetup, bool], ControlBackend]
@@ -108,7 +110,8 @@ def vehicle_of(config: StackConfig) -> Vehicle:
 def kernels_of(config: StackConfig) -> tuple[str, ...]:
     """Return the names of the kernels that ``build`` compiles or loads: those of the loops, then the other ones."""
     needs_loops = config.loops == PYTHON
-    return tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
+    kernels = tuple(name for name in _KERNELS if needs_loops or name not in _LOOP_KERNELS)
+    return kernels if config.lockstep else kernels + _REAL_TIME_KERNELS
 
 
 def check(config: StackConfig) -> None:
@@ -144,7 +147,7 @@ def build(
     if config.loops == PYTHON:
         compile_helper.start()
     backend = make(config.loops, setup, config.lockstep)
-    compile_helper.wait()
+    compile_helper.finish(with_streams=not config.lockstep)
     try:
         return _join(config, setup.vehicle, loop_rates, backend, open_log, logs)
     except BaseException:
@@ -169,7 +172,7 @@ def _join(
         vehicle, backend, behaviour, config.home, loop_rates.divisor, loop_rates.outer_hz, recorder,
         simulator.state, simulator.rotor_speed_rad_s, simulator,
     )  # fmt: skip
-    parts.warm_up()
+    parts.warm_up(with_streams=not config.lockstep)
     connect_parameters(params, parts, recorder)
     timing = LoopTiming(round(1e9 / loop_rates.inner_hz))
     report = TimingReport(timing, loop_rates, config.lockstep)

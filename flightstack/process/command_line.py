@@ -102,24 +102,26 @@ def make_app(**settings: Any) -> typer.Typer:
 def expand_options(command: Callable[..., None], without: Collection[str] = ()) -> Callable[..., None]:
     """Replace each dataclass among the parameters of a command by one option per field.
 
-    A field is an option if its type is ``Annotated`` and its name is not in ``without``.
+    A field is an option if its type is ``Annotated`` and its name is not in ``without``. If the command has a
+    parameter with the name of a field, both get the value of one option.
     """
     groups: dict[str, tuple[Any, list[inspect.Parameter]]] = {}
     parameters: list[inspect.Parameter] = []
+    own = set(inspect.signature(command).parameters)
     for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
         if dataclasses.is_dataclass(parameter.annotation):
             groups[name] = parameter.annotation, _options_of(parameter.annotation, without)
-            parameters += groups[name][1]
+            parameters += [option for option in groups[name][1] if option.name not in own]
         else:
             parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
 
     @functools.wraps(command)
     def run(**given: Any) -> None:
         built = {
-            name: group(**{option.name: given.pop(option.name) for option in options})
+            name: group(**{option.name: given[option.name] for option in options})
             for name, (group, options) in groups.items()
         }
-        command(**built, **given)
+        command(**built, **{name: value for name, value in given.items() if name in own})
 
     run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
@@ -164,7 +166,7 @@ Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace existing f
 
 @dataclasses.dataclass(frozen=True)
 class PictureOptions:
-    """Options of ``gcs replay`` and ``sim-bridge render``, as given; None where not given."""
+    """Options of ``gcs log draw`` and ``sim-bridge render``, as given; None where not given."""
 
     png: Annotated[
         Path | None,

@@ -1,10 +1,13 @@
-"""Compile the kernels of guidance and commander in a second process, while this one compiles loops and plant.
+"""Compile some kernels in a second process, the compile helper, while this one compiles loops and the others.
 
 The second process writes them to the cache, from which this one reads them. If it fails, this process compiles them.
+Kernels that a vehicle in lockstep loads at their first use come last, while it flies.
 """
 
 from __future__ import annotations
 
+import atexit
+import importlib
 import os
 import subprocess
 import sys
@@ -20,7 +23,7 @@ from flightstack.commander.failsafe_monitor import FailsafeMonitor
 from flightstack.core.contract import STATE_SIZE
 from flightstack.core.kernel_cache import is_shared
 from flightstack.flight_log.recorder import FlightRecorder
-from flightstack.guidance.kernels import goal_kernel, stream_kernel
+from flightstack.guidance.kernels import goal_kernel
 from flightstack.guidance.navigator import Navigator
 from flightstack.guidance.params import guidance_params
 from flightstack.params.behaviour import Behaviour
@@ -30,35 +33,57 @@ from flightstack.process.clock import rates
 from flightstack.process.compile_notice import announce_compilation
 from flightstack.simulator_link.endpoint import SimulatorEndpoint
 
+GUIDANCE = "flightstack.process.compile_helper:compile_guidance"
+COMMANDER = "flightstack.process.compile_helper:compile_commander"
+
 _helper: subprocess.Popen[bytes] | None = None
+_tasks: tuple[str, ...] = ()
 
 
-def start(announced: Sequence[str] = ()) -> None:
-    """Start the helper if the cache is cold and a second CPU is available. It ends at the latest with this process.
+def start(announced: Sequence[str] = (), tasks: Sequence[str] = (GUIDANCE, COMMANDER)) -> None:
+    """Start the helper with ``tasks``, "module:function" each, if the cache is cold and a second CPU is available.
 
-    It announces its kernels on stderr if ``announced`` names all kernels of the program.
+    It ends at the latest with this process. It announces its kernels on stderr if ``announced`` names all kernels of
+    the program.
     """
-    global _helper  # noqa: PLW0603  # one helper for each process
+    global _helper, _tasks  # noqa: PLW0603  # one helper for each process
     if _helper is not None or not _is_useful():
         return
     path = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path)
     try:
         _helper = subprocess.Popen(
-            [sys.executable, "-P", "-m", __name__, *announced],
+            [sys.executable, "-P", "-m", __name__, ",".join(tasks), *announced],
             stdin=subprocess.PIPE,  # closes with this process
-            stdout=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
             stderr=None if announced else subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": path},
         )
     except OSError:
         return
+    _tasks = tuple(tasks)
+    atexit.register(_end, _helper)
 
 
-def wait() -> None:
-    """Wait until the helper has ended, if one was started."""
-    if _helper is not None and _helper.stdin is not None:
+def _end(helper: subprocess.Popen[bytes]) -> None:
+    helper.kill()
+    helper.wait()
+
+
+def finish(*, with_streams: bool) -> None:
+    """Compile what the helper was not given, and wait for its tasks; do nothing if none was started.
+
+    ``with_streams``: wait for the kernel of modes that follow a stream too.
+    """
+    if _helper is None or _helper.stdout is None or _helper.stdout.closed:
+        return
+    if COMMANDER not in _tasks:
+        compile_commander()
+    _helper.stdout.read(1)  # one byte after the tasks, none if it failed
+    _helper.stdout.close()
+    if with_streams:
         _helper.wait()
-        _helper.stdin.close()
+    else:
+        threading.Thread(target=_helper.wait, daemon=True).start()
 
 
 def _is_useful() -> bool:
@@ -66,22 +91,33 @@ def _is_useful() -> bool:
     if numba.config.DISABLE_JIT or not is_shared():
         return False
     cpus = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return cpus > 1 and not (_is_cached(stream_kernel) and _is_cached(goal_kernel))
+    return cpus > 1 and not _is_cached(goal_kernel)
 
 
 def _is_cached(kernel: Any) -> bool:
     return any(Path(kernel.stats.cache_path).glob(f"*.{kernel.__name__}-*.nbi"))
 
 
-def compile_kernels() -> None:
-    """Compile the kernels that every vehicle needs beside its loops, or load them from the cache."""
-    vehicle, behaviour, loop_rates = load_vehicle(DEFAULT_VEHICLE), Behaviour(), rates(500.0, 100.0)
+def compile_guidance() -> Navigator:
+    """Compile the kernels of guidance that every flight needs, or load them from the cache."""
+    vehicle, loop_rates = load_vehicle(DEFAULT_VEHICLE), rates(500.0, 100.0)
+    return Navigator(guidance_params(Behaviour(), vehicle.weight_n), loop_rates.outer_hz)
+
+
+def compile_commander() -> None:
+    """Compile the kernels of failsafes and of the log, or load them from the cache."""
+    vehicle, loop_rates = load_vehicle(DEFAULT_VEHICLE), rates(500.0, 100.0)
     simulator = SimulatorEndpoint(vehicle, DEFAULT_HOME, True, 1, loop_rates.interval_us)
-    Navigator(guidance_params(behaviour, vehicle.weight_n), loop_rates.outer_hz)
     FailsafeMonitor(
-        vehicle, behaviour, loop_rates.outer_hz, loop_rates.divisor, np.zeros(STATE_SIZE), simulator
+        vehicle, Behaviour(), loop_rates.outer_hz, loop_rates.divisor, np.zeros(STATE_SIZE), simulator
     ).warm_up()
     FlightRecorder(lambda: None, {}, dict, DEFAULT_HOME, lambda: simulator.battery)
+
+
+def _run(tasks: Sequence[str]) -> None:
+    for task in tasks:
+        module, _, function = task.partition(":")
+        getattr(importlib.import_module(module), function)()
 
 
 def _end_with_parent() -> None:
@@ -92,6 +128,9 @@ def _end_with_parent() -> None:
 
 if __name__ == "__main__":
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    if sys.argv[1:]:
-        announce_compilation("flightstack", sys.argv[1:], began=True)
-    compile_kernels()
+    notice = announce_compilation("flightstack", sys.argv[2:], began=True) if sys.argv[2:] else None
+    _run(sys.argv[1].split(","))
+    if notice is not None:
+        notice.stop()  # the vehicle flies
+    os.write(1, b"\n")
+    compile_guidance().warm_up_streams()

@@ -30,6 +30,10 @@ class CompileNotice(event.Listener):  # type: ignore[misc]  # Numba has no types
         """Track nested compilations."""
         self._depth -= 1
 
+    def stop(self) -> None:
+        """Report no more."""
+        event.unregister(_COMPILATION, self)
+
     def _report(self, kernel: str) -> None:
         if not self._began:
             self._began = True
@@ -45,10 +49,12 @@ def base_name(kernel: str) -> str:
     return kernel.partition("__")[0]
 
 
-def announce_compilation(program: str, kernels: Sequence[str], began: bool = False) -> None:
-    """Report each kernel that ``program`` compiles on stderr."""
+def announce_compilation(program: str, kernels: Sequence[str], began: bool = False) -> CompileNotice:
+    """Report each kernel that ``program`` compiles on stderr, until the notice is stopped."""
 
     def say(text: str) -> None:
         print(f"{program}: {text}", file=sys.stderr, flush=True)
 
-    event.register(_COMPILATION, CompileNotice(say, kernels, began))
+    notice = CompileNotice(say, kernels, began)
+    event.register(_COMPILATION, notice)
+    return notice

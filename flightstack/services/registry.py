@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable
+import math
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import partial
 from typing import Protocol
 
@@ -54,8 +55,41 @@ class Service(Protocol):
         ...
 
     def next_deadline(self) -> float | None:
-        """Return the link time of the next poll if no message arrives before; −inf for at once, None for never."""
+        """Return the link time of the next poll if no message arrives before; None for never.
+
+        −inf stands for every poll. The hub takes this at its word: before that time it does not poll the service.
+        """
         ...
+
+
+class Schedule:
+    """Polls each service when it is due, and all of them after a message: of ten, one has something to do.
+
+    A message for one service may change another: a command sets a parameter, which the parameter server announces.
+    """
+
+    def __init__(self, services: Sequence[Service]) -> None:
+        self._services = services
+        self._due_s: dict[int, float] = {}  # by the index of the service; not of those that are never due
+        self.wake()
+
+    def wake(self) -> None:
+        """Poll all services at the next poll."""
+        self._due_s = dict.fromkeys(range(len(self._services)), -math.inf)
+
+    def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
+        """Return the messages to send now, each with its peer; None stands for every peer that was heard."""
+        addressed: list[tuple[Hashable | None, Message]] = []
+        due = sorted([index for index, due_s in self._due_s.items() if due_s <= now_s])  # in sending order
+        for index in due:
+            addressed += self._services[index].poll(now_s)
+        for index in due:
+            due_s = self._services[index].next_deadline()
+            if due_s is None:
+                del self._due_s[index]
+            else:
+                self._due_s[index] = due_s
+        return addressed
 
 
 VENDOR = "flightstack"

@@ -18,7 +18,8 @@ from gcs_cli.clients.param_client import ParamClient
 from gcs_cli.clients.param_operations import ParamDone, ParamFailed
 from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Call
-from gcs_cli.link.session import SYSTEM_ID, Session
+from gcs_cli.link.session import Session
+from gcs_cli.link.wire import SYSTEM_ID
 from gcs_cli.transfers.plan_parts import Uploads
 
 STREAM_STEP_S = 0.05

@@ -13,12 +13,14 @@ from flightstack.mavlink.link import Link
 from flightstack.process import compile_helper
 from flightstack.process.assembly import Stack, build, reboot_config, transfer_state, vehicle_of
 from flightstack.services.logs.log_store import NO_LOGS, LogStore
+from flightstack.simulator_link.endpoint import SimulatorEndpoint
 from flightstack.simulator_link.hot_frames import ActuatorsFrame
 from flightstack.testing.setup import Setup
 from flightstack.vehicle.lockstep import Lockstep
 from sim_bridge.server.failure_command import inject_failure
 from sim_bridge.simulator import SIMULATOR_COMPONENT, Simulator
 
+_PLANT = "flightstack.testing.setup:compile_plant"
 _TIMING_US = 1_000_000
 """Interval of ``loop_timing`` in the log."""
 
@@ -27,6 +29,11 @@ class LogBuffer(io.BytesIO):
     """A log file in memory, readable after it was closed."""
 
     content = b""
+
+    def __init__(self, boot_s: float) -> None:
+        super().__init__()
+        self.boot_s = boot_s
+        """Simulated time at which the vehicle was switched on: times of the log count from there."""
 
     def close(self) -> None:
         """Close the file and keep its content."""
@@ -48,11 +55,12 @@ class Engine:
         """One log for each flight, oldest first."""
         self.config = setup.stack_config()
         self._open: FlightLog | None = None
+        self._boot_us = 0
         self._flight_logs = flight_logs
         self._wrap_loops = wrap_loops
-        compile_helper.start()
-        self.simulator: Simulator = setup.simulator(vehicle_of(self.config))
+        compile_helper.start(tasks=(compile_helper.GUIDANCE, _PLANT))
         self.stack = self._build()
+        self.simulator: Simulator = setup.simulator(vehicle_of(self.config))
         self.simulator.set_interval_us(self.stack.rates.interval_us)
         self._codec = Link(1, SIMULATOR_COMPONENT)
         self.actuators = ActuatorsFrame()
@@ -72,20 +80,27 @@ class Engine:
 
     def _begin(self) -> None:
         """Connect the stack to the simulator: it has its first state."""
-        self._lockstep = Lockstep(self.stack.simulator, self.stack.autopilot, self.stack.rates.interval_us)
+        self._endpoint, self._now = self.stack.simulator, self.stack.now
+        self._interval_us, self._divisor = self.stack.rates.interval_us, self.stack.rates.divisor
+        self._lockstep = Lockstep(self._endpoint, self.stack.autopilot, self._interval_us)
         self._missed_us = self._next_timing_us = self._ticks = 0
-        self.stack.simulator.receive(memoryview(self.states()))
-        self.stack.now.has_state = True
+        self._endpoint.receive(memoryview(self.states()))
+        self._now.has_state = True
 
     def _open_log(self) -> FlightLog:
-        self.logs.append(LogBuffer())
+        self.logs.append(LogBuffer(self._boot_us * 1e-6))
         self._open = FlightLog(self.logs[-1], len(self.stack.vehicle.rotors))
         return self._open
 
     @property
     def time_s(self) -> float:
-        """Simulated time [s]."""
-        return self.stack.now.time_us * 1e-6
+        """Simulated time since the start of the world [s]; the vehicle counts from its last power cycle."""
+        return (self._boot_us + self._now.time_us) * 1e-6
+
+    @property
+    def newest_boot_s(self) -> float:
+        """Simulated time from which the times of the newest log count [s]."""
+        return self.logs[-1].boot_s if self.logs else 0.0
 
     def newest_log(self) -> bytes:
         """Return the log of the newest flight, up to now if it is not over; b"" before the first."""
@@ -99,30 +114,39 @@ class Engine:
 
     def tick(self) -> bool:
         """Run one exchange: state to the stack, actuators back, all as bytes. Return True after an outer tick."""
-        stack = self.stack
+        link = self._endpoint
         if self._missed_us:
-            commands = stack.autopilot.tick(stack.simulator.time_us + self._missed_us)
+            commands = self.stack.autopilot.tick(link.time_us + self._missed_us)
         else:
             commands = self._lockstep.tick(self.machine_ns)
-        for severity, text in stack.simulator.steps.take_notices():
-            stack.journal.say(severity, text)
-        self.take_answer(stack.simulator.answer(commands, stack.now.status.armed))
+        for severity, text in link.steps.take_notices():
+            self.stack.journal.say(severity, text)
+        self.take_answer(link.answer(commands, self._now.status.armed))
         self._ticks += 1
-        is_outer = self._ticks % stack.rates.divisor == 0
-        if is_outer and stack.now.time_us >= self._next_timing_us:
-            time_us = stack.now.time_us
-            self._next_timing_us = time_us + _TIMING_US
-            stack.recorder.timing(time_us, **stack.report.log_fields(time_us // stack.rates.interval_us))
-        return is_outer
+        if self._ticks % self._divisor:
+            return False
+        if self._now.time_us >= self._next_timing_us:
+            self._record_timing()
+        return True
+
+    def _record_timing(self) -> None:
+        time_us = self._now.time_us
+        self._next_timing_us = time_us + _TIMING_US
+        fields = self.stack.report.log_fields(time_us // self._interval_us)
+        self.stack.recorder.timing(time_us, **fields)
 
     def advance(self) -> None:
         """Advance the simulator by one interval with the newest actuators, and send the stack its state."""
         self.simulator.apply(self.actuators)
-        self.machine_ns += self.stack.rates.interval_us * 1000
+        self.machine_ns += self._interval_us * 1000
         if self.loses_states:
-            self._missed_us += self.stack.rates.interval_us
+            self._missed_us += self._interval_us
         else:
-            self._check(self.stack.simulator.receive(memoryview(self.states())))
+            self._send_states(self._endpoint)
+
+    def _send_states(self, endpoint: SimulatorEndpoint) -> None:
+        if not endpoint.receive(memoryview(self.states())):
+            raise AssertionError("the flight stack refuses a frame of the simulator")
 
     def states(self) -> bytes | memoryview:
         """Return the bytes that the simulator sends for one step."""
@@ -130,12 +154,8 @@ class Engine:
 
     def take_answer(self, answer: bytes | memoryview) -> None:
         """Take the stack's actuators."""
-        self._check(self.actuators.open(answer))
-
-    @staticmethod
-    def _check(is_valid: bool) -> None:
-        if not is_valid:
-            raise AssertionError("simulator and flight stack exchanged a frame that one of them refuses")
+        if not self.actuators.open(answer):
+            raise AssertionError("the simulator refuses a frame of the flight stack")
 
     def pass_requests(self) -> None:
         """Pass the vehicle's requests to the simulator, and the answers back."""
@@ -150,8 +170,11 @@ class Engine:
         old = self.stack
         old.recorder.close()
         self.actuators = ActuatorsFrame()  # all zero: disarmed
-        for _ in range(round(off_s * old.rates.inner_hz)):
+        steps_off = round(off_s * old.rates.inner_hz)
+        for _ in range(steps_off):
             self.simulator.apply(self.actuators)
+        self._send_states(old.simulator)  # the new vehicle's clock begins here
+        self._boot_us += old.now.time_us + steps_off * old.rates.interval_us
         old.loops.close()
         self.config = reboot_config(old, self.config)
         self.stack = self._build()

@@ -24,6 +24,8 @@ from gcs_cli.report.summary import item_ned_m
 
 _UNEXPECTED = ("unexpected", "not refused")
 _SHOWN_EVENTS = 8
+_BEFORE_LANDING_S = 0.05
+"""Time before the landing detection at which the mode counts: the vehicle may change it upon landing."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +41,10 @@ class Check:
 
     @property
     def share(self) -> float | None:
-        """The margin as a share of the limit; None without either."""
-        if self.margin is None or self.limit is None or not math.isfinite(self.margin):
+        """The margin as a share of the limit; None without either, and for a limit of 0."""
+        if self.margin is None or not self.limit or not math.isfinite(self.margin):
             return None
-        return self.margin / max(abs(self.limit), 1e-9)
+        return self.margin / abs(self.limit)
 
     def __str__(self) -> str:
         return f"{self.name}: {self.found}"
@@ -95,15 +97,23 @@ def _outcome(expect: Expect, flight: Flight, last: State, events: Sequence[Event
     if wanted == "any":
         return Check(name, True, flight.outcome)
     if wanted in Mode.__members__:
-        landings = [event.time_s for event in flight.events if event.name == "landing"]
-        mode = flight.at(landings[-1] - 0.05).mode if landings else last.mode
-        return Check(name, mode == wanted, f"it {'landed' if landings else 'ended'} in mode {mode}")
+        mode = _landing_mode(flight)
+        ending = f"ended in mode {last.mode} without a landing" if mode is None else f"landed in mode {mode}"
+        return Check(name, mode == wanted, f"it {ending}")
     if wanted in tuple(Code):
         return Check(name, flight.outcome == wanted, f"{flight.outcome}: {flight.outcome_text}")
     failsafes = [
         event.name.removeprefix("failsafe_") for event in events if event.name.startswith("failsafe_")
     ]
     return Check(name, wanted in failsafes, f"active failsafes: {', '.join(failsafes) or 'none'}")
+
+
+def _landing_mode(flight: Flight) -> str | None:
+    """Return the mode in which the vehicle landed at last; None if the flight does not end on the ground."""
+    moves = [event for event in flight.events if event.name in ("takeoff", "landing")]
+    if not moves or moves[-1].name != "landing":
+        return None
+    return flight.at(moves[-1].time_s - _BEFORE_LANDING_S).mode
 
 
 def _limits(expect: Expect, flight: Flight) -> Iterator[Check]:
@@ -131,19 +141,7 @@ def _property(kind: str, text: str, flight: Flight) -> Check:
     found = f"{amount} at t = {margin.time_s:.2f} s"
     if not margin.holds:
         found = f"violated at t = {margin.time_s:.2f} s\n{margin.detail}"
-    limit = _number_in(text)
-    return Check(margin.prop, margin.holds, found, margin.margin if limit is not None else None, limit)
-
-
-def _number_in(text: str) -> float | None:
-    """Return the last number of an expression: the limit in most of them."""
-    parts = [part for part in parse_window(text)[0].replace("(", " ").replace(")", " ").split() if part]
-    for part in reversed(parts):
-        try:
-            return float(part)
-        except ValueError:
-            continue
-    return None
+    return Check(margin.prop, margin.holds, found, margin.margin, margin.limit)
 
 
 def _texts(expect: Expect, flight: Flight) -> Iterator[Check]:

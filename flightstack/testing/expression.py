@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import reduce
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -26,7 +27,7 @@ SIGNALS: dict[str, str] = {
     "mode": "flight mode, as text: 'MISSION', 'RETURN', 'LAND' …",
     "armed": "true if armed",
     "landed": "true if the land detector reports landed",
-    "failsafe": "true if a failsafe acts",
+    "failsafe": "true while a failsafe acts: until its end, a user's override, or disarming",
     "item": "current mission item, from 0",
     "altitude_m": "height above home at the start",
     "north_m": "position north of home at the start",
@@ -37,7 +38,7 @@ SIGNALS: dict[str, str] = {
     "pitch_deg": "pitch angle",
     "yaw_deg": "yaw angle, −180 to 180",
     "distance_to_home_m": "horizontal distance to home",
-    "error_m": "distance between position and position setpoint",
+    "error_m": "distance between position and position setpoint in flight; 0 on the ground",
     "battery_percent": "charge of the battery",
 }
 """Names in expressions; each is an attribute of ``State`` too."""
@@ -46,6 +47,8 @@ Values: TypeAlias = Mapping[str, Any]
 SMALLEST = 5e-324
 """The smallest positive number: the margin of equal values."""
 _LARGEST = 1e300
+_ROUNDING = 1e-9
+"""Largest relative difference of two equal margins."""
 NUMBER, TEXT, CONDITION = "a number", "a mode", "a condition"
 _KINDS = {"mode": TEXT, "armed": CONDITION, "landed": CONDITION, "failsafe": CONDITION}
 """What a signal is; the others are numbers."""
@@ -103,6 +106,35 @@ class Expression:
         with np.errstate(all="ignore"):
             margin = np.asarray(_margin(self._tree, signals), dtype=float)
         return np.where(np.isnan(margin), -math.inf, margin)
+
+    def limit(self, sample: Mapping[str, Any], margin: float) -> float | None:
+        """Return the number with which the comparison of this ``margin`` compares; None if it has none.
+
+        ``sample`` has the signals at the time of the margin.
+
+        >>> Expression("hypot(north_m, east_m) < 0.5 and altitude_m > 4.9").limit(
+        ...     {"north_m": 0.1, "east_m": 0.0, "altitude_m": 5.9}, 0.4)
+        0.5
+        """
+        if not math.isfinite(margin):
+            return None
+        limits: dict[float, float | None] = {}
+        for node in ast.walk(self._tree):
+            if isinstance(node, ast.Compare):
+                for operator, pair in zip(node.ops, pairwise((node.left, *node.comparators)), strict=True):
+                    found = abs(float(_compared(operator, *(_value(side, sample) for side in pair))))
+                    if math.isfinite(found):  # not of modes and flags
+                        limits.setdefault(abs(found - abs(margin)), _number(pair))
+        nearest = min(limits, default=math.inf)
+        return limits[nearest] if nearest <= _ROUNDING * (1.0 + abs(margin)) else None
+
+
+def _number(sides: Iterable[ast.expr]) -> float | None:
+    """Return the value of a side without signals; None if each has some."""
+    for side in sides:
+        if not any(isinstance(node, ast.Name) and node.id in SIGNALS for node in ast.walk(side)):
+            return float(_value(side, {}))
+    return None
 
 
 def _kind(node: ast.expr, text: str) -> str:

@@ -317,7 +317,7 @@ def signals_of(flight: Flight) -> Signals:
         "pitch_deg": angles[:, 1],
         "yaw_deg": angles[:, 2],
         "distance_to_home_m": np.sqrt(np.square(position[:, :2] - home).sum(axis=1)),
-        "error_m": np.linalg.norm(setpoint - position, axis=1),
+        "error_m": np.where(data.flying(time_s), np.linalg.norm(setpoint - position, axis=1), 0.0),
         "battery_percent": _battery_percent(log, time_s + data.start_s),
     }
     times: dict[str, list[float]] = {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
@@ -80,8 +81,12 @@ class LoggedText(NamedTuple):
 class Log(Mapping[str, Topic]):
     """Topics by name; docs/reference/log-topics.md lists them."""
 
-    def __init__(self, content: bytes) -> None:
-        """Read the bytes of a ULog file, empty for a vehicle that was never armed; raise ConfigError."""
+    def __init__(self, content: bytes, boot_s: float = 0.0) -> None:
+        """Read the bytes of a ULog file, empty for a vehicle that was never armed; raise ConfigError.
+
+        ``boot_s`` is the simulated time from which the file counts: a vehicle counts from its boot.
+        """
+        self._boot_s = boot_s
         self.content = content
         """The bytes of the file."""
         self._data: dict[str, dict[str, Array]] = {}
@@ -98,20 +103,23 @@ class Log(Mapping[str, Topic]):
         self._data = {item.name: item.data for item in log.data_list}
         self.parameters = dict(log.initial_parameters)
         self.texts = tuple(
-            LoggedText(item.timestamp * 1e-6, item.log_level - ord("0"), item.message)
+            LoggedText(self._boot_s + item.timestamp * 1e-6, item.log_level - ord("0"), item.message)
             for item in log.logged_messages
         )
 
     @cached_property
     def flight(self) -> FlightData:
         """The flight as ``gcs`` reads it from its log; empty without one."""
-        return flight_in(self._parsed, self.content, _SOURCE) if self.content else FlightData()
+        if not self.content:
+            return FlightData()
+        data = flight_in(self._parsed, self.content, _SOURCE)
+        return replace(data, start_s=self._boot_s + data.start_s)
 
     def __getitem__(self, name: str) -> Topic:
         if name not in self._data:
             raise KeyError(f"the log has no topic {name}; it has {', '.join(self._data)}")
         if name not in self._topics:
-            self._topics[name] = _topic(name, self._data[name])
+            self._topics[name] = _topic(name, self._data[name], self._boot_s)
         return self._topics[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -121,7 +129,7 @@ class Log(Mapping[str, Topic]):
         return len(self._data)
 
 
-def _topic(name: str, data: Mapping[str, Array]) -> Topic:
+def _topic(name: str, data: Mapping[str, Array], boot_s: float) -> Topic:
     """Join the elements of arrays: pyulog has a field for each."""
     fields: dict[str, Any] = {}
     for key, values in data.items():
@@ -133,5 +141,5 @@ def _topic(name: str, data: Mapping[str, Array]) -> Topic:
     joined = {
         key: np.column_stack(value) if isinstance(value, list) else value for key, value in fields.items()
     }
-    time_s: FloatArray = data["timestamp"].astype(np.float64) * 1e-6
+    time_s: FloatArray = boot_s + data["timestamp"].astype(np.float64) * 1e-6
     return Topic(name, time_s, joined)

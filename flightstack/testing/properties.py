@@ -41,6 +41,8 @@ class Margin(NamedTuple):
     """Time of the smallest margin, or of the first violation."""
     detail: str = ""
     """The values around the first violation, a line for each time."""
+    limit: float | None = None
+    """The number of the comparison that has this margin, 12 in ``altitude_m < 12``; of always and eventually."""
 
     @property
     def holds(self) -> bool:
@@ -104,7 +106,8 @@ def eventually(signals: Signals, text: str, window: Window = Window()) -> Margin
             last = int(inside[-1]) if len(inside) else len(signals.time_s) - 1
             at = last if best is None or found == -math.inf else int(best)
             detail = "" if found >= 0.0 else values_around(signals, expression.names, at)
-            worst = Margin(name, _plain(found), float(signals.time_s[at]), detail)
+            limit = _limit(expression, signals, at, found)
+            worst = Margin(name, _plain(found), float(signals.time_s[at]), detail, limit)
     return worst
 
 
@@ -164,7 +167,14 @@ def _worst(name: str, signals: Signals, names: Expression | tuple[str, ...], mar
     at = int(violated[0]) if len(violated) else int(np.argmin(margin))
     shown = names.names if isinstance(names, Expression) else names
     detail = values_around(signals, shown, at) if len(violated) else ""
-    return Margin(name, _plain(float(margin.min())), float(signals.time_s[at]), detail)
+    worst = int(np.argmin(margin))
+    limit = _limit(names, signals, worst, float(margin[worst])) if isinstance(names, Expression) else None
+    return Margin(name, _plain(float(margin[worst])), float(signals.time_s[at]), detail, limit)
+
+
+def _limit(expression: Expression, signals: Signals, at: int, margin: float) -> float | None:
+    """Return the number of the comparison that has ``margin`` at sample ``at``."""
+    return expression.limit({name: signals.values[name][at] for name in expression.names}, margin)
 
 
 def _plain(margin: float) -> float:

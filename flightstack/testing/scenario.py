@@ -74,7 +74,7 @@ class Event:
 class Expect:
     """``[expect]``."""
 
-    outcome: str = key("", "a code of summary.json, a flight mode in which it lands, or an active failsafe; "
+    outcome: str = key("", "a code of summary.json, the mode of the last landing, or a failsafe that was active; "
                            "`any` for none", choices=OUTCOMES)  # fmt: skip
     refusal: str | None = key(None, "text of the reason with which the vehicle refuses to start")
     reached: tuple[int, ...] | None = key(None, "mission items in the order in which they are reached", low=0)

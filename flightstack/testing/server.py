@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import NoReturn
@@ -40,19 +41,31 @@ class _BusyError(ServerError):
 class Server:
     """Simulator and flight stack of one vehicle. They end with ``stop``, or with this process, however it ends."""
 
-    def __init__(self, setup: Setup, folder: Path, *, speed: float = 1.0, timeout_s: float = 180.0) -> None:
+    def __init__(
+        self,
+        setup: Setup,
+        folder: Path,
+        *,
+        speed: float = 1.0,
+        timeout_s: float = 180.0,
+        faults: Sequence[str] = (),
+    ) -> None:
         """Start both at ``speed`` times real time, with their files in ``folder``, and wait until the vehicle can arm.
+
+        ``faults`` are those of ``sim-bridge --fault``, such as ``"rotor 2 efficiency 0.7 @12"``: their times count from
+        the start of the simulator. A client injects others with MAV_CMD_INJECT_FAILURE.
 
         The vehicle's timeouts for lost links are those of ``client_timeouts``, unless ``setup`` has them.
 
-        Raise ServerError if a process ends, or after ``timeout_s`` of wall time. Kernels that are not compiled yet
-        take a minute.
+        Raise ServerError if a process ends, as with a fault that it cannot have, or after ``timeout_s`` of wall time.
+        Kernels that are not compiled yet take a minute.
         """
         self.setup = setup
         self.folder = folder
         """Directory of the flight logs and the output of the processes."""
         self.instance = 0
         """Number from which the ports derive."""
+        self._faults = list(faults)
         self._kept_in: list[Path] = []
         self._guard: subprocess.Popen[bytes] | None = None
         end_s = time.monotonic() + timeout_s
@@ -128,7 +141,7 @@ class Server:
         self.stop()
 
     def _start(self, speed: float) -> subprocess.Popen[bytes]:
-        options = fly_options(self.setup, self.instance, speed)
+        options = replace(fly_options(self.setup, self.instance, speed), faults=self._faults)
         home = self.setup.home
         at = f"--home={home.latitude_deg!r},{home.longitude_deg!r},{home.altitude_m!r}"
         simulator = [*passed(options, TO_SIMULATOR), at]

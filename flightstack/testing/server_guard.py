@@ -1,6 +1,7 @@
 """Process between a test and a vehicle's processes: it ends them when its standard input is closed.
 
-The kernel closes that pipe when the test's process ends, by whatever signal.
+The kernel closes that pipe when the test's process ends, by whatever signal. It closes the pipes to the vehicle's
+processes too when the guard itself is killed.
 Usage: ``python -m flightstack.testing.server_guard FOLDER SIMULATOR STACK``, the latter two as JSON lists of arguments.
 """
 
@@ -44,7 +45,7 @@ class _Guard:
 
 def main(folder: Path, simulator: list[str], stack: list[str]) -> str:
     """Run both processes; return why they ended, empty if standard input was closed."""
-    with Children(folder) as children:
+    with Children(folder, supervised=True) as children:
         guard = _Guard(children)
         # the simulator's port is the lock of an instance: no flight stack may connect to the simulator of another test
         first = children.start(SIMULATOR, "sim_bridge", simulator)

@@ -17,7 +17,7 @@ from flightstack.firmware.choice import PYTHON, parse_loops
 from flightstack.firmware.targets import make_loops
 from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, DEFAULT_INNER_HZ, StackConfig
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
-from flightstack.params.vehicle import DEFAULT_VEHICLE, Vehicle
+from flightstack.params.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle
 from flightstack.plan import Plan, load_plan
 from flightstack.process.assembly import vehicle_of
 from flightstack.process.clock import nearest_outer_hz, rates
@@ -171,3 +171,8 @@ def _vector(name: str, values: Sequence[float]) -> Vector3:
     if len(values) != 3:
         raise UsageProblemError(f"{name}: {values!r} has {len(values)} numbers instead of 3")
     return Vector3(*(float(value) for value in values))
+
+
+def compile_plant() -> None:
+    """Compile the kernels of the default plant, or load them from the cache."""
+    Setup().simulator(load_vehicle(DEFAULT_VEHICLE))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -108,12 +108,16 @@ class SitlServer:
         self.running: list[Server] = []
         """Servers of tests and fixtures that are not over, whether stopped or not."""
 
-    def __call__(self, *, speed: float = 1.0, timeout_s: float = 180.0, **conditions: Any) -> Server:
+    def __call__(
+        self, *, speed: float = 1.0, timeout_s: float = 180.0, faults: Sequence[str] = (), **conditions: Any
+    ) -> Server:
         """Start simulator and flight stack, and wait until the vehicle is healthy; raise ServerError, ConfigError.
 
         ``speed`` is a multiple of real time, ``conditions`` are those of ``Setup``; ``timeout_s`` is wall time.
+        ``faults`` are those of ``sim-bridge --fault``, with times since the start of the simulator.
         """
-        server = Server(Setup(**conditions), self._make_folder(), speed=speed, timeout_s=timeout_s)
+        folder = self._make_folder()
+        server = Server(Setup(**conditions), folder, speed=speed, timeout_s=timeout_s, faults=faults)
         self.running.append(server)
         self._owners.add_finalizer(lambda: self._stop(server))
         return server

@@ -11,6 +11,9 @@ from flightstack.core.portable_math import distance
 from flightstack.process.assembly import Stack
 from sim_bridge.simulator import Simulator
 
+_TOUCH_M = 0.05
+"""A vehicle no higher than this touches the ground, as in the figures of a flight."""
+
 
 class State(NamedTuple):
     """True motion of the vehicle, and what the vehicle reports of itself. Positions count from home at the start."""
@@ -35,11 +38,14 @@ class State(NamedTuple):
     failsafes: tuple[str, ...]
     """Active failsafes by their names, the most important first, such as GCS_LOST or BATTERY_LOW."""
     failsafe: bool
-    """True if a failsafe acts."""
+    """True while a failsafe acts: until its end, a user's override, or disarming."""
     item: int
     """The current mission item, from 0; −1 without a mission."""
     error_m: float
-    """Distance between position and position setpoint; NaN if the setpoint leaves an axis free."""
+    """Distance between position and position setpoint in flight; NaN if the setpoint leaves an axis free.
+
+    0 on the ground, into which the setpoint of a landing sinks.
+    """
 
     @property
     def north_m(self) -> float:
@@ -75,15 +81,16 @@ class State(NamedTuple):
         return "; ".join(parts)
 
 
-def state_of(stack: Stack, simulator: Simulator) -> State:
-    """Return the present state."""
+def state_of(stack: Stack, simulator: Simulator, time_s: float) -> State:
+    """Return the present state; ``time_s`` is the time of the world."""
     now, truth = stack.now, simulator.frame.state
     position, velocity = Vector3(*truth[0:3].tolist()), Vector3(*truth[3:6].tolist())
     euler = euler_from_quaternion(Quaternion(*truth[6:10].tolist()))
     roll, pitch, yaw = (math.degrees(angle) for angle in euler)
+    flies = now.status.armed and not now.landed and -position.z > _TOUCH_M
     home = stack.places.frame.to_ned(stack.area.home)
     return State(
-        time_s=now.time_us * 1e-6,
+        time_s=time_s,
         mode=now.status.mode.name,
         armed=now.status.armed,
         landed=now.landed,
@@ -98,5 +105,5 @@ def state_of(stack: Stack, simulator: Simulator) -> State:
         failsafes=tuple(failsafe.name for failsafe in stack.parts.failsafes.active),
         failsafe=stack.journal.failsafe_acts,
         item=now.progress.current if now.mission_count else -1,
-        error_m=distance(*(now.setpoint[0:3] - position).tolist()),
+        error_m=distance(*(now.setpoint[0:3] - position).tolist()) if flies else 0.0,
     )

@@ -135,7 +135,7 @@ class World:
     @property
     def state(self) -> State:
         """The present state."""
-        return state_of(self.engine.stack, self.engine.simulator)
+        return state_of(self.engine.stack, self.engine.simulator, self.time_s)
 
     @property
     def texts(self) -> list[str]:
@@ -149,7 +149,7 @@ class World:
 
     @property
     def time_s(self) -> float:
-        """Simulated time [s]."""
+        """Simulated time since the start of the world [s]; a power cycle does not change it."""
         return self.engine.time_s
 
     # ------------------------------------------------------------------ time
@@ -360,7 +360,10 @@ class World:
         self.events.append(Event(self.time_s, name))
 
     def power_cycle(self, off_s: float = 1.0) -> None:
-        """Switch the vehicle off for ``off_s`` and on again; in the air it falls. Plans and parameters survive."""
+        """Switch the vehicle off for ``off_s`` and on again; in the air it falls. Plans and parameters survive.
+
+        The vehicle's time since boot, in its messages and in the bytes of its logs, begins at 0 again.
+        """
         self.engine.power_cycle(off_s)
         for client in self.clients.values():
             self._network.connect(client, self.engine.stack.ground, self._telemetry)
@@ -379,7 +382,7 @@ class World:
 
     def flight(self, outcome: Outcome | None = None) -> Flight:
         """Return the newest flight from its log, up to now if it is not over; ``outcome`` is that of its mission."""
-        log = Log(self.engine.newest_log())
+        log = Log(self.engine.newest_log(), self.engine.newest_boot_s)
         flight = Flight(log, outcome, self.plan, self.setup, tuple(self.events))
         if outcome is None or not log:
             return flight

@@ -58,6 +58,10 @@ class SerialPort:
             raise LineError(f"{self.name}: connection lost: closed by the other end")
         return data
 
+    def fileno(self) -> int:
+        """Return the file descriptor, for ``poll``."""
+        return int(self._port.fileno())
+
     def close(self) -> None:
         """Close the port; a second call does nothing."""
         self._port.close()

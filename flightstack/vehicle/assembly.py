@@ -46,11 +46,16 @@ class VehicleParts(NamedTuple):
     backend: ControlBackend
     autopilot: Autopilot
 
-    def warm_up(self) -> None:
-        """Compile the kernels of loops and commander, or load them from the cache."""
+    def warm_up(self, *, with_streams: bool) -> None:
+        """Compile the kernels of loops and commander, or load them from the cache.
+
+        ``with_streams``: that of modes that follow a stream too, which is else loaded in flight.
+        """
         now = self.now
         self.backend.warm_up(now.state, now.setpoint, now.rotor_speed)
         self.failsafes.warm_up()
+        if with_streams:
+            self.navigator.warm_up_streams()
 
     def set_behaviour(self, behaviour: Behaviour) -> None:
         """Set the parameters of guidance and commander, effective in the next outer tick."""

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
-
-import numpy as np
 
 from flightstack.commander.failsafe import Action
 from flightstack.commander.fence_monitor import FenceBreaches
-from flightstack.core.contract import FloatArray
 from flightstack.core.enums import Mode
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.navigator import MissionProgress
@@ -49,9 +46,8 @@ class PlanIds(NamedTuple):
     rally: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class VehicleStatus:
-    """Snapshot of the vehicle; the arrays are copies."""
+class VehicleStatus(NamedTuple):
+    """Snapshot of the vehicle, with lists in place of arrays."""
 
     info: VehicleInfo
     time_us: int
@@ -65,10 +61,11 @@ class VehicleStatus:
     """Action of the active failsafes."""
     state_is_good: bool
     """True if the newest state is finite, and neither too old nor frozen."""
-    state: FloatArray
-    setpoint: FloatArray
-    attitude_target: FloatArray
-    row: FloatArray
+    state: list[float]
+    """As ``FlightState.state``, and so the next two, ``in_single_precision``."""
+    setpoint: list[float]
+    attitude_target: list[float]
+    row: list[float]
     home: GeoPoint
     flight: FlightTimes
     mission: MissionProgress
@@ -97,9 +94,22 @@ def vehicle_info(vehicle: Vehicle, system_id: int, is_generic: bool, frame: Loca
     )
 
 
+_SINGLE_LIMIT = 1e18
+
+
+def in_single_precision(values: list[float]) -> list[float]:
+    """Return ``values`` with infinity for those beyond 1e18: single precision must hold them and products of them."""
+    if (
+        max(values) <= _SINGLE_LIMIT and min(values) >= -_SINGLE_LIMIT
+    ):  # the usual case; False if NaN hides a value
+        return values
+    return [math.copysign(math.inf, value) if abs(value) > _SINGLE_LIMIT else value for value in values]
+
+
 def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> VehicleStatus:
     """Return the current status."""
     now, failsafes, fence = parts.now, parts.failsafes, parts.area.fence
+    state: list[float] = now.state.tolist()
     return VehicleStatus(
         info=info,
         time_us=now.time_us,
@@ -108,11 +118,11 @@ def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> 
         landed=now.landed,
         can_arm=lambda: now.status.armed or not parts.readiness.arming_refusals(),
         failsafe_action=failsafes.decision.action,
-        state_is_good=now.has_state and not failsafes.states.is_stale and bool(np.isfinite(now.state).all()),
-        state=now.state.copy(),
-        setpoint=now.setpoint.copy(),
-        attitude_target=now.attitude_target.copy(),
-        row=now.row.copy(),
+        state_is_good=now.has_state and not failsafes.states.is_stale and all(map(math.isfinite, state)),
+        state=in_single_precision(state),
+        setpoint=in_single_precision(now.setpoint.tolist()),
+        attitude_target=in_single_precision(now.attitude_target.tolist()),
+        row=now.row.tolist(),
         home=parts.area.home,
         flight=FlightTimes(now.armed_us, now.takeoff_us, now.landing_us),
         mission=now.progress,
@@ -122,6 +132,6 @@ def vehicle_status(info: VehicleInfo, parts: VehicleParts, battery: Battery) -> 
         battery=battery,
         battery_level=failsafes.battery_level,
         fence_acts=now.behaviour.fence_action != 0,
-        fence_breached=bool(fence.flags),
+        fence_breached=fence.is_breached,
         fence_breaches=fence.breaches,
     )

@@ -2,6 +2,7 @@
 
 Commands: GCS_Common.cpp and GCS_MAVLink_Copter.cpp of ArduPilot. ``hold`` selects BRAKE, as QGroundControl's pause
 does: LOITER takes the climb rate from the throttle stick, and without a remote control the vehicle descends in it.
+The first mode that is named also makes the messages of ArduPilot's dialect known to the decoder.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.dialect import ardupilot_dialect, mavlink
 from gcs_cli.autopilots import common_commands
 from gcs_cli.autopilots.autopilot import Autopilot, Phase, Role, VehicleCommand
 
@@ -27,9 +28,7 @@ _COPTER = "COPTER_MODE"
 
 @cache
 def _names_of(enum: str) -> dict[int, str]:
-    from pymavlink.dialects.v20 import ardupilotmega  # noqa: PLC0415  # 0.1 s, for this autopilot only
-
-    entries: Mapping[int, Any] = ardupilotmega.enums[enum]
+    entries: Mapping[int, Any] = ardupilot_dialect().enums[enum]
     prefix = f"{enum}_"
     named = {number: entry.name.removeprefix(prefix) for number, entry in entries.items()}
     return {number: name for number, name in named.items() if name != "ENUM_END"}

@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.link import Address, Message, is_for, is_from
 from flightstack.mavlink.mission_messages import DEFAULT_TIMING, Timing
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionResult, MissionType
 from gcs_cli.clients.mission_operations import Clear, Done, Failed, Operation, SetCurrent
 from gcs_cli.clients.mission_transfers import Download, Upload
+from gcs_cli.plans.home_item import with_home_item, without_home_item
+from gcs_cli.plans.itinerary import home_of_items
 
 __all__ = ["Done", "Failed", "MissionClient"]
 
@@ -31,7 +34,11 @@ _ADDRESSED = frozenset(
 
 
 class MissionClient:
-    """Uploads, downloads, clears and sets the current item of one mission type on one vehicle."""
+    """Uploads, downloads, clears and sets the current item of one mission type on one vehicle.
+
+    ``begins_with_home``: item 0 of the vehicle's mission is its home position (``home``, if known), as on ArduPilot.
+    The items and numbers of this client are those of the plan, which has no such item.
+    """
 
     def __init__(
         self,
@@ -39,7 +46,12 @@ class MissionClient:
         own: Address,
         mission_type: MissionType = MissionType.MISSION,
         timing: Timing = DEFAULT_TIMING,
+        *,
+        begins_with_home: bool = False,
+        home: GeoPoint | None = None,
     ) -> None:
+        self._begins_with_home = begins_with_home and mission_type == MissionType.MISSION
+        self._home = home
         self.vehicle = vehicle
         self.own = own
         self.mission_type = mission_type
@@ -54,6 +66,8 @@ class MissionClient:
 
     def start_upload(self, items: Sequence[MissionItem]) -> None:
         """Replace the vehicle's mission by ``items``; without items, clear it."""
+        if self._begins_with_home and items:
+            items = with_home_item(tuple(items), home_of_items(items, self._home))
         self._start(Upload(self.vehicle, self.mission_type, items))
 
     def start_download(self) -> None:
@@ -66,7 +80,7 @@ class MissionClient:
 
     def start_set_current(self, seq: int) -> None:
         """Set the current item to ``seq`` (0 to 65535)."""
-        self._start(SetCurrent(self.vehicle, self.mission_type, seq))
+        self._start(SetCurrent(self.vehicle, self.mission_type, seq + self._shift))
 
     def cancel(self) -> None:
         """Cancel the operation, and tell the vehicle."""
@@ -77,7 +91,12 @@ class MissionClient:
     @property
     def result(self) -> Done | Failed | None:
         """Result of the operation; None before its end."""
-        return self._operation.result if self._operation else None
+        result = self._operation.result if self._operation else None
+        if isinstance(result, Done) and result.items and self._begins_with_home:
+            return Done(without_home_item(result.items))
+        if isinstance(result, Failed) and result.seq is not None:
+            return result._replace(seq=max(0, result.seq - self._shift))
+        return result
 
     @property
     def plan_id(self) -> int:
@@ -87,7 +106,13 @@ class MissionClient:
     @property
     def progress(self) -> tuple[int, int]:
         """Transferred items and their total (0 before the count is known)."""
-        return self._operation.progress if self._operation else (0, 0)
+        sent, count = self._operation.progress if self._operation else (0, 0)
+        return max(0, sent - self._shift), max(0, count - self._shift)
+
+    @property
+    def _shift(self) -> int:
+        """The vehicle's number of item 0 of the plan."""
+        return int(self._begins_with_home)
 
     def receive(self, message: Message, now_s: float) -> None:
         """Process a message; messages that do not belong to this operation are ignored."""

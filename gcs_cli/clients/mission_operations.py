@@ -13,7 +13,26 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.mission_messages import Timing, ack_message
 from flightstack.plan.item import MissionItem
-from flightstack.plan.vocabulary import MissionResult, result_name
+from flightstack.plan.vocabulary import MissionResult, MissionType, result_name
+
+_MEANINGS = {
+    MissionResult.ERROR: "it gives no reason",
+    MissionResult.UNSUPPORTED_FRAME: "the frame is not supported",
+    MissionResult.UNSUPPORTED: "the command is not supported",
+    MissionResult.NO_SPACE: "too many items",
+    MissionResult.INVALID: "a value is not valid",
+    **{
+        MissionResult(MissionResult.INVALID_PARAM1 + index): f"parameter {index + 1} is not valid"
+        for index in range(7)
+    },
+    MissionResult.INVALID_SEQUENCE: "an item came out of order",
+    MissionResult.DENIED: "it does not take one now",
+    MissionResult.OPERATION_CANCELLED: "it cancelled the transfer",
+}
+
+
+_TRY_COUNT = (MissionResult.ERROR, MissionResult.UNSUPPORTED)
+"""Refusals of MISSION_CLEAR_ALL after which the upload of no items may succeed, as ArduPilot's of a geofence."""
 
 
 class Done(NamedTuple):
@@ -30,7 +49,9 @@ class Failed(NamedTuple):
     result: int
     """The MAV_MISSION_RESULT: the vehicle's, or OPERATION_CANCELLED after a timeout."""
     seq: int | None = None
-    """The current item. None after the last one: then only the vehicle's STATUSTEXT names the item."""
+    """The last item that the vehicle requested: if it checks each item, the refused one."""
+    is_whole: bool = False
+    """True if the vehicle had all items: it may have refused any of them, or the plan as a whole."""
 
 
 class Operation:
@@ -77,20 +98,27 @@ class Operation:
         """Return the MISSION_ACK that ends the operation."""
         return ack_message(self.vehicle, result, self.mission_type)
 
-    def refused(self, result: int, seq: int | None = None) -> None:
+    def refused(self, result: int, seq: int | None = None, *, is_whole: bool = False) -> None:
         """End the operation with the vehicle's refusal."""
         self.may_be_open = False
-        self.result = Failed(f"the vehicle refused: {result_name(result)}", result, seq)
+        self.result = Failed(f"the vehicle refused: {result_text(result)}", result, seq, is_whole)
+
+
+def result_text(result: int) -> str:
+    """Return the meaning and the name of a MAV_MISSION_RESULT."""
+    meaning = _MEANINGS.get(MissionResult(result)) if result in MissionResult.__members__.values() else None
+    return result_name(result) if meaning is None else f"{meaning} ({result_name(result)})"
 
 
 class Clear(Operation):
-    """Removes the vehicle's mission."""
+    """Removes the vehicle's mission: by MISSION_CLEAR_ALL, or if that is refused, by the upload of no items."""
 
     is_transfer = False
 
     def __init__(self, vehicle: Address, mission_type: int) -> None:
         request = mavlink.MAVLink_mission_clear_all_message(*vehicle, mission_type)
         super().__init__(vehicle, mission_type, request)
+        self._has_counted = False
 
     def missing_answer(self) -> str:
         """Return a description of the missing answer."""
@@ -101,6 +129,12 @@ class Clear(Operation):
         if message.get_type() == "MISSION_ACK" and self.result is None:
             if message.type == MissionResult.ACCEPTED:
                 self.result = Done()
+            elif (
+                message.type in _TRY_COUNT and self.mission_type != MissionType.ALL and not self._has_counted
+            ):
+                self._has_counted = self.moved = True
+                self.request = mavlink.MAVLink_mission_count_message(*self.vehicle, 0, self.mission_type)
+                return [self.request]
             else:
                 self.refused(message.type)
         return []

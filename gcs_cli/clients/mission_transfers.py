@@ -23,6 +23,7 @@ class Upload(Operation):
         self._count_message = count
         self._is_serving = False
         self._last_sent_seq = -1
+        self._is_out_of_order = False
         self.may_be_open = True
 
     @property
@@ -35,11 +36,12 @@ class Upload(Operation):
         done, count = self.progress
         if not self._is_serving:
             return "did not answer the announcement of the upload"
-        return (
+        missing = (
             f"did not ask for item {done} (last {count - 1})"
             if done < count
             else "did not confirm the upload"
         )
+        return missing + (" after an item out of order" if self._is_out_of_order else "")
 
     def receive(self, message: Message) -> list[Message]:
         """Process a message from the vehicle, and return the answers."""
@@ -75,8 +77,12 @@ class Upload(Operation):
 
     def _on_ack(self, result: int, plan_id: int) -> None:
         is_whole = self._last_sent_seq == len(self._items) - 1
-        if result != MissionResult.ACCEPTED:
-            self.refused(result, None if is_whole or not self._is_serving else self._last_sent_seq)
+        if result == MissionResult.INVALID_SEQUENCE and self._is_serving:
+            # ArduPilot answers a copy of an item so, and continues; a vehicle that has ended the upload falls silent
+            self._is_out_of_order = True
+        elif result != MissionResult.ACCEPTED:
+            seq = self._last_sent_seq if self._is_serving else None
+            self.refused(result, seq, is_whole=is_whole and seq is not None)
         elif is_whole:
             self.plan_id = plan_id
             self.result = Done(self._items)

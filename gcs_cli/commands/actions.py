@@ -15,7 +15,7 @@ from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.perform import ask_modes, perform
 from gcs_cli.output import Output
-from gcs_cli.settings import LinkOptions
+from gcs_cli.settings import LinkOptions, output_of
 from gcs_cli.vehicle.view_types import VehicleView
 from gcs_cli.vehicle_link import connect_vehicle
 
@@ -38,15 +38,12 @@ class ActionOptions:
             "--no-wait", help="End with the acknowledgement; do not wait for the effect.", **IN_OUTPUT
         ),
     ] = False
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a line.", **IN_OUTPUT)] = (
-        False
-    )
 
 
 def run_action(context: typer.Context, link: LinkOptions, options: ActionOptions, action: Action) -> None:
     """Connect, perform ``action`` and print the result."""
     with connect_vehicle(context, link) as connection:
-        perform(connection, action, Output(options.as_json), waits=not options.no_wait)
+        perform(connection, action, output_of(context, link), waits=not options.no_wait)
 
 
 def confirm(question: str, yes: bool) -> None:
@@ -82,7 +79,7 @@ def disarm(
         if force and not yes and _may_fly(connection):
             confirm("the vehicle may be in the air, and its rotors will stop", yes)
         perform(
-            connection, on_vehicle.disarm(force=force), Output(options.as_json), waits=not options.no_wait
+            connection, on_vehicle.disarm(force=force), output_of(context, link), waits=not options.no_wait
         )
 
 
@@ -196,7 +193,7 @@ def mode(
 ) -> None:
     """Select a flight mode, or list the modes of the vehicle."""
     with connect_vehicle(context, link) as connection:
-        output = Output(options.as_json)
+        output = output_of(context, link)
         view = connection.session.view
         if name is None:
             is_listed = ask_modes(connection)

@@ -27,7 +27,7 @@ from gcs_cli.report.compare import (
     read_runs,
     render_comparison,
 )
-from gcs_cli.report.replay import find_run
+from gcs_cli.report.poses import find_run
 from gcs_cli.report.run_directory import COMPARISON_NAME as PAGE_NAME
 from gcs_cli.settings import JsonOption, OverwriteOption
 

@@ -1,8 +1,8 @@
-"""``gcs log list|download``."""
+"""``gcs log list|download|erase``: the logs on the vehicle."""
 
 from __future__ import annotations
 
-import json
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
@@ -15,6 +15,7 @@ from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.clients.log_client import LogEntry
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
+from gcs_cli.output import Output
 from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
 from gcs_cli.transfers import log_calls
 from gcs_cli.tui.transfer_bar import TransferBar
@@ -37,14 +38,12 @@ def list_logs(
         logs = log_calls.fetch_list(connection)
         files = log_calls.fetch_files(connection) if logs else ()
     named = [(log, log_calls.file_of(log, logs, files)) for log in logs]
-    if as_json:
-        typer.echo(json.dumps([_facts(log, file) for log, file in named]))
-    elif not logs:
+    out = Output(as_json)
+    if not logs and not as_json:
         typer.echo("the vehicle has no logs")
-    else:
-        for log, file in named:
-            line = f"{log.log_id:5d}  {_time_text(log):<20}  {size_text(log.size):>9}"
-            typer.echo(f"{line}  {file.name}" if file is not None else line)
+    for log, file in named:
+        line = f"{log.log_id:5d}  {_time_text(log):<20}  {size_text(log.size):>9}"
+        out.say("log", f"{line}  {file.name}" if file is not None else line, **_facts(log, file))
 
 
 @app.command()
@@ -63,8 +62,10 @@ def download(
         bool, typer.Option("--all", help="All logs, except those that are already in the folder.")
     ] = False,
     overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Download a log, or all of them."""
+    out = Output(as_json)
     number = _number(log_id)
     if everything and log_id != "latest":
         raise CliError("give either a log or --all", USAGE)
@@ -74,14 +75,46 @@ def download(
             raise CliError("the vehicle has no logs")
         files = log_calls.fetch_files(connection)
         if everything:
-            _download_all(connection, logs, files, output, overwrite)
+            _download_all(out, connection, logs, files, output, overwrite)
         else:
             log = _chosen(logs, number)
             file = log_calls.file_of(log, logs, files)
-            _download(connection, log, file, _path(log, file, output, False), overwrite)
+            _download(out, connection, log, file, _path(log, file, output, False), overwrite)
+
+
+@app.command()
+@expand_options
+def erase(
+    context: typer.Context,
+    link: LinkOptions,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Erase all logs but the one that is being written.
+
+    An armed vehicle may refuse.
+    """
+    if not yes and (sys.stdin is None or not sys.stdin.isatty()):
+        raise CliError("erase removes all logs from the vehicle: confirm with --yes", USAGE)
+    with connect_vehicle(context, link) as connection:
+        before = log_calls.fetch_list(connection)
+        if not before:
+            raise CliError("the vehicle has no logs")
+        size = size_text(sum(log.size for log in before))
+        if not yes:
+            typer.confirm(f"erase {len(before)} logs of {size} from the vehicle?", abort=True)
+        left = log_calls.erase_logs(connection, len(before))
+    if len(left) == len(before) and len(before) > 1:
+        raise CliError(f"the vehicle still has all {len(left)} logs")
+    count = len(before) - len(left)
+    sentence = f"{count} of {len(before)} logs erased"
+    Output(as_json).say(
+        "erased", f"{sentence}, {len(left)} left" if left else sentence, erased=count, left=len(left)
+    )
 
 
 def _download_all(
+    out: Output,
     connection: Connection,
     logs: tuple[LogEntry, ...],
     files: tuple[Entry, ...],
@@ -94,11 +127,11 @@ def _download_all(
         file = log_calls.file_of(log, logs, files)
         path = _path(log, file, output, True)
         if path.exists() and path.stat().st_size == log.size:
-            typer.echo(f"{path} exists already")
+            out.say("exists", f"{path} exists already", path=str(path))
         elif path.is_file() and not overwrite:
             refused.append(str(path))  # a log that has grown since, or another file
         else:
-            _download(connection, log, file, path, overwrite)
+            _download(out, connection, log, file, path, overwrite)
     if refused:
         verb = "exists" if len(refused) == 1 else "exist"
         raise CliError(
@@ -107,7 +140,9 @@ def _download_all(
         )
 
 
-def _download(connection: Connection, log: LogEntry, file: Entry | None, path: Path, overwrite: bool) -> None:
+def _download(
+    out: Output, connection: Connection, log: LogEntry, file: Entry | None, path: Path, overwrite: bool
+) -> None:
     check_new(path, overwrite)
     began_s = connection.now_s
     with TransferBar(f"log {log.log_id}") as bar:
@@ -116,7 +151,9 @@ def _download(connection: Connection, log: LogEntry, file: Entry | None, path: P
     path.parent.mkdir(parents=True, exist_ok=True)
     write_bytes_atomically(path, content)
     rate = size_text(len(content) / took_s)
-    typer.echo(f"log {log.log_id}: {size_text(len(content))} written to {path} ({rate}/s)")
+    sentence = f"log {log.log_id}: {size_text(len(content))} written to {path} ({rate}/s)"
+    facts = {"id": log.log_id, "path": str(path), "size_bytes": len(content), "took_s": took_s}
+    out.say("downloaded", sentence, **facts)
 
 
 def _number(text: str) -> int | None:

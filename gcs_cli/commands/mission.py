@@ -1,4 +1,4 @@
-"""``gcs mission upload|download|check|clear|start``."""
+"""``gcs mission upload|download|verify|clear|start|pause|resume|jump``."""
 
 from __future__ import annotations
 
@@ -9,21 +9,25 @@ from typing import Annotated
 import typer
 
 from flightstack.core.atomic_file import check_new
-from flightstack.core.geodesy import GeoPoint
-from flightstack.plan import MissionItem, MissionType, Plan, command_name, load_plan, save_plan
+from flightstack.plan import MissionType
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.errors import FAILED, CliError, VehicleLostError
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.link import calls
-from gcs_cli.link.connection import Connection
-from gcs_cli.settings import LinkOptions, OverwriteOption
-from gcs_cli.transfers.plan_files import PlanArgument
-from gcs_cli.transfers.plan_parts import Uploads, parts_to_send, plan_parts, plan_problem
+from gcs_cli.plans.formats.files import check_suffix, load_any
+from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
+from gcs_cli.transfers import mission_control
+from gcs_cli.transfers.plan_files import AnyPlanArgument
+from gcs_cli.transfers.plan_parts import Uploads, parts_to_send
+from gcs_cli.transfers.plan_transfers import (
+    complete_upload,
+    say_downloaded,
+    say_uploaded,
+    say_verified,
+)
+from gcs_cli.transfers.vehicle_plans import KINDS, download_plan
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
-
-_HOME_WAIT_S = 3.0
 
 
 class Part(StrEnum):
@@ -45,52 +49,18 @@ _PART_NAMES = {
 
 @app.command()
 @expand_options
-def upload(context: typer.Context, link: LinkOptions, file: PlanArgument) -> None:
+def upload(context: typer.Context, link: LinkOptions, file: AnyPlanArgument) -> None:
     """Replace the vehicle's mission by that of a file.
 
     Geofence and rally points are replaced if the file has any, else the vehicle keeps its own. They are uploaded
     first, because the vehicle checks the mission against them. If a part is refused, or after Ctrl-C, the former
     plans are restored; a second Ctrl-C ends at once.
     """
-    plan = load_plan(file)
+    plan = load_any(file)
     with connect_vehicle(context, link) as connection, Interruption() as interruption:
         uploads = Uploads(connection.session, plan, restores=True, interrupted=lambda: interruption.reason)
-        _complete(connection, uploads, file)
-    for part in parts_to_send(plan):
-        typer.echo(f"{part.name} of {len(part.items)} items uploaded")
-    for part in uploads.kept:
-        typer.echo(f"the vehicle keeps its {part.name} of {len(part.items)} items")
-
-
-def _complete(connection: Connection, uploads: Uploads, file: Path) -> None:
-    """Run an upload to its end; if it ends early, raise CliError with the plans that the vehicle holds."""
-
-    def name() -> str:
-        return f"upload of the {uploads.name} of {file}"
-
-    try:
-        connection.complete(uploads, name)
-    except VehicleLostError as error:
-        raise CliError(f"{error}; {uploads.state}") from None
-    except KeyboardInterrupt:
-        raise CliError(f"{name()}: interrupted; {uploads.state}") from None
-    except OSError as error:
-        raise CliError(f"{name()}: {error.strerror or error}; {uploads.state}") from None
-
-
-@app.command()
-def check(file: PlanArgument) -> None:
-    """Check a file as the vehicle does, without a vehicle.
-
-    Checks mission, geofence and rally points.
-    """
-    plan = load_plan(file)
-    first = next((item.position_deg for item in plan.items if item.position_deg is not None), (0.0, 0.0))
-    problem = plan_problem(plan, plan.home or GeoPoint(*first, 0.0))
-    if problem is not None:
-        raise CliError(f"{file}: {problem}", FAILED)
-    for part in plan_parts(plan):
-        typer.echo(f"{part.name} of {len(part.items)} items: good")
+        complete_upload(connection, uploads, file)
+    say_uploaded(output_of(context, link), parts_to_send(plan), uploads)
 
 
 @app.command()
@@ -106,27 +76,26 @@ def download(
 ) -> None:
     """Download the vehicle's mission, geofence and rally points."""
     if file is not None:
+        check_suffix(file)
         check_new(file, overwrite)
     with connect_vehicle(context, link) as connection:
-        session = connection.session
-        items, fence, rally = (
-            connection.complete(
-                calls.download(session, kind), "download", may_lack=kind != MissionType.MISSION
-            ).items
-            for kind in (MissionType.MISSION, MissionType.FENCE, MissionType.RALLY)
-        )
-        if file is not None:  # the file holds home too, if the vehicle sends it
-            connection.wait_for(lambda: session.view.home is not None, _HOME_WAIT_S)
-        home = session.view.home
-    plan = Plan(items, None if home is None else GeoPoint(*home[:3]), fence=fence, rally=rally)
-    if file is not None:
-        save_plan(file, plan)
-    for part in plan_parts(plan):
-        if file is None:
-            for seq, item in enumerate(part.items):
-                typer.echo(item_line(seq, item))
-        if part.items or part.kind == MissionType.MISSION:
-            typer.echo(f"{part.name} of {len(part.items)} items downloaded" + (f" to {file}" if file else ""))
+        plan = download_plan(connection, with_home=file is not None)
+    say_downloaded(output_of(context, link), plan, file, KINDS)
+
+
+@app.command()
+@expand_options
+def verify(context: typer.Context, link: LinkOptions, file: AnyPlanArgument) -> None:
+    """Compare the vehicle's plan with a file, item by item; exit with 1 if they differ.
+
+    Compares the mission, and geofence and rally points if the file has any.
+    """
+    plan = load_any(file)
+    parts = parts_to_send(plan)
+    with connect_vehicle(context, link) as connection:
+        stored = download_plan(connection, with_home=False, kinds=tuple(part.kind for part in parts))
+        tolerance = calls.storage_tolerance(connection.session)
+    say_verified(output_of(context, link), parts, stored, tolerance, file)
 
 
 @app.command()
@@ -140,23 +109,49 @@ def clear(
     name = _PART_NAMES[part]
     with connect_vehicle(context, link) as connection:
         connection.complete(calls.clear(connection.session, MissionType[part.name]), f"clearing the {name}")
-    typer.echo(f"{name} cleared")
+    output_of(context, link).say("cleared", f"{name} cleared", part=part.value)
 
 
 @app.command()
 @expand_options
 def start(context: typer.Context, link: LinkOptions) -> None:
-    """Start the mission; the vehicle arms for it."""
+    """Start the mission; the vehicle arms for it.
+
+    Waits until the vehicle is armed and flies the mission.
+    """
     with connect_vehicle(context, link) as connection:
-        connection.command(calls.START_MISSION, "mission start")
-    typer.echo("mission started")
+        mission_control.start(connection)
+    output_of(context, link).say("started", "mission started")
 
 
-def item_line(seq: int, item: MissionItem) -> str:
-    """Format one item on one line."""
-    position = ""
-    if item.position_deg is not None:
-        latitude, longitude = item.position_deg
-        position = f"{latitude:.7f} {longitude:.7f} {item.z:g} m"
-    params = " ".join(f"{value:g}" for value in item.params)
-    return f"{seq:4d}  {command_name(item.command):<22} {position:<34} [{params}]".rstrip()
+@app.command()
+@expand_options
+def pause(context: typer.Context, link: LinkOptions) -> None:
+    """Pause the mission: the vehicle holds its position."""
+    with connect_vehicle(context, link) as connection:
+        seq = mission_control.pause(connection)
+    at = "" if seq is None else f" at item {seq}"
+    output_of(context, link).say("paused", f"mission paused{at}", seq=seq)
+
+
+@app.command()
+@expand_options
+def resume(context: typer.Context, link: LinkOptions) -> None:
+    """Resume a paused mission at its current item."""
+    with connect_vehicle(context, link) as connection:
+        seq = mission_control.resume(connection)
+    at = "" if seq is None else f" at item {seq}"
+    output_of(context, link).say("resumed", f"mission resumed{at}", seq=seq)
+
+
+@app.command()
+@expand_options
+def jump(
+    context: typer.Context,
+    link: LinkOptions,
+    seq: Annotated[int, typer.Argument(metavar="N", min=0, max=65_535, help="Number of the item, from 0.")],
+) -> None:
+    """Make an item of the mission the current one; a mission in flight continues there."""
+    with connect_vehicle(context, link) as connection:
+        mission_control.jump(connection, seq)
+    output_of(context, link).say("jumped", f"item {seq} is the current one", seq=seq)

@@ -12,8 +12,10 @@ from gcs_cli.output import can_draw
 
 _ACTIONS = "gcs_cli.commands.actions"
 _MISSION = "gcs_cli.commands.mission"
+_PLANS = "gcs_cli.commands.mission_files"
 _PARAM = "gcs_cli.commands.param"
 _LOG = "gcs_cli.commands.log"
+_LOG_FILE = "gcs_cli.commands.log_file"
 _PIL = "gcs_cli.commands.pil"
 _PIL_FLY = "fly"
 
@@ -51,7 +53,7 @@ class GcsGroup(LazyGroup):
         "status": LazyCommand("gcs_cli.commands.status", "Show the state of the vehicle."),
         "watch": LazyCommand("gcs_cli.commands.watch", "Watch and command the vehicle; q or Ctrl-C ends."),
         "perf": LazyCommand("gcs_cli.commands.perf", "Show the timing of the flight stack's loops."),
-        "replay": LazyCommand("gcs_cli.commands.replay", "Draw a flight: pictures, a film, or a window."),
+        "report": LazyCommand("gcs_cli.commands.report", "Write the report page of a flight from its log."),
         "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),
     }
 
@@ -64,12 +66,54 @@ class MissionGroup(LazyGroup):
     """``gcs mission``."""
 
     lazy = {  # noqa: RUF012
+        "new": LazyCommand(_PLANS, "Write a mission of a pattern."),
+        "check": LazyCommand(
+            _PLANS,
+            "Check a file as the vehicle does: without a vehicle, or with one's geofence, home and parameters.",
+        ),
+        "show": LazyCommand(
+            _PLANS, "Show a plan: its items with distances, headings and times, and a drawing."
+        ),
+        "convert": LazyCommand(
+            _PLANS, "Convert a plan to the format of another file, and name what that format cannot hold."
+        ),
         "upload": LazyCommand(_MISSION, "Replace the vehicle's mission by that of a file."),
-        "check": LazyCommand(_MISSION, "Check a file as the vehicle does, without a vehicle."),
         "download": LazyCommand(_MISSION, "Download the vehicle's mission, geofence and rally points."),
+        "verify": LazyCommand(
+            _MISSION, "Compare the vehicle's plan with a file, item by item; exit with 1 if they differ."
+        ),
         "clear": LazyCommand(_MISSION, "Remove the vehicle's mission, geofence or rally points."),
         "start": LazyCommand(_MISSION, "Start the mission; the vehicle arms for it."),
+        "pause": LazyCommand(_MISSION, "Pause the mission: the vehicle holds its position."),
+        "resume": LazyCommand(_MISSION, "Resume a paused mission at its current item."),
+        "jump": LazyCommand(
+            _MISSION, "Make an item of the mission the current one; a mission in flight continues there."
+        ),
     }
+
+
+def _part_commands(module: str, name: str) -> dict[str, LazyCommand]:
+    return {
+        "upload": LazyCommand(module, f"Replace the vehicle's {name} by that of a file; its mission stays."),
+        "download": LazyCommand(module, f"Download the vehicle's {name}."),
+        "show": LazyCommand(module, f"Show the {name} of a file or of the vehicle."),
+        "verify": LazyCommand(
+            module, f"Compare the vehicle's {name} with that of a file; exit with 1 if they differ."
+        ),
+        "clear": LazyCommand(module, f"Remove the vehicle's {name}."),
+    }
+
+
+class FenceGroup(LazyGroup):
+    """``gcs fence``."""
+
+    lazy = _part_commands("gcs_cli.commands.fence", "geofence")
+
+
+class RallyGroup(LazyGroup):
+    """``gcs rally``."""
+
+    lazy = _part_commands("gcs_cli.commands.rally", "list of rally points")
 
 
 class ParamGroup(LazyGroup):
@@ -92,6 +136,11 @@ class LogGroup(LazyGroup):
     lazy = {  # noqa: RUF012
         "list": LazyCommand(_LOG, "List the logs, the oldest first."),
         "download": LazyCommand(_LOG, "Download a log, or all of them."),
+        "erase": LazyCommand(_LOG, "Erase all logs but the one that is being written."),
+        "info": LazyCommand(_LOG_FILE, "Show what a log holds."),
+        "plot": LazyCommand(_LOG_FILE, "Plot fields of a log."),
+        "export": LazyCommand(_LOG_FILE, "Export a log as CSV, Parquet, MCAP or Rerun."),
+        "draw": LazyCommand("gcs_cli.commands.log_draw", "Draw a flight: pictures, a film, or a window."),
     }
 
 
@@ -114,9 +163,11 @@ class PilGroup(LazyGroup):
 def add_groups(app: typer.Typer) -> None:
     """Add the groups of commands to ``gcs``."""
     for name, group, text in (
-        ("mission", MissionGroup, "The vehicle's mission."),
+        ("mission", MissionGroup, "Missions: files, and the vehicle's."),
+        ("fence", FenceGroup, "The vehicle's geofence."),
+        ("rally", RallyGroup, "The vehicle's rally points."),
         ("param", ParamGroup, "The vehicle's parameters."),
-        ("log", LogGroup, "The vehicle's flight logs."),
+        ("log", LogGroup, "Flight logs: those on the vehicle, and files."),
         (
             "pil",
             PilGroup,

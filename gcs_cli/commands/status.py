@@ -23,7 +23,7 @@ GATHER_S = 2.0
 @expand_options
 def status(context: typer.Context, link: LinkOptions, as_json: JsonOption = False) -> None:
     """Show the state of the vehicle."""
-    with connect_vehicle(context, link) as connection:
+    with connect_vehicle(context, link, takes_recording=True, in_real_time=False) as connection:
         session = connection.session
         session.subscribe(ROTORS_AND_TIMING)
         # most messages come several times a second; values that the vehicle does not send stay unknown

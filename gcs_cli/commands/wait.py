@@ -11,7 +11,7 @@ from gcs_cli.actions.conditions import ConditionError, ViewCondition, choices, p
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError, VehicleLostError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
-from gcs_cli.settings import JsonOption, LinkOptions, link_options
+from gcs_cli.settings import LinkOptions, link_options, output_of
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
@@ -28,7 +28,6 @@ def wait(
         list[str],
         typer.Argument(metavar="CONDITION...", help=f"{choices()}. Quote > and <.", show_default=False),
     ],
-    as_json: JsonOption = False,
 ) -> None:
     """Wait until the vehicle is in a state.
 
@@ -39,7 +38,7 @@ def wait(
     given = link_options(context, link).timeout
     timeout_s = DEFAULT_TIMEOUT_S if given is None else given
     with connect_vehicle(context, link) as connection:
-        wait_for(connection, wanted, timeout_s, Output(as_json))
+        wait_for(connection, wanted, timeout_s, output_of(context, link))
 
 
 def _parsed(text: str) -> ViewCondition:

@@ -14,7 +14,7 @@ from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.output import can_draw
-from gcs_cli.settings import LinkOptions, link_options, settings_of
+from gcs_cli.settings import LinkOptions, link_options, signing_key_of
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.watch_lines import state_line, text_line
 from gcs_cli.vehicle_link import connect_vehicle, open_link
@@ -62,11 +62,11 @@ def watch(
         serve_view(serve, [*_link_arguments(context, link), "--screen", screen])
         return
     if once:
-        with connect_vehicle(context, link) as connection:
+        with connect_vehicle(context, link, takes_recording=True) as connection:
             _print_once(connection, screen)
         return
-    with open_link(context, link) as connection:
-        connection.session.subscribe(ROTORS_AND_TIMING)
+    with open_link(context, link, takes_recording=True, shares=True) as connection:
+        connection.fleet.subscribe(ROTORS_AND_TIMING)
         timeout_s = link_options(context, link).timeout
         try:
             if can_draw():
@@ -130,8 +130,8 @@ def serve_view(address: str, arguments: list[str]) -> None:
 
 def _link_arguments(context: typer.Context, link: LinkOptions) -> list[str]:
     """Return the command with the same link."""
-    settings, chosen = settings_of(context), link_options(context, link)
-    arguments = [] if settings.signing_key is None else ["--signing-key", str(settings.signing_key)]
+    key, chosen = signing_key_of(context), link_options(context, link)
+    arguments = [] if key is None else ["--signing-key", str(key)]
     arguments.append("watch")
     for field in dataclasses.fields(chosen):
         value = getattr(chosen, field.name)
@@ -144,7 +144,7 @@ def watch_lines(connection: Connection) -> None:
     """Print one line per second and one per status text, until interrupted."""
     seen = 0
     next_s = connection.now_s
-    while True:
+    while not connection.ended:
         view = connection.session.view
         for entry in view.texts_since(seen):
             print(text_line(entry), flush=True)

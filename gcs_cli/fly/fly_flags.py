@@ -26,7 +26,7 @@ from gcs_cli.settings import (
     LinkOptions,
     OpenOption,
     OverwriteOption,
-    link_options,
+    given_options,
     settings_of,
 )
 from gcs_cli.transfers.plan_files import DEFAULT_PLAN, PlanArgument
@@ -180,7 +180,7 @@ def complete_options(context: typer.Context, command: str, options: Options, run
         raise CliError(
             f"{command} starts a vehicle of its own: leave --connect out, or see --instance", USAGE
         )
-    link = link_options(context, LinkOptions(timeout=run.timeout, instance=run.instance))
+    link = given_options(context, LinkOptions(timeout=run.timeout, instance=run.instance))
     timeout_s = FlyOptions.timeout_s if link.timeout is None else link.timeout
     return replace(
         options, instance=link.instance or 0, timeout_s=timeout_s, signing_key=settings.signing_key

@@ -29,7 +29,7 @@ from gcs_cli.fly.fly_options import (
 )
 from gcs_cli.fly.processes import Child, Children, Interruption
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.endpoint import LOOPBACK, VehicleEndpoint
+from gcs_cli.link.endpoint import LOOPBACK, UDP_IN, VehicleEndpoint
 from gcs_cli.link.tlog import TlogFile
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.report.flight_data import Flight as FlightData
@@ -69,7 +69,7 @@ def fly(
     The vehicle sends to a port of our own, so that another ground station may use the default one.
     """
     vehicle = (LOOPBACK, vehicle_ground_port(options.instance))
-    own_port = VehicleEndpoint(LOOPBACK, 0, listens=True)
+    own_port = VehicleEndpoint(UDP_IN, LOOPBACK, 0)
     signing = open_signing(options.signing_key)
     with Interruption() as interruption, Connection(own_port, signing=signing, vehicle=vehicle) as connection:
         check_ports(options)

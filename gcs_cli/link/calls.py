@@ -7,12 +7,15 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol, TypeAlias
 
 from flightstack.core.enums import Severity
+from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, mavlink
 from flightstack.mavlink.link import Address
 from flightstack.plan import MissionItem, MissionResult, MissionType
 from gcs_cli.clients.command_client import CommandClient, CommandResult
 from gcs_cli.clients.mission_client import Done, Failed, MissionClient
 from gcs_cli.link.session import Session
+from gcs_cli.plans.compare import EXACT, PACKED, Tolerance
+from gcs_cli.plans.names import any_command_name
 
 TEXT_WAIT_S = 0.3
 """How long to wait for the STATUSTEXT that explains a refusal; it follows the answer."""
@@ -51,7 +54,10 @@ class Request(Protocol):
 class Call:
     """A pending request. It is the session's service until it is answered."""
 
-    def __init__(self, session: Session, client: CommandClient | MissionClient) -> None:
+    def __init__(
+        self, session: Session, client: CommandClient | MissionClient, items: Sequence[MissionItem] = ()
+    ) -> None:
+        self._items = tuple(items)  # of an upload
         self._session = session
         self._client = client
         self._texts_before = session.view.text_count
@@ -77,13 +83,28 @@ class Call:
         )
         if silent:
             return Answer(False, result.reason, silent=True)
-        code = result.result or 0
+        return self._refusal(result, now_s)
+
+    def _refusal(self, result: CommandResult | Failed, now_s: float) -> Answer | None:
+        """Return the refusal with the vehicle's STATUSTEXT, which may still follow; and with the refused item."""
         text = self._explanation()
-        if text:
-            return Answer(False, text, result=code)
-        if self._text_due_s is None:
-            self._text_due_s = now_s + TEXT_WAIT_S
-        return Answer(False, result.reason, result=code) if now_s >= self._text_due_s else None
+        if not text:
+            if self._text_due_s is None:
+                self._text_due_s = now_s + TEXT_WAIT_S
+            if now_s < self._text_due_s:
+                return None
+        item = self._refused_item(result) if isinstance(result, Failed) else ""
+        reason = text or result.reason
+        if item and "item" not in text.lower():
+            reason = f"{item}: {reason}"
+        return Answer(False, reason, result=result.result or 0)
+
+    def _refused_item(self, failed: Failed) -> str:
+        """Return the item that the vehicle refused, in words; MISSION_ACK does not name it."""
+        if failed.seq is None or failed.seq >= len(self._items):
+            return ""
+        name = f"item {failed.seq} ({any_command_name(self._items[failed.seq].command)})"
+        return f"{name} or one before it" if failed.is_whole and failed.seq else name
 
     def _explanation(self) -> str:
         texts = [
@@ -117,7 +138,7 @@ def upload(session: Session, items: Sequence[MissionItem], kind: MissionType = M
     """Begin to upload a mission, geofence or rally points; an upload without items clears them."""
     client = mission_client(session, kind)
     client.start_upload(items)
-    return Call(session, client)
+    return Call(session, client, items)
 
 
 def download(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
@@ -136,7 +157,32 @@ def clear(session: Session, kind: MissionType = MissionType.MISSION) -> Call:
 
 def mission_client(session: Session, kind: MissionType) -> MissionClient:
     """Return a client that transfers one type of plan."""
-    return MissionClient(vehicle_address(session), session.own, kind)
+    home = session.view.home
+    return MissionClient(
+        vehicle_address(session),
+        session.own,
+        kind,
+        begins_with_home=mission_begins_with_home(session),
+        home=None if home is None else GeoPoint(*home[:3]),
+    )
+
+
+def set_current(session: Session, seq: int) -> Call:
+    """Begin to make item ``seq`` the current one, by MISSION_SET_CURRENT."""
+    client = mission_client(session, MissionType.MISSION)
+    client.start_set_current(seq)
+    return Call(session, client)
+
+
+def storage_tolerance(session: Session) -> Tolerance:
+    """Return the differences that the vehicle's storage makes: ArduPilot packs items into 12 bytes."""
+    return PACKED if mission_begins_with_home(session) else EXACT
+
+
+def mission_begins_with_home(session: Session) -> bool:
+    """Return True if item 0 of the vehicle's mission is its home position."""
+    identity = session.view.identity
+    return identity is not None and identity.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
 
 
 def vehicle_address(session: Session) -> Address:
@@ -178,12 +224,6 @@ def goto_command(latitude_deg: float, longitude_deg: float, altitude_amsl_m: flo
 def speed_command(speed_m_s: float) -> Command:
     """Return the command to set the ground speed."""
     return int(mavlink.MAV_CMD_DO_CHANGE_SPEED), (1.0, speed_m_s, -1.0)
-
-
-def home_command(home: tuple[float, float, float] | None) -> Command:
-    """Return the command to set home to latitude, longitude and AMSL altitude; None: the current position."""
-    number = int(mavlink.MAV_CMD_DO_SET_HOME)
-    return (number, (1.0,)) if home is None else (number, (0.0, 0.0, 0.0, NAN, *home))
 
 
 def mode_command(main: int, sub: int) -> Command:

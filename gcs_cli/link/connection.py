@@ -1,25 +1,38 @@
-"""The session on a real socket and the real clock."""
+"""A link on real transports and the real clock."""
 
 from __future__ import annotations
 
+import math
+import select
 import time
 from collections.abc import Callable
 from typing import Protocol
 
+from flightstack.mavlink.link import Message
 from flightstack.mavlink.signing import LinkSigning
 from flightstack.plan import MissionResult
-from flightstack.transports.udp import Address, PortBusyError, UdpSocket, resolve
-from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError, PortInUseError, VehicleLostError
+from flightstack.transports.udp import Address
+from gcs_cli.errors import FAILED, NO_ANSWER, USAGE, CliError, VehicleLostError
 from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Command, Request
-from gcs_cli.link.endpoint import VEHICLE_CONNECTION, VehicleEndpoint
+from gcs_cli.link.endpoint import RECORDING, VehicleEndpoint
+from gcs_cli.link.fleet import Fleet
+from gcs_cli.link.lines import Line
+from gcs_cli.link.opening import SeveralLines, open_line
+from gcs_cli.link.playback import PlaybackLine
 from gcs_cli.link.session import Service, Session
+from gcs_cli.link.share import ShareServer
 
 _LONGEST_WAIT_S = 0.25
 """Longest time until Ctrl-C, the end of a child or a resized terminal is noticed."""
 
 _PROGRESS_S = 0.1
 """Longest time between two updates of a progress bar."""
+
+_SETTLE_S = 0.1
+"""Time after the first heartbeat in which further vehicles are noticed by their telemetry or TIMESYNC answers."""
+
+_SHARE_PERIOD_S = 1.0
 
 
 class TransferClient(Service, Protocol):
@@ -34,11 +47,48 @@ class TransferClient(Service, Protocol):
         """Transferred units and their total (0 before it is known)."""
 
 
-class Connection:
-    """Runs a ``Session`` over UDP. Raises CliError if the port is busy.
+class WallClock:
+    """The monotonic clock of the machine."""
 
-    ``signing``: sign all messages, and accept only messages signed with the same key. ``vehicle``: accept only
-    datagrams from this address, although the vehicle sends first. ``system_id``: accept only this vehicle.
+    @staticmethod
+    def now_s() -> float:
+        """Return the time [s]."""
+        return time.monotonic()
+
+    @staticmethod
+    def wait(poll: select.poll, wait_s: float) -> None:
+        """Wait until a descriptor is ready, ``wait_s`` at most."""
+        poll.poll(max(0.0, wait_s) * 1e3)
+
+    @staticmethod
+    def unix_s() -> float:
+        """Return the time since the Unix epoch [s]."""
+        return time.time()
+
+
+class Clock(Protocol):
+    """Clock of a connection: that of the machine, or that of a recording."""
+
+    def now_s(self) -> float:
+        """Return the time [s]."""
+
+    def wait(self, poll: select.poll, wait_s: float) -> None:
+        """Wait until a descriptor is ready, ``wait_s`` at most."""
+
+    def unix_s(self) -> float:
+        """Return the time since the Unix epoch [s]."""
+
+
+class Connection:
+    """Runs the vehicles of a link, ``fleet``, over a transport; ``session`` is the selected vehicle.
+
+    Raises CliError if a port is busy or a file cannot be read. ``signing``: sign all messages, and accept only messages
+    signed with the same key. ``vehicle``: accept only datagrams from this address, although the vehicle sends first.
+    ``system_id``: select only this vehicle. ``line``: a transport to use instead of that of ``endpoint``. A recording
+    is played as a vehicle that takes no commands, at the speed of the recording if ``in_real_time``, else at once.
+
+    All exchange happens in ``step``. A program with an event loop of its own calls ``step(now_s)``, which does not
+    wait, from a timer, or runs ``step(now_s + 0.1)`` in a thread; only one thread may use a connection.
     """
 
     def __init__(
@@ -49,59 +99,110 @@ class Connection:
         *,
         vehicle: Address | None = None,
         system_id: int | None = None,
+        line: Line | None = None,
+        in_real_time: bool = True,
     ) -> None:
         self.endpoint = endpoint
         self._system_id = system_id
         self._signing = signing
-        try:
-            if endpoint.listens:
-                self._socket = UdpSocket(endpoint.host, endpoint.port)
-                self.session = Session(vehicle, record, signing, system_id)
-            else:
-                host = resolve(endpoint.host)
-                # bound to the loopback interface, the socket cannot be reached from the network
-                self._socket = UdpSocket("127.0.0.1" if host.startswith("127.") else "0.0.0.0")
-                self.session = Session((host, endpoint.port), record, signing, system_id)
-        except PortBusyError as error:
-            sentence = f"{error}: end the other ground station, or use --connect {VEHICLE_CONNECTION}"
-            if error.is_in_use:
-                raise PortInUseError(endpoint, sentence) from None
-            raise CliError(sentence, USAGE) from None
-        except OSError:
-            raise CliError(f"--connect: no host named {endpoint.host}", USAGE) from None
+        self._clock: Clock = WallClock()
+        if endpoint.kind == RECORDING:
+            playback = PlaybackLine(endpoint.host, self._clock.now_s if in_real_time else None)
+            self._clock = self._clock if in_real_time else playback.clock
+            line = playback
+        self._line = open_line(endpoint) if line is None else line
+        if line is None and vehicle is None and not endpoint.listens:
+            (vehicle,) = self._line.peers
+        self.fleet = Fleet(self._line.peers, vehicle, record, signing, system_id)
+        self._server: ShareServer | None = None
+        self._share_due_s = math.inf
+
+    @property
+    def session(self) -> Session:
+        """The selected vehicle."""
+        return self.fleet.selected
 
     @property
     def local_port(self) -> int:
-        """The local UDP port."""
-        return self._socket.address[1]
+        """The local port of a transport that listens."""
+        return int(getattr(self._line, "local_port", 0))
 
     @property
     def now_s(self) -> float:
-        """The clock of the session [s]."""
-        return time.monotonic()
+        """The clock of the sessions [s]."""
+        return self._clock.now_s()
+
+    @property
+    def unix_s(self) -> float:
+        """Time of the newest message since the Unix epoch [s]: now, or that of the recording."""
+        return self._clock.unix_s()
+
+    @property
+    def is_recording(self) -> bool:
+        """True if the vehicle is a recording, which takes no commands."""
+        return self.endpoint.kind == RECORDING
+
+    @property
+    def ended(self) -> bool:
+        """True after the end of a recording."""
+        return isinstance(self._line, PlaybackLine) and self._line.ended
 
     def step(self, until_s: float) -> None:
-        """Send due messages, wait for datagrams until ``until_s`` at most, and receive them."""
-        self._send(self.session.poll(self.now_s))
-        deadline_s = self.session.next_deadline()
-        wait_s = min(until_s, until_s if deadline_s is None else deadline_s) - self.now_s
-        if self._socket.wait(min(_LONGEST_WAIT_S, wait_s)):
-            now_s = self.now_s
-            for data, peer in self._socket.receive():
-                self.session.receive(data, peer, now_s)
-        self._send(self.session.poll(self.now_s))
+        """Send due messages, wait for data until ``until_s`` at most, and receive it."""
+        self._send()
+        line, server = self._line, self._server
+        poll = select.poll()
+        for descriptor, events in [*line.interests(), *(server.interests() if server else ())]:
+            poll.register(descriptor, events)
+        due_s = min(_time(self.fleet.next_deadline()), _time(line.due_s()), until_s)
+        self._clock.wait(poll, min(_LONGEST_WAIT_S, due_s - self.now_s))
+        now_s = self.now_s
+        for data, peer in line.receive(now_s):
+            if server is not None:
+                server.forward(data)
+            self.fleet.receive(data, peer, now_s)
+        for peer in line.closed_peers():
+            self.fleet.disconnect(peer)
+        self.fleet.peers = line.peers
+        if isinstance(line, SeveralLines) and self.session.peer is not None:
+            self.endpoint = line.keep(self.session.peer) or self.endpoint
+        self._serve(now_s)
+        self._send()
+
+    def share(self) -> None:
+        """Serve this link to other ``gcs`` processes of this user, until the connection is closed."""
+        if not self.is_recording:
+            self._share_due_s = -math.inf
+
+    def _serve(self, now_s: float) -> None:
+        if self._server is not None:
+            for frame in self._server.receive(now_s):
+                self._forward(frame)
+        elif now_s >= self._share_due_s:  # another process may serve it, and end
+            self._share_due_s = now_s + _SHARE_PERIOD_S
+            self._server = ShareServer.open(self.endpoint)
+
+    def _forward(self, frame: bytes) -> None:
+        """Send a frame of another process to all vehicles."""
+        if self.fleet.wire.record is not None:
+            self.fleet.wire.record(frame)
+        for peer in self.fleet.receivers():
+            self._line.send(frame, peer)
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        """Run until ``condition`` holds; return False after ``timeout_s``."""
+        """Run until ``condition`` holds; return False after ``timeout_s``, and at the end of a recording."""
         end_s = self.now_s + timeout_s
         while not condition():
-            if self.now_s >= end_s:
+            if self.now_s >= end_s or self.ended:
                 return False
             self.step(end_s)
         return True
 
     def wait_for_vehicle(self, timeout_s: float) -> None:
-        """Wait for a vehicle's heartbeat, and accept only that vehicle from then on; raise CliError (no answer)."""
+        """Wait for a vehicle's heartbeat, and accept only that vehicle from then on.
+
+        Raise CliError if there is none, or if there are several and none was chosen by its system id.
+        """
         if not self.wait_for(lambda: self.session.view.identity is not None, timeout_s):
             if self._signing is not None and self._signing.signing.counts.refused:
                 raise CliError(
@@ -109,18 +210,31 @@ class Connection:
                     NO_ANSWER,
                 )
             raise CliError(self._no_vehicle_text(timeout_s), NO_ANSWER)
-        self.session.keep_vehicle()
+        if self._system_id is None:
+            self._check_alone()
+        self.fleet.keep()
+
+    def _check_alone(self) -> None:
+        """Raise CliError if there are other vehicles on the link."""
+        if not self.is_recording:
+            self.wait_for(lambda: len(self.fleet.systems) > 1, _SETTLE_S)
+        if len(self.fleet.systems) > 1:
+            known = ", ".join(str(number) for number in sorted(self.fleet.systems))
+            raise CliError(f"several vehicles at {self.endpoint}: choose one of {known} with --system", USAGE)
 
     def _no_vehicle_text(self, timeout_s: float) -> str:
+        if self.is_recording:
+            return f"{self.endpoint}: the recording has no vehicle's heartbeat"
         way = "sent to" if self.endpoint.listens else "answered at"
-        foreign = ", ".join(str(number) for number in sorted(self.session.foreign_systems))
+        foreign = ", ".join(str(number) for number in sorted(self.fleet.sessions))
         if foreign:
             return (
                 f"no vehicle with system id {self._system_id} {way} {self.endpoint} within {timeout_s:g} s, only "
-                f"system {foreign}: leave --instance out and give its address with --connect"
+                f"system {foreign}: choose it with --system, or give another address with --connect"
             )
+        reason = f" ({self._line.problem})" if self._line.problem else ""
         return (
-            f"no vehicle {way} {self.endpoint} within {timeout_s:g} s: start `sim-bridge` and "
+            f"no vehicle {way} {self.endpoint} within {timeout_s:g} s{reason}: start `sim-bridge` and "
             "`flightstack`, or give its address with --connect"
         )
 
@@ -133,16 +247,25 @@ class Connection:
 
         With ``may_lack``, a type of plan that the vehicle does not support counts as empty.
         """
+        answer = self.wait_for_answer(call, name)
+        if may_lack and answer.result == MissionResult.UNSUPPORTED:
+            return Answer(True)
+        self.check_answer(answer, name() if callable(name) else name)
+        return answer
+
+    def wait_for_answer(self, call: Request, name: str | Callable[[], str]) -> Answer:
+        """Run a request to its end; raise CliError if the vehicle is lost."""
         while (answer := call.answer(self.now_s)) is None:
             self._check_vehicle(name)
             self.step(self.now_s + _LONGEST_WAIT_S)
-        if may_lack and answer.result == MissionResult.UNSUPPORTED:
-            return Answer(True)
+        return answer
+
+    @staticmethod
+    def check_answer(answer: Answer, what: str) -> None:
+        """Raise CliError if the vehicle has refused ``what`` or did not answer."""
         if not answer.accepted:
-            what = name() if callable(name) else name
             said = what if answer.silent or answer.cancelled else f"{what} refused"
             raise CliError(f"{said}: {answer.reason}", NO_ANSWER if answer.silent else FAILED)
-        return answer
 
     def run(
         self,
@@ -170,17 +293,24 @@ class Connection:
             how = "shut down" if view.powered_off else "was lost"
             raise VehicleLostError(f"{name() if callable(name) else name}: the vehicle {how}")
 
-    def _send(self, frames: list[bytes]) -> None:
+    def _send(self) -> None:
+        for data, peer in self.fleet.poll(self.now_s):
+            self._line.send(data, peer)
+
+    def send(self, message: Message) -> None:
+        """Send a message to the selected vehicle; nothing is sent before its first heartbeat."""
         peer = self.session.peer
         if peer is not None:
-            for frame in frames:
-                self._socket.send(frame, peer)
+            self._line.send(self.session.encode(message), peer)
 
     def close(self) -> None:
-        """Send the remaining messages, for example of a cancelled transfer, then POWEROFF, and close the socket."""
-        self._send(self.session.poll(self.now_s))
-        self._send(self.session.farewell())
-        self._socket.close()
+        """Send the remaining messages, for example of a cancelled transfer, then POWEROFF, and close the transport."""
+        self._send()
+        for data, peer in self.fleet.farewell():
+            self._line.send(data, peer)
+        self._line.close()
+        if self._server is not None:
+            self._server.close()
         if self._signing is not None:
             self._signing.signing.close()
 
@@ -189,3 +319,7 @@ class Connection:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _time(time_s: float | None) -> float:
+    return math.inf if time_s is None else time_s

@@ -1,4 +1,4 @@
-"""One vehicle over one link, sans-IO: datagrams in and out, heartbeats, the view and a service."""
+"""One vehicle on a link, sans-IO: messages in and datagrams out, heartbeats, the view and services."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from typing import Protocol
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address as Component
-from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.signing import LinkSigning, without_signature
+from flightstack.mavlink.link import Message
+from flightstack.mavlink.signing import LinkSigning
 from flightstack.transports.udp import Address
+from gcs_cli.link.quality import LinkMonitor, LinkQuality
 from gcs_cli.link.subscription import Subscription
+from gcs_cli.link.wire import SYSTEM_ID, Wire
 from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import VehicleView
 
-SYSTEM_ID = 255
-COMPONENT_ID = 190  # MAV_COMP_ID_MISSIONPLANNER, as most ground stations use
 HEARTBEAT_PERIOD_S = 1.0
 _BROADCAST = 0
-_MOST_PEERS = 32
 
 
 class Service(Protocol):
@@ -36,13 +35,14 @@ class Service(Protocol):
 
 
 class Session:
-    """The ground station's side of a link.
+    """The ground station's side of the link to one vehicle.
 
     The first peer that sends an autopilot's heartbeat is the vehicle; datagrams of others are dropped unless the
     vehicle is lost. With ``peer``, only datagrams from that address are accepted, and with ``system_id``, only that
     vehicle. Heartbeats are sent once per second of this clock and of vehicle time, because a simulation that is faster
     than real time measures their timeout in its own time. ``heartbeat_type`` is the MAV_TYPE that this side announces,
-    ``own_system`` its system id. ``record`` gets every frame, sent and received, without its signature.
+    ``own_system`` its system id. ``record`` gets every frame, sent and received, without its signature. Sessions of
+    several vehicles on one link share its ``wire``. With ``monitors``, the round trip is measured.
     """
 
     def __init__(
@@ -53,26 +53,29 @@ class Session:
         system_id: int | None = None,
         heartbeat_type: int = mavlink.MAV_TYPE_GCS,
         own_system: int = SYSTEM_ID,
+        *,
+        wire: Wire | None = None,
+        monitors: bool = False,
     ) -> None:
         self.view = VehicleView()
         self.peer = peer
-        self.own = Component(own_system, COMPONENT_ID)
-        """System and component of this side."""
-        self.foreign_systems: set[int] = set()
-        """System ids of other vehicles."""
+        self.observe: Callable[[Message], None] | None = None
+        """Called with every message from the vehicle's system."""
+        self.wire = Wire(signing, record, own_system) if wire is None else wire
         self._only_peer = peer
         self._system_id = system_id
-        self.bad = 0
-        self._links: dict[Address, Link] = {}
-        self._signing = signing
-        self._out = Link(*self.own, signing=signing)
-        self.record = record
-        self.observe: Callable[[Message], None] | None = None
-        """Called with every message from the vehicle."""
         self._heartbeat_type = heartbeat_type
         self._service: Service | None = None
+        self._subscription = Subscription(lambda: self.view, {})
+        self._monitor = LinkMonitor(lambda: self.view.link)
+        self._background: list[Service] = [self._monitor] if monitors else []
         self._heartbeat_due_s = 0.0
         self._heartbeat_due_vehicle_s = math.inf
+
+    @property
+    def own(self) -> Component:
+        """System and component of this side."""
+        return self.wire.own
 
     @property
     def target(self) -> tuple[int, int]:
@@ -80,9 +83,28 @@ class Session:
         identity = self.view.identity
         return (_BROADCAST, _BROADCAST) if identity is None else (identity.system_id, identity.component_id)
 
+    @property
+    def quality(self) -> LinkQuality:
+        """Rate, loss and round trip of the link."""
+        return self._monitor.quality
+
+    @property
+    def bad(self) -> int:
+        """Received bytes and frames that are no valid messages."""
+        return self.wire.bad
+
+    @property
+    def record(self) -> Callable[[bytes], None] | None:
+        """Receiver of every frame, sent and received."""
+        return self.wire.record
+
+    @record.setter
+    def record(self, record: Callable[[bytes], None] | None) -> None:
+        self.wire.record = record
+
     def subscribe(self, rates_hz: Mapping[int, float]) -> None:
-        """Request messages from the vehicle, id -> rate [Hz], until another service is used."""
-        self.use(Subscription(lambda: self.target, rates_hz))
+        """Request messages from the vehicle, id -> rate [Hz], instead of those of an earlier call."""
+        self._subscription = Subscription(lambda: self.view, rates_hz)
 
     def keep_vehicle(self) -> None:
         """Accept no other vehicle from now on, even if this one is lost."""
@@ -93,21 +115,43 @@ class Session:
         """Replace the service that exchanges messages with the vehicle."""
         self._service = service
 
+    def attach(self, service: Service) -> None:
+        """Run a service beside that of ``use`` until ``detach``."""
+        self._background.append(service)
+
+    def detach(self, service: Service) -> None:
+        """End a service of ``attach``."""
+        self._background.remove(service)
+
+    @property
+    def _services(self) -> list[Service]:
+        chosen = [] if self._service is None else [self._service]
+        return [*chosen, self._subscription, *self._background]
+
+    def is_heard(self, now_s: float) -> bool:
+        """Return True if the vehicle is connected: it was heard, and its heartbeat has not timed out."""
+        return self.peer is not None and self.view.identity is not None and not self.view.lost(now_s)
+
     def receive(self, data: bytes, peer: Address, now_s: float) -> None:
         """Process a datagram."""
-        if self._only_peer not in (None, peer):
+        if self._only_peer not in (None, peer) or (self.is_heard(now_s) and peer != self.peer):
             return
-        heard = self.view.identity is not None and not self.view.lost(now_s)
-        if heard and peer != self.peer:
+        for message in self.wire.decode(data, peer):
+            self.take(message, peer, now_s)
+
+    def take(self, message: Message, peer: Address, now_s: float) -> None:
+        """Process a decoded message of the vehicle, or of another system on its link."""
+        if self.is_heard(now_s):
+            if peer != self.peer:
+                return
+        elif not self._is_vehicle(message, peer, now_s):
             return
-        if len(self._links) > _MOST_PEERS:
-            self._links.clear()
-        link = self._links.setdefault(peer, Link(*self.own, signing=self._signing))
-        bad_before = link.bad
-        for message in link.decode(data):
-            if link.is_authentic(message) and (heard or self._is_vehicle(message, peer, now_s)):
-                self._process(message, now_s)
-        self.bad += link.bad - bad_before
+        self.view = update(self.view, message, now_s)
+        if self.observe is not None:
+            self.observe(message)
+        if not self._is_other_system(message):
+            for service in self._services:
+                service.receive(message, now_s)
 
     def _is_vehicle(self, message: Message, peer: Address, now_s: float) -> bool:
         """Return True if the message is from our vehicle; without one, accept the first autopilot's heartbeat."""
@@ -117,7 +161,6 @@ class Session:
         if update(candidate, message, now_s).last_heartbeat_s != now_s:
             return False
         if self._system_id not in (None, message.get_srcSystem()):
-            self.foreign_systems.add(message.get_srcSystem())
             return False
         self.view, self.peer = candidate, peer
         self._heartbeat_due_s = now_s
@@ -126,35 +169,38 @@ class Session:
     def _is_other_system(self, message: Message) -> bool:
         return (message.get_srcSystem(), message.get_srcComponent()) != self.target
 
-    def _process(self, message: Message, now_s: float) -> None:
-        if self.record is not None:
-            self.record(without_signature(bytes(message.get_msgbuf()), message.crc_extra))
-        self.view = update(self.view, message, now_s)
-        if self.observe is not None:
-            self.observe(message)
-        if self._service is not None and not self._is_other_system(message):
-            self._service.receive(message, now_s)
+    def disconnect(self) -> None:
+        """Accept the vehicle from any peer: its connection was closed."""
+        self.peer = None
 
     def poll(self, now_s: float) -> list[bytes]:
         """Return the datagrams to send now to ``peer``."""
         if self.peer is None:
             return []
         frames = []
-        vehicle_s = self.view.time_s
-        if now_s >= self._heartbeat_due_s or (vehicle_s or 0.0) >= self._heartbeat_due_vehicle_s:
+        if self.heartbeat_is_due(now_s):
             frames.append(self.encode(self._heartbeat(mavlink.MAV_STATE_ACTIVE)))
-            self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
-            self._heartbeat_due_vehicle_s = math.inf if vehicle_s is None else vehicle_s + HEARTBEAT_PERIOD_S
-        if self._service is not None:
-            frames += [self.encode(message) for message in self._service.poll(now_s)]
+            self.skip_heartbeat(now_s)
+        for service in self._services:
+            frames += [self.encode(message) for message in service.poll(now_s)]
         return frames
+
+    def heartbeat_is_due(self, now_s: float) -> bool:
+        """Return True if the next ``poll`` sends a heartbeat."""
+        return now_s >= self._heartbeat_due_s or (self.view.time_s or 0.0) >= self._heartbeat_due_vehicle_s
+
+    def skip_heartbeat(self, now_s: float) -> None:
+        """Send the next heartbeat one period from now: the peer just got one."""
+        self._heartbeat_due_s = now_s + HEARTBEAT_PERIOD_S
+        vehicle_s = self.view.time_s
+        self._heartbeat_due_vehicle_s = math.inf if vehicle_s is None else vehicle_s + HEARTBEAT_PERIOD_S
 
     def next_deadline(self) -> float | None:
         """Return the time at which to call ``poll`` at the latest; None without a peer."""
         if self.peer is None:
             return None
-        service = None if self._service is None else self._service.next_deadline()
-        return self._heartbeat_due_s if service is None else min(self._heartbeat_due_s, service)
+        due_s = (service.next_deadline() for service in self._services)
+        return min(self._heartbeat_due_s, *(time_s for time_s in due_s if time_s is not None), math.inf)
 
     def farewell(self) -> list[bytes]:
         """Return the HEARTBEAT in state POWEROFF, which ends the link in order."""
@@ -162,12 +208,12 @@ class Session:
 
     def encode(self, message: Message) -> bytes:
         """Return the frame of a message from this ground station."""
-        frame = self._out.encode(message)
-        if self.record is not None:
-            self.record(without_signature(frame, message.crc_extra))
-        return frame
+        return self.wire.encode(message, self.peer)
 
     def _heartbeat(self, state: int) -> Message:
-        return mavlink.MAVLink_heartbeat_message(
-            self._heartbeat_type, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, state, 3
-        )
+        return heartbeat(state, self._heartbeat_type)
+
+
+def heartbeat(state: int, kind: int = mavlink.MAV_TYPE_GCS) -> Message:
+    """Return the HEARTBEAT of a ground station in a MAV_STATE."""
+    return mavlink.MAVLink_heartbeat_message(kind, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, state, 3)

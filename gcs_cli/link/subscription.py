@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Message
+from gcs_cli.autopilots.autopilot import Autopilot
+from gcs_cli.vehicle.view_types import VehicleView
 
 RETRY_S = 1.0
 """Time after which a request without an answer is sent again."""
@@ -18,19 +20,25 @@ ROTORS_AND_TIMING = {**LOOP_TIMING, int(EscStatus.id): 10.0}
 """Messages of the views in addition to standard telemetry: message id -> rate [Hz]."""
 
 _SET_INTERVAL = int(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
+_OF_GROUPS = int(mavlink.MAVLINK_MSG_ID_ATTITUDE)
+"""Message that shows that the groups of streams are sent."""
 
 
 class Subscription:
     """Requests streams one after the other, and again if they stop. A refused stream is not requested again.
 
-    ``target`` returns system and component of the vehicle, (0, 0) without one.
+    ``view`` returns the state of the vehicle. Besides ``rates_hz`` (message id -> rate), the streams that its
+    autopilot does not send until asked are requested.
     """
 
-    def __init__(self, target: Callable[[], tuple[int, int]], rates_hz: Mapping[int, float]) -> None:
-        self._target = target
-        self._rates_hz = rates_hz
+    def __init__(self, view: Callable[[], VehicleView], rates_hz: Mapping[int, float]) -> None:
+        self._view = view
+        self._wanted_hz = rates_hz
         self._vehicle = (0, 0)
-        self._due_s = dict.fromkeys(rates_hz, -math.inf)
+        self._rates_hz: Mapping[int, float] = {}
+        self._groups_hz: Mapping[int, int] = {}
+        self._due_s: dict[int, float] = {}
+        self._groups_due_s = math.inf
         self._pending: int | None = None
         """The message whose request has no answer yet: COMMAND_ACK does not name it."""
 
@@ -44,15 +52,37 @@ class Subscription:
                 is_accepted = message.result == mavlink.MAV_RESULT_ACCEPTED
                 self._due_s[self._pending] = now_s + RENEW_S if is_accepted else math.inf
             self._pending = None
+        if number == _OF_GROUPS and self._groups_hz:
+            self._groups_due_s = now_s + RENEW_S
 
     def poll(self, now_s: float) -> list[Message]:
-        """Return the request to send now, if any."""
-        if self._target() != self._vehicle:  # a new vehicle may accept requests that the former one refused
-            self._vehicle = self._target()
-            self._due_s = dict.fromkeys(self._rates_hz, now_s)
-            self._pending = None
+        """Return the requests to send now, if any."""
+        identity = self._view().identity
+        vehicle = (0, 0) if identity is None else identity[:2]
+        if vehicle != self._vehicle:  # a new vehicle may accept requests that the former one refused
+            self._begin(vehicle, self._view().autopilot, now_s)
+        if vehicle == (0, 0):
+            return []
+        return [*self._group_requests(now_s), *self._message_request(now_s)]
+
+    def _begin(self, vehicle: tuple[int, int], autopilot: Autopilot, now_s: float) -> None:
+        self._vehicle = vehicle
+        self._rates_hz = {**autopilot.stream_messages_hz, **self._wanted_hz}
+        self._groups_hz = autopilot.stream_groups_hz
+        self._due_s = dict.fromkeys(self._rates_hz, now_s)
+        self._groups_due_s = now_s if self._groups_hz else math.inf
+        self._pending = None
+
+    def _group_requests(self, now_s: float) -> list[Message]:
+        if now_s < self._groups_due_s:
+            return []
+        self._groups_due_s = now_s + RENEW_S
+        start = mavlink.MAVLink_request_data_stream_message
+        return [start(*self._vehicle, group, rate_hz, 1) for group, rate_hz in self._groups_hz.items()]
+
+    def _message_request(self, now_s: float) -> list[Message]:
         number = self._next
-        if self._vehicle == (0, 0) or now_s < self._due_s[number]:
+        if number is None or now_s < self._due_s[number]:
             return []
         self._pending = number
         self._due_s[number] = now_s + RETRY_S
@@ -65,10 +95,13 @@ class Subscription:
 
     def next_deadline(self) -> float | None:
         """Return the time at which to call ``poll``; None without a vehicle, or without requests."""
-        due_s = self._due_s[self._next]
+        number = self._next
+        due_s = min(math.inf if number is None else self._due_s[number], self._groups_due_s)
         return None if self._vehicle == (0, 0) or due_s == math.inf else due_s
 
     @property
-    def _next(self) -> int:
+    def _next(self) -> int | None:
         """The message to request next: the pending one, else the one that is due first."""
-        return min(self._due_s, key=self._due_s.__getitem__) if self._pending is None else self._pending
+        if self._pending is not None or not self._due_s:
+            return self._pending
+        return min(self._due_s, key=self._due_s.__getitem__)

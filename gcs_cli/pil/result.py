@@ -146,9 +146,8 @@ def _failures(flights: Mapping[str, Flown]) -> float:
 
 
 def _reasons(flights: Mapping[str, Flown]) -> str:
-    reasons = [
-        f"{stage}: {flown.outcome_text}" for stage, flown in flights.items() if flown.outcome != COMPLETED
-    ]
+    """Name the stages that failed by their outcome; their reason is the flight's ``outcome_text``."""
+    reasons = [f"{stage}: {flown.outcome}" for stage, flown in flights.items() if flown.outcome != COMPLETED]
     blank = [
         stage for stage, flown in flights.items() if flown.outcome == COMPLETED and flown.samples is None
     ]

@@ -133,7 +133,7 @@ def fly_stage(
 def _words(flown: Flown) -> str:
     simulated_s, wall_s = flown.facts["sim_time_s"], flown.facts["wall_time_s"]
     if flown.outcome != COMPLETED or wall_s is None:
-        return f"{flown.outcome}: {flown.outcome_text}"
+        return flown.outcome  # the error of the run has the reason
     return f"{flown.outcome}: {simulated_s:.1f} s simulated in {wall_s:.1f} s"
 
 

@@ -113,7 +113,10 @@ class _Reader:
     def __init__(self, log: Any) -> None:
         self._log = log
         self._start_us = log.start_timestamp
-        self._data: dict[str, dict[str, Any]] = {item.name: item.data for item in log.data_list}
+        instances = sorted(log.data_list, key=lambda item: item.multi_id, reverse=True)
+        self._data: dict[str, dict[str, Any]] = {
+            item.name: item.data for item in instances
+        }  # the first one counts
 
     def flight(self) -> Flight:
         log = self._log
@@ -194,7 +197,8 @@ class _Reader:
 
     def _origin(self) -> GeoPoint | None:
         rows = self._rows("vehicle_local_position", "ref_lat", "ref_lon", "ref_alt")
-        return GeoPoint(*rows[0][1:]) if rows else None
+        places = (GeoPoint(*place) for _, *place in rows)
+        return next((place for place in places if all(map(math.isfinite, place))), None)
 
     def _overruns(self) -> int | None:
         rows = self._rows("loop_timing", "overruns")

@@ -31,13 +31,15 @@ def write_report(path: Path, flight: Flight, plan: Plan, summary: dict[str, Any]
     write_text_atomically(path, render_report(flight, plan, summary, read_loop_timing(tlog, flight.start_s)))
 
 
-def render_report(flight: Flight, plan: Plan, summary: dict[str, Any], timing: Sequence[LoopTiming]) -> str:
-    """Return the report as HTML; ``timing`` is that of the telemetry."""
+def render_report(
+    flight: Flight, plan: Plan, summary: dict[str, Any], timing: Sequence[LoopTiming], name: str = ""
+) -> str:
+    """Return the report as HTML; ``timing`` is that of the telemetry, ``name`` the title of a flight without plan."""
     return render_page(
         TEMPLATES,
         "report.html",
-        title=Path(summary["plan"]).stem,
-        outcome=summary["outcome"].replace("_", " "),
+        title=Path(summary["plan"]).stem if summary["plan"] else name,
+        outcome=(summary["outcome"] or "").replace("_", " "),
         is_good=summary["outcome"] == _COMPLETED,
         lines=[" · ".join(line) for line in ([summary["outcome_text"]], flown(summary), conditions(summary))],
         tiles=tiles(summary),

@@ -45,4 +45,19 @@ PLAN_ARGUMENT = typer.Argument(
     autocompletion=_complete,
     help=f"A .plan or .waypoints file, or the name of an example: {', '.join(example_plans())}.",
 )
+ANY_PLAN_ARGUMENT = typer.Argument(
+    metavar="PLAN",
+    parser=plan_file,
+    autocompletion=_complete,
+    help="A .plan, .waypoints, .kml, .gpx or .geojson file, or the name of an example: "
+    f"{', '.join(example_plans())}.",
+)
+OPTIONAL_PLAN = typer.Argument(
+    metavar="[PLAN]",
+    parser=plan_file,
+    autocompletion=_complete,
+    help="A file as of `gcs mission upload`, or the name of an example; without it, the vehicle's plan.",
+    show_default=False,
+)
 PlanArgument = Annotated[Path, PLAN_ARGUMENT]
+AnyPlanArgument = Annotated[Path, ANY_PLAN_ARGUMENT]

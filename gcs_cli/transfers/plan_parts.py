@@ -12,15 +12,12 @@ from flightstack.plan import (
     MissionResult,
     MissionType,
     Plan,
-    check_fence,
-    check_mission,
-    check_rally,
-    fence_shape,
 )
 from gcs_cli.clients.mission_client import MissionClient
 from gcs_cli.link import calls
 from gcs_cli.link.calls import Answer, Call
 from gcs_cli.link.session import Session
+from gcs_cli.plans.check import plan_problems
 
 RESTORE_TIMEOUT_S = 30.0
 """Longest time to restore the former plans after an interrupt."""
@@ -42,14 +39,9 @@ def plan_parts(plan: Plan) -> list[PlanPart]:
 
 
 def plan_problem(plan: Plan, home: GeoPoint) -> str | None:
-    """Return the reason that a vehicle refuses the plan, or None; the geofence is checked first."""
-    fence = fence_shape(plan.fence, home)
-    checks = (
-        ("geofence", check_fence(plan.fence, home)),
-        ("mission", check_mission(plan.items, home, fence=fence) if plan.items else None),
-        ("list of rally points", check_rally(plan.rally, home, fence=fence)),
-    )
-    return next((f"{name}: {rejection.reason}" for name, rejection in checks if rejection is not None), None)
+    """Return the first reason that a vehicle refuses the plan, or None; the geofence is checked first."""
+    problem = next(plan_problems(plan, home), None)
+    return None if problem is None else f"{problem.part}: {problem.reason}"
 
 
 def parts_to_send(plan: Plan) -> list[PlanPart]:
@@ -67,18 +59,25 @@ class Uploads:
 
     With ``restores``, the former parts are downloaded first, and restored if a new one is not accepted. Without, a
     vehicle keeps the parts that it has accepted. ``interrupted`` returns a reason to end early, or an empty text: then
-    the former plans are restored too, for RESTORE_TIMEOUT_S at most.
+    the former plans are restored too, for RESTORE_TIMEOUT_S at most. With ``only``, the other parts stay.
     """
 
     def __init__(
-        self, session: Session, plan: Plan, *, restores: bool, interrupted: Callable[[], str] = str
+        self,
+        session: Session,
+        plan: Plan,
+        *,
+        restores: bool,
+        interrupted: Callable[[], str] = str,
+        only: MissionType | None = None,
     ) -> None:
         self._session = session
-        self._parts = parts_to_send(plan)
+        self._parts = [part for part in parts_to_send(plan) if only in (None, part.kind)]
         self._others = [part for part in plan_parts(plan) if part not in self._parts]
         self._clients: dict[MissionType, MissionClient] = {}
         self._restores = restores
         self._interrupted = interrupted
+        self._only = only
         self._steps = self._run()
         self._call: Call | None = None
         self._answer: Answer | None = None
@@ -87,6 +86,8 @@ class Uploads:
         self._current: MissionType | None = None
         self._is_restoring = False
         self._restore_due_s: float | None = None
+        self._is_gradual = calls.mission_begins_with_home(session)
+        """True if the vehicle overwrites a part item by item, as ArduPilot; others replace it after the last item."""
         self._now_s = 0.0
         self.name = self._parts[0].name
         """The current part, or the one that was not accepted."""
@@ -145,7 +146,7 @@ class Uploads:
 
     def _run(self) -> Generator[Call, Answer, Answer]:
         before: list[PlanPart] = []
-        if self._restores and len(self._parts) > 1:  # a single part is replaced completely or not at all
+        if self._restores and (len(self._parts) > 1 or self._is_gradual):
             for part in self._parts:
                 self.name = part.name
                 answer = yield self._transfer(part.kind)
@@ -165,7 +166,7 @@ class Uploads:
                     answer = yield from self._undo(part, answer, before, current)
                 return answer
             self._sent += len(part.items)
-        if self._restores:
+        if self._restores and self._only is None:
             yield from self._find_kept()
         return answer
 
@@ -184,17 +185,19 @@ class Uploads:
                 if kept.kind == MissionType.FENCE
             ]
         if before:
-            reasons.append((yield from self._restore(before, current)))
+            reasons.append((yield from self._restore(before, current, part.kind)))
         elif not is_refused:
             self._clients[part.kind].cancel()
             reasons.append(self.state)
         return answer._replace(reason="; ".join(reasons))
 
-    def _restore(self, before: Sequence[PlanPart], current: int) -> Generator[Call, Answer, str]:
+    def _restore(
+        self, before: Sequence[PlanPart], current: int, failed: MissionType
+    ) -> Generator[Call, Answer, str]:
         """Upload the former parts that were replaced; return a description of the vehicle's plans."""
         self._is_restoring = True
         for part in before:
-            if self._holds[part.kind] == _FORMER:
+            if self._holds[part.kind] == _FORMER and not (self._is_gradual and part.kind == failed):
                 continue
             answer = yield from self._send(part, _FORMER)
             if not answer.accepted:
@@ -235,4 +238,4 @@ class Uploads:
             client.start_download()
         else:
             client.start_upload(items)
-        return Call(self._session, client)
+        return Call(self._session, client, items or ())

@@ -44,17 +44,14 @@ class WatchApp(App[None]):
             Binding(entry.key, f"app.switch_mode('{entry.mode}')", entry.title, show=False)
             for entry in SCREENS
         ),
-        *(
-            Binding(order.key, f"order('{order.name}')", order.title, show=order.in_footer)
-            for order in ORDERS
-        ),
+        *(Binding(order.key, f"order('{order.name}')", order.title, show=False) for order in ORDERS),
         Binding("v", "vehicles", "Vehicles"),
         Binding("left_square_bracket", "next_vehicle(-1)", "Previous vehicle", show=False),
         Binding("right_square_bracket", "next_vehicle(1)", "Next vehicle", show=False),
-        Binding("question_mark", "keys", "Keys"),
         Binding("ctrl+p", "command_palette", "Commands", priority=True),
         Binding("ctrl+z", "suspend_process", "Suspend", show=False),
         Binding("q", "quit", "Quit"),
+        Binding("question_mark", "keys", "Keys"),
         Binding("ctrl+c", "quit", "Quit", show=False, priority=True),
     ]
 
@@ -104,9 +101,9 @@ class WatchApp(App[None]):
         if state != self._state:  # other keys work
             self._state = state
             self.refresh_bindings()
-        screen = next(iter(self._screen_stack), None)  # empty while the application ends
-        if isinstance(screen, WatchScreen):
-            screen.show(view, self.feed.now_s)
+        screens = self.screen_stack  # empty while a mode begins
+        if screens and isinstance(screens[0], WatchScreen):
+            screens[0].show(view, self.feed.now_s)
             self.redraws += 1
 
     # -- what the user asks of the vehicle

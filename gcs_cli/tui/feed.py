@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, NamedTuple, TypeVar
 
@@ -54,11 +54,13 @@ class Feed:
         self.messages = MessageLog()
         self.notices: deque[Notice] = deque(maxlen=20)
         """Lines for the user, which the application takes."""
+        self.commands_all = False
+        """True if actions go to all vehicles."""
         self.error: Exception | None = None
         """Error that ended the thread."""
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
         self._running: dict[int, _Running] = {}
-        self._rates_hz: Mapping[int, float] = ROTORS_AND_TIMING
+        self._rates_hz: dict[int, float] = dict(ROTORS_AND_TIMING)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -70,7 +72,8 @@ class Feed:
     @property
     def views(self) -> tuple[VehicleView, ...]:
         """States of all vehicles on the link, by system id."""
-        return (self.view,) if self.view.identity is not None else ()
+        sessions = tuple(self._connection.fleet.sessions.values())
+        return tuple(sorted((session.view for session in sessions), key=lambda view: view.identity or ()))
 
     @property
     def now_s(self) -> float:
@@ -84,9 +87,8 @@ class Feed:
 
     def start(self) -> None:
         """Start to receive."""
-        session = self._connection.session
-        session.observe = self._observe
-        self._subscribe(session)
+        self._connection.fleet.observe = self._observe
+        self._connection.fleet.subscribe(self._rates_hz)
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._thread.start()
 
@@ -102,26 +104,26 @@ class Feed:
         self._jobs.append((job, future))
         return future
 
+    def select(self, system_id: int | None) -> None:
+        """Show and command the vehicle with this system id; None: command all."""
+        self.commands_all = system_id is None
+        if system_id is not None:
+            self.submit(lambda connection: connection.fleet.select(system_id))
+
     def act(self, action: Action) -> None:
         """Perform ``action``; the answer and the effect become notices and messages.
 
         A new action ends the wait for the effect of the former one.
         """
-        self.submit(lambda connection: self._begin(action, connection.session))
+        self.submit(lambda connection: self._begin(action, connection))
 
     def keep_rate(self, message_id: int, rate_hz: float | None) -> None:
-        """Request a stream again at this rate if it stops; not if the rate is 0 or None, the default."""
+        """Request a stream of the screens at this rate from now on; not at all if it is 0, or None for the default."""
+        if message_id not in self._rates_hz:
+            return
         rates = {number: rate for number, rate in self._rates_hz.items() if number != message_id}
         self._rates_hz = {**rates, message_id: rate_hz} if rate_hz else rates
-
-    def select(self, system_id: int | None) -> None:
-        """Show and command the vehicle with this system id; None: command all."""
-
-    def _subscribe(self, session: Session) -> None:
-        if self._rates_hz:
-            session.subscribe(self._rates_hz)
-        else:
-            session.use(None)
+        self.submit(lambda connection: connection.fleet.subscribe(self._rates_hz))
 
     def _observe(self, message: Message) -> None:
         self.history.record(message, self.now_s)
@@ -149,24 +151,31 @@ class Feed:
             future.set_result(job(self._connection))
         except Exception as error:
             future.set_exception(error)
-        finally:
-            if not self._running:
-                self._subscribe(self._connection.session)
 
-    def _begin(self, action: Action, session: Session) -> None:
-        former = self._running.pop(session.target[0], None)
+    def _begin(self, action: Action, connection: Connection) -> None:
+        if connection.is_recording:
+            self._say(connection.session, f"{action.name}: a recording takes no commands", Severity.WARNING)
+            return
+        sessions = connection.fleet.sessions.values() if self.commands_all else [connection.session]
+        for session in sessions:
+            self._begin_one(action, session)
+
+    def _begin_one(self, action: Action, session: Session) -> None:
+        system_id = session.target[0]
+        former = self._running.pop(system_id, None)
         if former is not None:
-            self._say(former.session, f"{former.run.action.name}: no longer followed", Severity.NOTICE)
+            session.detach(former.run)
+            self._say(session, f"{former.run.action.name}: no longer followed", Severity.NOTICE)
         run = ActionRun(action, lambda: session.view, self.now_s, session.own)
-        session.use(run)
-        self._running[session.target[0]] = _Running(session, run)
+        session.attach(run)
+        self._running[system_id] = _Running(session, run)
 
     def _follow(self, system_id: int) -> None:
         """Report the answer of the vehicle, then the effect."""
         session, run, is_announced = self._running[system_id]
         if run.result is not None:
             del self._running[system_id]
-            self._subscribe(session)
+            session.detach(run)
             self._say(session, result_text(run.action, run.result), severity_of(run.result))
         elif run.acknowledged and not is_announced:
             self._running[system_id] = _Running(session, run, is_announced=True)
@@ -174,7 +183,8 @@ class Feed:
 
     def _say(self, session: Session, text: str, severity: Severity) -> None:
         self.messages.say(session.view, text, severity)
-        self.notices.append(Notice(text, severity))
+        several = len(self.views) > 1
+        self.notices.append(Notice(f"{session.target[0]}: {text}" if several else text, severity))
 
 
 def result_text(action: Action, result: Result) -> str:

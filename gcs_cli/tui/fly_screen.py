@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
+from textual.binding import Binding
 from textual.containers import Horizontal, Vertical
 
 from gcs_cli.tui.compact import compact, waiting
 from gcs_cli.tui.drawing import Drawing, watch_app
 from gcs_cli.tui.flight_display import flight_display
 from gcs_cli.tui.health_panels import health_panel, link_panel
+from gcs_cli.tui.orders import ORDERS
 from gcs_cli.tui.palette import Palette
 from gcs_cli.tui.panels import messages_panel, mission_panel, position_panel, power_panel
 from gcs_cli.tui.timing_panels import timing_panel
@@ -22,6 +25,10 @@ from gcs_cli.vehicle.view_types import VehicleView
 
 class FlyScreen(WatchScreen):
     """The state of the vehicle at a glance."""
+
+    BINDINGS: ClassVar = [  # they work on every screen; here the footer shows them
+        Binding(order.key, f"app.order('{order.name}')", order.title) for order in ORDERS if order.in_footer
+    ]
 
     def compose_body(self) -> ComposeResult:
         """Yield the drawings; the window's size selects which are shown."""

@@ -138,10 +138,10 @@ class MapScreen(WatchScreen):
             )
             self.notify(reason, severity="warning")
             return
-        text = place_text(frame, place, self.map.scene.home)
-        if not await self.app.push_screen_wait(
-            Confirm(f"Fly to {text}\nat the current altitude?", "Fly there")
-        ):
+        feed = watch_app(self).feed
+        who = f"all {len(feed.views)} vehicles" if feed.commands_all else "the vehicle"
+        question = f"Fly {who} to {place_text(frame, place, self.map.scene.home)}\nat the current altitude?"
+        if not await self.app.push_screen_wait(Confirm(question, "Fly there")):
             return
         target = frame.to_geo(Vector3(*place, 0.0))
-        watch_app(self).feed.act(in_flight.goto(target.latitude_deg, target.longitude_deg))
+        feed.act(in_flight.goto(target.latitude_deg, target.longitude_deg))

@@ -12,8 +12,17 @@ _LANDED = {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}
 _GOOD_LINK, _POOR_LINK = 0.98, 0.9
 
 
-def status_line(view: VehicleView, now_s: float, width: int, _height: int, colours: Palette) -> list[Text]:
-    """Return the line, as much of it as ``width`` holds."""
+def status_line(
+    view: VehicleView,
+    now_s: float,
+    width: int,
+    _height: int,
+    colours: Palette,
+    *,
+    vehicles: int = 1,
+    commands_all: bool = False,
+) -> list[Text]:
+    """Return the line, as much of it as ``width`` holds, with the number of ``vehicles`` on the link."""
     if view.identity is None:
         return [Text(" waiting for a vehicle", f"bold {colours.warning}")]
     right = link_text(view, now_s, colours)
@@ -21,11 +30,14 @@ def status_line(view: VehicleView, now_s: float, width: int, _height: int, colou
     left.append(f" {view.mode or 'unknown mode'} ", f"bold {colours.background} on {colours.accent}")
     armed = colours.bad if view.armed else colours.good
     left.append(" ARMED " if view.armed else " DISARMED ", f"bold {colours.background} on {armed}")
+    if commands_all:
+        left.append(f" COMMANDS TO ALL {vehicles} ", f"bold {colours.background} on {colours.target}")
     if view.in_failsafe:
         left.append(" FAILSAFE ", f"bold {colours.background} on {colours.warning}")
     parts = [
         (f" {_LANDED.get(view.landed_state, '')}", colours.text),
         (f"  {view.identity.kind} {view.identity.system_id}", colours.muted),
+        (f" of {vehicles}" if vehicles > 1 else "", colours.muted),
         (f"  t {clock_text(view.time_s)}", colours.text),
     ]
     if view.timing is not None and view.timing.real_time_factor is not None:

@@ -24,6 +24,7 @@ class VehicleList(ModalScreen[int | None]):
     VehicleList { align: center middle; }
     VehicleList OptionList { width: 64; max-width: 90%; height: auto; max-height: 80%; border: round $accent; }
     """
+    AUTO_FOCUS = "OptionList"
     BINDINGS: ClassVar = [Binding("escape", "cancel", "Cancel")]
 
     def __init__(self, views: tuple[VehicleView, ...], now_s: float) -> None:

@@ -11,6 +11,7 @@ from textual.widget import Widget
 from textual.widgets import Footer
 
 from gcs_cli.tui.drawing import Drawing, watch_app
+from gcs_cli.tui.palette import Palette
 from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.status_line import status_line
 from gcs_cli.vehicle.view_types import VehicleView
@@ -73,11 +74,20 @@ class WatchScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         """Yield the frame around the body."""
-        yield Drawing(status_line, id="status")
+        yield Drawing(self._status, id="status")
         yield Tabs(id="tabs")
         with Container(id="body"):
             yield from self.compose_body()
         yield Footer(show_command_palette=False)
+
+    def _status(
+        self, view: VehicleView, now_s: float, width: int, height: int, colours: Palette
+    ) -> list[Text]:
+        feed = watch_app(self).feed
+        vehicles = len(feed.views)
+        return status_line(
+            view, now_s, width, height, colours, vehicles=vehicles, commands_all=feed.commands_all
+        )
 
     def compose_body(self) -> ComposeResult:
         """Yield the widgets of the screen."""

@@ -36,7 +36,6 @@ _NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
 _RESTART_S = 1.0
 """Step back of the vehicle's clock that no reordering of datagrams explains."""
-_LONGEST_ROUND_TRIP_S = 60.0
 _ATTITUDE, _VELOCITY, _POSITION, _ALTITUDE, _CONSTANT = 1, 0b110, 1 << 4, 1 << 5, 1 << 7
 """Flags of ESTIMATOR_STATUS and EKF_STATUS_REPORT."""
 
@@ -84,9 +83,7 @@ def _counted(link: LinkCounts, sequence: int, now_s: float) -> LinkCounts:
         start = now_s
     elif now_s - start >= _RATE_WINDOW_S:
         start, count, rate = now_s, 0, count / (now_s - start)
-    return LinkCounts(
-        link.received + 1, link.lost + gap, sequence, now_s, rate, start, count, link.round_trip_s
-    )
+    return LinkCounts(link.received + 1, link.lost + gap, sequence, now_s, rate, start, count)
 
 
 def _number(value: float) -> float | None:
@@ -211,16 +208,6 @@ def _wind_cov(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return view._replace(wind_ned_m_s=_vector(message.wind_x, message.wind_y, message.wind_z))
 
 
-def _timesync(view: VehicleView, message: Any, now_s: float) -> VehicleView:
-    """Take the round trip from the answer to a TIMESYNC with our clock in ``ts1``."""
-    if message.tc1 == 0:  # a request of the vehicle
-        return view
-    round_trip_s = now_s - message.ts1 / 1e9
-    if not 0.0 <= round_trip_s < _LONGEST_ROUND_TRIP_S:
-        return view
-    return view._replace(link=view.link._replace(round_trip_s=round_trip_s))
-
-
 def _attitude(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     angles = _vector(message.roll, message.pitch, message.yaw)
     return view._replace(
@@ -328,7 +315,6 @@ _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "EKF_STATUS_REPORT": _ekf_status,
     "WIND": _wind,
     "WIND_COV": _wind_cov,
-    "TIMESYNC": _timesync,
     "ATTITUDE": _attitude,
     "ATTITUDE_TARGET": _attitude_target,
     "LOCAL_POSITION_NED": _local_position,

@@ -38,7 +38,7 @@ def require(what: str, *modules: str) -> None:
 
 @expand_options
 def render(
-    poses: Annotated[Path, typer.Argument(help="File of poses (.npz), as gcs replay writes it.")],
+    poses: Annotated[Path, typer.Argument(help="File of poses (.npz), as gcs log draw writes it.")],
     options: PictureOptions,
     vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the file's]")] = None,
     caller: Annotated[str, typer.Option(hidden=True, help="Command named in error messages.")] = _NAME,

@@ -61,7 +61,7 @@ def require_display() -> None:
     ):
         raise UsageProblemError(
             "--view: no display (neither DISPLAY nor WAYLAND_DISPLAY is set); run it in a desktop session, "
-            "or make a film: gcs replay RUN --video FILE"
+            "or make a film: gcs log draw RUN --video FILE"
         )
     import glfw  # noqa: PLC0415
 

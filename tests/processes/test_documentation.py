@@ -30,6 +30,7 @@ SKIPPED = {
     "compare.md": 1,
     "faults.md": 1,
     "film.md": 1,
+    "logs.md": 1,
 }
 """Number of blocks that a page marks as not to be run; 0 for any other page."""
 MODULES = {"sim-bridge": "sim_bridge", "flightstack": "flightstack", "gcs": "gcs_cli"}

@@ -304,7 +304,8 @@ def test_no_vehicle(command: list[str]) -> None:
     with UdpSocket("127.0.0.1") as silent:
         result = gcs("--timeout", "0.2", "--connect", f"udpout:127.0.0.1:{silent.address[1]}", *command)
     assert (result.stdout, result.returncode) == ("", 3)
-    assert result.stderr.startswith("gcs: no vehicle answered at UDP 127.0.0.1:")
+    name = "" if command == ["watch"] else f"{' '.join(command)}: "
+    assert result.stderr.startswith(f"gcs: {name}no vehicle answered at UDP 127.0.0.1:")
 
 
 def test_a_busy_port_is_named_with_the_way_round() -> None:
@@ -317,18 +318,19 @@ def test_a_busy_port_is_named_with_the_way_round() -> None:
 
 
 @pytest.mark.parametrize("command", [["arm"], ["--timeout", "20", "watch"]])
-def test_beside_a_ground_station_the_vehicle_is_called_at_its_own_port(
+def test_vehicle_is_found_beside_a_ground_station_on_the_default_port(
     monkeypatch: pytest.MonkeyPatch, command: list[str]
 ) -> None:
-    """The same vehicle sends to the usual port, where `gcs watch` may listen, and hears on another."""
     vehicle = FakeVehicle()
     monkeypatch.setattr("gcs_cli.commands.watch.watch_lines", lambda _connection: print("watching"))
-    with UdpSocket("127.0.0.1") as taken, serve(vehicle) as socket:
-        usual, own = taken.address[1], socket.address[1]
-        monkeypatch.setattr("gcs_cli.settings.DEFAULT_CONNECTION", f"udp:127.0.0.1:{usual}")
-        monkeypatch.setattr("gcs_cli.vehicle_link.VEHICLE_CONNECTION", f"udpout:127.0.0.1:{own}")
+    with UdpSocket("127.0.0.1") as taken, UdpSocket("127.0.0.1") as silent, serve(vehicle) as socket:
+        ports = [taken.address[1], silent.address[1], socket.address[1]]
+        monkeypatch.setattr("gcs_cli.settings.DEFAULT_CONNECTION", f"udp:127.0.0.1:{ports[0]}")
+        others = tuple(f"udpout:127.0.0.1:{port}" for port in ports[1:])
+        monkeypatch.setattr("gcs_cli.vehicle_link.OTHER_CONNECTIONS", others)
         result = gcs(*command)
-    said = f"gcs: UDP 127.0.0.1:{usual} is in use: connecting to the vehicle at UDP 127.0.0.1:{own}\n"
+    tried = f"UDP 127.0.0.1:{ports[1]}, UDP 127.0.0.1:{ports[2]}"
+    said = f"gcs: UDP 127.0.0.1:{ports[0]} is in use: trying {tried}\n"
     assert result == ("armed\n" if command == ["arm"] else "watching\n", said, 0)
     assert vehicle.codec.total_packets_received > 0
 
@@ -343,6 +345,9 @@ def test_beside_a_ground_station_the_vehicle_is_called_at_its_own_port(
         (["fly", "--seed", "x"], "--seed: 'x' is not a whole number; give 0 to 2147483647"),
         (["fly", "--seed", "1.5"], "--seed: '1.5' is not a whole number"),
         (["--connect", "tcp:1", "status"], "expected udp:PORT"),
+        (["--connect", "nowhere.tlog", "status"], "nowhere.tlog: cannot be read: No such file"),
+        (["--connect", "nowhere.tlog", "arm"], "arm: nowhere.tlog is a recording, which takes no commands"),
+        (["--connect", "serial:/dev/none", "status"], "/dev/none: no such device"),
         (["--timeout", "0", "status"], "--timeout: 0 is outside the allowed range 0.1 to 86400"),
         (["goto", "--", "91", "0"], "latitude: 91 is outside the allowed range -90 to 90"),
         (["goto", "--", "0", "nan"], "longitude: nan is outside the allowed range -180 to 180"),

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 import re
+import select
 import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,7 +25,7 @@ from gcs_cli.fly.processes import Child, Children
 from gcs_cli.report.analysis import read_flight
 from gcs_cli.tui.panels import SEVERITIES, clock_text
 from tests.support.commands import Ended, gcs
-from tests.support.process import children_of
+from tests.support.process import await_output, children_of, ends_of
 
 LONG_S = 120.0  # a bound for a busy machine that compiles the kernels anew; a flight takes two seconds
 MISSIONS = Path(__file__).parents[2] / "missions"
@@ -44,40 +44,22 @@ def run(out: Path, *flags: str, plan: str = "hop.plan") -> Ended:
     return gcs(*command(out, *flags, plan=plan)[3:])
 
 
-def wait_until(condition: Callable[[], bool], what: str) -> None:
-    end_s = time.monotonic() + LONG_S
-    while not condition():
-        assert time.monotonic() < end_s, what
-        time.sleep(0.02)
-
-
-def is_running(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
 @contextmanager
 def flight(out: Path, *flags: str) -> Iterator[tuple[subprocess.Popen[str], dict[str, int]]]:
     """Begin a flight and wait until it is in the air; no child may be left afterwards."""
-    with (out.parent / "printed").open("w") as printed:
-        process = subprocess.Popen(
-            command(out, *flags, *PATIENT),
-            stdout=printed,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
+    process = subprocess.Popen(
+        command(out, *flags, *PATIENT),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
     try:
-        wait_until(
-            lambda: "Takeoff detected" in (out.parent / "printed").read_text() or process.poll() is not None,
-            "it never took off",
-        )
+        await_output(process, "Takeoff detected")
         children = children_of(process.pid)
         assert set(children) == {"sim_bridge", "flightstack"}
-        yield process, children
-        wait_until(lambda: not any(is_running(pid) for pid in children.values()), "a child was left behind")
+        with ends_of(*children.values()):
+            yield process, children
     finally:
         if process.poll() is None:
             process.kill()
@@ -296,13 +278,18 @@ def test_a_child_that_cannot_start_says_why(tmp_path: Path) -> None:
         assert child.end_reason.startswith("sim-bridge ended with code 2: --plant: 'flat' is not one of")
 
 
-def test_a_child_that_does_not_listen_is_killed(tmp_path: Path) -> None:
+def test_a_child_that_does_not_listen_is_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "deaf.py").write_text(
-        "import signal, time\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\nprint('deaf', flush=True)\n"
-        "time.sleep(600)"
+        "import signal\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "pipe = open('told', 'w')\nprint('deaf', file=pipe, flush=True)\n"
+        "while True:\n    signal.pause()\n"
     )
+    os.mkfifo(tmp_path / "told")
+    told = os.open(tmp_path / "told", os.O_RDONLY | os.O_NONBLOCK)
+    monkeypatch.chdir(tmp_path)
     child = Child("deaf", [sys.executable, str(tmp_path / "deaf.py")], tmp_path / "deaf.log")
-    wait_until(lambda: child.last_line == "deaf", "it never started")
+    assert select.select([told], [], [], LONG_S)[0]
+    os.close(told)
     with Children(tmp_path) as children:
         children.add(child)
         children.stop(timeout_s=0.1)

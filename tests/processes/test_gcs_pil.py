@@ -7,8 +7,6 @@ import json
 import os
 import shutil
 import subprocess
-import threading
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -163,28 +161,28 @@ def test_a_board_is_examined_and_flown_at_its_serial_port(board: Board, tmp_path
     assert limits[0] > 0.0  # of a board nobody asks for the same bits
 
 
-def unplug(board: Board, log: Path) -> None:
-    """Pull the plug when the log holds a part of the flight: a fifth of it."""
-    end_s = time.monotonic() + LONG_S
-    while time.monotonic() < end_s and not (log.exists() and log.stat().st_size > 100_000):
-        time.sleep(0.01)
-    board.remove()
-
-
 @pytest.mark.parametrize("here_as_before", ["1"], indirect=True)  # leaves time to unplug
 @pytest.mark.usefixtures("here_as_before")
-def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(board: Board, tmp_path: Path) -> None:
+def test_a_board_that_is_unplugged_ends_the_run_with_a_sentence(
+    board: Board, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = tmp_path / "out"
-    unplugging = threading.Thread(target=unplug, args=(board, out / "pil" / "flight.ulg"))
-    unplugging.start()
+    log = out / "pil" / "flight.ulg"
+
+    def unplug(*_: object) -> None:
+        """Pull the plug when the log holds a part of the flight: a fifth of it."""
+        if log.exists() and log.stat().st_size > 100_000:
+            board.remove()
+
+    monkeypatch.setattr(pil_run.NoticeDisplay, "update", unplug)
     done = fly(out, f"serial:{board.device}")
-    unplugging.join()
     assert not {"sim_bridge", "flightstack"} & set(children_of(os.getpid()))
     assert done.returncode == NO_ANSWER, done.stdout + done.stderr
     assert board.device in done.stderr
     result = result_of(out)
     assert result["verdict"] == "failed"
     assert result["flights"]["SIL"]["outcome"] == "completed"
+    assert (done.stdout + done.stderr).count(result["flights"]["PIL"]["outcome_text"]) == 1
     assert largest(result, "SIL–PIL") == 0.0  # as far as it came
     assert (out / "pil.html").exists()
 

@@ -8,8 +8,6 @@ import pty
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +16,7 @@ from pyulog import ULog
 
 from flightstack.testing.instances import free_instance
 from tests.support.commands import flightstack_command, gcs
+from tests.support.process import await_output, ends_of
 
 LONG_S = 180.0  # a bound for a busy machine that compiles kernels and firmware anew
 HOP = Path(__file__).parents[2] / "missions" / "hop.plan"
@@ -41,16 +40,7 @@ def check(*flags: str) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-def eventually(look: Callable[[], int | None]) -> int:
-    end_s = time.monotonic() + LONG_S
-    while time.monotonic() < end_s:
-        if (found := look()) is not None:
-            return found
-        time.sleep(0.01)
-    raise AssertionError("it did not happen")
-
-
-def program_below(pid: int) -> int | None:
+def program_below(pid: int) -> int:
     """Return the process id of the host program that a descendant of ``pid`` has started."""
     parents = {}
     for entry in Path("/proc").iterdir():
@@ -64,7 +54,7 @@ def program_below(pid: int) -> int | None:
     for child, (name, parent) in parents.items():
         if name.startswith("fs_host") and parents.get(parent, ("", 0))[1] == pid:
             return child
-    return None
+    raise AssertionError("there is no host program")
 
 
 @pytest.fixture(scope="module")
@@ -102,9 +92,8 @@ def test_a_target_that_dies_in_flight_ends_it_with_a_sentence(tmp_path: Path) ->
         text=True,
     )
     try:
-        program = eventually(lambda: program_below(process.pid))
-        eventually(lambda: 1 if _is_flying(out) else None)
-        os.kill(program, signal.SIGKILL)
+        await_output(process, "Takeoff detected")
+        os.kill(program_below(process.pid), signal.SIGKILL)
         _, said = process.communicate(timeout=LONG_S)
     finally:
         process.kill()
@@ -114,23 +103,16 @@ def test_a_target_that_dies_in_flight_ends_it_with_a_sentence(tmp_path: Path) ->
     assert "connection lost" in json.loads((out / "pil-link.json").read_text())["ending"]
 
 
-def _is_flying(out: Path) -> bool:
-    try:
-        return (out / "flight.ulg").stat().st_size > 0
-    except OSError:
-        return False
-
-
 def test_who_ends_a_flight_leaves_no_program_behind(tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = subprocess.Popen(
-        gcs_fly(out, "--loops", "host", "--speed", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        gcs_fly(out, "--loops", "host", "--speed", "1"), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )
     try:
-        program = eventually(lambda: program_below(process.pid))
-        process.send_signal(signal.SIGINT)
-        process.wait(LONG_S)
-        eventually(lambda: None if Path(f"/proc/{program}").exists() else 1)
+        await_output(process, "Takeoff detected")
+        with ends_of(program_below(process.pid)):
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=LONG_S)
     finally:
         process.kill()
 

@@ -22,8 +22,10 @@ from flightstack.testing import server
 from flightstack.testing.instances import ServerError, free_instance
 from flightstack.testing.server import Server
 from flightstack.testing.setup import Setup
+from gcs_cli.link.connection import Connection
+from gcs_cli.link.endpoint import parse_endpoint
 from tests.support.plugin_run import PLUGIN, load, prepare, run, section
-from tests.support.process import children_of
+from tests.support.process import children_of, ends_of
 
 pytest_plugins = ["pytester"]
 
@@ -61,8 +63,15 @@ def outside(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
 @pytest.fixture(scope="module")
 def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     folder = tmp_path_factory.mktemp("vehicle")
-    with Server(Setup(vehicle="x_quad", params={"MIS_TAKEOFF_ALT": 4.0}), folder, speed=10.0) as started:
+    setup = Setup(vehicle="x_quad", params={"MIS_TAKEOFF_ALT": 4.0})
+    with Server(setup, folder, speed=10.0, faults=["battery level 0.6 @0.5"]) as started:
         yield started
+
+
+def assert_free(port: int) -> None:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind(("127.0.0.1", port))
 
 
 def test_pymavlink_reads_a_parameter_at_the_url(vehicle: Server) -> None:
@@ -76,6 +85,12 @@ def test_pymavlink_reads_a_parameter_at_the_url(vehicle: Server) -> None:
         link.close()
 
 
+def test_fault_acts_from_its_time_since_the_start_of_the_simulator(vehicle: Server) -> None:
+    with Connection(parse_endpoint(vehicle.gcs_url)) as connection:
+        assert connection.wait_for(lambda: connection.session.view.battery is not None, LONG_S)
+        assert connection.wait_for(lambda: connection.session.view.battery.remaining <= 0.6, LONG_S)
+
+
 def test_urls_have_the_forms_of_their_libraries(vehicle: Server) -> None:
     assert re.fullmatch(r"udpin://127\.0\.0\.1:\d+", vehicle.mavsdk_url)
     assert re.fullmatch(r"udpin:127\.0\.0\.1:\d+", vehicle.mavlink_url)
@@ -84,6 +99,11 @@ def test_urls_have_the_forms_of_their_libraries(vehicle: Server) -> None:
 def test_vehicle_that_cannot_start_names_the_reason(tmp_path: Path) -> None:
     with pytest.raises(ServerError, match="no_such_quad"):
         Server(Setup(vehicle="no_such_quad"), tmp_path)
+
+
+def test_fault_that_the_vehicle_cannot_have_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(ServerError, match="rotors 1 to 4"):
+        Server(Setup(vehicle="x_quad"), tmp_path, faults=["rotor 5 dead"])
 
 
 def test_port_taken_after_the_search_means_the_next_instance(
@@ -148,9 +168,7 @@ def test_servers_end_with_their_fixture(outside: pytest.Pytester) -> None:
     run(outside).assert_outcomes(passed=2)
     instance, guard = map(int, Path("first").read_text().split())
     assert not Path(f"/proc/{guard}").exists()
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        probe.bind(("127.0.0.1", simulator_port(instance)))
+    assert_free(simulator_port(instance))
 
 
 def test_parallel_workers_start_different_instances(outside: pytest.Pytester) -> None:
@@ -184,13 +202,20 @@ def test_killed_run_leaves_no_process_and_a_readable_log(
         instance, log, guard = json.loads(pipe.read())
     programs = children_of(guard)
     assert set(programs) == PROGRAMS
-    watched = [os.pidfd_open(pid) for pid in (guard, *programs.values())]
-    run_of_user.send_signal(number)
-    assert run_of_user.wait(LONG_S) != 0
-    for descriptor in watched:
-        assert select.select([descriptor], [], [], LONG_S)[0]
-        os.close(descriptor)
+    with ends_of(guard, *programs.values()):
+        run_of_user.send_signal(number)
+        assert run_of_user.wait(LONG_S) != 0
     assert ULog(log).get_dataset("vehicle_status") is not None
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        probe.bind(("127.0.0.1", simulator_port(instance)))
+    assert_free(simulator_port(instance))
+
+
+def test_killed_guard_ends_simulator_and_flight_stack(tmp_path: Path) -> None:
+    started = Server(Setup(vehicle="x_quad"), tmp_path, speed=10.0)
+    assert started._guard is not None
+    guard = started._guard.pid
+    programs = children_of(guard)
+    assert set(programs) == PROGRAMS
+    with ends_of(*programs.values()):
+        os.kill(guard, signal.SIGKILL)
+    assert_free(simulator_port(started.instance))
+    started.stop()

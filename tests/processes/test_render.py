@@ -1,4 +1,4 @@
-"""``sim-bridge render`` and ``gcs replay`` as processes: picture files and error messages."""
+"""``sim-bridge render`` and ``gcs log draw`` as processes: picture files and error messages."""
 
 from __future__ import annotations
 
@@ -100,9 +100,9 @@ def test_pictures_sheet_and_films_have_the_requested_size(poses: Path, tmp_path:
 def test_a_log_is_replayed_from_end_to_end(
     poses: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """The synthetic flight, through ``gcs replay``, which takes the vehicle from the log."""
+    """The synthetic flight, through ``gcs log draw``, which takes the vehicle from the log."""
     (tmp_path / "flight.ulg").write_bytes(synthetic_flight_bytes(inner_ms=20, outer_ms=20, seconds=4.0))
-    arguments = ("replay", tmp_path, *SMALL, "--fps", "5", "--speed", "4", "--no-words")
+    arguments = ("log", "draw", tmp_path, *SMALL, "--fps", "5", "--speed", "4", "--no-words")
     done = gcs(*arguments)
     assert (done.returncode, done.stderr, capfd.readouterr().err) == (0, "", "")
     assert frames_of(tmp_path / "replay.mp4") == (5, (96, 54))
@@ -119,7 +119,7 @@ def test_damaged_log_is_drawn_up_to_the_damage_with_a_warning(
 ) -> None:
     log = synthetic_flight_bytes(inner_ms=20, outer_ms=20, seconds=4.0)
     (tmp_path / "flight.ulg").write_bytes(log[: len(log) * 3 // 4])
-    done = gcs("replay", tmp_path, "--png", tmp_path / "p.png", *SMALL)
+    done = gcs("log", "draw", tmp_path, "--png", tmp_path / "p.png", *SMALL)
     assert done.returncode == 0
     said = re.fullmatch(
         r"gcs: warning: the log is damaged; drawn up to ([0-9.]+) s\n", done.stderr + capfd.readouterr().err
@@ -172,7 +172,7 @@ def test_bad_arguments_are_one_sentence(
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [([], "sim-bridge: render needs MuJoCo"), (["--caller", "gcs replay"], "gcs: replay needs MuJoCo")],
+    [([], "sim-bridge: render needs MuJoCo"), (["--caller", "gcs log draw"], "gcs: log draw needs MuJoCo")],
 )
 def test_error_messages_name_the_calling_command(
     tmp_path: Path,

@@ -172,7 +172,8 @@ def test_a_rejected_item_is_named_and_the_old_mission_stays() -> None:
     world.events.clear()
     bad = (*mission(2), MissionItem(Command.DO_JUMP, Frame.MISSION, 9.0, 1.0))
     result = world.upload("gcs", bad)
-    assert result == Failed("the vehicle refused: MAV_MISSION_INVALID_PARAM1", MissionResult.INVALID_PARAM1)
+    reason = "the vehicle refused: parameter 1 is not valid (MAV_MISSION_INVALID_PARAM1)"
+    assert result == Failed(reason, MissionResult.INVALID_PARAM1, 2, is_whole=True)
     rejection = check_mission(bad, HOME)
     assert rejection is not None
     assert world.events == [MissionRefused(*rejection)]

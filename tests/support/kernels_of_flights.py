@@ -1,4 +1,4 @@
-"""Print the kernels that flights compile, or load from the cache, after the vehicle was built. Expected: none."""
+"""Print the kernels that flights compile, or load from the cache, after the vehicle was built: that of streams only."""
 
 from __future__ import annotations
 

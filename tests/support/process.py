@@ -5,18 +5,23 @@ Waits are for events (a line of output, the end of the process); their timeouts 
 
 from __future__ import annotations
 
+import contextlib
+import os
+import select
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from queue import Empty, Queue
+from typing import Any
 
 from tests.support.programs import PROGRAMS, Program
 
 BOUND_S = 60.0
 MOST_LINES = 200
+SUPERVISOR = "flightstack.process.supervised"
 
 
 def start(module: str, arguments: Sequence[str], listens: bool) -> Program | subprocess.Popen[str]:
@@ -44,8 +49,30 @@ def children_of(pid: int) -> dict[str, int]:
         except (OSError, IndexError):  # the process has ended
             continue
         if parent == pid and "-m" in arguments:
-            found[arguments[arguments.index("-m") + 1]] = int(entry.name)
+            module, *rest = arguments[arguments.index("-m") + 1 :]
+            found[rest[0] if module == SUPERVISOR else module] = int(entry.name)
     return found
+
+
+def await_output(process: subprocess.Popen[Any], text: str) -> None:
+    """Read the output of a process up to ``text``, or to its end."""
+    assert process.stdout is not None
+    seen = b""
+    while text.encode() not in seen:
+        assert select.select([process.stdout], [], [], BOUND_S)[0], seen.decode()
+        if not (more := os.read(process.stdout.fileno(), 4096)):
+            return
+        seen += more
+
+
+@contextlib.contextmanager
+def ends_of(*processes: int) -> Iterator[None]:
+    """Wait for the ends of processes, which what is done meanwhile causes."""
+    watched = [os.pidfd_open(process) for process in processes]
+    yield
+    for descriptor in watched:
+        assert select.select([descriptor], [], [], BOUND_S)[0]
+        os.close(descriptor)
 
 
 class Process:

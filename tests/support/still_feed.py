@@ -23,8 +23,9 @@ class StillFeed(Feed):
         self.notices = deque()
         self.actions: list[Action] = []
         """Actions that the user asked for."""
+        self.commands_all = False
+        self.others: list[VehicleView] = []
         self.error = None
-        self._rates_hz = {}
         self.shown = view
         self.time_s = now_s
         self.jobs: list[tuple[Callable[[Connection], Any], Future[Any]]] = []
@@ -33,6 +34,14 @@ class StillFeed(Feed):
     @property
     def view(self) -> VehicleView:
         return self.shown
+
+    @property
+    def views(self) -> tuple[VehicleView, ...]:
+        return (self.shown, *self.others) if self.shown.identity is not None else ()
+
+    def select(self, system_id: int | None) -> None:
+        self.commands_all = system_id is None
+        self.shown = next((view for view in self.views if view.identity.system_id == system_id), self.shown)
 
     @property
     def now_s(self) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -18,7 +17,7 @@ from flightstack.mavlink.dialect import FsLoopTiming
 from flightstack.mavlink.link import Message
 from flightstack.services.telemetry.telemetry import Telemetry
 from flightstack.simulator_link.endpoint import NO_BATTERY
-from flightstack.vehicle.status import FlightTimes, PlanIds, VehicleInfo, VehicleStatus
+from flightstack.vehicle.status import FlightTimes, PlanIds, VehicleInfo, VehicleStatus, in_single_precision
 
 HOME = GeoPoint(47.397742, 8.545594, 488.0)
 EULER = (0.1, -0.2, 2.5)
@@ -26,7 +25,7 @@ X, Y, Z, W = Rotation.from_euler("ZYX", EULER[::-1]).as_quat()
 
 
 def status(info: dict[str, object] | None = None, **changes: object) -> VehicleStatus:
-    """Return the status with ``changes``; ``info`` changes its ``VehicleInfo``."""
+    """Return the status with ``changes``, arrays as in flight; ``info`` changes its ``VehicleInfo``."""
     row = np.zeros(LoopRow.SIZE)
     row[LoopRow.REFERENCE_RATES] = 0.4, 0.5, 0.6
     row[LoopRow.WRENCH_ACHIEVED] = 6.0, 0.0, 0.0, 0.0
@@ -35,13 +34,15 @@ def status(info: dict[str, object] | None = None, **changes: object) -> VehicleS
     usual = VehicleStatus(
         info=constant._replace(**(info or {})), time_us=12_345_678, armed=True, mode=Mode.MISSION, landed=False,
         can_arm=lambda: True, failsafe_action=Action.NONE, state_is_good=True,
-        state=np.array([10.0, -20.0, -30.0, 1.0, -2.0, 0.5, W, X, Y, Z, 0.01, 0.02, 0.03]),
-        setpoint=np.arange(11.0), attitude_target=np.array([1.0, 0.0, 0.0, 0.0, 5.0]), row=row, home=HOME,
+        state=[10.0, -20.0, -30.0, 1.0, -2.0, 0.5, W, X, Y, Z, 0.01, 0.02, 0.03],
+        setpoint=np.arange(11.0).tolist(), attitude_target=[1.0, 0.0, 0.0, 0.0, 5.0], row=row.tolist(), home=HOME,
         flight=FlightTimes(), mission=MissionProgress(2, 1, False, False), mission_count=5, mission_complete=False,
         plan_ids=PlanIds(), battery=NO_BATTERY, battery_level=0, fence_acts=True, fence_breached=False,
         fence_breaches=FenceBreaches(),
     )  # fmt: skip
-    return replace(usual, **changes)
+    lists = {name: value.tolist() for name, value in changes.items() if isinstance(value, np.ndarray)}
+    fitted = {name: in_single_precision(values) for name, values in lists.items() if name != "row"}
+    return usual._replace(**{**changes, **lists, **fitted})
 
 
 def usual_timing() -> Message:

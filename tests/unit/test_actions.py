@@ -9,7 +9,10 @@ import pytest
 from flightstack.testing import World
 from gcs_cli.actions import in_flight, on_vehicle
 from gcs_cli.actions.action import Action
+from gcs_cli.actions.conditions import ConditionError, parse_condition
 from gcs_cli.actions.run import ActionRun, Outcome, Result
+from gcs_cli.clients.mode_client import ModeClient
+from gcs_cli.vehicle.view_types import VehicleView
 
 LIMIT_S = 200.0
 
@@ -19,6 +22,12 @@ def world() -> Iterator[World]:
     with World(telemetry=True) as made:
         made.run_for(2.0)
         yield made
+
+
+@pytest.fixture
+def flying(world: World) -> World:
+    assert perform(world, in_flight.takeoff(5.0))[:2] == (Outcome.DONE, "at 5 m")
+    return world
 
 
 def perform(world: World, action: Action, *, waits: bool = True) -> Result:
@@ -33,14 +42,133 @@ def perform(world: World, action: Action, *, waits: bool = True) -> Result:
     return run.result
 
 
-def test_arm_ends_when_the_vehicle_reports_armed(world: World) -> None:
+def seen(world: World) -> VehicleView:
+    return world.sender.session.view
+
+
+def test_arm_and_disarm_end_when_the_vehicle_reports_it(world: World) -> None:
     assert perform(world, on_vehicle.arm())[:2] == (Outcome.DONE, "armed")
-    assert world.sender.session.view.armed
+    assert seen(world).armed
     assert perform(world, on_vehicle.disarm())[:2] == (Outcome.DONE, "disarmed")
-    assert not world.sender.session.view.armed
+    assert not seen(world).armed
 
 
-def test_takeoff_ends_at_the_altitude(world: World) -> None:
-    result = perform(world, in_flight.takeoff(5.0))
-    assert result[:2] == (Outcome.DONE, "at 5 m")
-    assert world.state.altitude_m == pytest.approx(5.0, abs=0.6)
+def test_takeoff_ends_at_the_altitude(flying: World) -> None:
+    assert flying.state.altitude_m == pytest.approx(5.0, abs=0.6)
+
+
+def test_takeoff_without_an_altitude_goes_to_the_vehicles_own(world: World) -> None:
+    assert perform(world, in_flight.takeoff())[:2] == (Outcome.DONE, "took off")
+    assert seen(world).mode == "HOLD"
+    assert world.state.altitude_m == pytest.approx(world.param_get("MIS_TAKEOFF_ALT"), abs=0.6)
+
+
+@pytest.mark.parametrize("action", [in_flight.land(), in_flight.return_to_launch()], ids=["land", "rtl"])
+def test_landings_end_when_the_vehicle_has_disarmed(flying: World, action: Action) -> None:
+    assert perform(flying, action).outcome is Outcome.DONE
+    assert not flying.state.armed
+    assert flying.state.altitude_m < 0.2
+
+
+def test_goto_ends_at_the_position_and_hold_stops_on_the_way(flying: World) -> None:
+    home = seen(flying).home
+    assert home is not None
+    north_deg = home.latitude_deg + 20.0 / 111_195.0
+    assert perform(flying, in_flight.goto(north_deg, home.longitude_deg, 6.0)).outcome is Outcome.DONE
+    assert flying.state.north_m == pytest.approx(20.0, abs=1.1)
+    assert flying.state.altitude_m == pytest.approx(6.0, abs=0.6)
+    back = in_flight.goto(home.latitude_deg, home.longitude_deg)
+    assert perform(flying, back, waits=False).outcome is Outcome.ACKNOWLEDGED
+    flying.run_for(3.0)
+    assert perform(flying, in_flight.hold())[:2] == (Outcome.DONE, "holding the position")
+    assert 2.0 < flying.state.north_m < 19.0
+
+
+def test_yaw_ends_at_the_heading(flying: World) -> None:
+    assert perform(flying, in_flight.yaw(270.0))[:2] == (Outcome.DONE, "pointing to 270 degrees")
+
+
+def test_speed_ends_with_the_acknowledgement(flying: World) -> None:
+    assert perform(flying, in_flight.speed(2.0))[:2] == (Outcome.ACKNOWLEDGED, "flying at 2 m/s")
+    assert perform(flying, in_flight.speed(None)).ok
+
+
+def test_mode_ends_when_the_heartbeat_has_it(flying: World) -> None:
+    assert perform(flying, on_vehicle.select_mode("land"))[:2] == (Outcome.DONE, "mode land")
+    result = perform(flying, on_vehicle.select_mode("acro"))
+    assert result[:2] == (Outcome.REFUSED, "mode acro refused: this vehicle has no such mode")
+
+
+def test_set_home_ends_when_the_vehicle_reports_the_place(world: World) -> None:
+    home = seen(world).home
+    assert home is not None
+    place = (home.latitude_deg + 1e-4, home.longitude_deg, home.altitude_m)
+    assert perform(world, on_vehicle.set_home(place)).outcome is Outcome.DONE
+    moved = seen(world).home
+    assert moved is not None
+    assert moved.latitude_deg == pytest.approx(place[0], abs=1e-6)
+
+
+def test_mission_start_ends_when_the_mission_runs(world: World) -> None:
+    result = perform(world, in_flight.start_mission())
+    assert result[:2] == (Outcome.REFUSED, "mission start refused: no mission is loaded")
+    world.upload("hop")
+    assert perform(world, in_flight.start_mission())[:2] == (Outcome.DONE, "mission started")
+    assert (seen(world).mode, seen(world).armed) == ("MISSION", True)
+
+
+def test_termination_ends_when_the_vehicle_reports_it(flying: World) -> None:
+    assert perform(flying, on_vehicle.terminate())[:2] == (Outcome.DONE, "flight terminated")
+    assert seen(flying).mode == "TERMINATION"
+
+
+def test_an_injected_failure_needs_permission(world: World) -> None:
+    assert perform(world, on_vehicle.inject_failure("gps", "off")).outcome is Outcome.REFUSED
+
+
+def test_ready_follows_the_pre_arm_check(world: World) -> None:
+    ready = parse_condition("ready")
+    world.run_until(lambda _state: ready.holds(seen(world)), timeout_s=30.0)
+    assert perform(world, on_vehicle.arm()).ok
+
+
+def test_the_vehicle_lists_its_modes(world: World) -> None:
+    session = world.sender.session
+    client = ModeClient(lambda: session.view, session.own, world.time_s)
+    session.use(client)
+    while client.result is None:
+        world.step()
+    assert client.result
+    assert list(on_vehicle.mode_choices(session.view)) == [
+        "HOLD", "TAKEOFF", "MISSION", "RTL", "LAND", "POSITION", "ALTITUDE", "OFFBOARD"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("armed", "disarmed"),
+        ("landed", "on the ground"),
+        ("altitude<1", "m"),
+        ("mode=hold", "mode HOLD"),
+        ("item>=3", "0"),
+    ],
+)
+def test_conditions_name_the_present_value(world: World, text: str, value: str) -> None:
+    assert value in parse_condition(text).value(seen(world))
+
+
+@pytest.mark.parametrize(
+    "text", ["flying", "altitude", "altitude>high", "position=1", "color=red", "mode>HOLD"]
+)
+def test_conditions_that_are_not_understood_are_refused(text: str) -> None:
+    with pytest.raises(ConditionError, match=text):
+        parse_condition(text)
+
+
+def test_position_conditions_have_a_radius(world: World) -> None:
+    geo = seen(world).geo
+    assert geo is not None
+    near = f"position={geo.latitude_deg + 5e-5:.7f},{geo.longitude_deg:.7f}"  # 5.6 m away
+    assert not parse_condition(near).holds(seen(world))
+    assert parse_condition(f"{near},10").holds(seen(world))

@@ -24,7 +24,7 @@ from gcs_cli.report.compare import (
     read_runs,
     render_comparison,
 )
-from gcs_cli.report.replay import find_run
+from gcs_cli.report.poses import find_run
 from gcs_cli.report.summary import RunInfo, summarise, write_summary
 from tests.support.parsed_page import own_part, parsed
 from tests.support.square_plan import square_plan

@@ -41,7 +41,7 @@ print(json.dumps([Listener.compiled, hashlib.sha256(world.engine.newest_log()).h
 ORPHAN = """
 import os
 from flightstack.process import compile_helper
-compile_helper.start(["stream_kernel"])
+compile_helper.start(["goal_kernel"])
 os.write(1, str(compile_helper._helper.pid).encode())
 os._exit(0)
 """
@@ -81,12 +81,10 @@ def cold(monkeypatch: pytest.MonkeyPatch, not_started: None) -> None:
 )
 @pytest.mark.skipif(CPUS < 2, reason="the helper needs a second CPU")
 def test_cold_cache_is_compiled_once_and_gives_the_same_log(tmp_path: Path) -> None:
-    """The helper compiles guidance and commander, this process the rest."""
+    """The helper compiles guidance and plant, this process the rest; no kernel of streams is needed."""
     compiled, digest = json.loads(run(COLD_FLIGHT, json.dumps(FLIGHT), cache=tmp_path).stdout)
-    assert {"inner_kernel", "outer_kernel", "_advance"} <= set(compiled)
-    assert not {"stream_kernel", "goal_kernel", "rest_kernel", "detect", "fence_step", "outer_heading"} & set(
-        compiled
-    )
+    assert {"inner_kernel", "outer_kernel", "detect", "fence_step", "outer_heading"} <= set(compiled)
+    assert not {"stream_kernel", "goal_kernel", "rest_kernel", "_advance"} & set(compiled)
     assert digest == digest_of_flight()
 
 
@@ -101,15 +99,22 @@ def test_compile_helper_ends_with_its_parent(tmp_path: Path) -> None:
 
 def test_compile_helper_ends_in_order() -> None:
     """Its parent holds its standard input open."""
-    command = [sys.executable, "-P", "-m", "flightstack.process.compile_helper"]
+    tasks = f"{compile_helper.GUIDANCE},{compile_helper.COMMANDER}"
+    command = [sys.executable, "-P", "-m", "flightstack.process.compile_helper", tasks]
     path = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path)
-    helper = subprocess.Popen(
-        command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": path}
-    )
-    assert helper.wait() == 0
-    assert helper.stderr is not None
-    assert helper.stderr.read() == b""
-    helper.communicate()
+    environment = {**os.environ, "PYTHONPATH": path}
+    with subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=environment,
+    ) as helper:
+        assert helper.stdout is not None
+        assert helper.stderr is not None
+        assert helper.stdout.read() == b"\n"  # after the tasks
+        assert helper.stderr.read() == b""
+        assert helper.wait() == 0
 
 
 def test_a_failing_compile_helper_changes_nothing(cold: None, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,7 +130,6 @@ def test_a_failing_compile_helper_changes_nothing(cold: None, monkeypatch: pytes
 
 def test_compile_helper_starts_for_a_cold_cache_only(not_started: None) -> None:
     World(**FLIGHT)  # compiles, or loads from the cache
-    compile_helper.wait()
     assert not compile_helper._is_useful()
 
 

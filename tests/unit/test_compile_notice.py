@@ -10,6 +10,7 @@ import sys
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 from numba.core import event
@@ -51,8 +52,8 @@ for name, setup in json.loads(sys.argv[1]).items():
 """
 STACK = """
 from flightstack.process.assembly import build
-from flightstack.params.config import DEFAULT_HOME, StackConfig
-build(StackConfig("paper_quad", "pid", "tuned", "{loops}", 500.0, 100.0, False, True, DEFAULT_HOME, 1), lambda: None)
+from flightstack.params.config import StackConfig
+build(StackConfig(loops="{loops}", lockstep={lockstep}), lambda: None)
 """
 PLANT = """
 from flightstack.params.vehicle import load_vehicle
@@ -78,7 +79,8 @@ def whole(x: float) -> float:
 
 
 SETUPS = {
-    **{loops: STACK.format(loops=loops) for loops in ("python", "c")},
+    **{loops: STACK.format(loops=loops, lockstep=True) for loops in ("python", "c")},
+    "real time": STACK.format(loops="python", lockstep=False),
     **{plant: PLANT.format(plant=plant) for plant in ("rigid", "paper")},
     **({"multibody": PLANT.format(plant="multibody")} if find_spec("mujoco") else {}),
 }
@@ -123,13 +125,14 @@ def test_compile_notice_names_a_kernel_that_is_not_listed() -> None:
 
 
 @JIT
-@pytest.mark.parametrize("loops", ["python", "c"])
-def test_kernels_of_the_stack_are_those_it_loads(loops: str) -> None:
-    from flightstack.params.config import DEFAULT_HOME, StackConfig  # noqa: PLC0415
+@pytest.mark.parametrize(
+    ("setup", "config"), [("python", {}), ("c", {"loops": "c"}), ("real time", {"lockstep": False})]
+)
+def test_kernels_of_the_stack_are_those_it_loads(setup: str, config: dict[str, Any]) -> None:
+    from flightstack.params.config import StackConfig  # noqa: PLC0415
     from flightstack.process.assembly import kernels_of  # noqa: PLC0415
 
-    config = StackConfig("paper_quad", "pid", "tuned", loops, 500.0, 100.0, False, True, DEFAULT_HOME, 1)
-    assert loaded_kernels()[loops] == sorted(kernels_of(config))
+    assert loaded_kernels()[setup] == sorted(kernels_of(StackConfig(**config)))
 
 
 @JIT
@@ -143,7 +146,8 @@ def test_kernels_of_a_plant_are_those_it_loads(plant: str) -> None:
 
 
 @JIT
-def test_nothing_is_compiled_after_the_vehicle_is_built() -> None:
+def test_nothing_is_compiled_after_the_vehicle_is_built_but_for_streams() -> None:
+    """In lockstep, time stands still meanwhile; in real time that kernel is compiled too."""
     run = subprocess.run(
         [sys.executable, "-m", "tests.support.kernels_of_flights"],
         cwd=ROOT,
@@ -151,4 +155,4 @@ def test_nothing_is_compiled_after_the_vehicle_is_built() -> None:
         text=True,
         check=True,
     )
-    assert run.stdout.split() == []
+    assert run.stdout.split() == ["flightstack.guidance.kernels.stream_kernel"]

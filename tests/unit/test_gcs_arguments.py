@@ -36,7 +36,7 @@ from gcs_cli.fly.fly_options import (
 )
 from gcs_cli.link.endpoint import DEFAULT_CONNECTION, VehicleEndpoint, parse_endpoint
 from gcs_cli.report.flight_outcome import Code, Outcome
-from gcs_cli.report.replay import Run
+from gcs_cli.report.poses import Run
 from gcs_cli.report.run_directory import LOG_NAME, make_run_directory
 from gcs_cli.transfers.plan_files import example_plans
 from sim_bridge.__main__ import run as sim_bridge_run
@@ -50,10 +50,16 @@ HOP = MISSIONS / "hop.plan"
 @pytest.mark.parametrize(
     ("text", "endpoint"),
     [
-        (DEFAULT_CONNECTION, VehicleEndpoint("127.0.0.1", 14550, True)),
-        ("udp:14560", VehicleEndpoint("127.0.0.1", 14560, True)),
-        ("udpin:10.0.0.1:1", VehicleEndpoint("10.0.0.1", 1, True)),
-        ("udpout:vehicle.local:18570", VehicleEndpoint("vehicle.local", 18570, False)),
+        (DEFAULT_CONNECTION, VehicleEndpoint("udpin", "127.0.0.1", 14550)),
+        ("udp:14560", VehicleEndpoint("udpin", "127.0.0.1", 14560)),
+        ("udpin:10.0.0.1:1", VehicleEndpoint("udpin", "10.0.0.1", 1)),
+        ("udpin://0.0.0.0:14540", VehicleEndpoint("udpin", "0.0.0.0", 14540)),
+        ("udpout:vehicle.local:18570", VehicleEndpoint("udpout", "vehicle.local", 18570)),
+        ("tcp:127.0.0.1:5760", VehicleEndpoint("tcp", "127.0.0.1", 5760)),
+        ("tcpin:5760", VehicleEndpoint("tcpin", "127.0.0.1", 5760)),
+        ("serial:/dev/ttyACM0", VehicleEndpoint("serial", "/dev/ttyACM0", 57600)),
+        ("serial:/dev/ttyUSB0:921600", VehicleEndpoint("serial", "/dev/ttyUSB0", 921600)),
+        ("flights/c:1.TLOG", VehicleEndpoint("recording", "flights/c:1.TLOG")),
     ],
 )
 def test_connection_strings(text: str, endpoint: VehicleEndpoint) -> None:
@@ -65,7 +71,10 @@ def test_connection_strings(text: str, endpoint: VehicleEndpoint) -> None:
     [
         "",
         "14550",
-        "tcp:127.0.0.1:5760",
+        "tcp:5760",
+        "serial:",
+        "serial:/dev/ttyACM0:fast",
+        "serial::9600",
         "udp:",
         "udp:x",
         "udp:0",

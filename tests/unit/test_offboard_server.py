@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from flightstack.core.contract import Vector3
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.guidance.setpoints import OffboardSetpoint, PointSetpoint
@@ -66,10 +68,11 @@ def test_a_refusal_is_said_once_and_keeps_no_stream_alive() -> None:
 def test_a_stream_that_ends_is_lost() -> None:
     vehicle = Vehicle()
     server = vehicle.server()
+    assert server.next_deadline() is None
     server.receive(local_point((0.0, 0.0, -2.0)), "one", 0.0)
+    assert server.next_deadline() == -math.inf  # at every poll: the timeout counts vehicle time
     vehicle.time_us = 900_000
     assert server.poll(0.9) == []
     vehicle.time_us = 1_100_000
     server.poll(1.1)
     assert vehicle.lost == [False, True]
-    assert server.next_deadline() is None

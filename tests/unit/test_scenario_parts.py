@@ -10,6 +10,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Command, MissionItem, Plan
 from flightstack.testing import World
+from flightstack.testing.expectations import Check
 from flightstack.testing.expression import Expression
 from flightstack.testing.log import Log
 from flightstack.testing.orders import check_command, order
@@ -43,6 +44,34 @@ def test_refused_start_is_judged_by_its_reason(tmp_path: Path) -> None:
 def test_expectation_of_a_flight_fails_without_one(tmp_path: Path) -> None:
     path = scenario(tmp_path, DRAINED + 'outcome = "any"\nalways = ["altitude_m < 9"]\n')
     assert "did not arm" in run_scenario(load_scenario(path)).failures[0]
+
+
+HOVER = """vehicle = "x_quad"
+{end}
+[[event]]
+at_s = 0.1
+command = "takeoff 2"
+[[event]]
+at_s = 0.2
+command = "arm"
+[[event]]
+at_s = 4.0
+command = "land"
+[expect]
+"""
+
+
+@pytest.mark.parametrize(("end_s", "landed"), [(5.0, False), (40.0, True)])
+def test_mode_as_outcome_needs_a_landing(tmp_path: Path, end_s: float, landed: bool) -> None:
+    """The landing begins at 4 s, above 1 m."""
+    path = scenario(tmp_path, HOVER.format(end=f"duration_s = {end_s}") + 'outcome = "LAND"\n')
+    verdict = run_scenario(load_scenario(path))
+    assert verdict.passed is landed, verdict.failures
+    assert landed or verdict.failures == ["outcome LAND: it ended in mode LAND without a landing"]
+
+
+def test_share_of_a_limit_of_zero_is_unknown() -> None:
+    assert Check("always climb_m_s > 0", True, "holds", 0.3, 0.0).share is None
 
 
 def test_idle_loop_is_refused_at_once() -> None:

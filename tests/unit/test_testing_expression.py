@@ -165,3 +165,16 @@ def test_every_signal_is_an_attribute_of_the_state() -> None:
     with World() as world:
         missing = [name for name in SIGNALS if not hasattr(world.state, name)]
     assert not missing
+
+
+@pytest.mark.parametrize(
+    ("text", "margin", "limit"),
+    [
+        ("mode == 'HOLD' and altitude_m < 5", 2.0, 5.0),
+        ("armed == True and 5 > altitude_m", 2.0, 5.0),
+        ("mode == 'HOLD'", INF, None),
+        ("armed or altitude_m < 5", INF, None),
+    ],
+)
+def test_limit_is_that_of_the_comparison_of_numbers(text: str, margin: float, limit: float | None) -> None:
+    assert Expression(text).limit({"mode": "HOLD", "armed": True, "altitude_m": 3.0}, margin) == limit

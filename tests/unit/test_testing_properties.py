@@ -56,6 +56,36 @@ def test_eventually_is_the_largest_margin(pairs: list[tuple[float, float]]) -> N
     assert found.holds is any(value >= 1.0 for value in a)
 
 
+@pytest.mark.parametrize(
+    ("text", "limit"),
+    [
+        ("altitude_m < 5", 5.0),
+        ("5 > altitude_m", 5.0),
+        ("altitude_m < 2 * (1 + 1.5)", 5.0),
+        ("altitude_m < 5 and climb_m_s < 9", 5.0),  # margins 1 and 8
+        ("altitude_m < 50 and abs(climb_m_s) < 1.5", 1.5),  # margins 46 and 0.5
+        ("-3 < climb_m_s < 1.25", 1.25),
+        ("not altitude_m > 4.5", 4.5),
+        ("altitude_m > climb_m_s", None),
+        ("altitude_m - 5 < climb_m_s", None),
+        ("altitude_m < 6 or climb_m_s < 0.5", 6.0),
+    ],
+)
+def test_limit_of_a_margin_is_that_of_its_comparison(text: str, limit: float | None) -> None:
+    flown = signals([3.0, 4.0, 2.0], [1.0, 1.0, 1.0])
+    assert properties.always(flown, text).limit == limit
+
+
+def test_limit_of_a_violation_is_that_of_the_worst_sample() -> None:
+    flown = signals([3.0, 9.0, 4.0], [0.0, 0.0, 7.0])
+    found = properties.always(flown, "altitude_m < 8 and climb_m_s < 2")
+    assert (found.margin, found.limit) == (-5.0, 2.0)
+    assert found.time_s == pytest.approx(STEP_S)  # the first violation
+    found = properties.eventually(flown, "altitude_m > 8.5 and climb_m_s < 6")
+    assert (found.margin, found.limit) == (0.5, 8.5)
+    assert properties.always(flown, "altitude_m >= 3").limit == 3.0  # a margin of 0
+
+
 @given(PAIRS)
 def test_until_is_the_best_end_with_all_before_it(pairs: list[tuple[float, float]]) -> None:
     flown, a, b = both(pairs)

@@ -250,6 +250,25 @@ def test_power_cycle_keeps_parameters_and_plans(world: World) -> None:
     assert world.fly("hop").completed
 
 
+def test_world_time_goes_on_while_the_vehicle_boots_again(world: World) -> None:
+    world.arm()
+    world.run_for(5.0)
+    flown = world.flight()
+    before_s = world.time_s
+    world.power_cycle(off_s=2.0)
+    assert world.time_s == world.state.time_s == pytest.approx(before_s + 2.0, abs=0.011)
+    world.run_for(3.0)
+    assert world.time_s == pytest.approx(before_s + 5.0, abs=0.011)
+    assert world.gcs.received["ATTITUDE"].time_boot_ms == pytest.approx(3000, abs=260)
+    world.arm()  # the ground station goes on to send heartbeats
+    world.run_for(1.0)
+    again = world.flight()
+    assert [event.name for event in world.events] == ["power_cycle"]
+    assert flown.signals.time_s[-1] < world.events[0].time_s < again.signals.time_s[0]
+    begins_s = [again.signals.time_s[0], again.log.texts[0].time_s, again.log["vehicle_status"].time_s[0]]
+    assert begins_s == pytest.approx([before_s + 5.0] * 3, abs=0.011)
+
+
 def test_power_cycle_in_the_air_drops_the_vehicle(world: World) -> None:
     world.takeoff(5.0)
     world.run_until("altitude_m > 4.5", timeout_s=20.0)
@@ -306,6 +325,30 @@ def test_signals_agree_with_the_log(flight: Flight) -> None:
     assert part.time_s[0] >= 5.0
     assert part.time_s[-1] <= 6.0
     assert len(part.values["mode"]) == len(part.time_s)
+
+
+def test_error_is_that_of_the_flight(world: World) -> None:
+    """The setpoint sinks half a metre into the ground after the touchdown."""
+    errors_m: list[float] = []
+    world.watch(lambda: errors_m.append(world.state.error_m))
+    flight = world.fly("hop")
+    world.run_for(1.0)
+    assert flight.signals.values["error_m"].max() == flight.max_error_m < 0.1
+    assert max(errors_m) == pytest.approx(flight.max_error_m, abs=0.01)
+    assert flight.signals.values["error_m"][-1] == errors_m[-1] == 0.0
+    flight.always("error_m < 0.1")
+
+
+def test_failsafe_ends_with_disarming(world: World) -> None:
+    world.takeoff(3.0)
+    world.run_until("altitude_m > 2.5", timeout_s=20.0)
+    world.param_set("NAV_DLL_ACT", 3)  # land
+    world.link.cut()
+    world.run_until("landed", timeout_s=60.0)
+    assert world.state.failsafe
+    world.run_until("not armed", timeout_s=10.0)
+    assert not world.state.failsafe
+    world.flight().always("failsafe and armed after failsafe")
 
 
 def test_modes_and_events_are_in_order(flight: Flight) -> None:

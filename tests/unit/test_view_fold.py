@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, add_ardupilot_messages, mavlink
+from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, ardupilot_dialect, mavlink
 from flightstack.mavlink.link import Link
 from gcs_cli.vehicle.status_texts import PIECE_TIMEOUT_S
 from gcs_cli.vehicle.vehicle_view import update
@@ -260,10 +260,10 @@ def _raw_frame(message_id: int, payload: bytes) -> Any:
     return next(iter(Link(0, 0).decode(packed)), None)
 
 
-add_ardupilot_messages()
+ardupilot_dialect()
 FOLDED = [
-    0, 1, 2, 24, 30, 32, 33, 42, 46, 74, 83, 85, 111, 147, 168, 193, 230, 231, 242, 245, 253, 291, 435, 11030, 11031,
-    162, 53002,
+    0, 1, 2, 24, 30, 32, 33, 42, 46, 74, 83, 85, 147, 162, 168, 193, 230, 231, 242, 245, 253, 291, 435, 11030, 11031,
+    53002,
 ]  # fmt: skip
 
 

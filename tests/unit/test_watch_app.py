@@ -13,7 +13,7 @@ from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.feed import Notice
 from gcs_cli.tui.orders import ORDERS, Field, FieldError
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
-from gcs_cli.vehicle.view_types import VehicleView
+from gcs_cli.vehicle.view_types import Identity, VehicleView
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
 from tests.support.watch_states import BARE, FULL
@@ -47,7 +47,7 @@ def test_a_digit_opens_a_screen(entry: ScreenEntry) -> None:
         await pilot.pause()
         assert app.current_mode == entry.mode
         assert f"{entry.key} {entry.title}" in shown(app)[1]
-        assert shown(app)[-1].endswith("q Quit")
+        assert "q Quit" in shown(app)[-1]
 
     play(story, size=(120, 24))
 
@@ -247,3 +247,26 @@ def test_a_theme_changes_the_colours_of_drawings() -> None:
         assert app.palette.text.startswith("#")
 
     play(story)
+
+
+def test_vehicles_are_listed_selected_and_commanded_together() -> None:
+    other = FULL._replace(identity=Identity(7, 1, 13, 3), mode="GUIDED")
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.others.append(other)
+        app.redraw()
+        await pilot.pause()
+        assert "v Vehicles" in shown(app)[-1]
+        await pilot.press("v")
+        await pilot.pause()
+        assert "hexarotor  GUIDED" in "\n".join(shown(app))
+        await pilot.press("end", "enter")
+        await pilot.pause(0.3)
+        assert app.feed.commands_all
+        assert "COMMANDS TO ALL 2" in shown(app)[0]
+        await pilot.press("v", "down", "enter")
+        await pilot.pause()
+        assert not app.feed.commands_all
+        assert app.feed.view.identity.system_id == 7
+
+    play(story, size=(120, 24))

@@ -185,4 +185,6 @@ class LogStream:
         stream = self._stream
         if stream is None:
             return None
-        return stream.sent_s + RESEND_S if stream.waiting is not None else self._pace.ready_s()
+        if stream.waiting is None:
+            return self._pace.ready_s()
+        return min(stream.sent_s + RESEND_S, stream.since_s + GIVE_UP_S)

@@ -297,12 +297,12 @@ class MissionService:
 
     def receive(self, message: Message, peer: Hashable, now_s: float) -> None:
         """Take a message of the mission protocol."""
+        self._server.current_seq = self._vehicle.now.progress.current
         self._server.receive(message, peer, now_s)
         self._take_events()
 
     def poll(self, now_s: float) -> list[tuple[Hashable | None, Message]]:
         """Return requests, items and acknowledgements."""
-        self._server.current_seq = self._vehicle.now.progress.current
         outbox = list(self._server.poll(now_s))
         self._take_events()
         return outbox

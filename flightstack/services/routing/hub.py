@@ -18,7 +18,7 @@ from flightstack.mavlink.signing import Signing
 from flightstack.plan.kept_plans import KeptPlans
 from flightstack.services.commands.context import VehicleContext
 from flightstack.services.mission.mission_server import MissionService
-from flightstack.services.registry import Service, make_services
+from flightstack.services.registry import Schedule, Service, make_services
 from flightstack.services.routing.peer import Peer, PeerAddress
 from flightstack.services.routing.router import Router
 from flightstack.services.routing.signing_setup import NEVER_FORWARDED, link_signing, signing_setup
@@ -57,6 +57,8 @@ class GroundHub:
         self._polled_s = -math.inf
         services = make_services(self._own, vehicle, parts, telemetry, info, self._peer_at, self._has_room)
         self._services = [*services, self._setup]
+        self._schedule = Schedule(self._services)
+        vehicle.params.subscribe(lambda _name, _value: self._schedule.wake())
         self._by_type: dict[str, list[Service]] = {}
         for service in self._services:
             for kind in service.handles:
@@ -186,6 +188,7 @@ class GroundHub:
                 frame = bytes(message.get_msgbuf())
                 self._to_forward.extend((other, frame) for other in route.forward)
             if route.local:
+                self._schedule.wake()
                 for service in self._by_type.get(message.get_type(), ()):
                     service.receive(message, address, now_s)
 
@@ -203,8 +206,8 @@ class GroundHub:
         """
         self._congested, self._polled_s = congested, now_s
         changed = self._note_changes()
-        for service in self._services:
-            self._collect(service.poll(now_s))
+        if addressed := self._schedule.poll(now_s):
+            self._collect(addressed)
         self._send_texts()
         self._telemetry.begin_poll()
         for address, peer in list(self._peers.items()):
@@ -213,7 +216,8 @@ class GroundHub:
                 frames = [peer.link.encode_shared(message) for message in due]
                 for frame in frames:
                     yield address, frame
-        yield from self._forwarded(now_s)
+        if self._to_forward:
+            yield from self._forwarded(now_s)
         self._forget_silent(now_s)
 
     def _forwarded(self, now_s: float) -> Iterator[tuple[PeerAddress, bytes]]:
@@ -231,19 +235,21 @@ class GroundHub:
             elif isinstance(address, PeerAddress) and address in self._peers:
                 self._peers[address].outbox.append(message)
 
-    def _due(self, peer: Peer, changed: bool, now_s: float, streams: bool) -> Iterator[Message]:
-        """Yield the messages to send to ``peer`` now. Keep texts for a silent peer, which may be heard again."""
-        if (peer.heard or peer.permanent) and (changed or now_s >= peer.heartbeat_due_s):
+    def _due(self, peer: Peer, changed: bool, now_s: float, streams: bool) -> list[Message]:
+        """Return the messages to send to ``peer`` now. Keep texts for a silent peer, which may be heard again."""
+        due: list[Message] = []
+        if (changed or now_s >= peer.heartbeat_due_s) and (peer.heard or peer.permanent):
             peer.heartbeat_due_s = now_s + HEARTBEAT_S
-            yield from self._telemetry.messages(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+            due += self._telemetry.messages(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
         if not peer.is_served(now_s):
             texts = [message for message in peer.outbox if message.get_type() == "STATUSTEXT"]
             peer.outbox[:] = texts[-KEPT_TEXTS:]
-            return
-        yield from peer.outbox
+            return due
+        due += peer.outbox
         peer.outbox.clear()
         if streams:
-            yield from peer.streams.due(self._telemetry, now_s)
+            due += peer.streams.due(self._telemetry, now_s)
+        return due
 
     def _note_changes(self) -> bool:
         """Announce reached items and a change of home; return True if mode or arming has changed."""
@@ -274,6 +280,8 @@ class GroundHub:
         SYSTEM_TIME before a text carries its time, which STATUSTEXT does not.
         """
         self._take_events()  # texts of the services in this poll
+        if not self._texts:
+            return
         if not any(peer.heard for peer in self._peers.values()):
             del self._texts[:-KEPT_TEXTS]
             return

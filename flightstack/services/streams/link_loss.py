@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Iterable
 
 from flightstack.commander.inputs import LinkFacts
@@ -19,6 +20,11 @@ class SilenceTimer:
 
     def __init__(self) -> None:
         self._heard_us: int | None = None
+
+    @property
+    def is_new(self) -> bool:
+        """True if the link was never heard."""
+        return self._heard_us is None
 
     def heard(self, time_us: int) -> None:
         """Restart the timer."""
@@ -53,6 +59,10 @@ class StreamMonitor:
         """Restart the timeout, and report the start at once: a mode change may follow."""
         self._timer.heard(self._vehicle_time_us())
         self._set_lost(False)
+
+    def next_deadline(self) -> float | None:
+        """Return −inf for a stream that has begun, whose timeout counts vehicle time, else None."""
+        return None if self._timer.is_new else -math.inf
 
     def check(self) -> None:
         """Evaluate the timeout."""
@@ -113,5 +123,5 @@ class GroundLinkMonitor:
         return ()
 
     def next_deadline(self) -> float | None:
-        """Return None: the hub polls at least at its heartbeat rate."""
-        return None
+        """Return −inf: the timeout counts vehicle time, and before the first heartbeat NAV_DLL_ACT decides."""
+        return -math.inf

@@ -212,5 +212,5 @@ class SetpointServer:
         return []
 
     def next_deadline(self) -> float | None:
-        """Return None: the timeout counts on the vehicle clock too, which advances only between polls."""
-        return None
+        """Return the time of the next poll."""
+        return self._monitor.next_deadline()

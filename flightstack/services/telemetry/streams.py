@@ -7,7 +7,6 @@ ATTITUDE messages per second of wall time, not 2500. At real time, and on an in-
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
@@ -145,15 +144,20 @@ class Streams:
         for message_id in members:
             self.set_interval(message_id, interval_us)
 
-    def due(self, telemetry: Telemetry, link_now_s: float) -> Iterator[Message]:
-        """Yield the messages that are due on both the vehicle clock and the link clock."""
+    def due(self, telemetry: Telemetry, link_now_s: float) -> list[Message]:
+        """Return the messages that are due on both the vehicle clock and the link clock."""
         now_s = telemetry.time_us * 1e-6
+        due: list[Message] = []
         if now_s < self._soonest_s:
-            return
+            return due
         soonest_s = math.inf
         for stream in self._streams.values():
-            if now_s >= stream.vehicle_s and link_now_s >= stream.link_s:
+            vehicle_s = stream.vehicle_s
+            if now_s >= vehicle_s and link_now_s >= stream.link_s:
                 stream.sent(now_s, link_now_s)
-                yield from telemetry.messages(stream.message_id)
-            soonest_s = min(soonest_s, stream.vehicle_s)
+                vehicle_s = stream.vehicle_s
+                due += telemetry.messages(stream.message_id)
+            if vehicle_s < soonest_s:  # noqa: PLR1730  # ``min`` takes three times as long
+                soonest_s = vehicle_s
         self._soonest_s = soonest_s
+        return due

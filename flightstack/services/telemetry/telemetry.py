@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from flightstack.mavlink.link import Message
 from flightstack.services.telemetry import modes, motion, vehicle
-from flightstack.services.telemetry.fields import wrapped
+from flightstack.services.telemetry.fields import euler_rad, wrapped
 from flightstack.vehicle.status import VehicleStatus
 
 MAKERS: dict[int, Callable[[VehicleStatus], Message]] = {
@@ -67,6 +67,7 @@ class Telemetry:
         self._loop_timing = loop_timing
         self._status: VehicleStatus | None = None
         self._made: dict[int, tuple[Message, ...]] = {}
+        euler_rad(1.0, 0.0, 0.0, 0.0)  # compile now and not at the first message
 
     def begin_poll(self) -> None:
         """Discard the status and the messages of the last poll."""
@@ -92,11 +93,11 @@ class Telemetry:
 
     def messages(self, message_id: int) -> tuple[Message, ...]:
         """Return a message of ``STREAMED``, as of this tick: ticks may come between two parts of a poll."""
-        if self._status is not None and self._status.time_us != self.time_us:
+        if self._status is not None and self._status.time_us != self._time_us():
             self.begin_poll()
         made = self._made.get(message_id)
         if made is None:
-            made = self._made[message_id] = tuple(self._make(message_id))
+            made = self._made[message_id] = self._make(message_id)
         return made
 
     def requested(self, message_id: int, argument: float = 0.0) -> tuple[Message, ...]:
@@ -111,10 +112,10 @@ class Telemetry:
         self.begin_poll()
         return vehicle.heartbeat(self.status, leaving=True)
 
-    def _make(self, message_id: int) -> Iterator[Message]:
-        if message_id == FS_LOOP_TIMING_ID:
-            yield self._loop_timing()
-            return
-        yield MAKERS[message_id](self.status)
+    def _make(self, message_id: int) -> tuple[Message, ...]:
+        maker = MAKERS.get(message_id)
+        if maker is None:
+            return (self._loop_timing(),)
         if message_id == EscStatus.id and self.status.info.rotors > 4:  # one message holds four rotors
-            yield motion.esc_status(self.status, 4)
+            return (motion.esc_status(self.status), motion.esc_status(self.status, 4))
+        return (maker(self.status),)

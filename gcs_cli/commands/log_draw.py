@@ -1,4 +1,4 @@
-"""``gcs replay``: pictures and films of a flight from its log."""
+"""``gcs log draw``: pictures and films of a flight from its log."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from flightstack.process.command_line import PictureOptions, expand_options, mak
 from flightstack.process.console import complain
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.report.analysis import read_flight
-from gcs_cli.report.replay import find_run, poses_of
+from gcs_cli.report.poses import find_run, poses_of
 
 app = make_app(add_completion=False)
 
-_NAME = "gcs replay"
+_NAME = "gcs log draw"
 _END_TIMEOUT_S = 10.0
 
 
 @app.command()
 @expand_options
-def replay(
+def draw(
     run: Annotated[Path, typer.Argument(help="Directory of a flight, or its log.", show_default=False)],
     options: PictureOptions,
     vehicle: Annotated[str | None, typer.Option(help="Vehicle to draw.  [default: the log's]")] = None,
@@ -42,7 +42,7 @@ def replay(
         complain(f"gcs: warning: the log is damaged; drawn up to {poses.time_s[-1]:.1f} s")
     if not (options.png or options.sheet or options.video or options.view):
         options = replace(options, video=found.film, overwrite=True)  # part of the run, like its report
-    with tempfile.TemporaryDirectory(prefix="gcs-replay-") as folder:
+    with tempfile.TemporaryDirectory(prefix="gcs-draw-") as folder:
         file = Path(folder) / "poses.npz"
         write_poses(file, poses)
         code = _render([str(file), *options.arguments(), f"--caller={_NAME}"])

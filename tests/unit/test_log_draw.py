@@ -1,4 +1,4 @@
-"""``gcs replay``: from a log to poses, and what is said when that cannot be."""
+"""``gcs log draw``: from a log to poses, and what is said when that cannot be."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flightstack.plan import save_plan
 from gcs_cli.errors import CliError
 from gcs_cli.report.analysis import is_whole, read_flight
 from gcs_cli.report.flight_data import Flight, series
-from gcs_cli.report.replay import Run, find_run, poses_of
+from gcs_cli.report.poses import Run, find_run, poses_of
 from tests.support.commands import gcs
 from tests.support.square_plan import square_plan
 from tests.support.synthetic_flight import synthetic_flight_bytes
@@ -133,7 +133,7 @@ def test_a_log_is_whole_when_messages_fill_it(run: Path) -> None:
 
 def test_a_log_cut_to_its_head_holds_no_flight(run: Path, tmp_path: Path) -> None:
     (tmp_path / "flight.ulg").write_bytes((run / "flight.ulg").read_bytes()[:30])
-    ended = gcs("replay", tmp_path)
+    ended = gcs("log", "draw", tmp_path)
     assert ended.returncode == 2
     assert ended.stderr.startswith(
         f"gcs: {tmp_path}/flight.ulg: the log is damaged before its first position"
@@ -142,7 +142,7 @@ def test_a_log_cut_to_its_head_holds_no_flight(run: Path, tmp_path: Path) -> Non
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
     (tmp_path / "flight.ulg").write_bytes(b"not a log")
-    ended = gcs("replay", tmp_path)
+    ended = gcs("log", "draw", tmp_path)
     assert ended.returncode == 2
     assert "is not a readable flight log" in ended.stderr
     assert not (tmp_path / "replay.mp4").exists()

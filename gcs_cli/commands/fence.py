@@ -1,0 +1,8 @@
+"""``gcs fence``: the vehicle's geofence."""
+
+from __future__ import annotations
+
+from flightstack.plan import MissionType
+from gcs_cli.commands.plan_part import make_part_app
+
+app = make_part_app(MissionType.FENCE)

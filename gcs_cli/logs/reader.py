@@ -1,0 +1,38 @@
+"""Read any log: ULog by its first bytes, else a tlog."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flightstack.core.errors import ConfigError
+from gcs_cli.errors import USAGE, CliError
+from gcs_cli.logs.recording import Recording
+from gcs_cli.logs.tlog_reader import read_tlog
+from gcs_cli.logs.ulog_reader import read_ulog
+from gcs_cli.report.run_directory import LOG_NAME
+
+_ULOG_MAGIC = b"ULog"
+
+
+def log_file(path: Path) -> Path:
+    """Return the log at ``path``: the file, or the ULog of a flight's directory; raise CliError (usage)."""
+    if not path.is_dir():
+        return path
+    logs = [path / LOG_NAME] if (path / LOG_NAME).is_file() else sorted(path.glob("*.ulg"))
+    if len(logs) != 1:
+        found = f"has {len(logs)} logs" if logs else "has no log"
+        raise CliError(f"{path}: this directory {found}: name a .ulg or .tlog file", USAGE)
+    return logs[0]
+
+
+def read_log(path: Path) -> Recording:
+    """Read a log, complete or truncated; raise CliError (usage) if it is none."""
+    file = log_file(path)
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise CliError(f"{file}: cannot be read: {error.strerror}", USAGE) from None
+    try:
+        return (read_ulog if content.startswith(_ULOG_MAGIC) else read_tlog)(content, str(file))
+    except ConfigError as error:
+        raise CliError(str(error), USAGE) from None

@@ -1,0 +1,1 @@
+"""Plans on the ground: patterns, editing, comparison, formats of other programs, and drawings."""

@@ -1,0 +1,98 @@
+"""Comparison of a plan with the one that a vehicle holds, item by item."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+from flightstack.plan import Frame, MissionItem
+from gcs_cli.plans.names import any_command_name
+
+_EQUIVALENT_FRAMES = {
+    Frame.GLOBAL_INT: Frame.GLOBAL,
+    Frame.GLOBAL_RELATIVE_ALT_INT: Frame.GLOBAL_RELATIVE_ALT,
+    11: 10,  # GLOBAL_TERRAIN_ALT_INT
+}
+
+
+class Difference(NamedTuple):
+    """A field, or a whole item, that differs."""
+
+    seq: int
+    field: str
+    """``item`` for an item that one of the two lacks."""
+    wanted: Any
+    found: Any
+    """None for a missing item."""
+
+    @property
+    def sentence(self) -> str:
+        """The difference in words."""
+        if self.field == "item":
+            which = "is not on the vehicle" if self.found is None else "is only on the vehicle"
+            item = self.wanted if self.found is None else self.found
+            return f"item {self.seq} ({any_command_name(item.command)}) {which}"
+        return f"item {self.seq}: {self.field} is {_text(self.found)}, expected {_text(self.wanted)}"
+
+
+class Tolerance(NamedTuple):
+    """Differences that a vehicle's storage makes; none by default."""
+
+    altitude_m: float = 0.0
+    degrees_e7: int = 0
+    nan_is_zero: bool = False
+    """The vehicle stores 0 for NaN."""
+    keeps_autocontinue: bool = True
+
+
+EXACT = Tolerance()
+PACKED = Tolerance(altitude_m=0.01, degrees_e7=1, nan_is_zero=True, keeps_autocontinue=False)
+
+
+def differences(
+    wanted: Sequence[MissionItem], found: Sequence[MissionItem], tolerance: Tolerance = EXACT
+) -> Iterator[Difference]:
+    """Yield the differences of two lists of items as float32, in the order of their numbers."""
+    for seq in range(max(len(wanted), len(found))):
+        if seq >= len(found):
+            yield Difference(seq, "item", wanted[seq], None)
+        elif seq >= len(wanted):
+            yield Difference(seq, "item", None, found[seq])
+        else:
+            yield from _field_differences(seq, wanted[seq].on_wire(), found[seq].on_wire(), tolerance)
+
+
+def _field_differences(
+    seq: int, wanted: MissionItem, found: MissionItem, tolerance: Tolerance
+) -> Iterator[Difference]:
+    if wanted.command != found.command:
+        names = any_command_name(wanted.command), any_command_name(found.command)
+        yield Difference(seq, "command", *names)
+    if _frame(wanted) != _frame(found):
+        yield Difference(seq, "frame", wanted.frame, found.frame)
+    for number, (one, other) in enumerate(zip(wanted.params, found.params, strict=True), start=1):
+        if not _same(one, other, 0.0, tolerance):
+            yield Difference(seq, f"parameter {number}", one, other)
+    for name, one_e7, other_e7 in (("latitude", wanted.x, found.x), ("longitude", wanted.y, found.y)):
+        if abs(one_e7 - other_e7) > tolerance.degrees_e7:
+            shown = (one_e7 / 1e7, other_e7 / 1e7) if wanted.is_global else (one_e7, other_e7)
+            yield Difference(seq, name, *shown)
+    if not _same(wanted.z, found.z, tolerance.altitude_m, tolerance):
+        yield Difference(seq, "altitude", wanted.z, found.z)
+    if tolerance.keeps_autocontinue and wanted.autocontinue != found.autocontinue:
+        yield Difference(seq, "autocontinue", wanted.autocontinue, found.autocontinue)
+
+
+def _frame(item: MissionItem) -> int:
+    return _EQUIVALENT_FRAMES.get(item.frame, item.frame)
+
+
+def _same(one: float, other: float, within: float, tolerance: Tolerance) -> bool:
+    if tolerance.nan_is_zero:
+        one, other = (0.0 if math.isnan(value) else value for value in (one, other))
+    return (math.isnan(one) and math.isnan(other)) or abs(one - other) <= within
+
+
+def _text(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,119 @@
+"""Services are polled when they are due, and the vehicle sends what it would send if all were polled each time."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+
+from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.ftp_messages import Opcode, Packet, ftp_message
+from flightstack.mavlink.link import Address
+from flightstack.services.registry import Schedule
+from tests.support.hub_net import ALICE, BOB, Net, Station
+
+VEHICLE = Address(7, 1)
+
+
+class Bell:
+    """A service that counts its polls."""
+
+    handles = frozenset({"HEARTBEAT"})
+
+    def __init__(self, due_s: float | None) -> None:
+        self.due_s = due_s
+        self.polled_s: list[float] = []
+
+    def receive(self, message: object, peer: object, now_s: float) -> None:
+        raise AssertionError
+
+    def poll(self, now_s: float) -> list[tuple[None, str]]:
+        self.polled_s.append(now_s)
+        return [(None, f"{now_s:g}")]
+
+    def next_deadline(self) -> float | None:
+        return self.due_s
+
+
+def test_service_is_polled_at_its_deadline_and_after_a_wake() -> None:
+    never, at_2, always = Bell(None), Bell(2.0), Bell(-math.inf)
+    schedule = Schedule([never, at_2, always])
+    for now_s in (0.0, 1.0, 2.0):
+        schedule.poll(now_s)
+    at_2.due_s = 5.0
+    schedule.wake()
+    for now_s in (3.0, 4.0, 5.0):
+        schedule.poll(now_s)
+    assert never.polled_s == [0.0, 3.0]
+    assert at_2.polled_s == [0.0, 2.0, 3.0, 5.0]
+    assert always.polled_s == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert schedule.poll(6.0) == [(None, "6"), (None, "6")]
+
+
+def test_parameter_changed_without_a_message_is_announced() -> None:
+    net = Net()
+    alice = net.join(ALICE)
+    net.run(0.1)
+    net.stack.params.set("MIS_TAKEOFF_ALT", 4.5)
+    net.run(0.1)
+    assert [m.param_value for m in alice.take("PARAM_VALUE")] == [4.5]
+
+
+def traffic(seed: int) -> list[tuple[int, int, object]]:
+    """Return (poll, station, message): transfers that are begun and left, and single requests."""
+    m, chance = mavlink, random.Random(seed)
+    path = b"general.json"
+    opening = Packet(1, 0, Opcode.OPEN_FILE_RO, len(path), data=path)
+    messages = [
+        m.MAVLink_param_request_list_message(7, 1),
+        m.MAVLink_param_set_message(7, 1, b"SYS_FAILURE_EN", 1.0, m.MAV_PARAM_TYPE_REAL32),
+        m.MAVLink_param_set_message(7, 1, b"MIS_TAKEOFF_ALT", 3.0, m.MAV_PARAM_TYPE_REAL32),
+        m.MAVLink_mission_count_message(7, 1, 3),
+        m.MAVLink_mission_request_list_message(7, 1),
+        m.MAVLink_mission_item_int_message(7, 1, 0, 6, 16, 2, 1, 0, 0, 0, 0, 473977420, 85455940, 5.0),
+        m.MAVLink_log_request_list_message(7, 1, 0, 0xFFFF),
+        m.MAVLink_timesync_message(0, 5),
+        m.MAVLink_command_long_message(7, 1, m.MAV_CMD_LOGGING_START, 0, *[0.0] * 7),
+        m.MAVLink_command_long_message(7, 1, m.MAV_CMD_INJECT_FAILURE, 0, 101.0, 1.0, 2.0, *[0.0] * 4),
+        m.MAVLink_command_long_message(7, 1, m.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1.0, *[0.0] * 6),
+        m.MAVLink_manual_control_message(7, 0, 0, 500, 0, 0),
+        m.MAVLink_set_position_target_local_ned_message(0, 7, 1, 1, 0xDF8, 1.0, 0.0, -3.0, *[0.0] * 8),
+        ftp_message(VEHICLE, opening),
+        ftp_message(VEHICLE, Packet(2, 0, Opcode.BURST_READ_FILE, 200)),
+        ftp_message(VEHICLE, Packet(3, 0, Opcode.CALC_FILE_CRC32, len(path), data=path)),
+    ]
+    events = [(chance.randrange(1000), chance.randrange(2), message) for message in messages * 3]
+    return sorted(events, key=lambda event: event[0])
+
+
+def dialogue(seed: int) -> list[bytes]:
+    """Return all frames of 20 s with two stations, of which one is silent at the end."""
+    net, events = Net(), traffic(seed)
+    stations: list[Station] = [net.join(ALICE), net.join(BOB)]
+    for poll in range(2000):
+        while events and events[0][0] == poll:
+            _, station, message = events.pop(0)
+            stations[station].send(message)
+        if poll % 100 == 0 and poll < 1500:
+            stations[0].heartbeat()
+        if poll == 1200:
+            net.stack.simulator.take_requests()
+        net.run(0.01)
+    return [frame for station in stations for frame in station.frames]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_due_services_send_what_services_polled_each_time_send(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scheduled = dialogue(seed)
+    poll = Schedule.poll
+
+    def poll_all(schedule: Schedule, now_s: float) -> list:
+        schedule.wake()
+        return poll(schedule, now_s)
+
+    monkeypatch.setattr(Schedule, "poll", poll_all)
+    assert scheduled == dialogue(seed)
+    assert len({frame[7:10] for frame in scheduled}) > 20  # kinds of messages
