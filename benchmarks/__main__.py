@@ -21,10 +21,11 @@ from benchmarks import (
     round_trip,
     step_costs,
     three_processes,
+    transfers,
 )
 from benchmarks.measure import OtherLoad
 
-SECTIONS = ("steps", "flights", "emulated", "multibody", "realtime", "load", "start")
+SECTIONS = ("steps", "flights", "emulated", "multibody", "realtime", "load", "transfers", "start")
 
 
 def _arguments() -> argparse.Namespace:
@@ -77,6 +78,10 @@ def main() -> int:
         results["load"] = _measured(
             "ground stations, noise and clients that never read",
             lambda: ground_load.loads(2.0 if quick else 5.0, 1 if quick else 3),
+        )
+    if "transfers" in wanted:
+        results["transfers"] = _measured(
+            "transfers of plans and parameters", lambda: transfers.transfers(2 if quick else 5)
         )
     if "start" in wanted:
         results["start"] = _measured(

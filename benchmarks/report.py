@@ -15,6 +15,7 @@ from benchmarks.round_trip import WAYS
 from benchmarks.step_costs import Part
 from benchmarks.table import Row, table
 from benchmarks.three_processes import Flights
+from benchmarks.transfers import ITEMS, Transfers
 from flightstack.simulator_link.hot_frames import ActuatorsFrame, PlantStateFrame
 
 # on a machine of the same kind: PX4 with an external simulator, ArduCopter's SITL in one process
@@ -44,6 +45,8 @@ def texts(results: dict[str, Any], machine: dict[str, Any]) -> Iterator[str]:
         yield _lateness(*results["lateness"]) + "\n"
     if "load" in results:
         yield _load(results["load"]) + "\n"
+    if "transfers" in results:
+        yield _transfers(results["transfers"]) + "\n"
     if "start" in results:
         yield _start(results) + "\n"
 
@@ -158,6 +161,30 @@ def _load(results: dict[str, Seen]) -> str:
     ]
     head = ("", "late p50", "p99", "× none", "turn p50", "p99", "max", "overruns", "missed", "of", "frames/s")
     return table("GROUND LINKS in real time at 500 Hz, µs", head, rows)
+
+
+def _transfers(taken: Transfers) -> str:
+    floor_s = taken.floor_s.median
+    rows: list[Row] = [
+        (f"{ITEMS} mission items, upload", taken.upload_s.text(), short(taken.upload_s.median / floor_s, 2)),
+        (
+            f"{ITEMS} mission items, download",
+            taken.download_s.text(),
+            short(taken.download_s.median / floor_s, 2),
+        ),
+        (
+            f"{ITEMS} mission items, comparison",
+            taken.compare_s.text(),
+            short(taken.compare_s.median / floor_s, 2),
+        ),
+        (
+            f"{taken.parameters} parameters",
+            taken.parameters_s.text(),
+            short(taken.parameters_s.median / floor_s, 2),
+        ),
+        (f"floor: {ITEMS} round trips of datagrams", taken.floor_s.text(), "1"),
+    ]
+    return table("TRANSFERS over loopback, vehicle at real-time speed", ("", "s", "× floor"), rows)
 
 
 def _start(results: dict[str, Any]) -> str:

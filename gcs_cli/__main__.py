@@ -7,13 +7,11 @@ import sys
 
 import typer
 
-from flightstack.core.errors import ConfigError
-from flightstack.process.command_line import UsageError, Version, expand_options, make_app, usage_sentence
-from flightstack.process.console import complain, drop, replace_unencodable, say
+from flightstack.process.command_line import Version, expand_options, make_app
+from flightstack.process.console import replace_unencodable
 from gcs_cli.commands.registry import GcsGroup, add_groups
-from gcs_cli.errors import DONE, FAILED, USAGE, CliError
-from gcs_cli.output import error_line
-from gcs_cli.settings import LinkOptions, Settings, SigningKeyOption
+from gcs_cli.ending import run_command
+from gcs_cli.settings import LinkOptions, Settings, SigningKeyOption, given_options, settings_of
 
 app = make_app(
     name="gcs",
@@ -22,9 +20,6 @@ app = make_app(
     no_args_is_help=True,
 )
 add_groups(app)
-
-_TYPER_INTERRUPTED = 130
-"""Exit code of typer for a KeyboardInterrupt; not one of ours."""
 
 
 @app.callback()
@@ -36,7 +31,8 @@ def options(
     version: Version = False,  # its callback does all
 ) -> None:
     """Keep the options that are given before the command."""
-    context.obj = Settings(link, signing_key)
+    before = settings_of(context)  # of a shell
+    context.obj = Settings(given_options(context, link), signing_key or before.signing_key, before.lent)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -46,35 +42,8 @@ def main(argv: list[str] | None = None) -> int:
     """
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends like Ctrl-C: the terminal is restored
     replace_unencodable()
-    try:
-        code = app(argv, prog_name="gcs", standalone_mode=False) or DONE
-        if sys.stdout is not None:
-            sys.stdout.flush()
-        if code != _TYPER_INTERRUPTED:
-            return code
-        sentence, code = "interrupted", FAILED
-    except (KeyboardInterrupt, typer.Abort):
-        sentence, code = "interrupted", FAILED
-    except (BrokenPipeError, SystemExit):  # `gcs watch | head`, which typer ends itself
-        drop(sys.stdout)
-        return DONE
-    except OSError as error:
-        drop(sys.stdout)  # which may be what failed
-        where = "" if error.filename is None else f"{error.filename}: "
-        sentence, code = f"{where}{error.strerror or error}", FAILED
-    except UsageError as error:
-        if type(error).__name__ == "NoArgsIsHelpError":  # `gcs` and `gcs mission`: its message is the help
-            complain(error.format_message())
-            return USAGE
-        sentence, code = usage_sentence(error), USAGE
-    except CliError as error:
-        sentence, code = str(error), error.exit_code
-    except ConfigError as error:
-        sentence, code = str(error), USAGE
-    complain(f"gcs: {sentence}")
-    if "--json" in (sys.argv[1:] if argv is None else argv):
-        say(error_line(sentence, code))
-    return code
+    words = sys.argv[1:] if argv is None else argv
+    return run_command(lambda: app(argv, prog_name="gcs", standalone_mode=False), as_json="--json" in words)
 
 
 if __name__ == "__main__":

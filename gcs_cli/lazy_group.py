@@ -13,6 +13,9 @@ from typing import Any, ClassVar, NamedTuple
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
+EXAMPLES = "Examples:\n"
+"""First line of the paragraph of a docstring that lists command lines."""
+
 
 class LazyCommand(NamedTuple):
     """A command of ``module.app``."""
@@ -26,7 +29,14 @@ class LazyCommand(NamedTuple):
     def load(self, name: str) -> Any:
         """Import the module and return the Click command."""
         loaded = get_command(import_module(self.module).app)
-        return loaded.commands[name] if isinstance(loaded, TyperGroup) else loaded
+        command = loaded.commands[name] if isinstance(loaded, TyperGroup) else loaded
+        command.help = _with_lines_kept(command.help)
+        return command
+
+
+def _with_lines_kept(text: str | None) -> str | None:
+    """Return a help text whose examples keep their lines: Click wraps paragraphs without its mark."""
+    return text and text.replace(f"\n\n{EXAMPLES}", f"\n\n\b\n{EXAMPLES}")
 
 
 class LazyGroup(TyperGroup):

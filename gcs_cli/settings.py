@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -27,6 +27,9 @@ from gcs_cli.link.endpoint import (
 )
 from gcs_cli.output import Output
 
+if TYPE_CHECKING:
+    from gcs_cli.link.connection import Connection
+
 DEFAULT_TIMEOUT_S = 5.0
 _TIMEOUT: dict[str, Any] = {"metavar": "SECONDS", "min": SHORTEST_TIMEOUT_S, "max": LONGEST_TIMEOUT_S}
 _INSTANCE: dict[str, Any] = {"metavar": "N", "min": 0, "max": INSTANCES - 1, "show_default": False}
@@ -41,7 +44,16 @@ FlownTimeoutOption = Annotated[
 ]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace existing files.", **IN_OUTPUT)]
 OpenOption = Annotated[bool, typer.Option("--open", help="Open the report afterwards.", **IN_OUTPUT)]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object a line.", **IN_OUTPUT)]
+
+
+def _json_before_too(context: typer.Context, given: bool) -> bool:
+    return given or settings_of(context).link.as_json
+
+
+JsonOption = Annotated[
+    bool,
+    typer.Option("--json", help="Print one JSON object a line.", callback=_json_before_too, **IN_OUTPUT),
+]
 SigningKeyOption = Annotated[
     Path | None,
     typer.Option(
@@ -128,6 +140,8 @@ class Settings:
 
     link: LinkOptions = LinkOptions()
     signing_key: Path | None = None
+    lent: Connection | None = None
+    """The open link of a shell, for commands that name no other link."""
 
 
 def settings_of(context: typer.Context) -> Settings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import typer
@@ -26,7 +27,7 @@ from gcs_cli.link.endpoint import (
 from gcs_cli.link.lines import Line
 from gcs_cli.link.opening import SeveralLines, open_line, opened_lines
 from gcs_cli.link.share import open_shared
-from gcs_cli.settings import LinkOptions, link_options, signing_key_of
+from gcs_cli.settings import LinkOptions, given_options, link_options, settings_of, signing_key_of
 
 OTHER_CONNECTIONS = (
     VEHICLE_CONNECTION,
@@ -99,17 +100,28 @@ def connect_vehicle(
     takes_recording: bool = False,
     in_real_time: bool = True,
     shares: bool = False,
+    several: bool = False,
+    record: Callable[[bytes], None] | None = None,
 ) -> Connection:
-    """Open the link and wait for the vehicle; raise CliError that names the command."""
-    connection = open_link(
-        context, options, takes_recording=takes_recording, in_real_time=in_real_time, shares=shares
-    )
+    """Open the link, or use that of the shell, and wait for the vehicle; raise CliError that names the command.
+
+    With ``several``, the link may have several vehicles although none was chosen. ``record`` gets every frame, those
+    that are exchanged during the wait too.
+    """
+    lent = settings_of(context).lent
+    if lent is not None and given_options(context, options).is_default:
+        connection = lent
+        lent.fleet.choose(given_options(context, options).system)
+    else:
+        connection = open_link(
+            context, options, takes_recording=takes_recording, in_real_time=in_real_time, shares=shares
+        )
+    connection.fleet.wire.record = record
     try:
-        connection.wait_for_vehicle(link_options(context, options).timeout_s)
-    except CliError as error:
-        connection.close()
-        raise CliError(f"{command_name(context)}: {error}", error.exit_code) from None
-    except BaseException:
-        connection.close()
+        connection.wait_for_vehicle(link_options(context, options).timeout_s, several=several)
+    except BaseException as error:
+        connection.__exit__()
+        if isinstance(error, CliError):
+            raise CliError(f"{command_name(context)}: {error}", error.exit_code) from None
         raise
     return connection

@@ -61,9 +61,14 @@ class AttitudeController(NamedTuple):
     def key(self) -> str:
         """Name and source hash, so that a change of the controller invalidates its cached kernel."""
         digest = hashlib.sha256()
-        for source in _sources(self.step.__module__):
+        for source in self.sources:
             digest.update(source.read_bytes())
         return f"{re.sub(r'[^0-9A-Za-z]', '_', self.name)}_{digest.hexdigest()[:12]}"
+
+    @property
+    def sources(self) -> list[Path]:
+        """The source files of the law."""
+        return _sources(self.step.__module__)
 
 
 def _sources(module_name: str) -> list[Path]:

@@ -44,7 +44,7 @@ class Timing(NamedTuple):
     timeout_s: float = 1.5
     """Timeout before a message other than an item request is resent."""
     item_timeout_s: float = 0.25
-    """Timeout before an item request is resent."""
+    """Longest timeout before an item request is resent; see ``ItemTimeout``."""
     retries: int = 5
     """Number of retries of a message other than an item request."""
     silence_s: float = 5.0
@@ -60,6 +60,43 @@ class Timing(NamedTuple):
 
 
 DEFAULT_TIMING = Timing()
+
+
+class ItemTimeout:
+    """Timeout of item requests, from the measured round trips (RFC 6298), doubled after each loss.
+
+    With a fixed timeout of 0.25 s, 1000 items at 20 % loss in each direction take 150 s on any link. Round trips of
+    repeated requests are not measured, since it is not known which request was answered.
+    """
+
+    LEAST_S = 0.03
+    """A busy vehicle or ground station is late by this much; shorter timeouts only repeat messages."""
+
+    def __init__(self, longest_s: float) -> None:
+        self.timeout_s = longest_s
+        self._longest_s = longest_s
+        self._mean_s: float | None = None
+        self._deviation_s = 0.0
+        self._asked_s: float | None = None
+
+    def asked(self, now_s: float, *, again: bool) -> None:
+        """Note a request, or a repeated one."""
+        self._asked_s = None if again else now_s
+        if again:
+            self.timeout_s = min(self._longest_s, 2.0 * self.timeout_s)
+
+    def answered(self, now_s: float) -> None:
+        """Note the answer to the last request."""
+        if self._asked_s is not None:
+            took_s = now_s - self._asked_s
+            if self._mean_s is None:
+                self._mean_s, self._deviation_s = took_s, 0.5 * took_s
+            else:
+                self._deviation_s += 0.25 * (abs(took_s - self._mean_s) - self._deviation_s)
+                self._mean_s += 0.125 * (took_s - self._mean_s)
+        if self._mean_s is not None:
+            wanted_s = self._mean_s + 4.0 * self._deviation_s
+            self.timeout_s = min(self._longest_s, max(self.LEAST_S, wanted_s))
 
 
 def item_from_message(message: Message) -> MissionItem:

@@ -6,12 +6,13 @@ https://mavlink.io/en/services/parameter.html#parameter-encoding
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from flightstack.core.float32 import shortest
+from flightstack.core.float32 import as_float32, shortest
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Message
 
@@ -23,11 +24,23 @@ LARGEST_INTEGER = 2**22
 """Largest integer that every codec preserves: some beyond it have the bits of a signalling NaN, which codecs that
 convert to a 64-bit float (pymavlink on x86) change."""
 
+LARGEST_CAST_INTEGER = 2**24
+"""Largest integer that a float holds with all smaller ones."""
+
 HASH_NAME = "_HASH_CHECK"
 """Name of PX4's digest of all parameters, by which QGroundControl validates its parameter cache."""
 NO_INDEX = 65535
 """Index of a PARAM_VALUE that is not in the list."""
 
+_INTEGERS = {
+    mavlink.MAV_PARAM_TYPE_UINT8: struct.Struct("<Bxxx"),
+    mavlink.MAV_PARAM_TYPE_INT8: struct.Struct("<bxxx"),
+    mavlink.MAV_PARAM_TYPE_UINT16: struct.Struct("<Hxx"),
+    mavlink.MAV_PARAM_TYPE_INT16: struct.Struct("<hxx"),
+    mavlink.MAV_PARAM_TYPE_UINT32: struct.Struct("<I"),
+    mavlink.MAV_PARAM_TYPE_INT32: struct.Struct("<i"),
+}
+"""Bytes of the integer types in the field ``param_value``."""
 _FLOAT, _INT, _UNSIGNED = struct.Struct("<f"), struct.Struct("<i"), struct.Struct("<I")
 _ALL_ONES = 0xFFFFFFFF
 
@@ -42,6 +55,8 @@ class Parameter(NamedTuple):
     """Index in the vehicle's list."""
     total: int
     """Number of parameters of the vehicle."""
+    kind: int | None = None
+    """The MAV_PARAM_TYPE on the wire; None if it was not received."""
 
 
 def type_of(is_integer: bool) -> int:
@@ -73,21 +88,35 @@ def value_message(name: str, value: float, is_integer: bool, index: int, count: 
     )
 
 
-def parse_value(message: Message) -> Parameter | None:
-    """Return the parameter of a PARAM_VALUE, or None for an unsupported type.
+def parse_value(message: Message, *, casts: bool = False) -> Parameter | None:
+    """Return the parameter of a PARAM_VALUE, or None for a type of 64 bits or an integer that is not finite.
 
-    Unsupported are smaller integers, which ArduPilot casts instead of copying bits, and 64-bit types.
+    ``casts``: integers are sent as the float of their value, as ArduPilot does, not in the bits of the float.
     """
-    if message.param_type == REAL32:
+    kind = message.param_type
+    if kind == REAL32:
         value = shortest(message.param_value)
-    elif message.param_type == INT32:
-        value = float(integer_of(message.param_value))
-    elif message.param_type == UINT32:
-        value = float(unsigned_of(message.param_value))
-    else:
+    elif kind not in _INTEGERS:
         return None
-    is_integer = message.param_type != REAL32
-    return Parameter(message.param_id, value, is_integer, message.param_index, message.param_count)
+    elif casts:
+        if not math.isfinite(message.param_value):
+            return None
+        value = float(round(message.param_value))
+    else:
+        value = float(_INTEGERS[kind].unpack(_FLOAT.pack(message.param_value))[0])
+    return Parameter(message.param_id, value, kind != REAL32, message.param_index, message.param_count, kind)
+
+
+def set_value(value: float, kind: int, *, casts: bool = False) -> float | None:
+    """Return the field ``param_value`` of a PARAM_SET; None if ``value`` is outside the range of the type."""
+    if kind == REAL32:
+        return as_float32(value)
+    layout = _INTEGERS[kind]
+    try:
+        packed = layout.pack(int(value))
+    except struct.error:
+        return None
+    return float(int(value)) if casts else float(_FLOAT.unpack(packed)[0])
 
 
 def digest(parameters: Iterable[tuple[str, float, bool]]) -> int:

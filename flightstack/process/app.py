@@ -40,6 +40,12 @@ from flightstack.vehicle.lockstep import Lockstep
 GROUND_POLL_NS = 500_000
 GROUND_IDLE_NS = 2_000_000
 """Intervals of polling the ground links with and without traffic; a poll takes 40 µs."""
+GROUND_BUSY_NS = 50_000_000
+"""Time after received data in which the ground links are also served while waiting for the simulator.
+
+Mission items are requested one at a time: served every outer tick alone, a transfer of 1000 items takes 10 s. Not while
+ticks follow each other faster than GROUND_POLL_NS: then the outer ticks are frequent enough.
+"""
 GROUND_SHARE = 0.4
 """Maximum share of a real-time tick for sending to ground stations; the rest is sent in the next ticks."""
 REPORT_S = 0.2
@@ -65,6 +71,8 @@ class App:
         self._next_report_s = self._began_s + REPORT_S
         self._next_log_us = 0
         self._next_ground_ns = 0
+        self._busy_until_ns = 0
+        self._idle_poller: select.poll | None = None
         self._follower: AffinityFollower | None = None
 
     # ------------------------------------------------------------------ lifecycle
@@ -224,18 +232,28 @@ class App:
         receive, clock_ns = simulator.receive, time.monotonic_ns
         self._follower = AffinityFollower(simulator.socket)
         divisor, tick = self.stack.rates.divisor, 0
-        fresh = True  # the state received before the start
+        fresh, began_ns, before_ns = True, 0, 0  # fresh: the state received before the start
         while True:
             if fresh:
-                began_ns = clock_ns()
+                before_ns, began_ns = began_ns, clock_ns()
                 commands = lockstep.tick(began_ns)
                 simulator.send(link.answer(commands, autopilot.now.status.armed))
                 timing.tick(began_ns, clock_ns())
                 tick += 1
                 if tick % divisor == 0:
                     self._between_ticks(simulator)
+            if self._idle_poller is not None and began_ns - before_ns > GROUND_POLL_NS:
+                self._serve_while_idle(simulator, self._idle_poller)
             data = receive()
             fresh = self._wait_for_simulator(simulator) if data is None else link.receive(data)
+
+    def _serve_while_idle(self, simulator: TcpClient, poller: select.poll) -> None:
+        """Serve the ground links as data arrives, until the simulator sends."""
+        number = simulator.fileno()
+        while (ready := poller.poll(20)) and all(descriptor != number for descriptor, _ in ready):
+            if self._serve_ground():
+                self._busy_until_ns = time.monotonic_ns() + GROUND_BUSY_NS
+            self._check_stop()
 
     def _wait_for_simulator(self, simulator: TcpClient) -> bool:
         """Serve the ground links until the simulator sends data; return True for a new state."""
@@ -265,7 +283,7 @@ class App:
             simulator.send(link.answer(commands, autopilot.now.status.armed))
             timing.tick(began_ns, time.monotonic_ns())
             tick += 1
-            if tick % self.stack.rates.divisor == 0:
+            if tick % self.stack.rates.divisor == 0 or self._idle_poller is not None:
                 self._between_ticks(simulator)
                 check_deadline(heard_s + self._process.simulator_timeout_s, self.stack, self._process)
             elif self._ground.is_sending:
@@ -288,8 +306,20 @@ class App:
             self._follower.update()
         heard = self._serve_ground()
         self._next_ground_ns = now_ns + (GROUND_POLL_NS if heard else GROUND_IDLE_NS)
+        self._note_traffic(heard, now_ns, simulator)
         self._send_requests(simulator)
         self._check_stop()
+
+    def _note_traffic(self, heard: bool, now_ns: int, simulator: TcpClient) -> None:
+        """Begin or end to serve the ground links while waiting."""
+        if heard:
+            self._busy_until_ns = now_ns + GROUND_BUSY_NS
+            if self._idle_poller is None:
+                self._idle_poller = select.poll()
+                self._idle_poller.register(simulator, select.POLLIN)
+                self._ground.register(self._idle_poller)
+        elif now_ns >= self._busy_until_ns:
+            self._idle_poller = None
 
     def _report_notices(self) -> None:
         """Report problems with the simulator's steps; raise Ended before a mission that cannot be flown."""

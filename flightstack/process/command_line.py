@@ -102,16 +102,18 @@ def make_app(**settings: Any) -> typer.Typer:
 def expand_options(command: Callable[..., None], without: Collection[str] = ()) -> Callable[..., None]:
     """Replace each dataclass among the parameters of a command by one option per field.
 
-    A field is an option if its type is ``Annotated`` and its name is not in ``without``. If the command has a
-    parameter with the name of a field, both get the value of one option.
+    A field is an option if its type is ``Annotated`` and its name is not in ``without``. Fields of one name, and
+    a parameter of the command with that name, get the value of one option.
     """
     groups: dict[str, tuple[Any, list[inspect.Parameter]]] = {}
     parameters: list[inspect.Parameter] = []
     own = set(inspect.signature(command).parameters)
+    seen: set[str] = set()
     for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
         if dataclasses.is_dataclass(parameter.annotation):
             groups[name] = parameter.annotation, _options_of(parameter.annotation, without)
-            parameters += [option for option in groups[name][1] if option.name not in own]
+            parameters += [option for option in groups[name][1] if option.name not in own | seen]
+            seen |= {option.name for option in groups[name][1]}
         else:
             parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
 

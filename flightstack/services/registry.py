@@ -63,7 +63,7 @@ class Service(Protocol):
 
 
 class Schedule:
-    """Polls each service when it is due, and all of them after a message: of ten, one has something to do.
+    """Polls each service when it is due, and all of them after a message: in flight one of thirteen is due.
 
     A message for one service may change another: a command sets a parameter, which the parameter server announces.
     """

@@ -6,7 +6,8 @@
         flight = world.fly("square.plan")
     assert flight.completed and flight.max_error_m < 0.5
 
-The names of ``__all__`` are the public interface; other modules may change. They are imported when they are used: this
+The names of ``__all__`` are the public interface, with an example each in docs/reference/testing.md; other modules may
+change. They are imported when they are used: this
 package is imported by every run of pytest in its environment.
 """
 

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import shlex
+import sys
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import invalidate_caches
+from importlib.metadata import entry_points
 from pathlib import Path
 
 from flightstack.commander.failsafe import Failsafe
+from flightstack.control.controller_loading import ENTRY_POINT_GROUP, load_controller
 from flightstack.core.enums import Mode
 from flightstack.core.errors import ConfigError
+from flightstack.core.kernel_cache import is_own
 from flightstack.params.config import DEFAULT_CONTROLLER, DEFAULT_HOME, parse_home
 from flightstack.params.gains_file import DEFAULT_GAINS
 from flightstack.params.store import read_assignment
@@ -136,14 +141,15 @@ class Scenario:
         return tuple(range(self.seed, self.seed + self.repeat))
 
     def files(self) -> tuple[Path, ...]:
-        """Return the files on which the flights depend: scenario, plans, and those of vehicle and gains."""
-        setup = Setup(folder=self.path.parent)
+        """Return the files on which the flights depend: scenario, plans, those of vehicle and gains, a plug-in."""
+        setup, controller = Setup(folder=self.path.parent), load_controller(self.controller)
         plans = (self.plan, *(event.upload for event in self.event))
         records = (_beside(name, self.path.parent) for name in (self.vehicle, self.gains))
         return (
             self.path,
             *(setup.plan_path(plan) for plan in plans if plan is not None),
             *(Path(name) for name in records if name.endswith(".toml")),
+            *(() if is_own(controller.step.__module__) else controller.sources),
         )
 
     def setup(self, seed: int) -> Setup:
@@ -177,6 +183,15 @@ class Scenario:
 def _beside(name: str, folder: Path) -> str:
     """Return a built-in name as it is, and a file's path relative to the scenario."""
     return str(folder / name) if name.endswith(".toml") else name
+
+
+def forget_controllers() -> None:
+    """Forget the modules of plug-in controllers: the next use imports them as they are then."""
+    tops = {point.module.partition(".")[0] for point in entry_points(group=ENTRY_POINT_GROUP)}
+    plugins = tops - {__name__.partition(".")[0]}
+    for name in [name for name in sys.modules if name.partition(".")[0] in plugins]:
+        del sys.modules[name]
+    invalidate_caches()
 
 
 def is_scenario(path: Path) -> bool:

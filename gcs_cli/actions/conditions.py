@@ -84,16 +84,16 @@ def _landed_text(view: VehicleView) -> str:
 
 
 def _ready_text(view: VehicleView) -> str:
-    if view.can_arm is None:
-        return "the vehicle does not report a pre-arm check"
-    return "the pre-arm check passes" if view.can_arm else "the pre-arm check fails"
+    check = {None: "not reported", True: "passed", False: "failed"}[view.can_arm]
+    return f"pre-arm check {check}, position {'known' if view.has_position else 'unknown'}"
 
 
 def is_ready(view: VehicleView) -> bool:
-    """Return True if the vehicle can be armed: its pre-arm check passes; without one, if its sensors are healthy."""
-    if view.can_arm is not None:
-        return view.can_arm
-    return bool(view.healthy) and view.geo is not None
+    """Return True if the vehicle can be armed and flown: its pre-arm check passes, and it has a position.
+
+    ArduCopter's check needs no position in STABILIZE. Without a check, the sensors must be healthy.
+    """
+    return view.has_position and bool(view.healthy if view.can_arm is None else view.can_arm)
 
 
 STATES: Mapping[str, tuple[Callable[[VehicleView], bool], Callable[[VehicleView], str]]] = {

@@ -9,7 +9,13 @@ from gcs_cli.actions.on_vehicle import arm_step
 from gcs_cli.actions.progress import horizontal_m
 from gcs_cli.autopilots import common_commands
 from gcs_cli.autopilots.autopilot import Phase, Role
-from gcs_cli.vehicle.view_types import GeoPosition, VehicleView
+from gcs_cli.vehicle.view_types import (
+    MISSION_ACTIVE,
+    MISSION_COMPLETE,
+    NO_MISSION,
+    GeoPosition,
+    VehicleView,
+)
 
 ALTITUDE_TOLERANCE_M = 0.5
 POSITION_TOLERANCE_M = 1.0
@@ -260,12 +266,22 @@ def start_mission() -> Action:
 
     def plan(view: VehicleView) -> tuple[Step, ...]:
         phases = (Phase.START,) if view.armed else view.autopilot.start_phases
+        if Phase.ARM in phases and view.mission.state == NO_MISSION:
+            raise NotReadyError("the vehicle has no mission")
         name = view.autopilot.roles.get(Role.MISSION)
 
         def runs(view: VehicleView) -> bool:
-            return view.armed and name in (None, view.mode)
+            is_active = view.mission.state in (None, MISSION_ACTIVE, MISSION_COMPLETE)
+            return view.armed and name in (None, view.mode) and is_active
 
         end = Step("", common_commands.START_MISSION, runs, "does not fly the mission")
         return _ending([_phase_step(view, phase, None) for phase in phases], end)
 
-    return Action("mission start", plan, "starting the mission", "mission started")
+    return Action(
+        "mission start",
+        plan,
+        "starting the mission",
+        "mission started",
+        needs=lambda view: view.mission.current is not None,
+        needs_text="the vehicle does not report its mission",
+    )

@@ -68,7 +68,7 @@ def find_mode(view: VehicleView, name: str) -> int | None:
 def mode_choices(view: VehicleView) -> dict[str, int]:
     """Return the modes that a user may select, by name: those that the vehicle lists, else the autopilot's."""
     autopilot, kind = view.autopilot, view.vehicle_type
-    if view.modes:
+    if view.modes and len(view.modes) >= view.mode_total:
         listed = {mode.number: mode.label.upper() for mode in view.modes if mode.is_selectable}
         return {autopilot.mode_name(kind, number) or label: number for number, label in listed.items()}
     names = autopilot.mode_names(kind)

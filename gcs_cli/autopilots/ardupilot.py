@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from flightstack.mavlink.dialect import ardupilot_dialect, mavlink
+from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, ardupilot_dialect, mavlink
 from gcs_cli.autopilots import common_commands
 from gcs_cli.autopilots.autopilot import Autopilot, Phase, Role, VehicleCommand
 
@@ -84,8 +84,13 @@ ARDUPILOT = Autopilot(
         mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
         mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     },
+    reports_estimator=True,
+    lacks_messages=frozenset({FS_LOOP_TIMING_ID, int(EscStatus.id)}),
+    sends_modes_as_stream=True,
     refusal_prefixes=("Arm: ", "PreArm: "),
     casts_parameters=True,
     mission_begins_with_home=True,
+    replaces_plans_at_once=False,
     stores_items_exactly=False,
+    log_suffix=".bin",
 )

@@ -79,14 +79,24 @@ class Autopilot(NamedTuple):
     """Rates of MAV_DATA_STREAM groups to request, because the vehicle streams nothing until asked; empty: it does."""
     stream_messages_hz: Mapping[int, float]
     """Rates of single messages to request that are in none of those groups."""
+    reports_estimator: bool
+    """True if the vehicle sends ESTIMATOR_STATUS or EKF_STATUS_REPORT."""
+    lacks_messages: frozenset[int]
+    """Messages not to request: the vehicle answers each request with a warning."""
+    sends_modes_as_stream: bool
+    """True if AVAILABLE_MODES is sent one mode per stream interval, so that its rate must be raised first."""
     refusal_prefixes: tuple[str, ...]
     """Beginnings of the STATUSTEXT that explains a refusal; the reason follows."""
     casts_parameters: bool
     """True if an integer parameter is sent as the float of its value, False if as a float of its bits."""
     mission_begins_with_home: bool
     """True if item 0 of a mission is the home position, and the first command is item 1."""
+    replaces_plans_at_once: bool
+    """True if an upload that ends early leaves the former plan; False if it overwrites the plan item by item."""
     stores_items_exactly: bool
     """True if a downloaded item equals the uploaded one; False if frames and unused fields may differ."""
+    log_suffix: str = ".ulg"
+    """End of the name of a downloaded log."""
 
     def mode_name(self, vehicle_type: int, custom_mode: int) -> str | None:
         """Return the name of a custom mode; None if it is unknown."""

@@ -51,6 +51,11 @@ def set_home(latitude_deg: float, longitude_deg: float, altitude_amsl_m: float) 
     return VehicleCommand(mavlink.MAV_CMD_DO_SET_HOME, params, mavlink.MAV_FRAME_GLOBAL)
 
 
+def set_mission_current(seq: int) -> VehicleCommand:
+    """Return the command that makes an item, in the vehicle's numbers, the current one."""
+    return VehicleCommand(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, (float(seq),))
+
+
 def inject_failure(unit: int, failure: int, instance: int) -> VehicleCommand:
     """Return the command that injects a failure; instance 0 means all."""
     return VehicleCommand(mavlink.MAV_CMD_INJECT_FAILURE, (float(unit), float(failure), float(instance)))

@@ -36,8 +36,12 @@ GENERIC = Autopilot(
     start_phases=(Phase.ARM, Phase.START),
     stream_groups_hz=ARDUPILOT.stream_groups_hz,
     stream_messages_hz={},
+    reports_estimator=False,
+    lacks_messages=frozenset(),
+    sends_modes_as_stream=False,
     refusal_prefixes=(),
     casts_parameters=False,
     mission_begins_with_home=False,
+    replaces_plans_at_once=False,
     stores_items_exactly=False,
 )

@@ -93,6 +93,9 @@ PX4 = Autopilot(
     start_phases=(Phase.START,),
     stream_groups_hz={},
     stream_messages_hz={},
+    reports_estimator=True,
+    lacks_messages=frozenset(),
+    sends_modes_as_stream=False,
     refusal_prefixes=(
         "Command refused: ",
         "Mission refused: ",
@@ -104,5 +107,6 @@ PX4 = Autopilot(
     ),
     casts_parameters=False,
     mission_begins_with_home=False,
+    replaces_plans_at_once=True,
     stores_items_exactly=True,
 )

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from flightstack.core.geodesy import GeoPoint
 from flightstack.mavlink.link import Address, Message, is_for, is_from
-from flightstack.mavlink.mission_messages import DEFAULT_TIMING, Timing
+from flightstack.mavlink.mission_messages import DEFAULT_TIMING, ItemTimeout, Timing
 from flightstack.plan.item import MissionItem
 from flightstack.plan.vocabulary import MissionResult, MissionType
 from gcs_cli.clients.mission_operations import Clear, Done, Failed, Operation, SetCurrent
@@ -56,6 +56,7 @@ class MissionClient:
         self.own = own
         self.mission_type = mission_type
         self._timing = timing
+        self._item_timeout = ItemTimeout(timing.item_timeout_s)
         self._operation: Operation | None = None
         self._outbox: list[Message] = []
         self._deadline_s: float | None = None
@@ -134,6 +135,9 @@ class MissionClient:
             self._deadline_s = None
         elif operation.moved:
             operation.moved = False
+            if operation.waits_for_item:
+                self._item_timeout.answered(now_s)
+                self._item_timeout.asked(now_s, again=False)
             self._sends_left = self._timing.retries
             self._wait(operation, now_s)
             self._give_up_s = now_s + self._timing.silence_s
@@ -151,6 +155,8 @@ class MissionClient:
                 self._is_settling = False
                 self._sends_left -= 1
                 self._outbox.append(operation.request)
+                if operation.waits_for_item:
+                    self._item_timeout.asked(now_s, again=True)
                 self._wait(operation, now_s)
         outbox, self._outbox = self._outbox, []
         if outbox:
@@ -164,6 +170,7 @@ class MissionClient:
     def _start(self, operation: Operation) -> None:
         self.cancel()
         before, self._operation = self._operation, operation
+        self._item_timeout = ItemTimeout(self._timing.item_timeout_s)
         self._deadline_s = -math.inf  # the first poll sends the request and starts the clock
         quiet_s = operation.quiet_after(before, self._timing) if before is not None else 0.0
         if quiet_s > 0.0:
@@ -180,7 +187,9 @@ class MissionClient:
 
     def _wait(self, operation: Operation, now_s: float) -> None:
         timing = self._timing
-        self._deadline_s = now_s + (timing.item_timeout_s if operation.waits_for_item else timing.timeout_s)
+        self._deadline_s = now_s + (
+            self._item_timeout.timeout_s if operation.waits_for_item else timing.timeout_s
+        )
 
     def _give_up(self, operation: Operation, reason: str) -> None:
         if operation.is_transfer:

@@ -17,6 +17,10 @@ QUIET_S = 0.7
 """Time without a further mode after which the list counts as interrupted, or as not sent."""
 _TIMING = CommandTiming(timeout_s=0.5, retries=2)
 _MESSAGE = int(mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES)
+_REQUEST = common_commands.request_message(_MESSAGE)
+_RAISE_RATE = common_commands.message_interval(_MESSAGE, 20.0)
+_AFTER_RAISED_RATE = 2
+"""Number of requests left after that for the rate, whose answer does not matter."""
 
 
 class ModeClient:
@@ -29,14 +33,14 @@ class ModeClient:
         """True once the view has all modes, False if the vehicle does not send them."""
         self._view = view
         self._client = CommandClient(Address(identity.system_id, identity.component_id), own, _TIMING)
-        self._tries = 0
+        self._requests = [_REQUEST, _REQUEST]
+        if view().autopilot.sends_modes_as_stream:
+            self._requests.insert(0, _RAISE_RATE)
         self._due_s = now_s
-        self._count = 0
-        self._request(now_s)
+        self._send_next(now_s)
 
-    def _request(self, now_s: float) -> None:
-        self._tries += 1
-        self._client.send_command(common_commands.request_message(_MESSAGE), now_s)
+    def _send_next(self, now_s: float) -> None:
+        self._client.send_command(self._requests.pop(0), now_s)
         self._due_s = now_s + QUIET_S
 
     @property
@@ -52,20 +56,24 @@ class ModeClient:
 
     def poll(self, now_s: float) -> list[Message]:
         """Return the request to send now, if any."""
+        if self.result is None:
+            self._advance(now_s)
+        return self._client.poll(now_s) if self.result is None else []
+
+    def _advance(self, now_s: float) -> None:
         known, total = self.progress
         answer = self._client.result
-        if self.result is not None:
-            return []
         if total and known >= total:
             self.result = True
+        elif answer is not None and len(self._requests) == _AFTER_RAISED_RATE:
+            self._send_next(now_s)
         elif answer is not None and not answer.accepted:
             self.result = False
         elif answer is not None and now_s >= self._due_s:
-            if self._tries == 1 and known:
-                self._request(now_s)
+            if known and self._requests:
+                self._send_next(now_s)
             else:
                 self.result = False
-        return self._client.poll(now_s)
 
     def next_deadline(self) -> float | None:
         """Return the time at which to call ``poll`` at the latest."""

@@ -22,9 +22,17 @@ __all__ = ["ParamClient", "ParamDone", "ParamFailed", "ParamResult", "ParamTimin
 
 
 class ParamClient:
-    """Reads and sets parameters of one vehicle."""
+    """Reads and sets parameters of one vehicle; ``casts`` as in ``parse_value``."""
 
-    def __init__(self, vehicle: Address, own: Address, timing: ParamTiming = DEFAULT_TIMING) -> None:
+    def __init__(
+        self,
+        vehicle: Address,
+        own: Address,
+        timing: ParamTiming = DEFAULT_TIMING,
+        *,
+        casts: bool = False,
+    ) -> None:
+        self._casts = casts
         self.vehicle = vehicle
         self.own = own
         self._timing = timing
@@ -34,15 +42,15 @@ class ParamClient:
 
     def start_list(self) -> None:
         """Read all parameters."""
-        self._start(ListAll(self.vehicle, self._timing))
+        self._start(ListAll(self.vehicle, self._timing, casts=self._casts))
 
     def start_get(self, name: str) -> None:
         """Read one parameter."""
-        self._start(ReadOrSet(self.vehicle, self._timing, name, None))
+        self._start(ReadOrSet(self.vehicle, self._timing, name, None, casts=self._casts))
 
     def start_set(self, name: str, value: float) -> None:
         """Read the parameter's type, set it to the finite ``value``, and wait for the confirmation."""
-        self._start(ReadOrSet(self.vehicle, self._timing, name, float(value)))
+        self._start(ReadOrSet(self.vehicle, self._timing, name, float(value), casts=self._casts))
 
     @property
     def result(self) -> ParamResult | None:
@@ -63,7 +71,7 @@ class ParamClient:
         if kind != "PARAM_VALUE" and not (kind == "PARAM_ERROR" and is_for(message, self.own)):
             return
         if operation.receive(message):
-            self._sends_left = self._timing.retries + 1
+            self._sends_left = operation.sends
             self._deadline_s = now_s + operation.wait_s
         if operation.result is not None:
             self._deadline_s = None
@@ -89,4 +97,4 @@ class ParamClient:
     def _start(self, operation: Operation) -> None:
         self._operation = operation
         self._deadline_s = float("-inf")
-        self._sends_left = self._timing.retries + 1
+        self._sends_left = operation.sends

@@ -9,11 +9,12 @@ from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_values import (
     HASH_NAME,
+    LARGEST_CAST_INTEGER,
     LARGEST_INTEGER,
     Parameter,
     parse_value,
+    set_value,
     type_of,
-    wire_value,
 )
 
 _REASONS = {
@@ -40,6 +41,13 @@ class ParamTiming(NamedTuple):
     """Repetitions without progress."""
     window: int = 20
     """Missing parameters per request."""
+    read_timeout_s: float = 0.25
+    """Time after which the request for one parameter is sent again."""
+    reads: int = 8
+    """Requests for one parameter without an answer."""
+    probes: int = 5
+    """Answers about another parameter, without one about the wanted one, that show that it does not exist: PX4 does not
+    answer. With a loss of 20 % in each direction, an existing parameter is missed once in 1300 reads."""
 
 
 class ParamDone(NamedTuple):
@@ -73,6 +81,11 @@ class Operation(Protocol):
         ...
 
     @property
+    def sends(self) -> int:
+        """Requests without progress after which the operation fails."""
+        ...
+
+    @property
     def progress(self) -> tuple[int, int]:
         """Received parameters and their total (0 before the count is known)."""
         ...
@@ -91,42 +104,62 @@ class Operation(Protocol):
 
 
 class ReadOrSet:
-    """Reads one parameter, and sets it if a value is given."""
+    """Reads one parameter, and sets it if a value is given.
 
-    def __init__(self, vehicle: Address, timing: ParamTiming, name: str, wanted: float | None) -> None:
+    Some vehicles do not answer about a parameter that does not exist. The requests are repeated with one for the
+    first parameter of the vehicle: if that is answered, the vehicle knows no parameter of the name.
+    """
+
+    def __init__(
+        self, vehicle: Address, timing: ParamTiming, name: str, wanted: float | None, *, casts: bool = False
+    ) -> None:
         self.result: ParamResult | None = None
-        self.wait_s = timing.timeout_s
-        self._timeout_s = timing.timeout_s
+        self.wait_s = timing.read_timeout_s
+        self._timing, self._casts = timing, casts
         self._vehicle, self._name, self._wanted = vehicle, name, wanted
         self._found: Parameter | None = None
-        self._is_asked = False
+        self._asked = 0
+        self._probes = 0
 
     @property
     def progress(self) -> tuple[int, int]:
         """Received parameters and their total (0 before the count is known)."""
         return int(self.result is not None), 1
 
+    @property
+    def sends(self) -> int:
+        """Requests without progress after which the operation fails."""
+        return self._timing.reads if self._found is None else self._timing.retries + 1
+
     def requests(self) -> list[Message]:
         """Return the requests to send now."""
-        self._is_asked = True
-        self.wait_s = self._timeout_s
+        self._asked += 1
         name = self._name.encode("ascii", errors="replace")[:16]
         if self._found is None:
-            return [mavlink.MAVLink_param_request_read_message(*self._vehicle, name, -1)]
-        is_integer = self._found.is_integer
+            self.wait_s = self._timing.read_timeout_s
+            requests = [mavlink.MAVLink_param_request_read_message(*self._vehicle, name, -1)]
+            if self._asked > 1:
+                requests.append(mavlink.MAVLink_param_request_read_message(*self._vehicle, b"", 0))
+            return requests
+        self.wait_s = self._timing.timeout_s
         assert self._wanted is not None  # without a value, the read parameter is the result
-        value = wire_value(as_float32(self._wanted) if not is_integer else self._wanted, is_integer)
-        return [mavlink.MAVLink_param_set_message(*self._vehicle, name, value, type_of(is_integer))]
+        kind = type_of(self._found.is_integer) if self._found.kind is None else self._found.kind
+        value = set_value(self._wanted, kind, casts=self._casts)
+        assert value is not None  # checked by _find
+        return [mavlink.MAVLink_param_set_message(*self._vehicle, name, value, kind)]
 
     def receive(self, message: Message) -> bool:
         """Process a PARAM_VALUE or PARAM_ERROR; return True if the operation made progress."""
-        if message.param_id != self._name or not self._is_asked:
+        if not self._asked:
             return False
+        if message.param_id != self._name:
+            self._count_probe(message)
+            return self.result is not None
         if message.get_type() == "PARAM_ERROR":
             reason = _REASONS.get(message.error, f"the vehicle answered error {message.error}")
             self.result = ParamFailed(reason, message.error, False)
             return True
-        parameter = parse_value(message)
+        parameter = parse_value(message, casts=self._casts)
         if parameter is None:
             self.result = ParamFailed(f"its type {message.param_type} is not supported", None, False)
         elif self._wanted is None or self._is_confirmed(parameter):
@@ -135,6 +168,17 @@ class ReadOrSet:
             return self._find(parameter, self._wanted)
         return True
 
+    def _count_probe(self, message: Message) -> None:
+        is_probe = message.get_type() == "PARAM_VALUE" and message.param_index == 0
+        if is_probe and self._found is None and self._asked > 1:
+            self._probes += 1
+            if self._probes >= self._timing.probes:
+                self.result = self._unknown()
+
+    @staticmethod
+    def _unknown() -> ParamFailed:
+        return ParamFailed(_REASONS[1], None, False)
+
     def _is_confirmed(self, parameter: Parameter) -> bool:
         """Return True if the parameter has the wanted value, also if it had it before."""
         return self._wanted is not None and as_float32(parameter.value) == as_float32(self._wanted)
@@ -142,8 +186,12 @@ class ReadOrSet:
     def _find(self, parameter: Parameter, wanted: float) -> bool:
         """Store the type. Another value may be an old message: the request is repeated."""
         is_first, self._found = self._found is None, parameter
-        if parameter.is_integer and not (wanted.is_integer() and abs(wanted) <= LARGEST_INTEGER):
+        largest = LARGEST_CAST_INTEGER if self._casts else LARGEST_INTEGER
+        if parameter.is_integer and not (wanted.is_integer() and abs(wanted) <= largest):
             self.result = ParamFailed("the parameter is an integer", None, False)
+            return True
+        if parameter.kind is not None and set_value(wanted, parameter.kind, casts=self._casts) is None:
+            self.result = ParamFailed("the value is outside the range of the parameter's type", None, False)
             return True
         if is_first:
             self.wait_s = 0.0  # set it at once
@@ -153,19 +201,21 @@ class ReadOrSet:
         """Return the failure of an operation without an answer."""
         if self._found is not None:
             return ParamFailed(f"the vehicle keeps {self._found.value:g}", None, False)
+        if self._probes:
+            return self._unknown()
         return ParamFailed(
             f"the vehicle (system {self._vehicle.system}) did not answer about {self._name}", None, True
         )
 
 
 class ListAll:
-    """Reads all parameters; lost ones are requested by index."""
+    """Reads all parameters; lost ones are requested by index. Those of unsupported types are left out."""
 
-    def __init__(self, vehicle: Address, timing: ParamTiming) -> None:
+    def __init__(self, vehicle: Address, timing: ParamTiming, *, casts: bool = False) -> None:
         self.result: ParamResult | None = None
-        self._vehicle, self._timing = vehicle, timing
+        self._vehicle, self._timing, self._casts = vehicle, timing, casts
         self._count = 0
-        self._got: dict[int, Parameter] = {}
+        self._got: dict[int, Parameter | None] = {}
         self._is_asked = False
 
     @property
@@ -177,6 +227,11 @@ class ListAll:
     def wait_s(self) -> float:
         """Timeout of the next message [s]."""
         return self._timing.quiet_s if self._count else self._timing.timeout_s
+
+    @property
+    def sends(self) -> int:
+        """Requests without progress after which the operation fails."""
+        return self._timing.retries + 1
 
     def requests(self) -> list[Message]:
         """Return the requests to send now."""
@@ -196,13 +251,14 @@ class ListAll:
         if message.param_count != self._count:  # the first message, or another vehicle
             self._count = message.param_count
             self._got.clear()
-        parameter = parse_value(message)
-        if parameter is None or message.param_id == HASH_NAME or parameter.place >= self._count:
+        place = message.param_index
+        if message.param_id == HASH_NAME or place >= self._count:
             return False
-        is_new = parameter.place not in self._got
-        self._got[parameter.place] = parameter
+        is_new = place not in self._got
+        self._got[place] = parse_value(message, casts=self._casts)
         if len(self._got) == self._count:
-            self.result = ParamDone(tuple(self._got[index] for index in range(self._count)))
+            known = (self._got[index] for index in range(self._count))
+            self.result = ParamDone(tuple(parameter for parameter in known if parameter is not None))
         return is_new
 
     def missing_answer(self) -> ParamFailed:

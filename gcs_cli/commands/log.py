@@ -12,11 +12,12 @@ import typer
 from flightstack.core.atomic_file import check_new, write_bytes_atomically
 from flightstack.mavlink.files import Entry
 from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.autopilots.registry import autopilot_of
 from gcs_cli.clients.log_client import LogEntry
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
-from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
+from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
 from gcs_cli.transfers import log_calls
 from gcs_cli.tui.transfer_bar import TransferBar
 from gcs_cli.vehicle_link import connect_vehicle
@@ -31,15 +32,14 @@ _KILO = 1000.0
 def list_logs(
     context: typer.Context,
     link: LinkOptions,
-    as_json: JsonOption = False,
 ) -> None:
     """List the logs, the oldest first."""
     with connect_vehicle(context, link) as connection:
         logs = log_calls.fetch_list(connection)
         files = log_calls.fetch_files(connection) if logs else ()
     named = [(log, log_calls.file_of(log, logs, files)) for log in logs]
-    out = Output(as_json)
-    if not logs and not as_json:
+    out = output_of(context, link)
+    if not logs and not out.as_json:
         typer.echo("the vehicle has no logs")
     for log, file in named:
         line = f"{log.log_id:5d}  {_time_text(log):<20}  {size_text(log.size):>9}"
@@ -62,10 +62,9 @@ def download(
         bool, typer.Option("--all", help="All logs, except those that are already in the folder.")
     ] = False,
     overwrite: OverwriteOption = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Download a log, or all of them."""
-    out = Output(as_json)
+    out = output_of(context, link)
     number = _number(log_id)
     if everything and log_id != "latest":
         raise CliError("give either a log or --all", USAGE)
@@ -79,7 +78,7 @@ def download(
         else:
             log = _chosen(logs, number)
             file = log_calls.file_of(log, logs, files)
-            _download(out, connection, log, file, _path(log, file, output, False), overwrite)
+            _download(out, connection, log, file, _path(connection, log, file, output, False), overwrite)
 
 
 @app.command()
@@ -88,7 +87,6 @@ def erase(
     context: typer.Context,
     link: LinkOptions,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
-    as_json: JsonOption = False,
 ) -> None:
     """Erase all logs but the one that is being written.
 
@@ -108,7 +106,7 @@ def erase(
         raise CliError(f"the vehicle still has all {len(left)} logs")
     count = len(before) - len(left)
     sentence = f"{count} of {len(before)} logs erased"
-    Output(as_json).say(
+    output_of(context, link).say(
         "erased", f"{sentence}, {len(left)} left" if left else sentence, erased=count, left=len(left)
     )
 
@@ -125,7 +123,7 @@ def _download_all(
     refused: list[str] = []
     for log in logs:
         file = log_calls.file_of(log, logs, files)
-        path = _path(log, file, output, True)
+        path = _path(connection, log, file, output, True)
         if path.exists() and path.stat().st_size == log.size:
             out.say("exists", f"{path} exists already", path=str(path))
         elif path.is_file() and not overwrite:
@@ -175,9 +173,13 @@ def _chosen(logs: tuple[LogEntry, ...], number: int | None) -> LogEntry:
     raise CliError(f"no log {number}: the vehicle has {first} to {last}", FAILED)
 
 
-def _path(log: LogEntry, file: Entry | None, output: Path | None, everything: bool) -> Path:
+def _path(
+    connection: Connection, log: LogEntry, file: Entry | None, output: Path | None, everything: bool
+) -> Path:
     stamp = f"_{_moment(log):%Y%m%d-%H%M%S}" if log.time_utc_s else ""
-    name = f"log_{log.log_id}{stamp}.ulg" if file is None else file.name
+    identity = connection.session.view.identity
+    suffix = "" if identity is None else autopilot_of(identity.autopilot).log_suffix
+    name = f"log_{log.log_id}{stamp}{suffix}" if file is None else file.name
     if output is None:
         return Path(name)
     return output / name if everything or output.is_dir() else output

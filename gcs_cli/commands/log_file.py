@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import shutil
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.errors import ConfigError
@@ -21,7 +21,7 @@ from gcs_cli.logs.plot import field_figure, field_samples, terminal_panel
 from gcs_cli.logs.reader import read_log
 from gcs_cli.logs.recording import Recording
 from gcs_cli.output import Output
-from gcs_cli.settings import JsonOption, OverwriteOption
+from gcs_cli.settings import JsonOption, OverwriteOption, output_of
 
 app = make_app(add_completion=False)
 
@@ -37,18 +37,19 @@ _PRINTED = (".png", ".svg", ".pdf")
 
 
 @app.command()
-def info(log: LogArgument, as_json: JsonOption = False) -> None:
+def info(context: typer.Context, log: LogArgument, as_json: JsonOption = False) -> None:
     """Show what a log holds.
 
     Times, vehicle, topics with their rates, dropouts, changed parameters, texts.
     """
-    out = Output(as_json)
+    out = output_of(context, as_json)
     for line in info_lines(read_log(log)):
         out.say(line.event, line.sentence, **line.facts)
 
 
 @app.command()
 def plot(
+    context: typer.Context,
     log: LogArgument,
     fields: Annotated[
         list[str],
@@ -87,7 +88,7 @@ def plot(
     _warn_if_damaged(recording)
     found = list(dict.fromkeys(field for wanted in fields for field in find_fields(recording, wanted)))
     limits = begin, math.inf if end is None else end
-    out = Output(as_json)
+    out = output_of(context, as_json)
     if html is not None:
         figure = field_figure(recording, found, *limits)
         lines = [start_utc(recording) or "unknown date"]
@@ -115,13 +116,14 @@ def _print(out: Output, recording: Recording, fields: list[Field], limits: tuple
             time_s, values = field_samples(recording, field, *limits)
             out.say("field", "", name=field.label, time_s=time_s, values=values)
         return
-    width = min(160, shutil.get_terminal_size().columns)
+    console = Console(highlight=False)
     for panel in field_figure(recording, fields, *limits).panels:
-        typer.echo("\n".join(terminal_panel(panel, width, _PANEL_ROWS)))
+        console.print(terminal_panel(panel, console.width, _PANEL_ROWS), soft_wrap=True)
 
 
 @app.command()
 def export(
+    context: typer.Context,
     log: LogArgument,
     csv: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write a CSV file for each topic.", show_default=False)
@@ -153,7 +155,7 @@ def export(
                 raise ConfigError(file, "", "is a directory")
     recording = read_log(log)
     _warn_if_damaged(recording)
-    out = Output(as_json)
+    out = output_of(context, as_json)
     from gcs_cli.logs import export_mcap, export_rerun, export_tables  # noqa: PLC0415
 
     def say(form: str, path: Path, count: int, unit: str) -> None:

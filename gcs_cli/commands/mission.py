@@ -11,11 +11,12 @@ import typer
 from flightstack.core.atomic_file import check_new
 from flightstack.plan import MissionType
 from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.actions import in_flight, in_mission
+from gcs_cli.commands.actions import ActionOptions, run_action
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.link import calls
 from gcs_cli.plans.formats.files import check_suffix, load_any
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
-from gcs_cli.transfers import mission_control
 from gcs_cli.transfers.plan_files import AnyPlanArgument
 from gcs_cli.transfers.plan_parts import Uploads, parts_to_send
 from gcs_cli.transfers.plan_transfers import (
@@ -114,34 +115,26 @@ def clear(
 
 @app.command()
 @expand_options
-def start(context: typer.Context, link: LinkOptions) -> None:
+def start(context: typer.Context, link: LinkOptions, options: ActionOptions) -> None:
     """Start the mission; the vehicle arms for it.
 
-    Waits until the vehicle is armed and flies the mission.
+    Ends when the vehicle is armed and flies the mission.
     """
-    with connect_vehicle(context, link) as connection:
-        mission_control.start(connection)
-    output_of(context, link).say("started", "mission started")
+    run_action(context, link, options, in_flight.start_mission())
 
 
 @app.command()
 @expand_options
-def pause(context: typer.Context, link: LinkOptions) -> None:
+def pause(context: typer.Context, link: LinkOptions, options: ActionOptions) -> None:
     """Pause the mission: the vehicle holds its position."""
-    with connect_vehicle(context, link) as connection:
-        seq = mission_control.pause(connection)
-    at = "" if seq is None else f" at item {seq}"
-    output_of(context, link).say("paused", f"mission paused{at}", seq=seq)
+    run_action(context, link, options, in_mission.pause())
 
 
 @app.command()
 @expand_options
-def resume(context: typer.Context, link: LinkOptions) -> None:
+def resume(context: typer.Context, link: LinkOptions, options: ActionOptions) -> None:
     """Resume a paused mission at its current item."""
-    with connect_vehicle(context, link) as connection:
-        seq = mission_control.resume(connection)
-    at = "" if seq is None else f" at item {seq}"
-    output_of(context, link).say("resumed", f"mission resumed{at}", seq=seq)
+    run_action(context, link, options, in_mission.resume())
 
 
 @app.command()
@@ -149,9 +142,8 @@ def resume(context: typer.Context, link: LinkOptions) -> None:
 def jump(
     context: typer.Context,
     link: LinkOptions,
+    options: ActionOptions,
     seq: Annotated[int, typer.Argument(metavar="N", min=0, max=65_535, help="Number of the item, from 0.")],
 ) -> None:
     """Make an item of the mission the current one; a mission in flight continues there."""
-    with connect_vehicle(context, link) as connection:
-        mission_control.jump(connection, seq)
-    output_of(context, link).say("jumped", f"item {seq} is the current one", seq=seq)
+    run_action(context, link, options, in_mission.jump(seq))

@@ -14,13 +14,13 @@ from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.core.errors import ConfigError
 from flightstack.core.geodesy import GeoPoint
 from flightstack.params.config import DEFAULT_HOME, parse_home
-from flightstack.plan import DEFAULT_LIMITS, Limits, MissionItem, Plan
+from flightstack.plan import DEFAULT_LIMITS, Plan
 from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.output import Output
 from gcs_cli.plans import patterns
 from gcs_cli.plans.areas import area_rings, line_of
-from gcs_cli.plans.check import limits_of, plan_problems
+from gcs_cli.plans.check import Problem, limits_of, plan_problems
 from gcs_cli.plans.drawing import draw, places_of
 from gcs_cli.plans.formats.files import DEFAULT_ALTITUDE_M, SUFFIXES, check_suffix, load_any, save_any
 from gcs_cli.plans.itinerary import home_of_items, itinerary
@@ -220,13 +220,12 @@ def check(
 
     Checks geofence, mission and rally points, and names all items that are refused.
     """
-    plan = load_any(file)
-    home, limits, fence = home_of_items(plan.items, plan.home), DEFAULT_LIMITS, None
+    plan, output = load_any(file), output_of(context, link)
     if _uses_vehicle(link, vehicle):
-        home, limits, fence = _vehicle_limits(context, link, plan)
-    problems = list(plan_problems(plan, home, limits, fence))
-    output = output_of(context, link)
-    for problem in problems:
+        problems = _problems_of_vehicle(context, link, plan, output)
+    else:
+        problems = list(plan_problems(plan, home_of_items(plan.items, plan.home)))
+    for problem in problems if output.as_json or len(problems) > 1 else ():
         output.say("problem", f"{problem.part}: {problem.reason}", **problem._asdict())
     refused = {problem.part for problem in problems}
     for part in plan_parts(plan):
@@ -235,22 +234,33 @@ def check(
                 "good", f"{part.name} of {len(part.items)} items: good", part=part.name, items=len(part.items)
             )
     if problems:
-        many = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
-        raise CliError(f"{file}: {many}; the vehicle would refuse it", FAILED)
+        first, more = problems[0], len(problems) - 1
+        raise CliError(
+            f"{file}: {first.part}: {first.reason}" + (f" (and {more} more)" if more else ""), FAILED
+        )
 
 
 def _uses_vehicle(link: LinkOptions, vehicle: bool) -> bool:
     return vehicle or link.connect is not None or link.instance is not None
 
 
-def _vehicle_limits(
-    context: typer.Context, link: LinkOptions, plan: Plan
-) -> tuple[GeoPoint, Limits, tuple[MissionItem, ...]]:
-    """Return home, limits and geofence of the vehicle."""
+def _problems_of_vehicle(
+    context: typer.Context, link: LinkOptions, plan: Plan, output: Output
+) -> list[Problem]:
+    """Return the problems of ``plan`` with home, limits and geofence of the vehicle."""
     with connect_vehicle(context, link) as connection:
         stored = download_plan(connection, with_home=True)
-        parameters = limit_parameters(connection)
-    return home_of_items(plan.items, stored.home or plan.home), limits_of(parameters), stored.fence
+        autopilot = connection.session.view.autopilot
+        is_foreign = not autopilot.stores_items_exactly
+        limits = DEFAULT_LIMITS if is_foreign else limits_of(limit_parameters(connection))
+    if is_foreign:
+        output.say(
+            "limited",
+            f"only the geofence is checked: the commands of {autopilot.title} are not known",
+            autopilot=autopilot.name,
+        )
+    home = home_of_items(plan.items, stored.home or plan.home)
+    return list(plan_problems(plan, home, limits, stored.fence, is_foreign=is_foreign))
 
 
 @app.command()

@@ -1,8 +1,7 @@
-"""``gcs param list|get|set|reset|save|load|diff``."""
+"""``gcs param list|search|get|set|reset|save|load|diff``."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -15,12 +14,14 @@ from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.mavlink.param_values import Parameter
 from flightstack.params.param_file import is_parameter_name
 from flightstack.process.command_line import expand_options, make_app
-from gcs_cli.errors import FAILED, USAGE, CliError
+from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
-from gcs_cli.settings import JsonOption, LinkOptions, OverwriteOption
+from gcs_cli.output import Output
+from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
 from gcs_cli.transfers import param_calls
-from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, load_parameters, number_text, render_parameters
+from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, load_parameters, render_parameters
+from gcs_cli.vehicle.param_search import search_parameters
 from gcs_cli.vehicle.param_table import (
     change_line,
     description,
@@ -48,7 +49,6 @@ def list_parameters(
             metavar="[PATTERN]", help="Part of the name, or a pattern: MPC_*.", show_default=False
         ),
     ] = "*",
-    as_json: JsonOption = False,
 ) -> None:
     """List the parameters; highlight those that are not at their default."""
     with connect_vehicle(context, link) as connection:
@@ -56,20 +56,44 @@ def list_parameters(
         infos = param_calls.fetch_metadata(connection) if found else {}
     if not found:
         raise CliError(f"no parameter matches {pattern}")
-    _show(found, infos, as_json)
+    _show(found, infos, output_of(context, link))
 
 
 @app.command()
 @expand_options
-def get(context: typer.Context, link: LinkOptions, name: NameArgument, as_json: JsonOption = False) -> None:
-    """Show one parameter."""
+def search(
+    context: typer.Context,
+    link: LinkOptions,
+    words: Annotated[
+        list[str], typer.Argument(metavar="WORD...", help="Parts of words, in any order.", show_default=False)
+    ],
+    most: Annotated[int, typer.Option("--most", metavar="N", min=1, help="Largest number of results.")] = 20,
+) -> None:
+    """Search names and descriptions of parameters, the best match first; misspelt words match too."""
     with connect_vehicle(context, link) as connection:
-        parameter = param_calls.fetch(connection, name.upper())
+        parameters = param_calls.fetch_all(connection)
         infos = param_calls.fetch_metadata(connection)
-    if as_json:
-        typer.echo(json.dumps(facts(parameter, infos)))
-    else:
-        typer.echo(description(parameter, infos.get(parameter.name, UNKNOWN)))
+    found = search_parameters(parameters, infos, words)[:most]
+    if not found:
+        raise CliError(f"no parameter matches {' '.join(words)}")
+    _show(found, infos, output_of(context, link))
+
+
+@app.command()
+@expand_options
+def get(
+    context: typer.Context,
+    link: LinkOptions,
+    names: Annotated[list[str], typer.Argument(metavar="NAME...", show_default=False)],
+) -> None:
+    """Show parameters with their metadata."""
+    with connect_vehicle(context, link) as connection:
+        parameters = [param_calls.fetch(connection, name.upper()) for name in names]
+        infos = param_calls.fetch_metadata(connection)
+    output = output_of(context, link)
+    for parameter in parameters:
+        info = infos.get(parameter.name, UNKNOWN)
+        output.say("parameter", description(parameter, info), **facts(parameter, infos))
 
 
 @app.command("set", context_settings={"ignore_unknown_options": True})  # a value may be negative
@@ -86,7 +110,19 @@ def set_parameter(
         before = param_calls.fetch(connection, name.upper())
         after = param_calls.change(connection, name.upper(), number)
         infos = param_calls.fetch_metadata(connection)
-    typer.echo(change_line(after.name, before.value, after.value, infos.get(after.name, UNKNOWN)))
+    _say_change(output_of(context, link), before, after, infos)
+
+
+def _say_change(output: Output, before: Parameter, after: Parameter, infos: dict[str, ParamInfo]) -> None:
+    info = infos.get(after.name, UNKNOWN)
+    output.say(
+        "changed",
+        change_line(after.name, before.value, after.value, info),
+        name=after.name,
+        value=after.value,
+        before=before.value,
+        needs_restart=info.reboot_required,
+    )
 
 
 @app.command()
@@ -103,9 +139,9 @@ def reset(
     with connect_vehicle(context, link) as connection:
         if everything:
             connection.command(calls.RESET_PARAMETERS, "reset of all parameters")
-            typer.echo("all parameters have their defaults")
+            output_of(context, link).say("reset", "all parameters have their defaults")
         else:
-            _reset_some(connection, [name.upper() for name in names or ()])
+            _reset_some(connection, [name.upper() for name in names or ()], output_of(context, link))
 
 
 @app.command()
@@ -122,7 +158,8 @@ def save(
         parameters = param_calls.fetch_all(connection)
         saved = [parameter for parameter in parameters if is_parameter_name(parameter.name)]
         write_text_atomically(file, render_parameters(saved, *connection.session.target))
-    typer.echo(f"{len(saved)} parameters saved to {file}")
+    sentence = f"{len(saved)} parameters saved to {file}"
+    output_of(context, link).say("saved", sentence, file=str(file), parameters=len(saved))
     if len(saved) < len(parameters):
         names = ", ".join(parameter.name for parameter in parameters if parameter not in saved)
         typer.echo(f"gcs: not saved, not valid as parameter names: {names}", err=True)
@@ -140,32 +177,15 @@ def load(
     """Set the parameters that a file has; the others stay as they are."""
     wanted = load_parameters(file)
     with connect_vehicle(context, link) as connection:
-        failures, changed = _set_all(connection, wanted)
-    typer.echo(f"{changed} of {len(wanted)} parameters changed")
-    for failure in failures:
+        present = {parameter.name: parameter for parameter in param_calls.fetch_all(connection)}
+        result = param_calls.change_all(connection, wanted, present)
+    changed = len(result.changed)
+    sentence = f"{changed} of {len(wanted)} parameters changed"
+    output_of(context, link).say("loaded", sentence, file=str(file), changed=changed, parameters=len(wanted))
+    for failure in result.failures:
         typer.echo(f"gcs: {failure}", err=True)
-    if failures:
-        raise CliError(f"{len(failures)} parameters of {file} were not set")
-
-
-def _set_all(connection: Connection, wanted: dict[str, float]) -> tuple[list[str], int]:
-    """Set the parameters that differ; return the failures, and the number of changed ones."""
-    present = {parameter.name: parameter for parameter in param_calls.fetch_all(connection)}
-    failures: list[str] = []
-    changed = 0
-    for name, value in wanted.items():
-        if name in present and number_text(present[name].value) == number_text(value):
-            continue
-        try:
-            if name not in present:
-                raise CliError(f"{name}: the vehicle has no such parameter")
-            param_calls.change(connection, name, value)
-            changed += 1
-        except CliError as error:
-            if error.exit_code != FAILED:
-                raise
-            failures.append(str(error))
-    return failures, changed
+    if result.failures:
+        raise CliError(f"{len(result.failures)} parameters of {file} were not set")
 
 
 @app.command()
@@ -176,7 +196,6 @@ def diff(
     file: Annotated[
         Path | None, typer.Argument(help="A parameter file; without it, the defaults.", show_default=False)
     ] = None,
-    as_json: JsonOption = False,
 ) -> None:
     """Show parameters that differ from the defaults, or from a file."""
     wanted = None if file is None else load_parameters(file)
@@ -190,16 +209,19 @@ def diff(
             "the vehicle does not send the defaults of its parameters: name a file to compare with"
         )
     different = [parameter for parameter in parameters if is_changed(parameter, infos)]
-    if different or as_json:
-        _show(different, infos, as_json, "file" if file else "default")
+    output = output_of(context, link)
+    if different:
+        _show(different, infos, output, "file" if file else "default")
     else:
-        typer.echo(f"all parameters are as in {file}" if file else "all parameters have their defaults")
+        output.say(
+            "equal", f"all parameters are as in {file}" if file else "all parameters have their defaults"
+        )
     missing = sorted(set(wanted or ()) - {parameter.name for parameter in parameters})
-    if missing and not as_json:
-        typer.echo(f"not known to the vehicle: {', '.join(missing)}")
+    if missing:
+        output.say("unknown", f"not known to the vehicle: {', '.join(missing)}", names=missing)
 
 
-def _reset_some(connection: Connection, names: Iterable[str]) -> None:
+def _reset_some(connection: Connection, names: Iterable[str], output: Output) -> None:
     infos = param_calls.fetch_metadata(connection)
     for name in names:
         before = param_calls.fetch(connection, name)
@@ -207,14 +229,15 @@ def _reset_some(connection: Connection, names: Iterable[str]) -> None:
         if info.default is None:
             raise CliError(f"{name}: the vehicle does not send its default: use `gcs param set {name} VALUE`")
         after = param_calls.change(connection, name, info.default)
-        typer.echo(change_line(name, before.value, after.value, info))
+        _say_change(output, before, after, infos)
 
 
 def _show(
-    parameters: Sequence[Parameter], infos: dict[str, ParamInfo], as_json: bool, compared: str = "default"
+    parameters: Sequence[Parameter], infos: dict[str, ParamInfo], output: Output, compared: str = "default"
 ) -> None:
-    if as_json:
-        typer.echo(json.dumps([facts(parameter, infos) for parameter in parameters]))
+    if output.as_json:
+        for parameter in parameters:
+            output.say("parameter", "", **facts(parameter, infos))
         return
     console = Console()
     if not console.is_terminal:

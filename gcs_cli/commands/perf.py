@@ -33,7 +33,7 @@ def perf(
 ) -> None:
     """Show the timing of the flight stack's loops."""
     timeout_s = link_options(context, link).timeout_s
-    with connect_vehicle(context, link) as connection:
+    with connect_vehicle(context, link, takes_recording=True, in_real_time=False) as connection:
         connection.session.subscribe(LOOP_TIMING)
         timing = next_timing(connection, None, timeout_s)
         _show(timing, as_json)

@@ -52,7 +52,19 @@ class GcsGroup(LazyGroup):
         "wait": LazyCommand("gcs_cli.commands.wait", "Wait until the vehicle is in a state."),
         "status": LazyCommand("gcs_cli.commands.status", "Show the state of the vehicle."),
         "watch": LazyCommand("gcs_cli.commands.watch", "Watch and command the vehicle; q or Ctrl-C ends."),
+        "messages": LazyCommand(
+            "gcs_cli.commands.messages", "Print the status texts of the vehicle until Ctrl-C."
+        ),
+        "listen": LazyCommand(
+            "gcs_cli.commands.listen", "Print messages of the vehicle, one a line, until Ctrl-C."
+        ),
+        "send": LazyCommand("gcs_cli.commands.send", "Send a MAVLink message to the vehicle."),
+        "record": LazyCommand("gcs_cli.commands.record", "Record all messages of the link until Ctrl-C."),
+        "shell": LazyCommand("gcs_cli.commands.shell", "Run commands over one link."),
         "perf": LazyCommand("gcs_cli.commands.perf", "Show the timing of the flight stack's loops."),
+        "replay": LazyCommand(
+            "gcs_cli.commands.replay", "Replay a log as a vehicle that any client can watch."
+        ),
         "report": LazyCommand("gcs_cli.commands.report", "Write the report page of a flight from its log."),
         "compare": LazyCommand("gcs_cli.commands.compare", "Compare two or more flights."),
     }
@@ -121,7 +133,11 @@ class ParamGroup(LazyGroup):
 
     lazy = {  # noqa: RUF012
         "list": LazyCommand(_PARAM, "List the parameters; highlight those that are not at their default."),
-        "get": LazyCommand(_PARAM, "Show one parameter."),
+        "search": LazyCommand(
+            _PARAM,
+            "Search names and descriptions of parameters, the best match first; misspelt words match too.",
+        ),
+        "get": LazyCommand(_PARAM, "Show parameters with their metadata."),
         "set": LazyCommand(_PARAM, "Set a parameter."),
         "reset": LazyCommand(_PARAM, "Reset parameters to their defaults."),
         "save": LazyCommand(_PARAM, "Write all parameters to a file, as QGroundControl does."),

@@ -12,20 +12,20 @@ from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.process.command_line import make_app
 from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
-from gcs_cli.output import Output
 from gcs_cli.report.compare import read_runs
 from gcs_cli.report.page import render_report
 from gcs_cli.report.poses import find_run
 from gcs_cli.report.run_directory import LOG_NAME, REPORT_NAME, TLOG_NAME
 from gcs_cli.report.summary import file_sha256
 from gcs_cli.report.telemetry import read_loop_timing
-from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption
+from gcs_cli.settings import JsonOption, OpenOption, OverwriteOption, output_of
 
 app = make_app(add_completion=False)
 
 
 @app.command()
 def report(
+    context: typer.Context,
     log: Annotated[
         Path, typer.Argument(metavar="LOG", help="A ULog, or the directory of a flight.", show_default=False)
     ],
@@ -55,8 +55,7 @@ def report(
     tlog = run.log.with_name(TLOG_NAME)
     timing = read_loop_timing(tlog, flight.start_s) if run.summary else ()
     write_text_atomically(page, render_report(flight, read.plan, summary, timing, read.name))
-    out_lines = Output(as_json)
-    out_lines.say("report", f"report written to {page}", file=str(page), summary=summary)
+    output_of(context, as_json).say("report", f"report written to {page}", file=str(page), summary=summary)
     if open_page:
         webbrowser.open(page.resolve().as_uri())
 

@@ -10,8 +10,7 @@ import typer
 from flightstack.process.command_line import IN_OUTPUT, PanelCommand, expand_options, make_app
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.fly_flags import RunOptions, complete_options
-from gcs_cli.output import Output
-from gcs_cli.settings import FlownInstanceOption, FlownTimeoutOption, JsonOption
+from gcs_cli.settings import FlownInstanceOption, FlownTimeoutOption, JsonOption, output_of
 from gcs_cli.sim.sim_flags import PLAN_FIELDS, SimOptions
 
 app = make_app(add_completion=False)
@@ -34,9 +33,10 @@ def sim(
     Starts simulator and flight stack of each vehicle, in real time, and prints the addresses for MAVSDK,
     QGroundControl and gcs. Ctrl-C ends all of them.
     """
-    if watch and as_json:
+    out = output_of(context, as_json)
+    if watch and out.as_json:
         raise CliError("give either --watch or --json: the view needs the terminal", USAGE)
     from gcs_cli.sim.sim_run import simulate
 
     run = RunOptions(instance=instance, timeout=timeout)
-    simulate(complete_options(context, "sim", options, run), Output(as_json), watch)
+    simulate(complete_options(context, "sim", options, run), out, watch)

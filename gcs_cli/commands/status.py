@@ -2,39 +2,49 @@
 
 from __future__ import annotations
 
-import json
 import math
 from typing import Any
 
 import typer
 
 from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.link.quality import LinkQuality
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
-from gcs_cli.settings import JsonOption, LinkOptions
+from gcs_cli.settings import LinkOptions, output_of
 from gcs_cli.vehicle.view_types import VehicleView
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
 
-GATHER_S = 2.0
+GATHER_S = 0.5
+"""Longest wait for the values after the first heartbeat; a vehicle may not send all of them."""
 
 
 @app.command()
 @expand_options
-def status(context: typer.Context, link: LinkOptions, as_json: JsonOption = False) -> None:
-    """Show the state of the vehicle."""
+def status(context: typer.Context, link: LinkOptions) -> None:
+    """Show the state of the vehicle.
+
+    Examples:
+      gcs status
+      gcs --connect tcp:127.0.0.1:5760 status --json
+    """
     with connect_vehicle(context, link, takes_recording=True, in_real_time=False) as connection:
         session = connection.session
         session.subscribe(ROTORS_AND_TIMING)
         # most messages come several times a second; values that the vehicle does not send stay unknown
         connection.wait_for(lambda: _is_full(session.view), GATHER_S)
-        view = session.view
-    facts = status_facts(view)
-    if as_json:
-        typer.echo(json.dumps(facts))
-        return
-    for name, value in facts.items():
-        typer.echo(f"{name:<20} {_shown(value)}")
+        facts = {**status_facts(session.view), **_link_facts(session.quality)}
+    lines = [f"{name:<20} {_shown(value)}" for name, value in facts.items()]
+    output_of(context, link).say("status", "\n".join(lines), **facts)
+
+
+def _link_facts(quality: LinkQuality) -> dict[str, Any]:
+    loss, round_trip_s = quality.loss, quality.round_trip_s
+    return {
+        "link_loss": None if loss is None else round(loss, 4),
+        "round_trip_s": None if round_trip_s is None else round(round_trip_s, 6),
+    }
 
 
 def _is_full(view: VehicleView) -> bool:

@@ -162,27 +162,14 @@ def mission_client(session: Session, kind: MissionType) -> MissionClient:
         vehicle_address(session),
         session.own,
         kind,
-        begins_with_home=mission_begins_with_home(session),
+        begins_with_home=session.view.autopilot.mission_begins_with_home,
         home=None if home is None else GeoPoint(*home[:3]),
     )
 
 
-def set_current(session: Session, seq: int) -> Call:
-    """Begin to make item ``seq`` the current one, by MISSION_SET_CURRENT."""
-    client = mission_client(session, MissionType.MISSION)
-    client.start_set_current(seq)
-    return Call(session, client)
-
-
 def storage_tolerance(session: Session) -> Tolerance:
-    """Return the differences that the vehicle's storage makes: ArduPilot packs items into 12 bytes."""
-    return PACKED if mission_begins_with_home(session) else EXACT
-
-
-def mission_begins_with_home(session: Session) -> bool:
-    """Return True if item 0 of the vehicle's mission is its home position."""
-    identity = session.view.identity
-    return identity is not None and identity.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    """Return the differences that the vehicle's storage makes."""
+    return EXACT if session.view.autopilot.stores_items_exactly else PACKED
 
 
 def vehicle_address(session: Session) -> Address:

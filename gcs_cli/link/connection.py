@@ -103,7 +103,6 @@ class Connection:
         in_real_time: bool = True,
     ) -> None:
         self.endpoint = endpoint
-        self._system_id = system_id
         self._signing = signing
         self._clock: Clock = WallClock()
         if endpoint.kind == RECORDING:
@@ -114,6 +113,7 @@ class Connection:
         if line is None and vehicle is None and not endpoint.listens:
             (vehicle,) = self._line.peers
         self.fleet = Fleet(self._line.peers, vehicle, record, signing, system_id)
+        self._is_lent = False
         self._server: ShareServer | None = None
         self._share_due_s = math.inf
 
@@ -198,19 +198,20 @@ class Connection:
             self.step(end_s)
         return True
 
-    def wait_for_vehicle(self, timeout_s: float) -> None:
+    def wait_for_vehicle(self, timeout_s: float, *, several: bool = False) -> None:
         """Wait for a vehicle's heartbeat, and accept only that vehicle from then on.
 
-        Raise CliError if there is none, or if there are several and none was chosen by its system id.
+        Raise CliError if there is none, or, without ``several``, if there are several and none was chosen by its
+        system id.
         """
-        if not self.wait_for(lambda: self.session.view.identity is not None, timeout_s):
+        if not self.wait_for(lambda: self.session.is_heard(self.now_s), timeout_s):
             if self._signing is not None and self._signing.signing.counts.refused:
                 raise CliError(
                     f"the vehicle at {self.endpoint} does not sign with this key: check --signing-key on both sides",
                     NO_ANSWER,
                 )
             raise CliError(self._no_vehicle_text(timeout_s), NO_ANSWER)
-        if self._system_id is None:
+        if not (several or self.fleet.is_kept):
             self._check_alone()
         self.fleet.keep()
 
@@ -227,15 +228,15 @@ class Connection:
             return f"{self.endpoint}: the recording has no vehicle's heartbeat"
         way = "sent to" if self.endpoint.listens else "answered at"
         foreign = ", ".join(str(number) for number in sorted(self.fleet.sessions))
-        if foreign:
+        if foreign and self.fleet.chosen is not None:
             return (
-                f"no vehicle with system id {self._system_id} {way} {self.endpoint} within {timeout_s:g} s, only "
+                f"no vehicle with system id {self.fleet.chosen} {way} {self.endpoint} within {timeout_s:g} s, only "
                 f"system {foreign}: choose it with --system, or give another address with --connect"
             )
         reason = f" ({self._line.problem})" if self._line.problem else ""
         return (
-            f"no vehicle {way} {self.endpoint} within {timeout_s:g} s{reason}: start `sim-bridge` and "
-            "`flightstack`, or give its address with --connect"
+            f"no vehicle {way} {self.endpoint} within {timeout_s:g} s{reason}: start one with `gcs sim`, "
+            "or give its address with --connect"
         )
 
     def command(self, command: Command, name: str) -> None:
@@ -247,25 +248,16 @@ class Connection:
 
         With ``may_lack``, a type of plan that the vehicle does not support counts as empty.
         """
-        answer = self.wait_for_answer(call, name)
-        if may_lack and answer.result == MissionResult.UNSUPPORTED:
-            return Answer(True)
-        self.check_answer(answer, name() if callable(name) else name)
-        return answer
-
-    def wait_for_answer(self, call: Request, name: str | Callable[[], str]) -> Answer:
-        """Run a request to its end; raise CliError if the vehicle is lost."""
         while (answer := call.answer(self.now_s)) is None:
             self._check_vehicle(name)
             self.step(self.now_s + _LONGEST_WAIT_S)
-        return answer
-
-    @staticmethod
-    def check_answer(answer: Answer, what: str) -> None:
-        """Raise CliError if the vehicle has refused ``what`` or did not answer."""
+        if may_lack and answer.result == MissionResult.UNSUPPORTED:
+            return Answer(True)
         if not answer.accepted:
+            what = name() if callable(name) else name
             said = what if answer.silent or answer.cancelled else f"{what} refused"
             raise CliError(f"{said}: {answer.reason}", NO_ANSWER if answer.silent else FAILED)
+        return answer
 
     def run(
         self,
@@ -317,8 +309,17 @@ class Connection:
     def __enter__(self) -> Connection:
         return self
 
+    def lend(self) -> None:
+        """Keep the link open at the end of ``with`` blocks, for the next command of a shell."""
+        self._is_lent = True
+
     def __exit__(self, *_: object) -> None:
-        self.close()
+        if not self._is_lent:
+            self.close()
+            return
+        self.fleet.observe = self.fleet.wire.record = None
+        self.session.use(None)
+        self.fleet.subscribe({})
 
 
 def _time(time_s: float | None) -> float:

@@ -44,7 +44,8 @@ class Fleet:
         self.systems: set[int] = set()
         """Ids of systems whose autopilot, component 1, has sent any message."""
         self._only = only
-        self._system_id = system_id
+        self.chosen = system_id
+        """System id of the only vehicle to select; None: any."""
         self._kept = False
         self._rates_hz: Mapping[int, float] = {}
         self._sessions: dict[int, Session] = {}
@@ -72,9 +73,31 @@ class Fleet:
         self._kept = True
         return self._selected
 
+    @property
+    def is_kept(self) -> bool:
+        """True if the selection does not move to another vehicle when this one is lost."""
+        return self._kept or self.chosen is not None
+
     def keep(self) -> None:
         """Keep the selected vehicle, even if it is lost."""
         self._kept = True
+
+    @property
+    def selection(self) -> tuple[int | None, Session]:
+        """The chosen system id and the selected session."""
+        return self.chosen, self._selected
+
+    @selection.setter
+    def selection(self, selection: tuple[int | None, Session]) -> None:
+        self.chosen, self._selected = selection
+
+    def choose(self, system_id: int | None) -> None:
+        """Select only this vehicle from now on, heard or not; None: leave the selection as it is."""
+        if system_id is None or system_id == self.chosen:
+            return
+        self.chosen = system_id
+        session = self._sessions.get(system_id)
+        self._selected = self._new_session(system_id) if session is None else session
 
     def subscribe(self, rates_hz: Mapping[int, float]) -> None:
         """Request messages, id -> rate [Hz], from every vehicle, those that are heard later too."""
@@ -107,21 +130,19 @@ class Fleet:
             self._sessions[system] = session
         else:
             session.take(message, peer, now_s)
-        if session is not self._selected and not self._kept and self._may_replace(session, now_s):
+        if session is not self._selected and self._may_replace(session, now_s):
             self._selected = session
 
     def _candidate(self, system: int) -> Session:
         """Return the session for a vehicle that has no session yet."""
-        free = self._selected.view.identity is None and self._system_id in (None, system)
+        free = self._selected.view.identity is None and self.chosen in (None, system)
         return self._selected if free else self._new_session(system)
 
     def _may_replace(self, session: Session, now_s: float) -> bool:
-        system = session.target[0]
-        return (
-            self._system_id in (None, system)
-            and session.is_heard(now_s)
-            and not self._selected.is_heard(now_s)
-        )
+        """Return True if ``session`` becomes the selected one, whose vehicle is unknown or lost."""
+        is_kept = self._kept and self._selected.view.identity is not None
+        is_wanted = self.chosen in (None, session.target[0])
+        return is_wanted and not is_kept and session.is_heard(now_s) and not self._selected.is_heard(now_s)
 
     def poll(self, now_s: float) -> list[Datagram]:
         """Return the datagrams to send now."""

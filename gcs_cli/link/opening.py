@@ -19,7 +19,7 @@ from gcs_cli.link.endpoint import (
     VEHICLE_CONNECTION,
     VehicleEndpoint,
 )
-from gcs_cli.link.lines import Interest, Line, SerialLine, StreamLine, TcpInLine, UdpLine
+from gcs_cli.link.lines import Interest, Line, StreamLine, TcpInLine, UdpLine
 
 LATER_S = 1.2
 """Time in which a vehicle that sends heartbeats is heard."""
@@ -34,6 +34,8 @@ def open_line(endpoint: VehicleEndpoint) -> Line:
         if endpoint.kind == TCP_IN:
             return TcpInLine(endpoint.host, endpoint.port)
         if endpoint.kind == SERIAL:
+            from gcs_cli.link.serial_line import SerialLine  # noqa: PLC0415  # few links need pyserial
+
             return SerialLine(endpoint.host, endpoint.port)
         peer = (_resolved(endpoint.host), endpoint.port)
         if endpoint.kind == UDP_OUT:

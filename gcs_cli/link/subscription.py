@@ -67,7 +67,9 @@ class Subscription:
 
     def _begin(self, vehicle: tuple[int, int], autopilot: Autopilot, now_s: float) -> None:
         self._vehicle = vehicle
-        self._rates_hz = {**autopilot.stream_messages_hz, **self._wanted_hz}
+        rates_hz = {**autopilot.stream_messages_hz, **self._wanted_hz}
+        lacking = autopilot.lacks_messages
+        self._rates_hz = {number: rate for number, rate in rates_hz.items() if number not in lacking}
         self._groups_hz = autopilot.stream_groups_hz
         self._due_s = dict.fromkeys(self._rates_hz, now_s)
         self._groups_due_s = now_s if self._groups_hz else math.inf

@@ -77,6 +77,11 @@ class TlogFile:
             with contextlib.suppress(OSError):  # a pipe cannot be truncated
                 self._file.truncate(self._size)
 
+    @property
+    def is_closed(self) -> bool:
+        """True after ``close``."""
+        return self._file.closed
+
     def close(self) -> None:
         """Close the file; a second call does nothing."""
         self._file.close()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -28,18 +28,21 @@ Json: TypeAlias = dict[str, Any]
 _ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 _KINDS = {"b": "boolean", "i": "integer", "u": "integer", "f": "number"}
 _FOXGLOVE_LEVELS = {Severity.WARNING: 3, Severity.ERROR: 4}
+_encode = json.JSONEncoder(allow_nan=False).encode
+_SORTED = 10_000
+"""Messages whose places are held as lists at a time."""
 _INFO, _FATAL, _DEBUG = 2, 5, 1
 _ORANGE = {"r": 1.0, "g": 0.6, "b": 0.1, "a": 1.0}
 
 
 class Channel(NamedTuple):
-    """Messages of one schema: times of shape (n,) in the log's time, and the message of each row."""
+    """Messages of one schema: times of shape (n,) in the log's time; ``row`` makes the message of a row."""
 
     topic: str
     schema: str
     properties: Json
     time_us: AnyArray
-    rows: list[Json]
+    row: Callable[[int], Json]
 
 
 def export_mcap(recording: Recording, path: Path) -> int:
@@ -50,19 +53,15 @@ def export_mcap(recording: Recording, path: Path) -> int:
         writer = writer_module.Writer(file)
         writer.start(profile="", library="flightstack")
         numbers = [_register(writer, channel) for channel in channels]
-        order = sorted(
-            (time_us, index, row)
-            for index, channel in enumerate(channels)
-            for row, time_us in enumerate(channel.time_us.tolist())
-        )
-        for sequence, (time_us, index, row) in enumerate(order):
-            at_ns = max(0, recording.unix_ns(time_us))
-            data = json.dumps(channels[index].rows[row], allow_nan=False).encode()
+        for sequence, (index, row) in enumerate(in_order(channels)):
+            channel = channels[index]
+            at_ns = max(0, recording.unix_ns(channel.time_us[row]))
+            data = _encode(channel.row(row)).encode()
             writer.add_message(numbers[index], at_ns, data, at_ns, sequence)
         writer.add_metadata("flight", {name: str(value) for name, value in recording.info.items()})
         writer.add_metadata("parameters", {name: repr(value) for name, value in recording.parameters.items()})
         writer.finish()
-    return len(order)
+    return sum(len(channel.time_us) for channel in channels)
 
 
 def _register(writer: Any, channel: Channel) -> int:
@@ -72,20 +71,43 @@ def _register(writer: Any, channel: Channel) -> int:
     return number
 
 
+def in_order(channels: Sequence[Channel]) -> Iterator[tuple[int, int]]:
+    """Yield channel and row of all messages by time; messages of one time in the order of their channels."""
+    counts = [len(channel.time_us) for channel in channels]
+    owners = np.repeat(np.arange(len(channels)), counts)
+    rows = np.concatenate([np.arange(count) for count in counts])
+    order = np.argsort(np.concatenate([channel.time_us for channel in channels]), kind="stable")
+    for start in range(0, len(order), _SORTED):
+        part = order[start : start + _SORTED]
+        yield from zip(owners[part].tolist(), rows[part].tolist(), strict=True)
+
+
 def topic_channels(recording: Recording) -> Iterator[Channel]:
     """Yield a channel for each topic; the elements of an array are a list again, and NaN is null."""
     for topic in recording.topics:
-        groups = grouped_fields(topic)
-        rows: list[Json] = [{"timestamp": time_us} for time_us in topic.time_us.tolist()]
-        properties: Json = {"timestamp": {"type": "integer"}}
-        for name, columns in groups.items():
-            values = [_jsonable(column) for column in columns]
-            kind = {"type": _KINDS.get(columns[0].dtype.kind, "string")}
-            single = name in topic.fields
-            properties[name] = kind if single else {"type": "array", "items": kind}
-            for row, element in zip(rows, zip(*values, strict=True), strict=True):
-                row[name] = element[0] if single else list(element)
-        yield Channel(topic.name, topic.kind or topic.name, properties, topic.time_us, rows)
+        yield _topic_channel(topic)
+
+
+def _topic_channel(topic: Topic) -> Channel:
+    single: dict[str, list[Any]] = {}
+    arrays: dict[str, list[list[Any]]] = {}
+    properties: Json = {"timestamp": {"type": "integer"}}
+    for name, columns in grouped_fields(topic).items():
+        kind = {"type": _KINDS.get(columns[0].dtype.kind, "string")}
+        if name in topic.fields:
+            single[name], properties[name] = _jsonable(columns[0]), kind
+        else:
+            arrays[name] = [_jsonable(column) for column in columns]
+            properties[name] = {"type": "array", "items": kind}
+
+    def row(index: int) -> Json:
+        return {
+            "timestamp": int(topic.time_us[index]),
+            **{name: column[index] for name, column in single.items()},
+            **{name: [column[index] for column in columns] for name, columns in arrays.items()},
+        }
+
+    return Channel(topic.name, topic.kind or topic.name, properties, topic.time_us, row)
 
 
 def grouped_fields(topic: Topic) -> dict[str, list[AnyArray]]:
@@ -112,56 +134,59 @@ def foxglove_channels(recording: Recording) -> Iterator[Channel]:
     if len(motion.position.time_us) > 1:
         yield _path(recording, motion.position)
     if not motion.geodetic.is_empty:
-        rows = [
-            {
-                "timestamp": _time(recording, time_us),
-                "frame_id": WORLD,
-                "latitude": latitude,
-                "longitude": longitude,
-                "altitude": altitude,
-                "position_covariance": [0.0] * 9,
-                "position_covariance_type": 0,
-            }
-            for time_us, (latitude, longitude, altitude) in _rows(motion.geodetic)
-        ]
-        yield _channel("/location", "foxglove.LocationFix", motion.geodetic.time_us, rows)
+        yield _locations(recording, motion.geodetic)
     if recording.texts:
-        rows = [
-            {
-                "timestamp": _time(recording, text.time_us),
-                "level": _foxglove_level(text.severity),
-                "message": text.text,
-                "name": "vehicle",
-                "file": "",
-                "line": 0,
-            }
-            for text in recording.texts
-        ]
-        yield _channel(
-            "/texts",
-            "foxglove.Log",
-            np.array([text.time_us for text in recording.texts], dtype=np.int64),
-            rows,
-        )
+        yield _texts(recording)
 
 
 def _transforms(recording: Recording, motion: Motion) -> Channel:
     time_us = motion.attitude.time_us
-    position = latest(motion.position, time_us)
-    places = np.nan_to_num(enu_positions(position))
-    rows = [
-        {
-            "timestamp": _time(recording, at_us),
+    places = np.nan_to_num(enu_positions(latest(motion.position, time_us)))
+    turns = enu_quaternions(motion.attitude.values)
+
+    def row(index: int) -> Json:
+        w, x, y, z = turns[index].tolist()
+        return {
+            "timestamp": _time(recording, time_us[index]),
             "parent_frame_id": WORLD,
             "child_frame_id": BODY,
-            "translation": _vector(place),
+            "translation": _vector(places[index]),
             "rotation": {"x": x, "y": y, "z": z, "w": w},
         }
-        for at_us, place, (w, x, y, z) in zip(
-            time_us.tolist(), places, enu_quaternions(motion.attitude.values).tolist(), strict=True
-        )
-    ]
-    return _channel("/tf", "foxglove.FrameTransform", time_us, rows)
+
+    return _channel("/tf", "foxglove.FrameTransform", time_us, row)
+
+
+def _locations(recording: Recording, geodetic: Samples) -> Channel:
+    def row(index: int) -> Json:
+        latitude, longitude, altitude = geodetic.values[index].tolist()
+        return {
+            "timestamp": _time(recording, geodetic.time_us[index]),
+            "frame_id": WORLD,
+            "latitude": latitude,
+            "longitude": longitude,
+            "altitude": altitude,
+            "position_covariance": [0.0] * 9,
+            "position_covariance_type": 0,
+        }
+
+    return _channel("/location", "foxglove.LocationFix", geodetic.time_us, row)
+
+
+def _texts(recording: Recording) -> Channel:
+    def row(index: int) -> Json:
+        text = recording.texts[index]
+        return {
+            "timestamp": _time(recording, text.time_us),
+            "level": _foxglove_level(text.severity),
+            "message": text.text,
+            "name": "vehicle",
+            "file": "",
+            "line": 0,
+        }
+
+    time_us = np.array([text.time_us for text in recording.texts], dtype=np.int64)
+    return _channel("/texts", "foxglove.Log", time_us, row)
 
 
 def _path(recording: Recording, position: Samples) -> Channel:
@@ -191,12 +216,12 @@ def _path(recording: Recording, position: Samples) -> Channel:
         "lines": [line],
         **empty,
     }
-    rows = [{"deletions": [], "entities": [entity]}]
-    return _channel("/path", "foxglove.SceneUpdate", np.array([first_us]), rows)
+    scene: Json = {"deletions": [], "entities": [entity]}
+    return _channel("/path", "foxglove.SceneUpdate", np.array([first_us]), lambda _: scene)
 
 
-def _channel(topic: str, schema: str, time_us: AnyArray, rows: list[Json]) -> Channel:
-    return Channel(topic, schema, {name: _described(value) for name, value in rows[0].items()}, time_us, rows)
+def _channel(topic: str, schema: str, time_us: AnyArray, row: Callable[[int], Json]) -> Channel:
+    return Channel(topic, schema, {name: _described(value) for name, value in row(0).items()}, time_us, row)
 
 
 def _described(value: Any) -> Json:
@@ -209,11 +234,7 @@ def _described(value: Any) -> Json:
     return {"type": names.get(type(value), "number")}
 
 
-def _rows(found: Samples) -> Iterator[tuple[int, list[float]]]:
-    return zip(found.time_us.tolist(), found.values.tolist(), strict=True)
-
-
-def _time(recording: Recording, time_us: int) -> Json:
+def _time(recording: Recording, time_us: int | np.int64) -> Json:
     seconds, nanoseconds = divmod(max(0, recording.unix_ns(time_us)), 1_000_000_000)
     return {"sec": seconds, "nsec": nanoseconds}
 

@@ -75,13 +75,16 @@ ORIGIN = (
 )
 
 
-def samples(recording: Recording, sources: Sequence[Source], width: int) -> Samples:
-    """Return the first source that the log has, with ``width`` columns; rows that are not finite are left out."""
+def samples(recording: Recording, sources: Sequence[Source], width: int, *, finite: bool = True) -> Samples:
+    """Return the first source that the log has, with ``width`` columns.
+
+    With ``finite``, rows that hold a NaN or an infinity are left out.
+    """
     for source in sources:
         topic = recording.topic(source.topic)
         columns = None if topic is None else topic.columns(list(source.fields))
         if topic is not None and columns is not None:
-            good = np.isfinite(columns).all(axis=1)
+            good = np.isfinite(columns).all(axis=1) | (not finite)
             factors = np.array(source.factors or (1.0,) * width)
             return Samples(topic.time_us[good], columns[good] * factors)
     return Samples(np.zeros(0, dtype=np.int64), np.zeros((0, width)))

@@ -89,8 +89,8 @@ class Recording:
     topics: tuple[Topic, ...]
     texts: tuple[LogText, ...] = ()
     info: Mapping[str, Any] = field(default_factory=dict)
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    """At the start, or as the vehicle sent them."""
+    parameters: Mapping[str, int | float] = field(default_factory=dict)
+    """At the start, or as the vehicle sent them; integers are ``int``."""
     changes: tuple[ParameterChange, ...] = ()
     dropouts: tuple[Dropout, ...] = ()
     damaged: bool = False
@@ -109,7 +109,7 @@ class Recording:
         """Return a time of the log as seconds since its start."""
         return (time_us - self.start_us) * 1e-6
 
-    def unix_ns(self, time_us: int) -> int:
+    def unix_ns(self, time_us: int | np.int64) -> int:
         """Return a time of the log as ns since 1970; the log starts in 1970 if its date is unknown."""
         return (int(time_us) + (self.epoch_us or 0)) * 1000
 

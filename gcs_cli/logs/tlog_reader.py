@@ -10,18 +10,21 @@ import numpy as np
 from flightstack.core.errors import ConfigError
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
-from flightstack.mavlink.param_values import HASH_NAME, REAL32
+from flightstack.mavlink.param_values import HASH_NAME, REAL32, integer_of
+from gcs_cli.autopilots.registry import autopilot_of
 from gcs_cli.link.tlog import Record, decode_records, encode_record
 from gcs_cli.logs.recording import TLOG, AnyArray, LogText, Recording, Topic
 
 _Key: TypeAlias = tuple[int, int, str]
 """System, component and message."""
+_LATEST_US = 1 << 53
+"""In the year 2255."""
 _NOT_AUTOPILOTS = (mavlink.MAV_AUTOPILOT_INVALID,)
 
 
 def read_tlog(content: bytes, source: str) -> Recording:
     """Read the bytes of a tlog, complete or truncated; raise ConfigError, which names ``source``."""
-    records = list(decode_records(content))
+    records = dated_records(content)
     link = Link(0, 0)
     messages: dict[_Key, list[tuple[int, Message]]] = {}
     for record in records:
@@ -53,6 +56,11 @@ def read_tlog(content: bytes, source: str) -> Recording:
         unknown=link.bad,
         vehicle=vehicle,
     )
+
+
+def dated_records(content: bytes) -> list[Record]:
+    """Return the records of a tlog whose time is possible: damage can make any number of it."""
+    return [record for record in decode_records(content) if record.time_us < _LATEST_US]
 
 
 def vehicle_in(messages: dict[_Key, list[tuple[int, Message]]]) -> tuple[int, int]:
@@ -108,12 +116,12 @@ def _word(enum: str, value: int) -> str:
     return str(value) if entry is None else entry.name.removeprefix(f"{enum}_").lower()
 
 
-def _value(message: Message, own: dict[str, list[tuple[int, Message]]]) -> float:
-    """Return a parameter's value: an integer's bytes on PX4, a number on ArduPilot."""
-    bytewise = any(beat.autopilot == mavlink.MAV_AUTOPILOT_PX4 for _, beat in own.get("HEARTBEAT", ())[:1])
-    if not bytewise or message.param_type == REAL32:
+def _value(message: Message, own: dict[str, list[tuple[int, Message]]]) -> int | float:
+    """Return a parameter's value: that of an integer is in the bits of the float, or cast, by autopilot."""
+    if message.param_type == REAL32:
         return float(message.param_value)
-    return float(np.float32(message.param_value).view(np.int32))
+    casts = any(autopilot_of(beat.autopilot).casts_parameters for _, beat in own.get("HEARTBEAT", ())[:1])
+    return round(message.param_value) if casts else integer_of(message.param_value)
 
 
 def _size_of(records: Sequence[Record]) -> int:

@@ -31,7 +31,7 @@ def read_ulog(content: bytes, source: str) -> Recording:
         topics=topics,
         texts=tuple(sorted(_texts(log))),
         info=dict(log.msg_info_dict),
-        parameters={name: float(value) for name, value in log.initial_parameters.items()},
+        parameters=dict(log.initial_parameters),
         changes=tuple(
             ParameterChange(int(time_us), name, float(value))
             for time_us, name, value in log.changed_parameters
@@ -45,7 +45,7 @@ def read_ulog(content: bytes, source: str) -> Recording:
 def _topics(log: Any) -> Iterator[Topic]:
     names = Counter(item.name for item in log.data_list)
     for item in sorted(log.data_list, key=lambda item: (item.name, item.multi_id)):
-        if not len(item.data["timestamp"]):
+        if not len(item.data.get("timestamp", ())):  # damaged definitions may lack it
             continue
         several = names[item.name] > 1 and item.multi_id > 0
         yield Topic(

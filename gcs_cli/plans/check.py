@@ -17,6 +17,7 @@ from flightstack.plan import (
     fence_shape,
     mission_rejections,
 )
+from flightstack.plan.check import leg_rejections
 
 LIMIT_PARAMETERS = ("MIS_DIST_1WP", "MIS_DIST_WPS", "GF_MAX_VER_DIST", "GF_MAX_HOR_DIST")
 
@@ -48,16 +49,21 @@ def plan_problems(
     home: GeoPoint,
     limits: Limits = DEFAULT_LIMITS,
     fence: Sequence[MissionItem] | None = None,
+    *,
+    is_foreign: bool = False,
 ) -> Iterator[Problem]:
     """Yield the problems of geofence, mission and rally points, in this order.
 
-    ``fence``: the vehicle's geofence, which holds for a plan without one.
+    ``fence``: the vehicle's geofence, which holds for a plan without one. ``is_foreign``: the vehicle flies commands
+    that the flight stack does not, so that only the geofence is checked.
     """
     areas = plan.fence or tuple(fence or ())
     shape = fence_shape(areas, home)
     if plan.fence:
         yield from _problems("geofence", [check_fence(plan.fence, home)])
-    if plan.items:
+    if plan.items and is_foreign:
+        yield from _problems("mission", leg_rejections(plan.items, home, shape))
+    elif plan.items:
         yield from _problems("mission", mission_rejections(plan.items, home, limits, shape))
     yield from _problems("list of rally points", [check_rally(plan.rally, home, limits, shape)])
 

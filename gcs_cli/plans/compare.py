@@ -47,7 +47,9 @@ class Tolerance(NamedTuple):
 
 
 EXACT = Tolerance()
-PACKED = Tolerance(altitude_m=0.01, degrees_e7=1, nan_is_zero=True, keeps_autocontinue=False)
+PACKED = Tolerance(  # ArduPilot packs an item into 15 bytes
+    altitude_m=0.01, degrees_e7=1, nan_is_zero=True, keeps_autocontinue=False
+)
 
 
 def differences(

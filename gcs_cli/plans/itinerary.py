@@ -105,11 +105,12 @@ def flown_order(items: Sequence[MissionItem]) -> Iterator[int | None]:
         if jumps:
             left[seq] -= left[seq] > 0.0
             seq = int(items[seq].param1)
-        else:
+            continue
+        if items[seq].command != Command.DO_JUMP:
             yield seq
-            if items[seq].command == Command.NAV_RETURN_TO_LAUNCH:
-                return
-            seq += 1
+        if items[seq].command == Command.NAV_RETURN_TO_LAUNCH:
+            return
+        seq += 1
 
 
 def _target(

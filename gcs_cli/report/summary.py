@@ -108,9 +108,9 @@ def _control(flight: Flight) -> dict[str, Any]:
 
 
 def _flight_time_s(flight: Flight) -> float | None:
-    """Time in the air, from takeoff to touchdown; None without a log of positions."""
+    """Time in the air, from takeoff to touchdown; None without a log of positions and of the arming state."""
     time_s = flight.position.time_s
-    if len(time_s) < 2:
+    if len(time_s) < 2 or not flight.statuses:
         return None
     return _rounded(float(np.diff(time_s)[flight.flying(time_s)[:-1]].sum()))
 

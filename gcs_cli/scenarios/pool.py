@@ -155,6 +155,12 @@ class Pool:
         finally:
             self._cancel_from(0)
 
+    def renew(self) -> None:
+        """Replace the idle workers by one that has imported no plug-in controller: its source may change."""
+        for worker in self._idle:
+            worker.end()
+        self._idle = [_Worker(self._answers)]
+
     def _take(self) -> _Worker:
         worker = self._idle.pop() if self._idle else _Worker(self._answers)
         self._busy.append(worker)

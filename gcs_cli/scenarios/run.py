@@ -13,6 +13,7 @@ from rich.console import Console
 
 from flightstack.core.atomic_file import write_bytes_atomically, write_text_atomically
 from flightstack.core.errors import ConfigError
+from flightstack.testing.scenario import forget_controllers
 from gcs_cli.errors import DONE, FAILED, INTERRUPTED, CliError
 from gcs_cli.report.run_directory import LOG_NAME, REPORT_NAME, RUNS, fresh_directory
 from gcs_cli.scenarios.display import Display, make_display, print_failures, print_summary
@@ -92,6 +93,7 @@ def run_watching(pool: Pool, options: TestOptions, console: Console) -> int:
             _write(whole, options)
             _print(run, options, console)
             _check_complete(run)
+            pool.renew()
             console.print(f"watching {stamps.count} files; Ctrl-C ends", style="bright_black")
             cases = _changed_cases(stamps, options, console)
     return code
@@ -113,6 +115,7 @@ def _changed_cases(stamps: Stamps, options: TestOptions, console: Console) -> li
         time.sleep(_POLL_S)
         try:
             if stamps.poll(find_scenarios(_paths(options))):
+                forget_controllers()
                 return _cases(options)
         except (ConfigError, CliError) as error:
             if str(error) != shown:

@@ -34,7 +34,7 @@ from gcs_cli.sim.sim_vehicles import (
 )
 from gcs_cli.vehicle_link import open_signing
 
-_STEP_S = 0.05
+_STEP_S = 0.1
 _REQUEST_S = 0.25
 """Pause between two requests for the vehicle's state before it is ready."""
 _END_TIMEOUT_S = 10.0

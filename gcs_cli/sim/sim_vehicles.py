@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -124,6 +125,7 @@ def connections(vehicle: SimOptions) -> dict[str, Any]:
 def ready_text(vehicle: SimOptions) -> str:
     """Return the lines that say how to connect to the vehicle."""
     facts = connections(vehicle)
+    key = "" if vehicle.signing_key is None else f" --signing-key {shlex.quote(str(vehicle.signing_key))}"
     number = "" if vehicle.instance == 0 else f" --instance {vehicle.instance}"
     port = facts["ground_station_port"]
     stations = [f"UDP {port}" + ("" if vehicle.instance == 0 else ", added as a link")]
@@ -132,7 +134,7 @@ def ready_text(vehicle: SimOptions) -> str:
     rows = (
         ("MAVSDK", facts["mavsdk"]),
         ("QGroundControl", stations[0]),
-        ("gcs", f"gcs{number} status"),
+        ("gcs", f"gcs{key}{number} status"),
         ("any program", facts["tcp"]),
     )
     title = f"vehicle {facts['system_id']} is ready: {vehicle.vehicle}"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, TypeAlias
+
 from flightstack.core.enums import Severity
 from flightstack.mavlink.param_values import Parameter
 from gcs_cli.clients.ftp_client import FtpClient, FtpDone
@@ -14,13 +17,23 @@ from gcs_cli.vehicle.param_info import METADATA_PATH, ParamInfo, number_text, pa
 METADATA_WAIT_S = 3.0
 """Timeout of the parameter metadata; many vehicles have none."""
 TIMING = ParamTiming()
+Progress: TypeAlias = Callable[[int, int], None]
+"""Called with the transferred parameters and their total."""
 
 
-def fetch_all(connection: Connection) -> tuple[Parameter, ...]:
-    """Return all parameters, sorted by name; raise CliError."""
+class Changes(NamedTuple):
+    """Result of setting several parameters."""
+
+    changed: tuple[Parameter, ...]
+    failures: tuple[str, ...]
+    """The reasons of those that were not set."""
+
+
+def fetch_all(connection: Connection, show: Progress | None = None) -> tuple[Parameter, ...]:
+    """Return all parameters, sorted by name; raise CliError. ``show`` gets the received number and the total."""
     client = _param_client(connection)
     client.start_list()
-    connection.run(client, "the parameter list")
+    connection.run(client, "the parameter list", show=show)
     if isinstance(client.result, ParamDone):
         return tuple(sorted(client.result.parameters))
     raise _error(client.result, "parameters")
@@ -49,6 +62,31 @@ def change(connection: Connection, name: str, value: float) -> Parameter:
         said = _explanation(connection, name, texts_before)
         result = result if said is None else result._replace(reason=said)
     raise _error(result, f"{name} = {number_text(value)}")
+
+
+def change_all(
+    connection: Connection,
+    wanted: Mapping[str, float],
+    present: Mapping[str, Parameter],
+    show: Progress | None = None,
+) -> Changes:
+    """Set the parameters that differ from ``present``; raise CliError if the vehicle does not answer."""
+    changed: list[Parameter] = []
+    failures: list[str] = []
+    for number, (name, value) in enumerate(wanted.items(), 1):
+        if show is not None:
+            show(number, len(wanted))
+        if name in present and number_text(present[name].value) == number_text(value):
+            continue
+        try:
+            if name not in present:
+                raise CliError(f"{name}: the vehicle has no such parameter")
+            changed.append(change(connection, name, value))
+        except CliError as error:
+            if error.exit_code != FAILED:
+                raise
+            failures.append(str(error))
+    return Changes(tuple(changed), tuple(failures))
 
 
 def fetch_metadata(connection: Connection) -> dict[str, ParamInfo]:
@@ -83,4 +121,6 @@ def _error(result: object, what: str) -> CliError:
 
 
 def _param_client(connection: Connection) -> ParamClient:
-    return ParamClient(vehicle_address(connection.session), connection.session.own, TIMING)
+    session = connection.session
+    casts = session.view.autopilot.casts_parameters
+    return ParamClient(vehicle_address(session), session.own, TIMING, casts=casts)

@@ -86,7 +86,7 @@ class Uploads:
         self._current: MissionType | None = None
         self._is_restoring = False
         self._restore_due_s: float | None = None
-        self._is_gradual = calls.mission_begins_with_home(session)
+        self._is_gradual = not session.view.autopilot.replaces_plans_at_once
         """True if the vehicle overwrites a part item by item, as ArduPilot; others replace it after the last item."""
         self._now_s = 0.0
         self.name = self._parts[0].name

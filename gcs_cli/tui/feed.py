@@ -62,6 +62,7 @@ class Feed:
         self._running: dict[int, _Running] = {}
         self._rates_hz: dict[int, float] = dict(ROTORS_AND_TIMING)
         self._stopping = threading.Event()
+        self._order = threading.Event()
         self._thread: threading.Thread | None = None
 
     @property
@@ -115,7 +116,18 @@ class Feed:
 
         A new action ends the wait for the effect of the former one.
         """
+        self._order.set()
         self.submit(lambda connection: self._begin(action, connection))
+
+    @property
+    def order_waits(self) -> bool:
+        """True if an action waits for the end of a job."""
+        return self._order.is_set()
+
+    def tell(self, text: str, severity: Severity = Severity.NOTICE) -> None:
+        """Show a line for a moment, and keep it among the messages."""
+        self.notices.append(Notice(text, severity))
+        self.submit(lambda connection: self.messages.say(connection.session.view, text, severity))
 
     def keep_rate(self, message_id: int, rate_hz: float | None) -> None:
         """Request a stream of the screens at this rate from now on; not at all if it is 0, or None for the default."""
@@ -153,6 +165,7 @@ class Feed:
             future.set_exception(error)
 
     def _begin(self, action: Action, connection: Connection) -> None:
+        self._order.clear()
         if connection.is_recording:
             self._say(connection.session, f"{action.name}: a recording takes no commands", Severity.WARNING)
             return

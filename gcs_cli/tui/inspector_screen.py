@@ -76,7 +76,7 @@ class InspectorScreen(WatchScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Read the messages, unless paused."""
         super().show(view, now_s)
-        if self.query(LineList) and not self._is_paused and watch_app(self).redraws % _EVERY == 0:
+        if not self._is_paused and watch_app(self).redraws % _EVERY == 0:
             self._rows = message_rows(watch_app(self).feed.history, now_s)
             self._redraw()
 

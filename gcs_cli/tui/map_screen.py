@@ -69,7 +69,7 @@ class MapScreen(WatchScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the map, and download the plans if they changed."""
         super().show(view, now_s)
-        if not self.query(MapWidget) or watch_app(self).redraws % _EVERY:
+        if watch_app(self).redraws % _EVERY:
             return
         history = watch_app(self).feed.history
         system_id = None if view.identity is None else view.identity.system_id

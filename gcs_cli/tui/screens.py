@@ -38,4 +38,7 @@ SCREENS = (
         "gcs_cli.tui.inspector_screen:InspectorScreen",
         "every message with its fields",
     ),
+    ScreenEntry(
+        "parameters", "7", "Parameters", "gcs_cli.tui.param_screen:ParamScreen", "search, edit, compare, save"
+    ),
 )

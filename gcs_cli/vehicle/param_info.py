@@ -34,6 +34,9 @@ class ParamInfo(NamedTuple):
     help: str = ""
     choices: tuple[tuple[float, str], ...] = ()
     reboot_required: bool = False
+    details: str = ""
+    """The long description."""
+    group: str = ""
 
     @property
     def range_text(self) -> str:
@@ -88,6 +91,8 @@ def _info(entry: dict[str, Any]) -> ParamInfo:
         _text(entry.get("shortDesc")),
         tuple(choices),
         entry.get("rebootRequired") is True,
+        _text(entry.get("longDesc")),
+        _text(entry.get("group")),
     )
 
 
@@ -114,7 +119,7 @@ def render_parameters(parameters: Iterable[Parameter], system_id: int, component
         "# Vehicle-Id Component-Id Name Value Type",
     ]
     for parameter in parameters:
-        kind = INT32 if parameter.is_integer else REAL32
+        kind = parameter.kind or (INT32 if parameter.is_integer else REAL32)
         value = number_text(parameter.value)
         lines.append(f"{system_id}\t{component_id}\t{parameter.name}\t{value}\t{kind}")
     return "\n".join(lines) + "\n"

@@ -41,6 +41,7 @@ def facts(parameter: Parameter, infos: Infos) -> dict[str, Any]:
         "max": info.high,
         "unit": info.unit or None,
         "help": info.help or None,
+        "details": info.details or None,
         "choices": {number_text(value): text for value, text in info.choices} or None,
     }
 
@@ -81,6 +82,8 @@ def description(parameter: Parameter, info: ParamInfo) -> str:
     lines = [f"{parameter.name} = {number_text(parameter.value)}{_unit(info)}"]
     if info.help:
         lines.append(f"  {info.help}")
+    if info.details:
+        lines.append(f"  {info.details}")
     limits = [
         f"default {number_text(info.default)}" if info.default is not None else "",
         f"range {info.range_text}" if info.range_text and not info.choices else "",

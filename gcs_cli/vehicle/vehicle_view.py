@@ -36,7 +36,7 @@ _NO_NUMBER = 65535  # MISSION_CURRENT.total when the vehicle has no mission
 _NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
 _RESTART_S = 1.0
 """Step back of the vehicle's clock that no reordering of datagrams explains."""
-_ATTITUDE, _VELOCITY, _POSITION, _ALTITUDE, _CONSTANT = 1, 0b110, 1 << 4, 1 << 5, 1 << 7
+_ATTITUDE, _VELOCITY, _POSITION, _ALTITUDE = 1, 0b110, 1 << 4, 1 << 5
 """Flags of ESTIMATOR_STATUS and EKF_STATUS_REPORT."""
 
 
@@ -189,7 +189,7 @@ def _estimator(flags: int, ratios: Iterable[float]) -> Estimator:
     return Estimator(
         bool(flags & _ATTITUDE),
         flags & _VELOCITY == _VELOCITY,
-        bool(flags & _POSITION) and not flags & _CONSTANT,
+        bool(flags & _POSITION),
         bool(flags & _ALTITUDE),
         max(finite, default=None),
     )
@@ -233,8 +233,10 @@ def _local_position(view: VehicleView, message: Any, _now_s: float) -> VehicleVi
 
 
 def _global_position(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    """Take the position; ArduPilot sends zeros until it has one."""
     geo = GeoPosition(message.lat / 1e7, message.lon / 1e7, message.alt / 1e3, message.relative_alt / 1e3)
-    return view._replace(geo=geo, time_s=message.time_boot_ms / 1e3)
+    is_known = any(geo[:3])
+    return view._replace(geo=geo if is_known else None, time_s=message.time_boot_ms / 1e3)
 
 
 def _home(view: VehicleView, message: Any, _now_s: float) -> VehicleView:

@@ -28,7 +28,8 @@ _KINDS = {
     43: ("multirotor", 0),
 }
 """Name and number of rotors by MAV_TYPE."""
-MISSION_COMPLETE = 5  # MISSION_STATE_COMPLETE
+NO_MISSION, MISSION_ACTIVE, MISSION_COMPLETE = 1, 3, 5
+"""MISSION_STATE."""
 
 
 class Vector(NamedTuple):
@@ -296,6 +297,13 @@ class VehicleView(NamedTuple):
     def terminated(self) -> bool:
         """True if the vehicle has terminated the flight."""
         return self.system_status == _TERMINATED
+
+    @property
+    def has_position(self) -> bool:
+        """True if the position is known and the estimator, if the autopilot reports it, holds it for valid."""
+        if self.estimator is None:
+            return self.geo is not None and not self.autopilot.reports_estimator
+        return self.geo is not None and self.estimator.has_position
 
     @property
     def on_ground(self) -> bool | None:

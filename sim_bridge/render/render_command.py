@@ -51,7 +51,7 @@ def render(
 def _render(poses: Path, options: PictureOptions, vehicle: str | None, caller: str) -> None:
     request = parse_request(options)
     is_mp4 = request.video is not None and request.video.suffix.lower() == ".mp4"
-    require(caller.rsplit(maxsplit=1)[-1], "PIL", *(["imageio_ffmpeg"] if is_mp4 else []))
+    require(caller.split(maxsplit=1)[-1], "PIL", *(["imageio_ffmpeg"] if is_mp4 else []))
     from flightstack.flight_log.poses_file import read_poses  # noqa: PLC0415
     from flightstack.params.vehicle import load_vehicle  # noqa: PLC0415
     from sim_bridge.render.poses import FlightPath  # noqa: PLC0415

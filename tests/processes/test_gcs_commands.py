@@ -6,8 +6,6 @@ import functools
 import io
 import json
 import os
-import pty
-import select
 import signal
 import subprocess
 import sys
@@ -17,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import flightstack
+from flightstack.mavlink.dialect import mavlink
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.__main__ import main
 from gcs_cli.clients.command_client import CommandClient, CommandTiming
@@ -243,6 +242,15 @@ def test_download_of_all_logs_goes_on_after_one_that_exists(
     assert grown.read_bytes() == b"new"
 
 
+def test_logs_of_ardupilot_are_named_bin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_calls, "fetch_list", lambda _: (LogEntry(1, 3, 0),))
+    monkeypatch.setattr(log_calls, "fetch_files", lambda _: ())
+    monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
+    vehicle = FakeVehicle(autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
+    assert told(vehicle, "log", "download", "-o", tmp_path).returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["log_1.bin"]
+
+
 def test_a_vehicle_without_geofence_is_downloaded_from() -> None:
     vehicle = FakeVehicle(unknown_types=(1, 2))
     result = told(vehicle, "mission", "download")
@@ -275,6 +283,7 @@ def test_status_as_json() -> None:
     assert facts["battery_remaining"] is None
     assert result.returncode == 0
     lines = told(FakeVehicle(), "status").stdout.splitlines()
+    assert facts.pop("event") == "status"
     assert len(lines) == len(facts)
 
 
@@ -400,85 +409,3 @@ def test_a_full_disk_behind_the_output_is_one_sentence() -> None:
     with Path("/dev/full").open("w") as full:
         result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, timeout=LONG_S, check=False)
     assert (result.stderr, result.returncode) == (b"gcs: No space left on device\n", 1)
-
-
-def test_watch_prints_lines_without_a_terminal() -> None:
-    vehicle = FakeVehicle()
-    with serve(vehicle) as socket:
-        command = [
-            sys.executable,
-            "-m",
-            "gcs_cli",
-            "watch",
-            "--connect",
-            f"udpout:127.0.0.1:{socket.address[1]}",
-        ]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-            assert process.stdout is not None
-            assert process.stderr is not None
-            line = next(line for line in process.stdout if "HOLD" in line)
-            process.send_signal(signal.SIGINT)
-            assert process.wait(LONG_S) == 0
-            assert "N +1.00 E +2.00 up 3.00 m" in line
-            assert process.stderr.read() == ""
-
-
-def test_a_reader_that_goes_away_ends_the_watch() -> None:
-    with serve(FakeVehicle()) as socket:
-        link = f"udpout:127.0.0.1:{socket.address[1]}"
-        command = [sys.executable, "-m", "gcs_cli", "watch", "--connect", link]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-            assert process.stdout is not None
-            assert process.stderr is not None
-            process.stdout.readline()
-            process.stdout.close()
-            assert process.wait(LONG_S) == 0
-            assert process.stderr.read() == b""
-
-
-# makes the terminal on stdin the process's own, so that Ctrl-C reaches it
-ON_ITS_TERMINAL = """
-import fcntl, os, sys, termios
-os.setsid()
-fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-os.execv(sys.executable, [sys.executable, "-m", "gcs_cli", *sys.argv[1:]])
-"""
-
-
-@pytest.mark.parametrize("ending", [b"q", b"\x03", signal.SIGTERM], ids=["q", "Ctrl-C", "SIGTERM"])
-def test_watch_draws_on_a_terminal_and_restores_it(ending: bytes | signal.Signals) -> None:
-    terminal, inner = pty.openpty()
-    try:
-        with serve(FakeVehicle()) as socket:
-            link = f"udpout:127.0.0.1:{socket.address[1]}"
-            process = subprocess.Popen(
-                [sys.executable, "-c", ON_ITS_TERMINAL, "watch", "--connect", link],
-                stdin=inner, stdout=inner, stderr=inner,
-                env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24"},
-            )  # fmt: skip
-            seen = _read_until(terminal, b"Attitude")
-            assert b"\x1b[?1049h" in seen  # the alternate screen
-            if isinstance(ending, bytes):
-                os.write(terminal, ending)
-            else:
-                process.send_signal(ending)
-            seen += _read_until(terminal, b"\x1b[?1049l")
-            assert process.wait(LONG_S) == 0
-            assert b"Traceback" not in seen
-    finally:
-        os.close(inner)
-        os.close(terminal)
-
-
-MOST_READS = 2000
-"""Of a terminal that is drawn eight times a second: minutes."""
-
-
-def _read_until(terminal: int, wanted: bytes) -> bytes:
-    seen = b""
-    for _ in range(MOST_READS):
-        if wanted in seen:
-            return seen
-        assert select.select([terminal], [], [], LONG_S)[0], f"{wanted!r} never came"
-        seen += os.read(terminal, 65536)
-    raise AssertionError(f"{wanted!r} never came, but {seen[-200:]!r}")

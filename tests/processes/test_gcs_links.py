@@ -118,6 +118,12 @@ def test_error_is_a_json_line_too(words: list[str]) -> None:
     assert result.stderr == f"gcs: {said['message']}\n"
 
 
+def test_json_may_stand_before_a_command() -> None:
+    with udp_vehicles(FakeVehicle()) as port:
+        result = gcs("--json", "--connect", f"udpout:127.0.0.1:{port}", "perf")
+    assert json.loads(result.stdout)["lockstep"] is True
+
+
 def test_second_process_uses_the_link_of_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """The vehicle talks to one client only, as PX4 does at its port for ground stations."""
     port, vehicle = free_port(), FakeVehicle()

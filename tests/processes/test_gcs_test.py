@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 import pytest
 
 from tests.support.commands import Ended, gcs
+from tests.support.plugin_site import ROOT, install
 from tests.support.process import BOUND_S, Process, children_of
 
 GOOD = "plan = 'hop'\n[expect]\nmax_error_m = 0.2\n"
@@ -218,3 +219,26 @@ def test_watch_flies_what_changed_until_ctrl_c(folder: Path) -> None:
     run.interrupt()
     assert run.end() == 0
     assert has_ended(worker)
+
+
+def test_watch_flies_a_changed_controller(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    site = folder / ".site"
+    site.mkdir()
+    install(site)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), str(ROOT)]))
+    write(a=f"controller = 'lqr'\ntorque_n_m = [0.005, 0.0, 0.0]\n{GOOD}")
+    # a new interpreter: the warm server has another path
+    run = Process("gcs_cli.__main__", "test", "--watch", "-j", "1", "--keep", "kept")
+    run.wait_for("PASS  a")
+    run.wait_for("watching 3 files")
+    law = site / "lqr_controller.py"
+    text = law.read_text()
+    law.write_text(text.replace("roll = params", "roll = -params"))
+    run.wait_for("FAIL  a")
+    run.wait_for("watching 3 files")
+    law.write_text("1 / 0\n")
+    run.wait_for("cannot be loaded: division by zero")
+    law.write_text(text)
+    run.wait_for("PASS  a")
+    run.interrupt()
+    assert run.end() == 0

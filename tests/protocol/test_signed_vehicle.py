@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, NamedTuple
 
 import pytest
@@ -16,6 +17,7 @@ from flightstack.testing import World
 KEY, OTHER_KEY = bytes(range(32)), bytes(range(1, 33))
 HERE, ELSEWHERE = "127.0.0.1", "192.0.2.7"
 NOW_S = 1.75e9
+STARTS_S = itertools.count(0.0, 1000.0)
 REQUEST_LIST = common.MAVLink_param_request_list_message(1, 1)
 
 
@@ -28,7 +30,7 @@ class Station:
         self.hub, self.address = vehicle.world.engine.stack.ground, PeerAddress(GROUND, host, 5000 + system)
         self.codec = common.MAVLink(None, system, 190)
         self.codec.robust_parsing = True
-        self.now_s = 0.0
+        self.now_s = vehicle.began_s
         if key is not None:
             self.codec.signing.secret_key, self.codec.signing.sign_outgoing = key, True
             self.codec.signing.timestamp = timestamp_of(NOW_S)
@@ -63,6 +65,8 @@ class SignedVehicle(NamedTuple):
     stored: list[bytes]
     """Keys that were kept for the next start."""
     heard_before_s: float
+    began_s: float
+    """Start of the test on the clock of the links, which never goes back."""
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +79,8 @@ def vehicle(shared: World) -> SignedVehicle:
     """The vehicle on the ground, with a key and no peers."""
     for address, _ in shared.engine.stack.ground.addresses():
         shared.engine.stack.ground.drop_peer(address)
-    signed = SignedVehicle(shared, Signing(KEY, lambda: NOW_S), [], shared.engine.stack.ground.last_heard_s)
+    heard_s = shared.engine.stack.ground.last_heard_s
+    signed = SignedVehicle(shared, Signing(KEY, lambda: NOW_S), [], heard_s, next(STARTS_S))
     shared.engine.stack.ground.use_signing(signed.signing, signed.stored.append)
     return signed
 

@@ -230,5 +230,7 @@ class FakeArduCopter:
                 above_mm, 0, 0, 0, round(self.heading_deg * 100),
             ),
             apm.MAVLink_sys_status_message(check, check, health, 0, 12600, 0, 100, 0, 0, 0, 0, 0, 0),
+            apm.MAVLink_mission_current_message(0, 3, 3 if self.mode == AUTO else 2, 0),
+            apm.MAVLink_ekf_status_report_message(831 if self.has_position else 167, 0, 0, 0, 0, 0),
             apm.MAVLink_extended_sys_state_message(0, 2 if self.altitude_m > 0.1 else 1),
         ]  # fmt: skip

@@ -16,6 +16,7 @@ from flightstack.mavlink.dialect import EscStatus, FsLoopTiming, mavlink
 from flightstack.transports.udp import UdpSocket
 
 ARM, START, SHUT_DOWN, REQUEST, RETURN, SET_INTERVAL = 400, 300, 246, 512, 20, 511
+SET_CURRENT = 224
 LAND_NOW, TAKE_OFF, SET_MODE = 21, 22, 176
 TAKEOFF, HOLD, MISSION, RTL, LAND = (4 << 16 | sub << 24 for sub in (2, 3, 4, 5, 6))
 HOME_M = 488.0
@@ -48,6 +49,7 @@ class FakeVehicle:
     at_stop: str = "disarm"
     ends_in_air: bool = False
     simulated_s_per_item: float = 5.0
+    autopilot: int = mavlink.MAV_AUTOPILOT_PX4
 
     def __post_init__(self) -> None:
         self.codec = mavlink.MAVLink(None, self.system_id, 1)
@@ -102,7 +104,10 @@ class FakeVehicle:
         if command == ARM:
             self._become(armed=params[0] == 1.0)
         elif command == START:
-            self._become(mode=MISSION)
+            self._become(armed=True, mode=MISSION)
+        elif command == SET_CURRENT:
+            self.current = int(params[0])
+            self._out.append(self._mission_current())
         elif command == RETURN:
             self._become(mode=RTL)
         elif command == SHUT_DOWN:
@@ -249,7 +254,7 @@ class FakeVehicle:
     def _heartbeat(self) -> Any:
         base = 128 * self.armed + mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         state = mavlink.MAV_STATE_POWEROFF if self.powered_off else mavlink.MAV_STATE_ACTIVE
-        return mavlink.MAVLink_heartbeat_message(2, mavlink.MAV_AUTOPILOT_PX4, base, self.mode, state, 3)
+        return mavlink.MAVLink_heartbeat_message(2, self.autopilot, base, self.mode, state, 3)
 
     def _sys_status(self) -> Any:
         sensors = mavlink.MAV_SYS_STATUS_AHRS

@@ -7,9 +7,10 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
+from flightstack.core.enums import Severity
 from gcs_cli.actions.action import Action
 from gcs_cli.link.connection import Connection
-from gcs_cli.tui.feed import Feed
+from gcs_cli.tui.feed import Feed, Notice
 from gcs_cli.tui.history import History
 from gcs_cli.tui.message_log import MessageLog
 from gcs_cli.vehicle.view_types import VehicleView
@@ -26,6 +27,7 @@ class StillFeed(Feed):
         self.commands_all = False
         self.others: list[VehicleView] = []
         self.error = None
+        self._rates_hz = {}
         self.shown = view
         self.time_s = now_s
         self.jobs: list[tuple[Callable[[Connection], Any], Future[Any]]] = []
@@ -57,6 +59,14 @@ class StillFeed(Feed):
 
     def act(self, action: Action) -> None:
         self.actions.append(action)
+
+    @property
+    def order_waits(self) -> bool:
+        return bool(self.actions)
+
+    def tell(self, text: str, severity: Severity = Severity.NOTICE) -> None:
+        self.notices.append(Notice(text, severity))
+        self.messages.say(self.shown, text, severity)
 
     def start(self) -> None:
         """Nothing runs."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import importlib
 import os
-import shutil
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import numba
@@ -31,27 +29,9 @@ from flightstack.process.assembly import build
 from flightstack.testing import World
 from tests.support.commands import flightstack_command
 from tests.support.console_blocks import File, steps
+from tests.support.plugin_site import EXAMPLE, GROUP, ROOT, install
 
-ROOT = Path(__file__).resolve().parents[2]
-EXAMPLE = ROOT / "tests" / "support" / "example_controller"
 MODULE = (EXAMPLE / "lqr_controller.py").read_text(encoding="utf-8")
-GROUP = "flightstack.attitude_controllers"
-
-
-def install(site: Path, project: Path = EXAMPLE) -> Path:
-    """Do what pip does with the project, without a network: its module and its metadata into ``site``."""
-    with (project / "pyproject.toml").open("rb") as file:
-        declared = tomllib.load(file)["project"]
-    for source in project.glob("*.py"):
-        shutil.copy(source, site)
-    info = site / f"{declared['name'].replace('-', '_')}-{declared['version']}.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(
-        f"Metadata-Version: 2.1\nName: {declared['name']}\nVersion: {declared['version']}\n"
-    )
-    entries = [f"{name} = {value}" for name, value in declared["entry-points"][GROUP].items()]
-    (info / "entry_points.txt").write_text(f"[{GROUP}]\n" + "\n".join(entries) + "\n")
-    return site
 
 
 @pytest.fixture

@@ -41,7 +41,9 @@ def output_of(*arguments: str, **environment: str) -> str:
     return result.stdout
 
 
-@pytest.mark.parametrize("words", [[], ["param"], ["pil"], ["fly"], ["test"], ["pil", "fly"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "words", [[], ["param"], ["pil"], ["fly"], ["sim"], ["log"], ["test"], ["pil", "fly"]], ids=" ".join
+)
 def test_help_imports_nothing_heavy(words: list[str]) -> None:
     assert f"Usage: {' '.join(['gcs', *words])}" in output_of(*words, "--help")
 
@@ -60,3 +62,30 @@ def test_help_imports_nothing_heavy(words: list[str]) -> None:
 def test_completion_imports_nothing_heavy(line: str, completion: str) -> None:
     shell = {"_GCS_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
     assert completion in output_of(**shell).splitlines()
+
+
+LATE = (
+    "numba",
+    "scipy",
+    "matplotlib",
+    "pyulog",
+    "rich.console",
+    "jinja2",
+    "plotly",
+    "textual",
+    "serial",
+)
+"""Libraries that a command about messages does not use; a serial port is opened with the last one."""
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        f"gcs_cli.commands.{name}"
+        for name in ("actions", "status", "messages", "listen", "send", "record", "shell")
+    ],
+)
+def test_command_imports_only_the_link(module: str) -> None:
+    code = f"import sys, {module}; print(*[name for name in {LATE!r} if name in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == ""

@@ -53,7 +53,7 @@ def test_names_from_the_vehicle_cannot_command_the_terminal(vehicle: ParamVehicl
         result = told(vehicle, *words)
         assert result.returncode == 0, result.stderr
         assert all(line.isprintable() for line in result.stdout.splitlines())
-    names = {entry["name"] for entry in json.loads(told(vehicle, "list", "--json").stdout)}
+    names = {json.loads(line)["name"] for line in told(vehicle, "list", "--json").stdout.splitlines()}
     assert names > {"�[2J", "A B C", "X�� Y", "[red]R[/]", "�"}
     assert "[red]R[/]" in told(vehicle, "list").stdout
 
@@ -106,12 +106,11 @@ def test_a_vehicle_without_metadata_is_listed_all_the_same() -> None:
 
 def test_the_list_as_json(vehicle: ParamVehicle) -> None:
     facts = json.loads(told(vehicle, "list", "yaw", "--json").stdout)
-    assert facts == [
-        {
-            "name": "MPC_YAW_MODE", "value": 0, "default": 0.0, "min": 0.0, "max": 5.0, "unit": None,
-            "help": "Heading of waypoints without yaw", "choices": {"0": "Towards the waypoint", "5": "Unchanged"},
-        }
-    ]  # fmt: skip
+    assert facts == {
+        "event": "parameter", "name": "MPC_YAW_MODE", "value": 0, "default": 0.0, "min": 0.0, "max": 5.0,
+        "unit": None, "help": "Heading of waypoints without yaw", "details": None,
+        "choices": {"0": "Towards the waypoint", "5": "Unchanged"},
+    }  # fmt: skip
 
 
 def test_a_pattern_that_matches_nothing(vehicle: ParamVehicle) -> None:
@@ -133,6 +132,12 @@ def test_get_tells_all_about_one(vehicle: ParamVehicle) -> None:
 def test_get_of_an_unknown_name(vehicle: ParamVehicle) -> None:
     result = told(vehicle, "get", "NONE")
     assert (result.stderr, result.returncode) == ("gcs: NONE refused: the vehicle has no such parameter\n", 1)
+
+
+def test_search_finds_by_description(vehicle: ParamVehicle) -> None:
+    found = told(vehicle, "search", "horizontal", "sped", "--json").stdout.splitlines()
+    assert [json.loads(line)["name"] for line in found] == ["MPC_XY_CRUISE"]
+    assert told(vehicle, "search", "battery").returncode == 1
 
 
 def test_set_says_what_it_changed(vehicle: ParamVehicle) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from flightstack.mavlink.link import Link
+from gcs_cli.actions.conditions import is_ready
 from gcs_cli.link.tlog import decode_records
 from gcs_cli.vehicle.vehicle_view import update
 from gcs_cli.vehicle.view_types import VehicleView
@@ -75,6 +76,13 @@ def test_px4_reports_its_state() -> None:
     assert (view.gnss.fix_name, view.gnss.satellites) == ("3D fix", 10)
     assert view.mission.reached == 2
     assert values(seen, lambda view: view.on_ground)[:3] == [None, True, False]
+
+
+def test_px4_has_a_position_while_it_stands() -> None:
+    """PX4 sets the flag of a constant position in ESTIMATOR_STATUS for a vehicle at rest."""
+    view = views("px4_sih_start")[-1]
+    assert view.has_position
+    assert is_ready(view)
 
 
 def test_messages_unknown_to_the_dialect_do_not_count_as_lost() -> None:

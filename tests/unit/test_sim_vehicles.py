@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from flightstack.__main__ import RunOptions
 from flightstack.core.geodesy import LocalFrame
 from flightstack.params.config import DEFAULT_HOME
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.sim import sim_run
 from gcs_cli.sim.sim_flags import TO_STACK, SimOptions
 from gcs_cli.sim.sim_vehicles import connections, ready_text, stack_arguments, start_of, vehicles_of
 from tests.support.commands import gcs
@@ -83,6 +86,8 @@ def test_addresses_are_those_of_the_instance() -> None:
         "altitude_m": DEFAULT_HOME.altitude_m,
     }
     assert "gcs --instance 1 status" in ready_text(second)
+    (signed,) = vehicles_of(SimOptions(signing_key=Path("my key")))
+    assert "gcs --signing-key 'my key' status" in ready_text(signed)
 
 
 def test_the_default_speed_is_real_time() -> None:
@@ -111,6 +116,24 @@ def test_bad_options_are_refused_before_anything_starts(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     ended = gcs("sim", *words.split())
-    assert (ended.returncode, ended.stdout) == (USAGE, "")
+    assert ended.returncode == USAGE
+    assert "ready" not in ended.stdout
     assert ended.stderr.startswith(f"gcs: {said}")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_view_is_a_process_that_ends_with_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[tuple[str, ...]] = []
+
+    def program(*words: str) -> list[str]:
+        started.append(words)
+        return [sys.executable, "-c", "import signal; signal.pause()"]
+
+    monkeypatch.setattr(sim_run, "own_program", program)
+    with sim_run._view(SimOptions(instance=3, signing_key=Path("k")), wanted=True) as view:
+        assert view is not None
+        assert view.poll() is None
+    assert view.returncode == -signal.SIGTERM
+    assert started == [("gcs_cli", "--signing-key", "k", "--instance", "3", "watch")]
+    with sim_run._view(SimOptions(), wanted=False) as nothing:
+        assert nothing is None

@@ -8,6 +8,7 @@ import math
 import re
 import struct
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from flightstack.core.errors import ConfigError
 from flightstack.core.geometry_bulk import euler_from_quaternions
 from flightstack.plan import Command, Frame, MissionItem, Plan
 from gcs_cli.errors import FAILED
-from gcs_cli.report.analysis import read_flight
+from gcs_cli.report.analysis import flight_in, read_flight
 from gcs_cli.report.flight_data import Flight, MissionProgress, Series, Status, series
 from gcs_cli.report.flight_figures import attitude_error, rms_command_rate_rad_s2, rms_torque_n_m
 from gcs_cli.report.flight_outcome import COMPLETED, Code, Outcome, with_log
@@ -477,3 +478,30 @@ def test_damage_is_never_printed_or_raised_as_anything_else(
             outcomes.add(ConfigError)
     assert outcomes <= {Flight, ConfigError}
     assert capsys.readouterr().out == ""
+
+
+def test_flight_time_is_unknown_without_an_arming_state() -> None:
+    time_s = np.arange(0.0, 10.0, 0.1)
+    flight = Flight(duration_s=10.0, position=series(time_s, np.zeros((100, 3))))
+    assert summarise(flight, Plan(()), RunInfo("", ""))["flight_time_s"] is None
+
+
+def test_first_instance_of_a_topic_and_first_known_origin_count() -> None:
+    def topic(name: str, number: int, **fields: list[float]) -> SimpleNamespace:
+        data = {"timestamp": np.array([0, 1], dtype=np.uint64)}
+        return SimpleNamespace(
+            name=name, multi_id=number, data=data | {k: np.array(v) for k, v in fields.items()}
+        )
+
+    place = {"ref_lat": [math.nan, 47.0], "ref_lon": [math.nan, 8.0], "ref_alt": [math.nan, 400.0]}
+    topics = [
+        topic("battery_status", number, remaining=[share] * 2, voltage_v=[12.0] * 2)
+        for number, share in ((0, 0.9), (1, 0.2))
+    ]
+    log = SimpleNamespace(
+        start_timestamp=0, last_timestamp=1, data_list=[*topics, topic("vehicle_local_position", 0, **place)],
+        msg_info_dict={}, initial_parameters={}, logged_messages=[], file_corruption=False,
+    )  # fmt: skip
+    flight = flight_in(log, b"", "log")
+    assert flight.battery.values[:, 0].tolist() == [0.9, 0.9]
+    assert flight.local_origin == (47.0, 8.0, 400.0)

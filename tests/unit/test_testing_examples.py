@@ -1,10 +1,12 @@
-"""The examples in the docstrings of flightstack.testing run, and every public name has one."""
+"""The examples of flightstack.testing run, those of docstrings and of docs/reference/testing.md; each name has one."""
 
 from __future__ import annotations
 
 import doctest
 import importlib
 import pkgutil
+import re
+from functools import cached_property
 from pathlib import Path
 from types import ModuleType
 
@@ -13,38 +15,58 @@ import pytest
 from flightstack import testing
 
 NAMES = [name for _, name, _ in pkgutil.iter_modules(testing.__path__) if name != "server_guard"]
-DATA = {
-    "Event", "Log", "Margin", "ModeSpan", "SIGNALS", "Sample", "Scenario", "Signals", "State", "Topic", "Verdict",
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "testing.md"
+SECTIONS = {
+    title: "\n".join(re.findall(r"^```pycon\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
+    for title, _, text in (part.partition("\n") for part in PAGE.read_text("utf-8").split("\n## ")[1:])
+}
+"""The examples of each section of the page."""
+OWNERS = [name for name in testing.__all__ if isinstance(getattr(testing, name), type)]
+SHOWN_BY = {
+    "Margin": "Flight", "Signals": "Flight", "Sample": "Flight", "ModeSpan": "Flight", "Event": "Flight",
+    "Topic": "Log", "Scenario": "Scenario and Verdict", "Verdict": "Scenario and Verdict",
+    "RefusedError": "Errors", "ConditionTimeoutError": "Errors", "PropertyViolationError": "Errors",
 }  # fmt: skip
-"""Public names without an example of their own: results that those of other names show."""
+"""The section of each class that has none of its own name."""
 
 
 def module(name: str) -> ModuleType:
     return importlib.import_module(f"{testing.__name__}.{name}")
 
 
-def sources() -> str:
-    """Return all examples, each with the name of its owner."""
-    finder = doctest.DocTestFinder()
-    tests = [test for name in NAMES for test in finder.find(module(name))]
-    return "\n".join(f"{test.name} {example.source}" for test in tests for example in test.examples)
-
-
 @pytest.mark.parametrize("name", NAMES)
-def test_examples_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_of_docstrings_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert doctest.testmod(module(name)).failed == 0
 
 
-def test_public_names_have_examples() -> None:
-    texts = sources()
-    shown = {name for name in testing.__all__ if name in texts}
-    assert set(testing.__all__) - shown - DATA == set()
+@pytest.mark.parametrize("title", SECTIONS)
+def test_examples_of_the_reference_run(title: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    example = doctest.DocTestParser().get_doctest(SECTIONS[title], {}, title, str(PAGE), 0)
+    said: list[str] = []
+    flags = doctest.ELLIPSIS | doctest.REPORT_ONLY_FIRST_FAILURE
+    doctest.DocTestRunner(optionflags=flags).run(example, out=said.append)
+    assert not said, "".join(said)
 
 
-@pytest.mark.parametrize("owner", ["Flight", "Link"])
-def test_public_methods_have_examples(owner: str) -> None:
-    cls = getattr(testing, owner)
-    texts = sources()
-    methods = [name for name, value in vars(cls).items() if not name.startswith("_") and callable(value)]
-    assert [name for name in methods if f".{name}(" not in texts] == []
+def public_members(name: str) -> list[str]:
+    """Return the methods and properties that a class defines."""
+    kinds = (property, cached_property)
+    return [
+        member
+        for member, value in vars(getattr(testing, name)).items()
+        if not member.startswith("_") and (callable(value) or isinstance(value, kinds))
+    ]
+
+
+@pytest.mark.parametrize("name", OWNERS)
+def test_every_method_and_property_has_an_example(name: str) -> None:
+    shown = SECTIONS[SHOWN_BY.get(name, name)]
+    assert [member for member in public_members(name) if not re.search(rf"\.{member}\b", shown)] == []
+
+
+def test_every_function_has_an_example() -> None:
+    everything = "".join(SECTIONS.values())
+    others = set(testing.__all__) - set(OWNERS)
+    assert {name for name in others if not re.search(rf"\b{name}\b", everything)} == set()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Address, Message
-from flightstack.mavlink.mission_messages import Timing, item_from_message
+from flightstack.mavlink.mission_messages import ItemTimeout, Timing, item_from_message
 from flightstack.plan.item import MissionItem
 
 _ATTEMPTS_PER_KIND = 4  # three requests of the preferred type, then one of the other
@@ -29,6 +29,7 @@ class Upload:
         self.count = count
         self.items: list[MissionItem] = []
         self._timing = timing
+        self._item_timeout = ItemTimeout(timing.item_timeout_s)
         self._prefers_int = True
         self._attempts = 0
         self._may_request_early = True
@@ -57,6 +58,7 @@ class Upload:
                 self.deadline_s = now_s
             return False
         self.items.append(item_from_message(message))
+        self._item_timeout.answered(now_s)
         self._prefers_int = message.get_type() == "MISSION_ITEM_INT"
         self._attempts = 0
         self._may_request_early = True
@@ -84,5 +86,6 @@ class Upload:
         kind = mavlink.MAVLink_mission_request_int_message
         if not is_int:
             kind = mavlink.MAVLink_mission_request_message
-        self.deadline_s = now_s + self._timing.item_timeout_s
+        self._item_timeout.asked(now_s, again=self._attempts > 1)
+        self.deadline_s = now_s + self._item_timeout.timeout_s
         return kind(*self.client.address, len(self.items), self.mission_type)

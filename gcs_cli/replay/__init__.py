@@ -1,0 +1,1 @@
+"""``gcs replay``: a log as a vehicle that any client can watch."""

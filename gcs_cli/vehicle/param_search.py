@@ -1,0 +1,71 @@
+"""Search over names and descriptions of parameters. Pure."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from difflib import SequenceMatcher
+
+from flightstack.mavlink.param_values import Parameter
+from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo
+
+_SIMILAR = 0.75
+"""Ratio of equal letters at which a misspelt word still matches."""
+_WORD = re.compile(r"[a-z0-9]+")
+
+
+def search_parameters(
+    parameters: Sequence[Parameter], infos: Mapping[str, ParamInfo], words: Sequence[str]
+) -> list[Parameter]:
+    """Return the parameters that match all ``words``, the best first; equal ones in their order.
+
+    A word counts most as the whole name or its beginning, then within the name, the short description, the long
+    description and choices; least as a misspelling of a word of these, or as letters of the name in their order.
+    """
+    wanted = [word.lower() for text in words for word in text.split()]
+    scored = [
+        (_score(parameter.name, infos.get(parameter.name, UNKNOWN), wanted), parameter)
+        for parameter in parameters
+    ]
+    found = [(score, parameter) for score, parameter in scored if score > 0.0]
+    return [parameter for _, parameter in sorted(found, key=lambda entry: -entry[0])]
+
+
+def _score(name: str, info: ParamInfo, wanted: Sequence[str]) -> float:
+    """Return the sum of the scores of all words, 0 if one of them does not match."""
+    lower, short = name.lower(), info.help.lower()
+    rest = " ".join((info.details, info.group, *(text for _, text in info.choices))).lower()
+    known = {*_WORD.findall(lower), *_WORD.findall(short), *_WORD.findall(rest)}
+    scores = [_word_score(word, lower, short, rest, known) for word in wanted]
+    return sum(scores) if all(scores) else 0.0
+
+
+def _word_score(word: str, name: str, short: str, rest: str, known: set[str]) -> float:
+    exact = (
+        (name == word, 10.0),
+        (name.startswith(word), 8.0),
+        (word in name.split("_"), 7.0),
+        (word in name, 6.0),
+        (word in _WORD.findall(short), 5.0),
+        (word in short, 4.0),
+        (word in rest, 3.0),
+    )
+    score = next((value for matches, value in exact if matches), 0.0)
+    if score or len(word) < 3:
+        return score
+    ratio = max((_similarity(word, other) for other in known), default=0.0)
+    if ratio >= _SIMILAR:
+        return 2.0 * ratio
+    return 0.5 if _is_subsequence(word, name) else 0.0
+
+
+def _similarity(word: str, other: str) -> float:
+    if abs(len(word) - len(other)) > 2:
+        return 0.0
+    matcher = SequenceMatcher(None, word, other, autojunk=False)
+    return matcher.ratio() if matcher.quick_ratio() >= _SIMILAR else 0.0
+
+
+def _is_subsequence(word: str, name: str) -> bool:
+    letters = iter(name)
+    return all(letter in letters for letter in word)

@@ -1,0 +1,93 @@
+"""Several transports at once, of which the one with the vehicle is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import pytest
+
+from flightstack.transports.udp import Address
+from gcs_cli.link import opening
+from gcs_cli.link.endpoint import VehicleEndpoint, parse_endpoint
+from gcs_cli.link.lines import Interest, Line
+from gcs_cli.link.opening import LATER_S, SeveralLines
+
+HERE, THERE = ("10.0.0.1", 1), ("10.0.0.2", 2)
+ONE, TWO = parse_endpoint("udp:14550"), parse_endpoint("udpout:10.0.0.2:2")
+
+
+class MemoryLine:
+    """A transport in memory."""
+
+    def __init__(self, peer: Address, peers: Sequence[Address] = (), problem: str = "") -> None:
+        self._peer = peer
+        self.peers = peers
+        self.problem = problem
+        self.arriving: list[bytes] = []
+        self.sent: list[bytes] = []
+        self.is_closed = False
+
+    def interests(self) -> Iterable[Interest]:
+        return ()
+
+    def due_s(self) -> float | None:
+        return None
+
+    def receive(self, now_s: float) -> Iterable[tuple[bytes, Address]]:
+        arriving, self.arriving = self.arriving, []
+        return [(data, self._peer) for data in arriving]
+
+    def send(self, data: bytes, peer: Address) -> None:
+        self.sent.append(data)
+
+    def closed_peers(self) -> Iterable[Address]:
+        return ()
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+def test_data_goes_to_the_transport_of_its_peer() -> None:
+    one, two = MemoryLine(HERE), MemoryLine(THERE, [THERE])
+    several = SeveralLines({ONE: one, TWO: two})
+    assert several.peers == [THERE]
+    several.send(b"hello", THERE)
+    one.arriving.append(b"beat")
+    assert list(several.receive(0.0)) == [(b"beat", HERE)]
+    several.send(b"back", HERE)
+    assert (one.sent, two.sent) == ([b"back"], [b"hello"])
+
+
+def test_transport_with_the_vehicle_is_kept() -> None:
+    one, two = MemoryLine(HERE), MemoryLine(THERE, [THERE])
+    several = SeveralLines({ONE: one, TWO: two})
+    two.arriving.append(b"beat")
+    list(several.receive(0.0))
+    assert several.keep(THERE) == TWO
+    assert (one.is_closed, two.is_closed) == (True, False)
+
+
+def test_problem_of_one_transport_is_none_of_all() -> None:
+    one, two = MemoryLine(HERE), MemoryLine(THERE, problem="connection refused")
+    assert SeveralLines({ONE: one, TWO: two}).problem == ""
+    assert SeveralLines({TWO: two}).problem == "connection refused"
+
+
+def test_later_transports_are_opened_once_nothing_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[VehicleEndpoint] = []
+    broken = MemoryLine(HERE, problem="connection refused")
+    lines: dict[VehicleEndpoint, Line] = {TWO: MemoryLine(THERE, [THERE]), ONE: broken}
+
+    def open_line(endpoint: VehicleEndpoint) -> Line:
+        opened.append(endpoint)
+        return lines[endpoint]
+
+    monkeypatch.setattr(opening, "open_line", open_line)
+    monkeypatch.setattr(opening.time, "monotonic", lambda: 100.0)
+    several = SeveralLines({}, later=[TWO, ONE])
+    assert several.due_s() == 100.0 + LATER_S
+    list(several.receive(100.0 + LATER_S - 0.01))
+    assert opened == []
+    list(several.receive(100.0 + LATER_S))
+    assert (opened, several.peers, broken.is_closed) == ([TWO, ONE], [THERE], True)
+    assert several.due_s() is None

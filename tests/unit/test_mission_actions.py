@@ -1,0 +1,60 @@
+"""Pause, resume and jump: what is sent to each autopilot, and when they are done."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightstack.mavlink.dialect import mavlink
+from gcs_cli.actions.action import Action, NotReadyError
+from gcs_cli.actions.in_mission import jump, pause, resume
+from gcs_cli.autopilots.autopilot import Role
+from gcs_cli.vehicle.view_types import Identity, Mission, VehicleView
+
+PX4 = Identity(1, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
+ARDUPILOT = PX4._replace(autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
+
+
+def view_in(role: Role, identity: Identity = PX4, *, armed: bool = True) -> VehicleView:
+    """A vehicle in the mode of a role."""
+    view = VehicleView(identity=identity, armed=armed)
+    mode = view.autopilot.role_mode(role, view.vehicle_type)
+    assert mode is not None
+    return view._replace(custom_mode=mode, mode=view.autopilot.mode_name(view.vehicle_type, mode))
+
+
+@pytest.mark.parametrize("identity", [PX4, ARDUPILOT])
+@pytest.mark.parametrize(("action", "before", "after"), [
+    (pause(), Role.MISSION, Role.HOLD),
+    (resume(), Role.HOLD, Role.MISSION),
+])  # fmt: skip
+def test_pause_and_resume_change_the_mode(
+    identity: Identity, action: Action, before: Role, after: Role
+) -> None:
+    start, end = view_in(before, identity), view_in(after, identity)
+    (step,) = action.plan(start)
+    assert step.command == start.autopilot.select_mode(end.custom_mode)
+    assert step.effect is not None
+    assert (step.effect(start), step.effect(end)) == (False, True)
+
+
+def test_jump_is_done_when_the_vehicle_reports_the_item() -> None:
+    for identity, number in ((PX4, 3), (ARDUPILOT, 4)):
+        view = view_in(Role.MISSION, identity)
+        (step,) = jump(3).plan(view)
+        assert step.command.params == (float(number),)
+        assert step.effect is not None
+        assert not step.effect(view)
+        assert step.effect(view._replace(mission=Mission(current=number)))
+
+
+@pytest.mark.parametrize(
+    ("action", "view", "reason"),
+    [
+        (pause(), view_in(Role.HOLD), "does not fly a mission: it is in mode HOLD"),
+        (pause(), view_in(Role.MISSION, armed=False), "it is disarmed"),
+        (resume(), view_in(Role.HOLD, armed=False), "use `gcs mission start`"),
+    ],
+)
+def test_pause_and_resume_need_a_mission_in_flight(action: Action, view: VehicleView, reason: str) -> None:
+    with pytest.raises(NotReadyError, match=reason):
+        action.plan(view)

@@ -1,0 +1,43 @@
+"""Search over names and descriptions of parameters."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightstack.mavlink.param_values import Parameter
+from gcs_cli.vehicle.param_info import ParamInfo
+from gcs_cli.vehicle.param_search import search_parameters
+
+INFOS = {
+    "MPC_XY_CRUISE": ParamInfo(help="Horizontal speed in auto modes"),
+    "MPC_XY_VEL_MAX": ParamInfo(help="Maximum horizontal speed"),
+    "GF_ACTION": ParamInfo(help="Geofence breach action", choices=((2.0, "Hold"),)),
+    "GF_MAX_HOR_DIST": ParamInfo(
+        help="Maximum distance", details="Horizontal limit of the geofence, from home"
+    ),
+    "NAV_ACC_RAD": ParamInfo(help="Acceptance radius of waypoints"),
+}
+PARAMETERS = [Parameter(name, 0.0, False, index, 5) for index, name in enumerate(INFOS)]
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (["geofence"], ["GF_ACTION", "GF_MAX_HOR_DIST"]),
+        (["gf"], ["GF_ACTION", "GF_MAX_HOR_DIST"]),
+        (["horizontal", "speed"], ["MPC_XY_CRUISE", "MPC_XY_VEL_MAX"]),
+        (["acceptence"], ["NAV_ACC_RAD"]),  # misspelt
+        (["hold"], ["GF_ACTION"]),  # a choice
+        (["mpcvel"], ["MPC_XY_VEL_MAX"]),  # letters of the name
+        (["geofence max"], ["GF_MAX_HOR_DIST"]),
+        (["battery"], []),
+    ],
+)
+def test_search_finds_by_name_and_description(words: list[str], names: list[str]) -> None:
+    assert [each.name for each in search_parameters(PARAMETERS, INFOS, words)] == names
+
+
+def test_search_prefers_names_to_descriptions() -> None:
+    found = search_parameters(PARAMETERS, INFOS, ["max"])
+    assert [each.name for each in found] == ["MPC_XY_VEL_MAX", "GF_MAX_HOR_DIST"]
+    assert search_parameters(PARAMETERS, {}, ["nav"])[0].name == "NAV_ACC_RAD"
