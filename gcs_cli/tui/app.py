@@ -109,7 +109,7 @@ class WatchApp(App[None]):
             self._state = state
             self.refresh_bindings()
         screens = self.screen_stack  # empty while a mode begins
-        if screens and isinstance(screens[0], WatchScreen):
+        if screens and isinstance(screens[0], WatchScreen) and screens[0].is_composed:
             screens[0].show(view, self.feed.now_s)
             self.redraws += 1
 

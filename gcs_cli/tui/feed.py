@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, NamedTuple, TypeVar
 
@@ -60,7 +60,7 @@ class Feed:
         """Error that ended the thread."""
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
         self._running: dict[int, _Running] = {}
-        self._rates_hz: Mapping[int, float] = ROTORS_AND_TIMING
+        self._rates_hz: dict[int, float] = dict(ROTORS_AND_TIMING)
         self._stopping = threading.Event()
         self._order = threading.Event()
         self._thread: threading.Thread | None = None
@@ -130,7 +130,9 @@ class Feed:
         self.submit(lambda connection: self.messages.say(connection.session.view, text, severity))
 
     def keep_rate(self, message_id: int, rate_hz: float | None) -> None:
-        """Request a stream again at this rate if it stops; not if the rate is 0 or None, the default."""
+        """Request a stream of the screens at this rate from now on; not at all if it is 0, or None for the default."""
+        if message_id not in self._rates_hz:
+            return
         rates = {number: rate for number, rate in self._rates_hz.items() if number != message_id}
         self._rates_hz = {**rates, message_id: rate_hz} if rate_hz else rates
         self.submit(lambda connection: connection.fleet.subscribe(self._rates_hz))

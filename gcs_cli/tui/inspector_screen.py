@@ -76,7 +76,7 @@ class InspectorScreen(WatchScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Read the messages, unless paused."""
         super().show(view, now_s)
-        if self.query(LineList) and not self._is_paused and watch_app(self).redraws % _EVERY == 0:
+        if not self._is_paused and watch_app(self).redraws % _EVERY == 0:
             self._rows = message_rows(watch_app(self).feed.history, now_s)
             self._redraw()
 
@@ -138,7 +138,12 @@ class InspectorScreen(WatchScreen):
     async def action_rate(self) -> None:
         """Ask for another rate of the message at the cursor, and request it."""
         line = self.selected
-        if line is None:
+        app = watch_app(self)
+        identity = app.feed.view.identity
+        if line is None or identity is None:
+            return
+        if line.row.key.system_id != identity.system_id:
+            self.notify(f"select vehicle {line.row.key.system_id} first: v", severity="warning")
             return
         number, name = line.row.key.message_id, line.row.message.get_type()
         order = Order(
@@ -149,7 +154,6 @@ class InspectorScreen(WatchScreen):
             lambda rate: on_vehicle.set_message_rate(number, name, rate),
             (Field("rate", "Hz", smallest=0.0, largest=1000.0, is_optional=True),),
         )
-        app = watch_app(self)
         values = await self.app.push_screen_wait(OrderForm(order, app.feed.view))
         if values is not None:
             app.feed.keep_rate(number, values[0])

@@ -40,12 +40,12 @@ def draw_map(
     canvas.line(*view.to_dots(scene.track), colours.good)
     if scene.vehicle is not None and scene.target is not None:
         canvas.line(*view.to_dots(np.array([scene.vehicle.place, scene.target])), colours.target, DOTTED)
+    if cursor is not None:
+        canvas.label(*cursor, _CURSOR_MARK, f"bold {colours.text}")
     for craft in scene.others:
         _draw_craft(canvas, view, craft, colours.bad, colours)
     if scene.vehicle is not None:
         _draw_craft(canvas, view, scene.vehicle, colours.text, colours)
-    if cursor is not None:
-        canvas.label(*cursor, _CURSOR_MARK, f"bold {colours.text}")
     _draw_marks(canvas, view, scene, colours)
     _draw_scale(canvas, view, colours, grid)
     return canvas

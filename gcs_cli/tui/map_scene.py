@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -18,6 +19,8 @@ from gcs_cli.vehicle.view_types import GeoPosition, VehicleView
 TRACK_POINTS = 4000
 """Most points of a track; when it is full, every second one is dropped."""
 _FIRST_STEP_M = 0.1
+_FARTHEST_M = 1e7
+"""Setpoints farther away are not on the earth."""
 
 
 class Place(NamedTuple):
@@ -190,7 +193,8 @@ def vehicle_scene(view: VehicleView, frame: LocalFrame) -> MapScene:
     if view.setpoint is not None and view.setpoint.position_ned_m and view.position_ned_m:
         # the origin of the vehicle's local frame is not home, so only the difference is used
         wanted, now = view.setpoint.position_ned_m, view.position_ned_m
-        target = Place(place.north_m + wanted.x - now.x, place.east_m + wanted.y - now.y)
+        if math.hypot(wanted.x - now.x, wanted.y - now.y) < _FARTHEST_M:
+            target = Place(place.north_m + wanted.x - now.x, place.east_m + wanted.y - now.y)
     return MapScene(Craft(place, heading), home, target, view.mission.current)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-from functools import partial
 from typing import ClassVar
 
 from rich.text import Text
@@ -13,12 +11,7 @@ from textual.binding import Binding
 from textual.widgets import Static
 
 from flightstack.core.contract import Vector3
-from flightstack.core.geodesy import GeoPoint
 from gcs_cli.actions import in_flight
-from gcs_cli.errors import CliError
-from gcs_cli.link.connection import Connection
-from gcs_cli.link.perform import perform
-from gcs_cli.output import Output
 from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.drawing import watch_app
 from gcs_cli.tui.map_drawing import legend, place_text
@@ -73,7 +66,7 @@ class MapScreen(WatchScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the map, and download the plans if they changed."""
         super().show(view, now_s)
-        if not self.query(MapWidget) or watch_app(self).redraws % _EVERY:
+        if watch_app(self).redraws % _EVERY:
             return
         history = watch_app(self).feed.history
         system_id = None if view.identity is None else view.identity.system_id
@@ -142,26 +135,10 @@ class MapScreen(WatchScreen):
             )
             self.notify(reason, severity="warning")
             return
-        text = place_text(frame, place, self.map.scene.home)
-        if not await self.app.push_screen_wait(
-            Confirm(f"Fly to {text}\nat the current altitude?", "Fly there")
-        ):
+        feed = watch_app(self).feed
+        who = f"all {len(feed.views)} vehicles" if feed.commands_all else "the vehicle"
+        question = f"Fly {who} to {place_text(frame, place, self.map.scene.home)}\nat the current altitude?"
+        if not await self.app.push_screen_wait(Confirm(question, "Fly there")):
             return
         target = frame.to_geo(Vector3(*place, 0.0))
-        try:
-            self.notify(await asyncio.wrap_future(watch_app(self).feed.submit(partial(_goto, target=target))))
-        except CliError as error:
-            self.notify(str(error), severity="error")
-
-
-class _NoOutput(Output):
-    """Prints nothing: the screen shows the result."""
-
-    def say(self, event: str, sentence: str, **facts: object) -> None:
-        """Ignore the sentence."""
-
-
-def _goto(connection: Connection, target: GeoPoint) -> str:
-    """Send the vehicle there and return its answer; the flight itself is on the map."""
-    action = in_flight.goto(target.latitude_deg, target.longitude_deg)
-    return perform(connection, action, _NoOutput(False), waits=False).sentence
+        feed.act(in_flight.goto(target.latitude_deg, target.longitude_deg))

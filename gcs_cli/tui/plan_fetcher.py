@@ -98,5 +98,7 @@ class PlanFetcher:
 
 
 def _download(connection: Connection, kind: MissionType) -> tuple[MissionItem, ...]:
+    if connection.is_recording:
+        return ()
     call = calls.download(connection.session, kind)
     return connection.complete(call, f"download of the {PLAN_NAMES[kind]}", may_lack=True).items

@@ -18,6 +18,7 @@ _GAP_PERIODS, _LEAST_GAP_S = 6.0, 1.0
 """A curve is interrupted if no sample arrives for this many of its usual periods, and for this time."""
 _LEAST_RANGE = 1e-4
 """Of an axis: smaller changes are noise in most units."""
+_LARGEST = 1e100
 _TICK_ROWS = 4
 _PARTS = 5
 """An axis ends at a multiple of this part of its tick step, so that it seldom changes."""
@@ -103,7 +104,7 @@ def scale_of(lane: Lane, span: Span) -> Scale:
     low, high = math.inf, -math.inf
     for curve in lane.curves:
         values = _visible(curve, span)[1]
-        values = values[np.isfinite(values)]
+        values = np.clip(values[np.isfinite(values)], -_LARGEST, _LARGEST)
         if len(values):
             low, high = min(low, float(values.min())), max(high, float(values.max()))
     if low > high:

@@ -137,7 +137,7 @@ class PlotScreen(WatchScreen):
     def show(self, view: VehicleView, now_s: float) -> None:
         """Draw the curves up to now, unless paused."""
         super().show(view, now_s)
-        if self._is_paused or not self.query(PlotWidget) or watch_app(self).redraws % _EVERY:
+        if self._is_paused or watch_app(self).redraws % _EVERY:
             return
         if self.plot.step_end(now_s) > self.plot.end_s or watch_app(self).redraws == 0:
             self._load()

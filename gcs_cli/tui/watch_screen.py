@@ -100,8 +100,14 @@ class WatchScreen(Screen[None]):
             if redraw % drawing.every == 0:
                 drawing.show(view, now_s)
 
+    @property
+    def is_composed(self) -> bool:
+        """True if the widgets of the body exist; a screen is resumed and redrawn before."""
+        return bool(self.query("#body > *"))
+
     def on_screen_resume(self) -> None:
         """Draw the state that arrived while another screen was open."""
         app = watch_app(self)
         app.redraws = 0
-        self.show(app.feed.view, app.feed.now_s)
+        if self.is_composed:
+            self.show(app.feed.view, app.feed.now_s)

@@ -218,6 +218,7 @@ def test_field_is_sent_to_the_plot_and_back():
 
 def test_another_rate_is_asked_for_and_requested():
     async def story(pilot, app, _screen):
+        app.feed._rates_hz = {mavlink.MAVLINK_MSG_ID_ATTITUDE: 10.0}
         await pilot.press("r")
         await pilot.pause()
         assert isinstance(app.screen, OrderForm)

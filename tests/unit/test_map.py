@@ -17,7 +17,17 @@ from gcs_cli.tui.canvas import rows_of_text
 from gcs_cli.tui.history import History
 from gcs_cli.tui.map_drawing import distance_text, draw_map, place_text
 from gcs_cli.tui.map_model import MapModel
-from gcs_cli.tui.map_scene import TRACK_POINTS, Craft, MapArea, MapPlan, MapScene, Place, Track, map_plan
+from gcs_cli.tui.map_scene import (
+    TRACK_POINTS,
+    Craft,
+    MapArea,
+    MapPlan,
+    MapScene,
+    PathItem,
+    Place,
+    Track,
+    map_plan,
+)
 from gcs_cli.tui.palette import DARK
 from gcs_cli.tui.viewport import LARGEST_M_PER_DOT, SMALLEST_M_PER_DOT, Viewport, round_step
 from gcs_cli.vehicle.view_types import GeoPosition, Identity, Mission, Setpoint, Vector, VehicleView
@@ -205,6 +215,22 @@ def test_map_of_far_places_draws_only_the_frame():
     assert "".join(rows[:-1]).split() == ["N↑"]
 
 
+anywhere = st.floats(-1e9, 1e9)
+
+
+@given(st.lists(st.tuples(anywhere, anywhere), min_size=1, max_size=5), st.floats(0.0, 360.0))
+def test_any_places_are_drawn(places, heading):
+    crafts = tuple(Craft(Place(*place), heading) for place in places)
+    plan = MapPlan(
+        path=tuple(PathItem(seq, Place(*place)) for seq, place in enumerate(places)),
+        areas=(MapArea(False, tuple(Place(*place) for place in places)),),
+        rally=tuple(Place(*place) for place in places),
+    )
+    scene = MapScene(crafts[0], crafts[0].place, crafts[0].place, 0, plan, np.array(places), crafts)
+    view = Viewport(width=30, height=10).fitted(scene.extent())
+    assert len(draw_map(scene, view, DARK, grid=True, cursor=(3, 3)).segments()) == 10
+
+
 VIEW = VehicleView(
     identity=Identity(1, 1, 2, 12),
     geo=GeoPosition(HOME.latitude_deg, HOME.longitude_deg, 493.0, 5.0),
@@ -266,3 +292,8 @@ def test_switching_the_vehicle_drops_the_track():
     assert len(model.scene(VIEW, history, Plan(())).track) == 1
     other = VIEW._replace(identity=Identity(2, 1, 2, 12))
     assert not len(model.scene(other, history, Plan(())).track)
+
+
+def test_setpoint_beyond_the_earth_is_not_shown():
+    far = VIEW._replace(setpoint=Setpoint(Vector(3e38, 0.0, 0.0)))
+    assert MapModel().scene(far, History(), Plan(())).target is None

@@ -13,11 +13,12 @@ from flightstack.plan import FenceCommand, MissionItem
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.confirm import Confirm
+from gcs_cli.tui.map_scene import place_of
 from gcs_cli.tui.map_screen import MapScreen
 from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.unit.test_map import VIEW, Place, item
+from tests.unit.test_map import FRAME, VIEW, Place, item
 
 pytestmark = pytest.mark.unit
 
@@ -58,7 +59,7 @@ def test_map_shows_the_plans_of_the_vehicle(size):
         assert all(mark in text for mark in "⌂◇◎↗12")
         assert "track" not in lines[-2]
         assert lines[-2].startswith("mission  keep out  ◇ rally  ⌂ home  ◎ setpoint")
-        check_picture(f"map-{size[0]}x{size[1]}", lines[2:])
+        check_picture(f"map-{size[0]}x{size[1]}", lines[2:-1])
 
     drive(story, size)
 
@@ -112,32 +113,25 @@ def test_wheel_zooms_around_the_mouse_and_drag_moves_the_map():
 @pytest.mark.parametrize("answer", ["y", "enter", "escape"])
 def test_click_asks_before_the_vehicle_is_sent(answer):
     async def story(pilot, app, screen):
-        count = len(app.feed.jobs)
         await pilot.click(screen.map, (10, 5))
         await pilot.pause()
         assert isinstance(app.screen, Confirm)
-        assert len(app.feed.jobs) == count
+        assert not app.feed.actions
         await pilot.press(answer)
         await pilot.pause()
-        assert len(app.feed.jobs) == count + (answer == "y")
+        assert [action.name for action in app.feed.actions] == ["goto"] * (answer == "y")
 
     drive(story)
 
 
-@pytest.mark.parametrize("error", [None, CliError("goto refused: outside the geofence", FAILED)])
-def test_answer_of_the_vehicle_to_go_there_is_shown(error):
-    async def story(pilot, app, _screen):
+def test_vehicle_is_sent_to_the_place_under_the_cursor():
+    async def story(pilot, app, screen):
         await pilot.press("h", "g", "y")
         await pilot.pause()
-        future = app.feed.jobs[-1][1]
-        if error is None:
-            future.set_result("flying to 47.3977 8.5456")
-        else:
-            future.set_exception(error)
-        await pilot.pause()
-        (note,) = app._notifications
-        assert note.message.startswith("flying to" if error is None else str(error))
-        assert note.severity == ("information" if error is None else "error")
+        (action,) = app.feed.actions
+        place = place_of(FRAME, action.facts["latitude_deg"], action.facts["longitude_deg"])
+        assert place == pytest.approx(screen.map.cursor_place, abs=1e-6)
+        assert action.facts["altitude_m"] is None
 
     drive(story)
 

@@ -94,6 +94,12 @@ def test_axis_holds_the_values_with_at_least_two_ticks(low, size, rows):
     assert len(set(tick_labels(scale))) == len(scale.ticks)
 
 
+@given(st.lists(st.floats(), min_size=2, max_size=9))
+def test_any_values_are_drawn(values):
+    curve = Curve("a", "", np.arange(len(values), dtype=np.float64), np.array(values))
+    assert len(drawn([curve], Span(0.0, 9.0, 4.0), 40, 10)) <= 10
+
+
 def test_axis_steps_are_one_two_five_with_needed_decimals():
     assert tick_labels(Scale(0.0, 1.0, 0.2)) == ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
     assert tick_labels(Scale(-20.0, 20.0, 20.0)) == ["-20", "0", "20"]

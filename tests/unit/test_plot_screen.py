@@ -59,7 +59,7 @@ def drive(story: Callable[[Pilot[None], WatchApp, PlotScreen], Awaitable[None]],
 @pytest.mark.parametrize("size", [(80, 24), (120, 35), (200, 50)], ids=str)
 def test_plot_shows_the_first_fields_by_unit(size):
     async def story(_pilot, app, _screen):
-        check_picture(f"plot-{size[0]}x{size[1]}", shown(app)[2:])
+        check_picture(f"plot-{size[0]}x{size[1]}", shown(app)[2:-1])
 
     drive(story, size)
 
