@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
 
@@ -16,12 +15,13 @@ from textual.widgets import Static
 from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import MissionItem, Plan
+from gcs_cli.actions import in_flight, in_mission
 from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.plans import edit
 from gcs_cli.plans.formats.files import SUFFIXES, load_any, save_any
 from gcs_cli.plans.names import any_command_name
-from gcs_cli.transfers import mission_control, plan_transfers
+from gcs_cli.transfers import plan_transfers
 from gcs_cli.transfers.plan_parts import Uploads
 from gcs_cli.transfers.vehicle_plans import problems_on_vehicle
 from gcs_cli.tui.drawing import watch_app
@@ -316,11 +316,6 @@ class MissionScreen(JobScreen):
             self.draft = MissionDraft()
             watch_app(self).plans.reload()
 
-    async def _control(self, doing: str, job: Callable[[Connection], str]) -> None:
-        said = await self.run_job(doing, job)
-        if said is not None:
-            watch_app(self).feed.tell(said)
-
     @work
     async def action_jump(self) -> None:
         """Make the selected item the current one."""
@@ -328,38 +323,16 @@ class MissionScreen(JobScreen):
         name = any_command_name(self.items[seq].command)
         if watch_app(self).feed.view.armed and not await self.ask(f"Fly to item {seq} ({name})?", "Jump"):
             return
+        watch_app(self).feed.act(in_mission.jump(seq))
 
-        def job(connection: Connection) -> str:
-            mission_control.jump(connection, seq)
-            return f"item {seq} is the current one"
-
-        await self._control(f"jumping to item {seq}", job)
-
-    @work
-    async def action_pause(self) -> None:
+    def action_pause(self) -> None:
         """Hold the position."""
-
-        def job(connection: Connection) -> str:
-            seq = mission_control.pause(connection)
-            return "mission paused" if seq is None else f"mission paused at item {seq}"
-
-        await self._control("pausing", job)
+        watch_app(self).feed.act(in_mission.pause())
 
     @work
     async def action_start(self) -> None:
         """Start the mission on the ground, or resume it in the air."""
-        view = watch_app(self).feed.view
-        if view.armed:
-
-            def resume(connection: Connection) -> str:
-                seq = mission_control.resume(connection)
-                return "mission resumed" if seq is None else f"mission resumed at item {seq}"
-
-            await self._control("resuming", resume)
+        if watch_app(self).feed.view.armed:
+            watch_app(self).feed.act(in_mission.resume())
         elif await self.ask("Start the mission? The vehicle arms and takes off.", "Start"):
-
-            def start(connection: Connection) -> str:
-                mission_control.start(connection)
-                return "mission started"
-
-            await self._control("starting", start)
+            watch_app(self).feed.act(in_flight.start_mission())
