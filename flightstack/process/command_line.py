@@ -42,7 +42,7 @@ def usage_sentence(error: Any) -> str:
     """
     problems: list[Any] = getattr(error.__cause__, "errors", list)()
     if not problems or getattr(error, "param", None) is None:
-        return str(error.format_message())
+        return _plain(error)
     kind, value = problems[0]["type"], problems[0]["input"]
     name = max(getattr(error.param, "opts", None) or [error.param.name], key=len)
     info = error.param.type_descriptor.parameter_info
@@ -52,8 +52,12 @@ def usage_sentence(error: Any) -> str:
         return f"{name}: {value} is outside the allowed range {limits}"
     wanted = _NUMBERS.get(kind.split("_")[0])
     if wanted is None:
-        return str(error.format_message())
+        return _plain(error)
     return f"{name}: {value!r} is not {wanted}" + (f"; give {limits}" if ends != (None, None) else "")
+
+
+def _plain(error: Any) -> str:
+    return str(error.format_message()).replace("Value error, ", "")  # of Pydantic
 
 
 class _Panels:

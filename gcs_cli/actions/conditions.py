@@ -27,6 +27,8 @@ class ViewCondition(NamedTuple):
     holds: Callable[[VehicleView], bool]
     value: Callable[[VehicleView], str]
     """The present value, in words."""
+    mode: str = ""
+    """Name of the mode that it needs."""
 
 
 class _Quantity(NamedTuple):
@@ -161,7 +163,7 @@ def _mode_condition(text: str, name: str) -> ViewCondition:
     def holds(view: VehicleView) -> bool:
         return view.identity is not None and view.custom_mode == find_mode(view, name)
 
-    return ViewCondition(text, holds, lambda view: f"mode {view.mode}")
+    return ViewCondition(text, holds, lambda view: f"mode {view.mode}", name)
 
 
 def _position_condition(text: str, value: str) -> ViewCondition:

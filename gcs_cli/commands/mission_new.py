@@ -102,17 +102,20 @@ def new(
     pattern: Annotated[Pattern, typer.Argument(metavar="PATTERN", help=f"{', '.join(Pattern)}.")],
     shape: ShapeOptions,
     route: RouteOptions,
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", metavar="FILE", help=f"File to write: {', '.join(SUFFIXES)}.", show_default=False
-        ),
-    ],
     area: Annotated[
         Path | None,
         typer.Argument(
             metavar="[AREA]",
             help="Area of a survey (a polygon or a geofence) or line of a corridor: a file of any plan format.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help=f"File to write: {', '.join(SUFFIXES)}.  [default: PATTERN.plan]",
             show_default=False,
         ),
     ] = None,
@@ -123,6 +126,7 @@ def new(
 
     A square begins at home and extends north and east; a circle and a lemniscate have their centre there.
     """
+    out = Path(f"{pattern.value}.plan") if out is None else out
     check_suffix(out)
     check_new(out, overwrite)
     if (area is None) == (pattern in (Pattern.CORRIDOR, Pattern.SURVEY)):

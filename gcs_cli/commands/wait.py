@@ -8,8 +8,10 @@ import typer
 
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.actions.conditions import ConditionError, ViewCondition, choices, parse_condition
+from gcs_cli.actions.on_vehicle import find_mode, mode_choices
 from gcs_cli.errors import NO_ANSWER, USAGE, CliError, VehicleLostError
 from gcs_cli.link.connection import Connection
+from gcs_cli.link.perform import ask_modes
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, link_options, output_of
 from gcs_cli.vehicle_link import connect_vehicle
@@ -31,13 +33,14 @@ def wait(
 ) -> None:
     """Wait until the vehicle is in a state.
 
-    Several conditions must hold at once. Exit code 1: the vehicle was lost; 3: --timeout passed (60 s by default, of
-    real time).
+    Several conditions must hold at once. Exit code 1: the vehicle was lost; 3: --timeout passed. It limits the search
+    for the vehicle, 5 s by default, and then the wait, 60 s by default, both in real time.
     """
     wanted = [_parsed(text) for text in conditions]
     given = link_options(context, link).timeout
     timeout_s = DEFAULT_TIMEOUT_S if given is None else given
     with connect_vehicle(context, link) as connection:
+        _check_modes(connection, wanted)
         wait_for(connection, wanted, timeout_s, output_of(context, link))
 
 
@@ -46,6 +49,19 @@ def _parsed(text: str) -> ViewCondition:
         return parse_condition(text)
     except ConditionError as error:
         raise CliError(f"wait: {error}", USAGE) from None
+
+
+def _check_modes(connection: Connection, wanted: list[ViewCondition]) -> None:
+    """Raise CliError (usage) for a mode that the vehicle does not have."""
+    for condition in wanted:
+        if condition.mode and find_mode(connection.session.view, condition.mode) is None:
+            ask_modes(connection)  # the vehicle may have modes of its own
+            view = connection.session.view
+            if find_mode(view, condition.mode) is None:
+                names = ", ".join(name.lower() for name in mode_choices(view))
+                raise CliError(
+                    f"wait {condition.text}: the vehicle has no such mode; choose one of {names}", USAGE
+                )
 
 
 def wait_for(connection: Connection, wanted: list[ViewCondition], timeout_s: float, output: Output) -> None:

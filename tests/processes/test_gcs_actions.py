@@ -120,6 +120,12 @@ def test_wait_ends_at_once_if_the_condition_holds() -> None:
     assert (result.stdout, result.returncode) == ("disarmed, altitude>2\n", 0)
 
 
+def test_a_mode_to_wait_for_must_exist() -> None:
+    result = told(FakeVehicle(), "wait", "mode=nix")
+    assert result.returncode == 2
+    assert "wait mode=nix: the vehicle has no such mode; choose one of" in result.stderr
+
+
 def test_wait_names_the_last_value_after_its_timeout() -> None:
     result = told(FakeVehicle(), "wait", "armed", "altitude>9", "--timeout", "1.5")
     assert result.returncode == 3

@@ -472,3 +472,10 @@ def test_lines_tell_the_course_of_a_flight() -> None:
     assert lines[2].startswith("MISSION  item ")
     assert "N   +1.0 E   +2.0 up   3.0 m" in lines[2]
     assert lines[-1] == "flight completed"
+
+
+def test_unknown_word_of_a_choice_is_named_without_the_words_of_a_library(capsys: Any) -> None:
+    assert main(["mission", "new", "sqare"]) == USAGE
+    error = capsys.readouterr().err
+    assert "'sqare' is not one of 'square'" in error
+    assert "Value error" not in error
