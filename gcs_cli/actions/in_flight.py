@@ -73,10 +73,15 @@ def _climbed(view: VehicleView, altitude_m: float | None) -> Condition:
     if altitude_m is None:
         mode = view.autopilot.roles.get(Role.TAKEOFF)
         return lambda view: view.armed and view.on_ground is False and view.mode not in (None, mode)
-    if view.autopilot.takeoff_frame is None:
-        target_m = _amsl_m(view, altitude_m)
-        return lambda view: view.geo is not None and view.geo.altitude_m > target_m - ALTITUDE_TOLERANCE_M
-    return lambda view: (view.relative_altitude_m or 0.0) > altitude_m - ALTITUDE_TOLERANCE_M
+    is_relative = view.autopilot.takeoff_frame is not None
+    least_m = (altitude_m if is_relative else _amsl_m(view, altitude_m)) - ALTITUDE_TOLERANCE_M
+
+    def is_there(view: VehicleView) -> bool:
+        if view.geo is None or view.on_ground:  # the ground may be above home
+            return False
+        return (view.geo.relative_altitude_m if is_relative else view.geo.altitude_m) > least_m
+
+    return is_there
 
 
 def _amsl_m(view: VehicleView, altitude_m: float) -> float:

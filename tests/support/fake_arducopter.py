@@ -37,6 +37,8 @@ class FakeArduCopter:
     """Commands that are executed without an answer."""
     velocity_ned_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Reported velocity."""
+    rise_of_ground_m: float = 0.0
+    """Height of the ground above home."""
     commands: list[tuple[int, int | None]] = field(default_factory=list)
     """Commands without requests of streams, and the frame of those that came as COMMAND_INT."""
 
@@ -225,7 +227,7 @@ class FakeArduCopter:
         ms = round((self._time_s - self._booted_s) * 1e3)
         latitude = 47.397742 + self.north_m / METRES_PER_DEGREE
         longitude = 8.545594 + self.east_m / METRES_PER_DEGREE / math.cos(math.radians(47.397742))
-        above_mm = round(self.altitude_m * 1e3)
+        above_mm = round((self.altitude_m + self.rise_of_ground_m) * 1e3)
         check = apm.MAV_SYS_STATUS_PREARM_CHECK
         health = check if self.has_position else 0
         yaw_rad = math.radians(self.heading_deg)

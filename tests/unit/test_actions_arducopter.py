@@ -243,6 +243,14 @@ def test_hold_is_not_done_while_the_vehicle_moves(rig: Rig) -> None:
         assert rig.perform(in_flight.hold()).outcome is Outcome.NOT_SEEN
 
 
+def test_takeoff_is_not_done_on_ground_above_the_altitude() -> None:
+    rig = Rig(FakeArduCopter(ignores_takeoff=True))
+    rig.vehicle.rise_of_ground_m = 10.0
+    rig.run_for(1.0)
+    assert rig.view.relative_altitude_m == 10.0
+    assert rig.perform(in_flight.takeoff(6.0)).outcome is Outcome.NOT_SEEN
+
+
 def test_takeoff_in_the_air_is_not_sent(rig: Rig) -> None:
     rig.flying()
     result = rig.perform(in_flight.takeoff(5.0))
