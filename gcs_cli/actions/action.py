@@ -33,7 +33,7 @@ class Step(NamedTuple):
     needs_armed: bool = False
     """True if a disarm before the effect ends the action."""
     restarts: bool = False
-    """True if the vehicle restarts: silence does not end the action."""
+    """True if the vehicle restarts: silence does not end the action, and the command is sent once."""
 
 
 class Action(NamedTuple):

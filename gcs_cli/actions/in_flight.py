@@ -22,7 +22,7 @@ POSITION_TOLERANCE_M = 1.0
 """Largest distances from the target at which it counts as reached: less than what PX4 and ArduPilot accept."""
 HEADING_TOLERANCE_DEG = 3.0
 STANDING_M_S = 0.5
-"""Speed below which a vehicle holds its position."""
+"""Speed, horizontal and vertical, below which a vehicle holds its position."""
 TAKEOFF_STILL_S = 15.0
 """Longest time without movement; ArduCopter spins up for 5 s."""
 TRAVEL_STILL_S = 20.0
@@ -37,6 +37,8 @@ def takeoff(altitude_m: float | None = None) -> Action:
     """Take off to an altitude above home, and arm for it; None: the vehicle's own altitude."""
 
     def plan(view: VehicleView) -> tuple[Step, ...]:
+        if view.armed and view.on_ground is False:
+            raise NotReadyError("the vehicle is in the air: give the new altitude to goto")
         if altitude_m is None and not view.autopilot.has_takeoff_altitude:
             raise ActionError(f"{view.autopilot.title} has no default altitude: give one with --alt")
         steps = [_phase_step(view, phase, altitude_m) for phase in view.autopilot.takeoff_phases]
@@ -71,10 +73,15 @@ def _climbed(view: VehicleView, altitude_m: float | None) -> Condition:
     if altitude_m is None:
         mode = view.autopilot.roles.get(Role.TAKEOFF)
         return lambda view: view.armed and view.on_ground is False and view.mode not in (None, mode)
-    if view.autopilot.takeoff_frame is None:
-        target_m = _amsl_m(view, altitude_m)
-        return lambda view: view.geo is not None and view.geo.altitude_m > target_m - ALTITUDE_TOLERANCE_M
-    return lambda view: (view.relative_altitude_m or 0.0) > altitude_m - ALTITUDE_TOLERANCE_M
+    is_relative = view.autopilot.takeoff_frame is not None
+    least_m = (altitude_m if is_relative else _amsl_m(view, altitude_m)) - ALTITUDE_TOLERANCE_M
+
+    def is_there(view: VehicleView) -> bool:
+        if view.geo is None or view.on_ground:  # the ground may be above home
+            return False
+        return (view.geo.relative_altitude_m if is_relative else view.geo.altitude_m) > least_m
+
+    return is_there
 
 
 def _amsl_m(view: VehicleView, altitude_m: float) -> float:
@@ -115,7 +122,7 @@ def _modes(view: VehicleView, *roles: Role) -> frozenset[str]:
 
 
 def land() -> Action:
-    """Land at the present position; done when the vehicle has disarmed."""
+    """Land at the present position; done when the vehicle has disarmed on the ground."""
 
     def plan(view: VehicleView) -> tuple[Step, ...]:
         return (_descent(view, "landing", Role.LAND),)
@@ -124,7 +131,7 @@ def land() -> Action:
 
 
 def return_to_launch() -> Action:
-    """Return to launch and land; done when the vehicle has disarmed."""
+    """Return to launch and land; done when the vehicle has disarmed on the ground."""
 
     def plan(view: VehicleView) -> tuple[Step, ...]:
         return (_descent(view, "return", Role.RETURN),)
@@ -136,11 +143,12 @@ def _descent(view: VehicleView, name: str, role: Role) -> Step:
     return Step(
         name,
         common_commands.LAND if role is Role.LAND else common_commands.RETURN,
-        lambda view: not view.armed,
-        "is still armed",
+        lambda view: not view.armed and view.on_ground is not False,
+        "is still armed or in the air",
         LANDING_STILL_S,
         is_flight=True,
         modes=_modes(view, role, Role.LAND),
+        needs_armed=True,
     )
 
 
@@ -167,7 +175,8 @@ def _require_flight(view: VehicleView) -> None:
 
 
 def _stands(view: VehicleView) -> bool:
-    return (view.ground_speed_m_s or 0.0) < STANDING_M_S
+    velocity = view.velocity_ned_m_s
+    return velocity is not None and math.hypot(*velocity) < STANDING_M_S
 
 
 def goto(latitude_deg: float, longitude_deg: float, altitude_m: float | None = None) -> Action:

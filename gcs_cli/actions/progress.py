@@ -26,6 +26,8 @@ class EffectTimer:
         """True once the vehicle was in a mode of the step."""
         self.was_armed = False
         """True once the vehicle was armed during the step."""
+        self.disarmed_s = 0.0
+        """Time since it disarmed."""
         self._still_s = 0.0
         self._clock_s = view.time_s
         self._clock_moved_s = now_s
@@ -40,6 +42,8 @@ class EffectTimer:
         self._clock_s = view.time_s
         self.elapsed_s += step_s
         self._still_s += step_s
+        self.was_armed |= view.armed
+        self.disarmed_s = self.disarmed_s + step_s if self.was_armed and not view.armed else 0.0
         if view.geo is not None and (self._place is None or distance_m(self._place, view.geo) > MOVED_M):
             self._place, self._still_s = view.geo, 0.0
 

@@ -10,13 +10,15 @@ from flightstack.core.enums import Severity
 from flightstack.mavlink.link import Address, Message
 from gcs_cli.actions.action import Action, ActionError, NotReadyError, Step
 from gcs_cli.actions.progress import EffectTimer
-from gcs_cli.clients.command_client import CommandClient
+from gcs_cli.clients.command_client import CommandClient, CommandTiming
 from gcs_cli.vehicle.view_types import VehicleView
 
 NEEDS_LIMIT_S = 3.0
 """How long an action waits for the telemetry that it needs."""
 TEXT_WAIT_S = 0.3
 """How long to wait for the STATUSTEXT that explains a refusal; it follows the answer."""
+LANDED_STATE_S = 2.0
+"""How long a disarmed vehicle may report that it is in the air: PX4 sends its landed state once a second."""
 _POLL_S = 0.25
 _MOST_REASONS = 3
 
@@ -150,7 +152,11 @@ class ActionRun:
             return
         self.step, self._timer, self._text_due_s = self._steps.pop(0), None, None
         assert view.identity is not None
-        self._client = CommandClient(Address(*view.identity[:2]), self._own)
+        vehicle = Address(*view.identity[:2])
+        if self.step.restarts:  # a repeated command would act on the restarted vehicle
+            self._client = CommandClient(vehicle, self._own, CommandTiming(self.step.limit_s, retries=0))
+        else:
+            self._client = CommandClient(vehicle, self._own)
         self._client.send_command(self.step.command, now_s)
         self._texts_before = view.text_count
 
@@ -160,6 +166,9 @@ class ActionRun:
         assert self._steps is not None
         answer = self._client.result
         if answer is None:
+            if self.step.restarts and self.step.effect is not None and self.step.effect(view):
+                self._client = None  # the answer was lost
+                self._next_step(view, now_s)
             return
         if answer.result is None:
             self._end(Outcome.SILENT, f"{self.step.name}: {answer.reason}")
@@ -194,15 +203,18 @@ class ActionRun:
         if step.effect(view):
             self._next_step(view, now_s)
             return
+        if step.needs_armed and timer.was_armed and not view.armed:
+            is_in_air = view.on_ground is False
+            if not is_in_air or timer.disarmed_s >= LANDED_STATE_S:
+                where = " in the air" if is_in_air else ""
+                self._end(Outcome.ENDED, f"{self.action.name}: the vehicle disarmed{where}")
+            return
         if view.mode in step.modes:
             timer.was_in_mode = True
         elif timer.was_in_mode:
             self._end(Outcome.ENDED, f"{self.action.name}: the vehicle changed to mode {view.mode}")
             return
-        timer.was_armed |= view.armed
-        if step.needs_armed and timer.was_armed and not view.armed:
-            self._end(Outcome.ENDED, f"{self.action.name}: the vehicle disarmed")
-        elif timer.is_over(step.limit_s, step.is_flight):
+        if timer.is_over(step.limit_s, step.is_flight):
             waited = f"within {step.limit_s:g} s"
             if step.is_flight:
                 waited = f"and has not moved for {step.limit_s:g} s"

@@ -150,12 +150,13 @@ class Fleet:
         served: set[Address] = set()
         for session in self._sessions.values():
             peer = session.peer
-            if peer is None:
-                continue
             if peer in served:  # one heartbeat serves all vehicles behind a peer
                 session.skip_heartbeat(now_s)
             due = session.heartbeat_is_due(now_s)
-            out += [Datagram(frame, peer) for frame in session.poll(now_s)]
+            frames = session.poll(now_s)
+            if peer is None:
+                continue
+            out += [Datagram(frame, peer) for frame in frames]
             if due:
                 served.add(peer)
         return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import select
 import socket
@@ -92,7 +93,10 @@ class UdpLine:
 
 
 class StreamLine:
-    """A client of a stream socket that connects, and connects again after the connection is lost."""
+    """A client of a stream socket that connects, and connects again after the connection is lost.
+
+    A connection that was ``connected`` elsewhere has no ``address``, and is not opened again.
+    """
 
     def __init__(
         self, family: int, address: object, peer: Address, connected: socket.socket | None = None
@@ -104,7 +108,7 @@ class StreamLine:
         self.problem = ""
         self._socket = connected
         self._is_connected = connected is not None
-        self._retry_s = 0.0
+        self._retry_s = math.inf if address is None else 0.0
         self._unsent = bytearray()
         if connected is None:
             self._connect(time.monotonic())

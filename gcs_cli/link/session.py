@@ -174,15 +174,19 @@ class Session:
         self.peer = None
 
     def poll(self, now_s: float) -> list[bytes]:
-        """Return the datagrams to send now to ``peer``."""
-        if self.peer is None:
+        """Return the datagrams to send now to ``peer``.
+
+        After ``disconnect`` nothing can be sent, but services still notice the loss of the vehicle and their timeouts.
+        """
+        if self.peer is None and self.view.identity is None:
             return []
         frames = []
-        if self.heartbeat_is_due(now_s):
+        if self.peer is not None and self.heartbeat_is_due(now_s):
             frames.append(self.encode(self._heartbeat(mavlink.MAV_STATE_ACTIVE)))
             self.skip_heartbeat(now_s)
         for service in self._services:
-            frames += [self.encode(message) for message in service.poll(now_s)]
+            messages = service.poll(now_s)
+            frames += [self.encode(message) for message in messages if self.peer is not None]
         return frames
 
     def heartbeat_is_due(self, now_s: float) -> bool:
@@ -196,11 +200,12 @@ class Session:
         self._heartbeat_due_vehicle_s = math.inf if vehicle_s is None else vehicle_s + HEARTBEAT_PERIOD_S
 
     def next_deadline(self) -> float | None:
-        """Return the time at which to call ``poll`` at the latest; None without a peer."""
-        if self.peer is None:
+        """Return the time at which to call ``poll`` at the latest; None without a vehicle."""
+        if self.peer is None and self.view.identity is None:
             return None
-        due_s = (service.next_deadline() for service in self._services)
-        return min(self._heartbeat_due_s, *(time_s for time_s in due_s if time_s is not None), math.inf)
+        due_s = [service.next_deadline() for service in self._services]
+        due_s.append(None if self.peer is None else self._heartbeat_due_s)
+        return min((time_s for time_s in due_s if time_s is not None), default=None)
 
     def farewell(self) -> list[bytes]:
         """Return the HEARTBEAT in state POWEROFF, which ends the link in order."""

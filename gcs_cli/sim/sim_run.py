@@ -88,10 +88,13 @@ class VehicleProcesses:
         number, waited_s = system_id(self.vehicle.instance), self.vehicle.timeout_s
         return f"vehicle {number} was not ready within {waited_s:g} s: give more with --timeout"
 
-    def check(self) -> None:
-        """Show warnings of the processes; raise CliError if one of them has ended."""
+    def show_notices(self) -> None:
+        """Print the new warnings of the processes."""
         for line in self.children.notices():
             complain(line)
+
+    def check(self) -> None:
+        """Raise CliError if one of the processes has ended."""
         if not self.children.ended():
             return
         child = self.children.culprit(_END_TIMEOUT_S)
@@ -128,16 +131,26 @@ class Fleet:
         self._ends.callback(processes.close)
         self._all.append(processes)
 
-    def step(self, out: Output, due_s: float) -> None:
-        """Check the processes and report the vehicles that have become ready; raise CliError."""
+    def step(self, out: Output, due_s: float, *, shows: bool = True) -> None:
+        """Check the processes and report the vehicles that have become ready; raise CliError.
+
+        Without ``shows``, warnings remain for a later call.
+        """
         now_s = time.monotonic()
         for processes in self._all:
             if processes.poll(now_s):
                 out.say("vehicle_ready", ready_text(processes.vehicle), **connections(processes.vehicle))
             elif not processes.is_ready and now_s >= due_s:
                 raise CliError(processes.late_text, NO_ANSWER)
+            if shows:
+                processes.show_notices()
             processes.check()
         time.sleep(_STEP_S)
+
+    def show_notices(self) -> None:
+        """Print the new warnings of all processes."""
+        for processes in self._all:
+            processes.show_notices()
 
     def __enter__(self) -> Fleet:
         return self
@@ -168,9 +181,12 @@ def simulate(options: SimOptions, out: Output, watch: bool) -> None:
             fleet.step(out, due_s)
         if not interruption.reason:
             out.say("ready", _ready_sentence(len(vehicles)), vehicles=len(vehicles))
-            with _view(first, watch) as view:
-                while not interruption.reason and (view is None or view.poll() is None):
-                    fleet.step(out, due_s)
+            try:
+                with _view(first, watch) as view:
+                    while not interruption.reason and (view is None or view.poll() is None):
+                        fleet.step(out, due_s, shows=view is None)
+            finally:
+                fleet.show_notices()
     out.say("ended", "simulation ended", reason=interruption.reason or "the view was closed")
 
 

@@ -233,10 +233,15 @@ def _local_position(view: VehicleView, message: Any, _now_s: float) -> VehicleVi
 
 
 def _global_position(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    """Take the position; ArduPilot sends zeros until it has one."""
+    """Take the position, and the velocity without LOCAL_POSITION_NED; ArduPilot sends zeros until it has them."""
     geo = GeoPosition(message.lat / 1e7, message.lon / 1e7, message.alt / 1e3, message.relative_alt / 1e3)
     is_known = any(geo[:3])
-    return view._replace(geo=geo if is_known else None, time_s=message.time_boot_ms / 1e3)
+    velocity = view.velocity_ned_m_s
+    if is_known and view.position_ned_m is None:
+        velocity = Vector(message.vx / 1e2, message.vy / 1e2, message.vz / 1e2)
+    return view._replace(
+        geo=geo if is_known else None, velocity_ned_m_s=velocity, time_s=message.time_boot_ms / 1e3
+    )
 
 
 def _home(view: VehicleView, message: Any, _now_s: float) -> VehicleView:

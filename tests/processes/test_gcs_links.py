@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from flightstack.transports.udp import UdpSocket
+from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
-from gcs_cli.link.endpoint import parse_endpoint
+from gcs_cli.link.endpoint import VehicleEndpoint, parse_endpoint
+from gcs_cli.link.lines import RETRY_S, Line
 from gcs_cli.link.share import ShareServer, open_shared, share_path
 from gcs_cli.link.tlog import encode_record
 from tests.support.commands import gcs
@@ -173,3 +175,42 @@ def test_socket_of_a_killed_process_is_replaced() -> None:
     assert second is not None
     second.close()
     assert not share_path(endpoint).exists()
+
+
+def test_server_drops_a_client_that_disconnected() -> None:
+    endpoint = parse_endpoint("udp:14550")
+    server = ShareServer.open(endpoint)
+    assert server is not None
+    client = open_shared(endpoint)
+    assert client is not None
+    assert list(server.receive(0.0)) == []
+    client.close()
+    server.forward(b"data")  # fails, and loses the connection
+    assert list(server.receive(1.0)) == []
+    assert len(list(server.interests())) == 1
+    server.close()
+
+
+def test_client_waits_while_another_process_has_the_port(monkeypatch: pytest.MonkeyPatch) -> None:
+    endpoint = parse_endpoint("udp:14550")
+    server = ShareServer.open(endpoint)
+    assert server is not None
+    client = open_shared(endpoint)
+    assert client is not None
+    list(server.receive(0.0))
+    server.close()
+
+    def busy(_endpoint: VehicleEndpoint) -> Line:
+        raise CliError("the port is in use")
+
+    monkeypatch.setattr("gcs_cli.link.share.open_line", busy)
+    assert [list(client.receive(now_s)) for now_s in (0.0, 1.0, 2.0)] == [[], [], []]
+    assert client.due_s() == 2.0 + RETRY_S
+    next_server = ShareServer.open(endpoint)
+    assert next_server is not None
+    list(client.receive(3.0))
+    list(next_server.receive(3.0))
+    next_server.forward(b"data")
+    assert [data for data, _ in client.receive(4.0)] == [b"data"]
+    client.close()
+    next_server.close()

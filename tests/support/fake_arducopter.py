@@ -33,6 +33,12 @@ class FakeArduCopter:
     heading_deg: float = 356.0
     ignores_takeoff: bool = False
     """Acknowledges a takeoff and stays on the ground."""
+    unanswered: set[int] = field(default_factory=set)
+    """Commands that are executed without an answer."""
+    velocity_ned_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Reported velocity."""
+    rise_of_ground_m: float = 0.0
+    """Height of the ground above home."""
     commands: list[tuple[int, int | None]] = field(default_factory=list)
     """Commands without requests of streams, and the frame of those that came as COMMAND_INT."""
 
@@ -126,7 +132,9 @@ class FakeArduCopter:
             result = handler(params, frame)
         said = self._out[texts:]  # texts follow the answer
         del self._out[texts:]
-        self._out += [apm.MAVLink_command_ack_message(command, result, 0, 0, 255, 190), *said]
+        if command not in self.unanswered:
+            self._out.append(apm.MAVLink_command_ack_message(command, result, 0, 0, 255, 190))
+        self._out += said
 
     def _say(self, text: str, severity: int = 2) -> None:
         self._out.append(apm.MAVLink_statustext_message(severity, text.encode()))
@@ -219,7 +227,7 @@ class FakeArduCopter:
         ms = round((self._time_s - self._booted_s) * 1e3)
         latitude = 47.397742 + self.north_m / METRES_PER_DEGREE
         longitude = 8.545594 + self.east_m / METRES_PER_DEGREE / math.cos(math.radians(47.397742))
-        above_mm = round(self.altitude_m * 1e3)
+        above_mm = round((self.altitude_m + self.rise_of_ground_m) * 1e3)
         check = apm.MAV_SYS_STATUS_PREARM_CHECK
         health = check if self.has_position else 0
         yaw_rad = math.radians(self.heading_deg)
@@ -227,7 +235,7 @@ class FakeArduCopter:
             apm.MAVLink_attitude_message(ms, 0.0, 0.0, yaw_rad, 0.0, 0.0, 0.0),
             apm.MAVLink_global_position_int_message(
                 ms, round(latitude * 1e7), round(longitude * 1e7), round(self.home_m * 1e3) + above_mm,
-                above_mm, 0, 0, 0, round(self.heading_deg * 100),
+                above_mm, *(round(speed * 1e2) for speed in self.velocity_ned_m_s), round(self.heading_deg * 100),
             ),
             apm.MAVLink_sys_status_message(check, check, health, 0, 12600, 0, 100, 0, 0, 0, 0, 0, 0),
             apm.MAVLink_mission_current_message(0, 3, 3 if self.mode == AUTO else 2, 0),

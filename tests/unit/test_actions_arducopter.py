@@ -224,3 +224,65 @@ def test_modes_are_named_by_arducopters_names(rig: Rig) -> None:
     assert rig.view.mode == "STABILIZE"
     assert rig.perform(on_vehicle.select_mode("alt-hold"))[:2] == (Outcome.DONE, "mode alt-hold")
     assert rig.view.mode == "ALT_HOLD"
+
+
+def test_reboot_without_an_answer_is_sent_once(rig: Rig) -> None:
+    rig.vehicle.unanswered = {mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN}
+    rig.run_for(20.0)
+    rig.vehicle.commands.clear()
+    assert rig.perform(on_vehicle.reboot())[:2] == (Outcome.DONE, "rebooted")
+    rig.run_for(10.0)
+    assert rig.vehicle.commands == [(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, None)]
+
+
+def test_hold_is_not_done_while_the_vehicle_moves(rig: Rig) -> None:
+    rig.flying()
+    for velocity in ((0.0, 1.0, 0.0), (0.0, 0.0, -1.0)):
+        rig.vehicle.velocity_ned_m_s = velocity
+        rig.run_for(1.0)
+        assert rig.perform(in_flight.hold()).outcome is Outcome.NOT_SEEN
+
+
+def test_takeoff_is_not_done_on_ground_above_the_altitude() -> None:
+    rig = Rig(FakeArduCopter(ignores_takeoff=True))
+    rig.vehicle.rise_of_ground_m = 10.0
+    rig.run_for(1.0)
+    assert rig.view.relative_altitude_m == 10.0
+    assert rig.perform(in_flight.takeoff(6.0)).outcome is Outcome.NOT_SEEN
+
+
+def test_takeoff_in_the_air_is_not_sent(rig: Rig) -> None:
+    rig.flying()
+    result = rig.perform(in_flight.takeoff(5.0))
+    assert result[:2] == (
+        Outcome.REFUSED,
+        "takeoff: the vehicle is in the air: give the new altitude to goto",
+    )
+    assert rig.vehicle.commands == []
+
+
+@pytest.mark.parametrize("action", [in_flight.land(), in_flight.return_to_launch()], ids=["land", "rtl"])
+def test_landings_end_when_the_vehicle_disarms_in_the_air(rig: Rig, action: Action) -> None:
+    rig.flying()
+    run = ActionRun(action, lambda: rig.view, rig.now_s, rig.session.own)
+    rig.session.use(run)
+    rig.run_for(1.5)
+    rig.vehicle.armed = False
+    rig.run_for(5.0)
+    assert run.result is not None
+    assert run.result[:2] == (Outcome.ENDED, f"{action.name}: the vehicle disarmed in the air")
+
+
+def test_landing_is_done_if_the_landed_state_follows_the_disarm(rig: Rig) -> None:
+    """ArduCopter disarms at touchdown, and EXTENDED_SYS_STATE comes up to 0.5 s after the heartbeat."""
+    rig.flying()
+    run = ActionRun(in_flight.land(), lambda: rig.view, rig.now_s, rig.session.own)
+    rig.session.use(run)
+    rig.run_for(1.5)
+    rig.vehicle.armed = False
+    rig.run_for(1.05)
+    assert (rig.view.armed, rig.view.on_ground, run.result) == (False, False, None)
+    rig.vehicle.altitude_m = 0.0
+    rig.run_for(0.5)
+    assert run.result is not None
+    assert run.result.outcome is Outcome.DONE

@@ -9,6 +9,8 @@ import pytest
 from flightstack.mavlink.dialect import mavlink
 from flightstack.mavlink.link import Link, Message
 from flightstack.transports.udp import Address
+from gcs_cli.actions.in_flight import land
+from gcs_cli.actions.run import ActionRun, Outcome
 from gcs_cli.link.fleet import Fleet
 from tests.support.fake_vehicle import FakeVehicle
 
@@ -97,6 +99,22 @@ def test_vehicle_may_reconnect_from_another_address() -> None:
     assert sent(fleet, 0.5) == []
     met(fleet, FakeVehicle(1), THERE, 0.6)
     assert fleet.selected.peer == THERE
+
+
+def test_action_ends_after_the_connection_was_closed() -> None:
+    fleet = met(Fleet(), FakeVehicle(1))
+    session = fleet.selected
+    run = ActionRun(land(), lambda: session.view, 0.0, session.own)
+    session.use(run)
+    fleet.disconnect(HERE)
+    now_s = 0.0
+    while run.result is None and now_s < 10.0:
+        due_s = fleet.next_deadline()
+        assert due_s is not None
+        now_s = max(now_s + 0.01, due_s)
+        assert sent(fleet, now_s) == []
+    assert run.result is not None
+    assert run.result[:2] == (Outcome.ENDED, "land: the vehicle was lost")
 
 
 def test_messages_of_every_system_are_observed() -> None:

@@ -6,17 +6,18 @@ import pytest
 
 from flightstack.mavlink.dialect import mavlink
 from gcs_cli.actions.action import Action, NotReadyError
+from gcs_cli.actions.in_flight import hold
 from gcs_cli.actions.in_mission import jump, pause, resume
 from gcs_cli.autopilots.autopilot import Role
-from gcs_cli.vehicle.view_types import Identity, Mission, VehicleView
+from gcs_cli.vehicle.view_types import Identity, Mission, Vector, VehicleView
 
 PX4 = Identity(1, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
 ARDUPILOT = PX4._replace(autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
 
 
 def view_in(role: Role, identity: Identity = PX4, *, armed: bool = True) -> VehicleView:
-    """A vehicle in the mode of a role."""
-    view = VehicleView(identity=identity, armed=armed)
+    """A standing vehicle in the mode of a role."""
+    view = VehicleView(identity=identity, armed=armed, velocity_ned_m_s=Vector(0.0, 0.0, 0.0))
     mode = view.autopilot.role_mode(role, view.vehicle_type)
     assert mode is not None
     return view._replace(custom_mode=mode, mode=view.autopilot.mode_name(view.vehicle_type, mode))
@@ -58,3 +59,10 @@ def test_jump_is_done_when_the_vehicle_reports_the_item() -> None:
 def test_pause_and_resume_need_a_mission_in_flight(action: Action, view: VehicleView, reason: str) -> None:
     with pytest.raises(NotReadyError, match=reason):
         action.plan(view)
+
+
+def test_hold_needs_a_known_speed() -> None:
+    (step,) = hold().plan(view_in(Role.HOLD))
+    assert step.effect is not None
+    assert step.effect(view_in(Role.HOLD))
+    assert not step.effect(view_in(Role.HOLD)._replace(velocity_ned_m_s=None))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,9 @@ import pytest
 from flightstack.__main__ import RunOptions
 from flightstack.core.geodesy import LocalFrame
 from flightstack.params.config import DEFAULT_HOME
+from flightstack.process.console import complain
 from gcs_cli.errors import USAGE, CliError
+from gcs_cli.output import Output
 from gcs_cli.sim import sim_run
 from gcs_cli.sim.sim_flags import TO_STACK, SimOptions
 from gcs_cli.sim.sim_vehicles import connections, ready_text, stack_arguments, start_of, vehicles_of
@@ -137,3 +141,53 @@ def test_view_is_a_process_that_ends_with_the_simulation(monkeypatch: pytest.Mon
     assert started == [("gcs_cli", "--signing-key", "k", "--instance", "3", "watch")]
     with sim_run._view(SimOptions(), wanted=False) as nothing:
         assert nothing is None
+
+
+def test_notices_are_printed_after_the_view(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The view draws on the same terminal."""
+    notices: list[str] = []
+
+    class NoisyChildren(contextlib.nullcontext[None]):
+        """Children that write a warning while the view runs."""
+
+        def start(self, *_: object) -> None:
+            pass
+
+        def notices(self) -> list[str]:
+            new = list(notices)
+            notices.clear()
+            return new
+
+        def ended(self) -> list[object]:
+            return []
+
+        def __enter__(self) -> NoisyChildren:  # type: ignore[override]
+            return self
+
+    class View:
+        """A view that ends after two steps."""
+
+        steps = 0
+
+        def poll(self) -> int | None:
+            self.steps += 1
+            return None if self.steps < 3 else 0
+
+    @contextlib.contextmanager
+    def view(*_: object) -> Iterator[View]:
+        notices.append("WARNING low battery")
+        yield View()
+        complain("view ended")
+
+    def become_ready(processes: sim_run.VehicleProcesses, _now_s: float) -> bool:
+        processes.is_ready = True
+        return False
+
+    monkeypatch.setattr(sim_run, "_view", view)
+    monkeypatch.setattr(sim_run, "Children", NoisyChildren)
+    monkeypatch.setattr(sim_run, "check_ports", lambda _vehicle: None)
+    monkeypatch.setattr(sim_run.VehicleProcesses, "poll", become_ready)
+    sim_run.simulate(SimOptions(), Output(as_json=False), watch=True)
+    assert capsys.readouterr().err == "view ended\nWARNING low battery\n"
