@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import shlex
+import signal
 from pathlib import Path
 
 import typer
@@ -24,12 +26,22 @@ class WatchServer(Server):
         names = _LOOPBACK_NAMES if host in _LOOPBACK_NAMES else (host,)
         self._origins = {f"http://{name}:{port}" for name in names}
 
-    def initialize_logging(self) -> None:
-        """Log nothing: the address is printed at the start."""
-
     async def on_startup(self, app: web.Application) -> None:
-        """Print the address."""
-        typer.echo(f"serving at {self.public_url}: Ctrl-C ends")
+        """Print no banner."""
+
+    def serve(self, debug: bool = False) -> None:
+        """Serve until SIGINT or SIGTERM; print the address once browsers can connect."""
+        loop = asyncio.new_event_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, self.request_exit)
+        web.run_app(
+            self._make_app(),
+            host=self.host,
+            port=self.port,
+            handle_signals=False,
+            loop=loop,
+            print=lambda *_: typer.echo(f"serving at {self.public_url}: Ctrl-C ends"),
+        )
 
     async def handle_websocket(self, request: web.Request) -> web.WebSocketResponse:
         """Serve a page of ours; a foreign page in the same browser must not command the vehicle."""

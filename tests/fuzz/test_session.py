@@ -14,7 +14,7 @@ from gcs_cli.tui.watch_lines import state_line, text_line
 from tests.fuzz.clients import SERVICES
 from tests.fuzz.inputs import KINDS, Inputs
 from tests.fuzz.measure import calls, held
-from tests.unit.test_view_render import PANELS
+from tests.support.view_panels import PANELS
 
 MESSAGES = 1_000
 STEP_S = 0.02

@@ -32,6 +32,8 @@ SKIPPED = {
     "film.md": 1,
     "logs.md": 2,
     "sim.md": 1,
+    "connect.md": 1,
+    "watch.md": 1,
 }
 """Number of blocks that a page marks as not to be run; 0 for any other page."""
 MODULES = {"sim-bridge": "sim_bridge", "flightstack": "flightstack", "gcs": "gcs_cli"}

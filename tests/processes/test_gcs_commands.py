@@ -22,19 +22,13 @@ from gcs_cli.clients.command_client import CommandClient, CommandTiming
 from gcs_cli.clients.log_client import LogEntry
 from gcs_cli.link.connection import Connection
 from gcs_cli.transfers import log_calls
-from tests.support.commands import Ended, gcs
+from tests.support.commands import gcs
 from tests.support.fake_vehicle import ARM, FakeVehicle, serve
 from tests.support.plan_items import circle
+from tests.support.told import MISSIONS, told
 from tests.support.vehicle_processes import vehicle
 
 LONG_S = 30  # a bound for a machine that is busy; nothing is expected to take a second
-MISSIONS = Path(__file__).parents[2] / "missions"
-
-
-def told(vehicle: FakeVehicle, *arguments: object) -> Ended:
-    """Run ``gcs`` with the link to ``vehicle``."""
-    with serve(vehicle) as socket:
-        return gcs("--connect", f"udpout:127.0.0.1:{socket.address[1]}", *arguments)
 
 
 @pytest.mark.parametrize(

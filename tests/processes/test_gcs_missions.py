@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from flightstack.plan import load_plan, save_plan
-from tests.processes.test_gcs_commands import MISSIONS, told
 from tests.support.commands import Ended, gcs
 from tests.support.fake_vehicle import HOLD, MISSION, FakeVehicle
 from tests.support.plan_items import circle
+from tests.support.told import MISSIONS, told
 from tests.support.vehicle_processes import vehicle
 
 FENCED = MISSIONS / "fenced_square.plan"

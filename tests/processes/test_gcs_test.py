@@ -83,7 +83,9 @@ def test_a_bad_file_or_option_exits_with_2_before_a_flight(
     ended = gcs("test", *arguments)
     assert ended.stderr.startswith(sentence)
     assert ended.stderr.count("\n") == 1
-    assert (ended.stdout, ended.returncode) == ("", 2)
+    told = [json.loads(line) for line in ended.stdout.splitlines()]
+    error = {"event": "error", "message": sentence.removeprefix("gcs: "), "exit_code": 2}
+    assert (told, ended.returncode) == ([error] if "--json" in arguments else [], 2)
 
 
 def test_the_number_of_processes_changes_no_result(folder: Path) -> None:

@@ -11,7 +11,7 @@ from flightstack.mavlink.link import Address, Link
 from flightstack.mavlink.param_values import LARGEST_INTEGER, parse_value, set_value
 from gcs_cli.clients.param_client import ParamClient, ParamDone, ParamFailed
 from tests.protocol.param_harness import Station, World, store_of
-from tests.protocol.test_param_protocol import NAN, SEEDS, all_told, ignore_errors, world_of
+from tests.support.param_worlds import NAN, SEEDS, all_told, ignore_errors, world_of
 
 
 def test_an_unknown_parameter_of_a_mute_vehicle_is_known_within_two_seconds() -> None:

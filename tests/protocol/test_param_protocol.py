@@ -28,13 +28,7 @@ from flightstack.params.store import ParamStore
 from flightstack.transports.memory import Conditions
 from gcs_cli.clients.param_client import ParamDone, ParamFailed
 from tests.protocol.param_harness import LOSSY, Station, World, spec, store_of
-
-SEEDS = st.integers(0, 2**32)
-NAN, INF = float("nan"), float("inf")
-
-
-def world_of(count: int = 100) -> World:
-    return World(store_of(count), Station("gcs"), Station("other", system=254))
+from tests.support.param_worlds import INF, NAN, SEEDS, all_told, ignore_errors, world_of
 
 
 def set_message(name: str, value: float, kind: int = REAL32, target: tuple[int, int] = (1, 1)) -> Message:
@@ -294,13 +288,6 @@ def test_any_message_is_taken_and_no_value_leaves_its_range(messages: list[Messa
 # ---------------------------------------------------------------------- client and server
 
 
-def all_told(world: World, result: object) -> bool:
-    return (
-        isinstance(result, ParamDone)
-        and {told.name: told.value for told in result.parameters} == world.store.values()
-    )
-
-
 def test_a_client_lists_reads_and_sets() -> None:
     world = world_of()
     assert all_told(world, world.list("gcs"))
@@ -332,14 +319,6 @@ def test_a_silent_vehicle_is_given_up() -> None:
         assert result.silent
         assert "system 1" in result.reason
     assert world.now_s - 100.0 == pytest.approx(21 * 0.5 + 2 * 8 * 0.25)
-
-
-def ignore_errors(station: Station) -> None:
-    """Let PARAM_ERROR not arrive, as with a vehicle that does not send it."""
-    receive = station.client.receive
-    station.client.receive = lambda message, now_s: (  # type: ignore[method-assign]
-        None if message.get_type() == "PARAM_ERROR" else receive(message, now_s)
-    )
 
 
 def test_a_vehicle_that_knows_no_param_error_is_told_by_the_value_it_keeps() -> None:

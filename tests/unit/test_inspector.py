@@ -18,11 +18,11 @@ from gcs_cli.tui.inspector_lines import field_texts, filtered, lines, message_ro
 from gcs_cli.tui.inspector_screen import InspectorScreen
 from gcs_cli.tui.order_form import OrderForm
 from gcs_cli.tui.palette import DARK
+from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.unit.test_map import VIEW
-from tests.unit.test_watch_history import attitude, received
+from tests.support.telemetry_frames import attitude, received
 
 pytestmark = pytest.mark.unit
 

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightstack.core.contract import Vector3
-from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import mavlink
-from flightstack.plan import Command, FenceCommand, Frame, MissionItem, Plan
+from flightstack.plan import Command, FenceCommand, Plan
 from gcs_cli.tui.canvas import rows_of_text
 from gcs_cli.tui.history import History
 from gcs_cli.tui.map_drawing import distance_text, draw_map, place_text
@@ -30,22 +29,13 @@ from gcs_cli.tui.map_scene import (
 )
 from gcs_cli.tui.palette import DARK
 from gcs_cli.tui.viewport import LARGEST_M_PER_DOT, SMALLEST_M_PER_DOT, Viewport, round_step
-from gcs_cli.vehicle.view_types import GeoPosition, Identity, Mission, Setpoint, Vector, VehicleView
-from tests.unit.test_watch_history import received
+from gcs_cli.vehicle.view_types import GeoPosition, Identity, Setpoint, Vector
+from tests.support.map_views import FRAME, VIEW, item
+from tests.support.telemetry_frames import received
 
 pytestmark = pytest.mark.unit
 
-HOME = GeoPoint(47.397742, 8.545594, 488.0)
-FRAME = LocalFrame(HOME)
 metres = st.floats(-20_000.0, 20_000.0)
-
-
-def item(command: int, place: Place | None = None, **fields: float) -> MissionItem:
-    x = y = 0
-    if place is not None:
-        geo = FRAME.to_geo(Vector3(place.north_m, place.east_m, 0.0))
-        x, y = round(geo.latitude_deg * 1e7), round(geo.longitude_deg * 1e7)
-    return MissionItem(command, Frame.GLOBAL_RELATIVE_ALT_INT, x=x, y=y, z=10.0, **fields)
 
 
 def drawn(scene: MapScene, view: Viewport) -> list[str]:
@@ -229,17 +219,6 @@ def test_any_places_are_drawn(places, heading):
     scene = MapScene(crafts[0], crafts[0].place, crafts[0].place, 0, plan, np.array(places), crafts)
     view = Viewport(width=30, height=10).fitted(scene.extent())
     assert len(draw_map(scene, view, DARK, grid=True, cursor=(3, 3)).segments()) == 10
-
-
-VIEW = VehicleView(
-    identity=Identity(1, 1, 2, 12),
-    geo=GeoPosition(HOME.latitude_deg, HOME.longitude_deg, 493.0, 5.0),
-    home=GeoPosition(HOME.latitude_deg, HOME.longitude_deg, 488.0, 0.0),
-    position_ned_m=Vector(100.0, 0.0, -5.0),
-    setpoint=Setpoint(Vector(110.0, -4.0, -5.0)),
-    heading_deg=45.0,
-    mission=Mission(1, 2),
-)
 
 
 def position(north_m: float, system: int = 1, hdg: int = 65535):

@@ -34,10 +34,11 @@ from gcs_cli.tui.mission_rows import (
 from gcs_cli.tui.mission_screen import MissionScreen
 from gcs_cli.tui.palette import DARK
 from gcs_cli.vehicle.view_types import GeoPosition, Identity, Mission
+from tests.support.map_views import HOME, VIEW, item
 from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.unit.test_map import HOME, VIEW, Place, item
+from tests.unit.test_map import Place
 
 pytestmark = pytest.mark.unit
 

@@ -27,10 +27,10 @@ from gcs_cli.tui.param_model import (
 )
 from gcs_cli.tui.param_screen import ParamScreen
 from gcs_cli.vehicle.param_info import ParamInfo
+from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.unit.test_map import VIEW
 
 pytestmark = pytest.mark.unit
 

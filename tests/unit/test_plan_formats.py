@@ -20,7 +20,7 @@ from gcs_cli.plans.formats.files import load_any, save_any
 from gcs_cli.plans.formats.geojson import read_geojson, render_geojson
 from gcs_cli.plans.formats.kml import read_kml, render_kml
 from tests.support.plan_items import HOME, circle, polygon, rally_point, return_point, square
-from tests.unit.test_plan_files import plans
+from tests.support.random_plans import plans
 
 EXAMPLES = ["square.plan", "every_item.plan", "fenced_square.plan", "triangle.waypoints"]
 KML = """<kml xmlns="http://www.opengis.net/kml/2.2"><Document><Placemark><name>field</name><Polygon>

@@ -30,7 +30,7 @@ from gcs_cli.tui.plot_drawing import (
 )
 from gcs_cli.tui.plot_fields import FIRST_FIELDS, MOST_FIELDS, PlotFields, field_choices, value_note
 from gcs_cli.vehicle.field_units import enum_text, field_unit, shown_unit, shown_values
-from tests.unit.test_watch_history import attitude, received
+from tests.support.telemetry_frames import attitude, received
 
 pytestmark = pytest.mark.unit
 

@@ -17,11 +17,11 @@ from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.field_picker import FieldPicker
 from gcs_cli.tui.history import History
 from gcs_cli.tui.plot_screen import PlotScreen
+from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.unit.test_map import VIEW
-from tests.unit.test_watch_history import received
+from tests.support.telemetry_frames import received
 
 pytestmark = pytest.mark.unit
 

@@ -23,13 +23,10 @@ from gcs_cli.tui.timing_panels import timing_panel
 from gcs_cli.tui.trends import trends_panel
 from gcs_cli.tui.watch_lines import state_line, text_line
 from gcs_cli.vehicle.view_types import Battery, Euler, Mission, StatusText, Vector, VehicleView
+from tests.support.view_panels import PANELS
 from tests.support.watch_states import BARE, FAILING, FULL, TIMING, flown_history
 
 SIZES = [(34, 6), (80, 24), (50, 12), (20, 2), (7, 1), (120, 60)]
-PANELS = [
-    flight_display, position_panel, power_panel, health_panel, link_panel, mission_panel, timing_panel,
-    messages_panel, compact, status_line,
-]  # fmt: skip
 
 
 def plain(lines: list[Text]) -> str:

@@ -7,19 +7,8 @@ import math
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link, Message
 from gcs_cli.tui.history import ROWS_KEPT, History
-
-LINK, DECODER = Link(1, 1), Link(255, 190)
-
-
-def received(message: Message) -> Message:
-    (decoded,) = DECODER.decode(LINK.encode(message))
-    return decoded
-
-
-def attitude(roll: float) -> Message:
-    return received(mavlink.MAVLink_attitude_message(1000, roll, 0.0, 0.0, 0.0, 0.0, 0.0))
+from tests.support.telemetry_frames import attitude, received
 
 
 def test_history_keeps_each_numeric_field_with_its_time() -> None:
