@@ -77,6 +77,12 @@ class Feed:
         return tuple(sorted((session.view for session in sessions), key=lambda view: view.identity or ()))
 
     @property
+    def targets(self) -> tuple[VehicleView, ...]:
+        """States of the vehicles that actions go to: the selected one, or all."""
+        view = self.view
+        return self.views if self.commands_all else () if view.identity is None else (view,)
+
+    @property
     def now_s(self) -> float:
         """Clock of the connection [s]."""
         return self._connection.now_s
@@ -90,6 +96,7 @@ class Feed:
         """Start to receive."""
         self._connection.fleet.observe = self._observe
         self._connection.fleet.subscribe(self._rates_hz)
+        self._connection.fleet.keep()
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._thread.start()
 
@@ -111,13 +118,13 @@ class Feed:
         if system_id is not None:
             self.submit(lambda connection: connection.fleet.select(system_id))
 
-    def act(self, action: Action) -> None:
-        """Perform ``action``; the answer and the effect become notices and messages.
+    def act(self, action: Action, system_id: int) -> None:
+        """Perform ``action`` on a vehicle, selected or not.
 
-        A new action ends the wait for the effect of the former one.
+        The answer and the effect become notices and messages. A new action ends the wait for the effect of the former one.
         """
         self._order.set()
-        self.submit(lambda connection: self._begin(action, connection))
+        self.submit(lambda connection: self._begin(action, connection.fleet.sessions[system_id], connection))
 
     @property
     def order_waits(self) -> bool:
@@ -164,16 +171,11 @@ class Feed:
         except Exception as error:
             future.set_exception(error)
 
-    def _begin(self, action: Action, connection: Connection) -> None:
+    def _begin(self, action: Action, session: Session, connection: Connection) -> None:
         self._order.clear()
         if connection.is_recording:
-            self._say(connection.session, f"{action.name}: a recording takes no commands", Severity.WARNING)
+            self._say(session, f"{action.name}: a recording takes no commands", Severity.WARNING)
             return
-        sessions = connection.fleet.sessions.values() if self.commands_all else [connection.session]
-        for session in sessions:
-            self._begin_one(action, session)
-
-    def _begin_one(self, action: Action, session: Session) -> None:
         system_id = session.target[0]
         former = self._running.pop(system_id, None)
         if former is not None:

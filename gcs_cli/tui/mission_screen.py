@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
 
@@ -16,6 +17,7 @@ from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import MissionItem, Plan
 from gcs_cli.actions import in_flight, in_mission
+from gcs_cli.actions.action import Action
 from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.plans import edit
@@ -38,6 +40,7 @@ from gcs_cli.tui.mission_rows import (
     mission_table,
     summary,
 )
+from gcs_cli.tui.orders import asks_to_start, in_air, vehicle_name
 from gcs_cli.tui.row_list import RowList, title_text
 from gcs_cli.vehicle.view_types import VehicleView
 
@@ -321,18 +324,31 @@ class MissionScreen(JobScreen):
         """Make the selected item the current one."""
         seq = self.rows.cursor
         name = any_command_name(self.items[seq].command)
-        if watch_app(self).feed.view.armed and not await self.ask(f"Fly to item {seq} ({name})?", "Jump"):
-            return
-        watch_app(self).feed.act(in_mission.jump(seq))
+        await self._perform(
+            "Jump",
+            lambda _view: in_mission.jump(seq),
+            lambda view: f"Fly {vehicle_name(view)} to item {seq} ({name})?" if view.armed else "",
+        )
 
-    def action_pause(self) -> None:
+    @work
+    async def action_pause(self) -> None:
         """Hold the position."""
-        watch_app(self).feed.act(in_mission.pause())
+        await self._perform("Pause", lambda _view: in_mission.pause())
 
     @work
     async def action_start(self) -> None:
         """Start the mission on the ground, or resume it in the air."""
-        if watch_app(self).feed.view.armed:
-            watch_app(self).feed.act(in_mission.resume())
-        elif await self.ask("Start the mission? The vehicle arms and takes off.", "Start"):
-            watch_app(self).feed.act(in_flight.start_mission())
+        await self._perform(
+            "Start",
+            lambda view: in_mission.resume() if in_air(view) else in_flight.start_mission(),
+            asks_to_start,
+        )
+
+    async def _perform(
+        self,
+        title: str,
+        make: Callable[[VehicleView], Action],
+        ask: Callable[[VehicleView], str] = lambda _view: "",
+    ) -> None:
+        app = watch_app(self)
+        await app.perform(title, app.feed.targets, make, ask)

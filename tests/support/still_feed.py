@@ -24,6 +24,8 @@ class StillFeed(Feed):
         self.notices = deque()
         self.actions: list[Action] = []
         """Actions that the user asked for."""
+        self.acted_on: list[int] = []
+        """System ids of the vehicles of ``actions``."""
         self.commands_all = False
         self.others: list[VehicleView] = []
         self.error = None
@@ -57,8 +59,9 @@ class StillFeed(Feed):
         self.jobs.append((job, Future()))
         return self.jobs[-1][1]
 
-    def act(self, action: Action) -> None:
+    def act(self, action: Action, system_id: int) -> None:
         self.actions.append(action)
+        self.acted_on.append(system_id)
 
     @property
     def order_waits(self) -> bool:

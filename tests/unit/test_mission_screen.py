@@ -307,3 +307,39 @@ def test_jump_needs_the_mission_of_the_vehicle():
         assert len(app.feed.actions) == 1
 
     drive(story)
+
+
+def test_start_on_the_ground_asks_although_armed():
+    async def story(pilot, app, screen):
+        await pilot.press("s")
+        await pilot.pause()
+        assert isinstance(app.screen, Confirm)
+        await pilot.press("y")
+        await pilot.pause()
+        assert [action.name for action in app.feed.actions] == ["mission start"]
+
+    drive(story, view=FLYING._replace(landed_state=1))
+
+
+def test_start_in_the_air_resumes_at_once():
+    async def story(pilot, app, screen):
+        await pilot.press("s")
+        await pilot.pause()
+        assert [action.name for action in app.feed.actions] == ["mission resume"]
+
+    drive(story)
+
+
+@pytest.mark.parametrize("key", ["s", "j", "p"])
+def test_mission_orders_to_all_vehicles_ask(key):
+    async def story(pilot, app, screen):
+        app.feed.others.append(FLYING._replace(identity=Identity(7, 1, 2, 12)))
+        app.feed.commands_all = True
+        await pilot.press(key)
+        await pilot.pause()
+        assert "all 2 vehicles (1, 7)?" in "\n".join(shown(app))
+        await pilot.press("y")
+        await pilot.pause()
+        assert app.feed.acted_on == [1, 7]
+
+    drive(story)

@@ -48,7 +48,7 @@ def notices(feed: Feed) -> list[str]:
 
 def test_an_action_reports_the_answer_and_the_time_of_its_effect() -> None:
     with fed(FakeVehicle()) as feed:
-        feed.act(on_vehicle.arm())
+        feed.act(on_vehicle.arm(), 1)
         until(lambda: any(text.startswith("armed after ") for text in notices(feed)))
         assert feed.view.armed
         texts = [entry.text for entry in feed.messages.since(0) if entry.is_own]
@@ -57,15 +57,15 @@ def test_an_action_reports_the_answer_and_the_time_of_its_effect() -> None:
 
 def test_a_refusal_gives_the_vehicles_reason() -> None:
     with fed(FakeVehicle(refusals={ARM: "Arming refused: no position"})) as feed:
-        feed.act(on_vehicle.arm())
+        feed.act(on_vehicle.arm(), 1)
         until(lambda: feed.notices)
         assert "no position" in notices(feed)[-1]
 
 
 def test_a_new_action_ends_the_wait_for_the_former_one() -> None:
     with fed(FakeVehicle(ignored={ARM})) as feed:
-        feed.act(on_vehicle.arm())
-        feed.act(in_flight.hold())
+        feed.act(on_vehicle.arm(), 1)
+        feed.act(in_flight.hold(), 1)
         until(lambda: "arm: no longer followed" in notices(feed))
 
 
@@ -144,10 +144,11 @@ def test_several_vehicles_are_selected_and_commanded_together() -> None:
 
             until(lambda: run() or len(feed.views) == 2)
             assert [view.identity.system_id for view in feed.views if view.identity] == [3, 4]
+            assert feed._connection.fleet.is_kept  # a lost vehicle stays selected
             feed.select(4)
             until(lambda: run() or feed.view.identity[0] == 4)
-            feed.select(None)
-            feed.act(on_vehicle.arm())
+            for number in vehicles:
+                feed.act(on_vehicle.arm(), number)
             until(lambda: run() or all(vehicle.armed for vehicle in vehicles.values()))
         finally:
             feed.stop()
