@@ -113,6 +113,8 @@ class Connection:
         if line is None and vehicle is None and not endpoint.listens:
             (vehicle,) = self._line.peers
         self.fleet = Fleet(self._line.peers, vehicle, record, signing, system_id)
+        self.on_step: Callable[[], None] | None = None
+        """Called in every step after the messages were received."""
         self._is_lent = False
         self._server: ShareServer | None = None
         self._share_due_s = math.inf
@@ -167,6 +169,8 @@ class Connection:
         if isinstance(line, SeveralLines) and self.session.peer is not None:
             self.endpoint = line.keep(self.session.peer) or self.endpoint
         self._serve(now_s)
+        if self.on_step is not None:
+            self.on_step()
         self._send()
 
     def share(self) -> None:

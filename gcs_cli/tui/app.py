@@ -163,7 +163,7 @@ class WatchApp(App[None]):
     ) -> None:
         """Ask whether to act on ``targets``, and act on them.
 
-        ``targets`` are the states at the key press: a selection that moves meanwhile changes neither vehicle nor action.
+        ``targets`` are the states at the key press: a selection that moves meanwhile does not count.
         ``ask`` returns the question for a vehicle, empty for none.
         """
         total = len(self.feed.views) if self.feed.commands_all else 1

@@ -293,8 +293,8 @@ class MissionScreen(JobScreen):
         return f"uploaded: {self._compare(connection, plan)}"
 
     def _note(self, uploads: Uploads) -> str:
-        self.show_progress(*uploads.progress)
-        return ""
+        self.progress = uploads.progress
+        return "interrupted" if watch_app(self).feed.is_stopping else ""
 
     def _compare(self, connection: Connection, plan: Plan) -> str:
         """Return the parts that are equal on the vehicle; raise CliError with the differences."""

@@ -229,7 +229,7 @@ class ParamScreen(JobScreen):
             self._take(self._params._replace(parameters=by_name, infos=infos))
 
     def _download(self, connection: Connection) -> tuple[tuple[Parameter, ...], dict[str, ParamInfo]]:
-        parameters = param_calls.fetch_all(connection, self.yield_to_orders)
+        parameters = param_calls.fetch_all(connection, self.show_progress)
         return parameters, param_calls.fetch_metadata(connection)
 
     @work

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -29,6 +30,7 @@ class StillFeed(Feed):
         self.commands_all = False
         self.others: list[VehicleView] = []
         self.error = None
+        self._stopping = threading.Event()
         self._rates_hz = {}
         self.shown = view
         self.time_s = now_s
@@ -62,10 +64,6 @@ class StillFeed(Feed):
     def act(self, action: Action, system_id: int) -> None:
         self.actions.append(action)
         self.acted_on.append(system_id)
-
-    @property
-    def order_waits(self) -> bool:
-        return bool(self.actions)
 
     def tell(self, text: str, severity: Severity = Severity.NOTICE) -> None:
         self.notices.append(Notice(text, severity))

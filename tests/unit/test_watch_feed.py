@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -78,6 +79,36 @@ def test_a_job_runs_beside_the_reception_of_messages() -> None:
             return 42
 
         assert feed.submit(job).result(HANG_S) == 42
+
+
+def test_order_is_performed_and_followed_during_a_job() -> None:
+    with fed(FakeVehicle()) as feed:
+
+        def job(connection: Connection) -> bool:
+            feed.act(on_vehicle.arm(), 1)
+            return connection.wait_for(lambda: any("armed after" in text for text in notices(feed)), HANG_S)
+
+        assert feed.submit(job).result()
+
+
+def test_stop_waits_for_the_end_of_a_job() -> None:
+    ended = []
+
+    def job(connection: Connection) -> None:
+        begun.set()
+        connection.wait_for(lambda: feed.is_stopping, HANG_S)
+        count = connection.session.view.link.received
+        connection.wait_for(lambda: connection.session.view.link.received > count + 3, HANG_S)
+        ended.append(True)
+
+    begun = threading.Event()
+    with fed(FakeVehicle()) as feed:
+        feed.submit(job)
+        later = feed.submit(job)
+        begun.wait()
+        feed.stop()
+        assert ended == [True]
+        assert later.cancelled()
 
 
 def test_an_error_in_a_job_goes_to_its_caller() -> None:
