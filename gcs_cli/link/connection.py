@@ -252,8 +252,9 @@ class Connection:
 
         With ``may_lack``, a type of plan that the vehicle does not support counts as empty.
         """
+        session = self.session
         while (answer := call.answer(self.now_s)) is None:
-            self._check_vehicle(name)
+            self._check_vehicle(session, name)
             self.step(self.now_s + _LONGEST_WAIT_S)
         if may_lack and answer.result == MissionResult.UNSUPPORTED:
             return Answer(True)
@@ -274,17 +275,18 @@ class Connection:
 
         ``show`` is called with the transferred units and their total.
         """
-        self.session.use(client)
+        session = self.session
+        session.use(client)
         end_s = None if timeout_s is None else self.now_s + timeout_s
         while client.result is None and (end_s is None or self.now_s < end_s):
-            self._check_vehicle(name)
+            self._check_vehicle(session, name)
             self.step(self.now_s + _PROGRESS_S)
             if show is not None:
                 show(*client.progress)
-        self.session.use(None)
+        session.use(None)
 
-    def _check_vehicle(self, name: str | Callable[[], str]) -> None:
-        view = self.session.view
+    def _check_vehicle(self, session: Session, name: str | Callable[[], str]) -> None:
+        view = session.view
         if view.powered_off or view.lost(self.now_s):
             how = "shut down" if view.powered_off else "was lost"
             raise VehicleLostError(f"{name() if callable(name) else name}: the vehicle {how}")

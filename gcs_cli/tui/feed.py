@@ -13,6 +13,7 @@ from flightstack.core.enums import Severity
 from flightstack.mavlink.link import Message
 from gcs_cli.actions.action import Action
 from gcs_cli.actions.run import ActionRun, Outcome, Result
+from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.session import Session
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
@@ -115,10 +116,14 @@ class Feed:
         """True if the current job has to end."""
         return self._stopping.is_set()
 
-    def submit(self, job: Callable[[Connection], Value]) -> Future[Value]:
-        """Run ``job`` in the thread of the link; messages are received while it waits on the connection."""
+    def submit(self, job: Callable[[Connection], Value], system_id: int | None = None) -> Future[Value]:
+        """Run ``job`` in the thread of the link; messages are received while it waits on the connection.
+
+        With ``system_id`` it fails with CliError if another vehicle is selected when it begins. The selection changes
+        only between jobs.
+        """
         future: Future[Value] = Future()
-        self._jobs.append((job, future))
+        self._jobs.append((partial(_run_on, system_id, job), future))
         return future
 
     def select(self, system_id: int | None) -> None:
@@ -208,6 +213,12 @@ class Feed:
         self.messages.say(session.view, text, severity)
         several = len(self.views) > 1
         self.notices.append(Notice(f"{session.target[0]}: {text}" if several else text, severity))
+
+
+def _run_on(system_id: int | None, job: Callable[[Connection], Value], connection: Connection) -> Value:
+    if system_id not in (None, connection.session.target[0]):
+        raise CliError(f"vehicle {system_id} is no longer selected: select it with v")
+    return job(connection)
 
 
 def result_text(action: Action, result: Result) -> str:

@@ -45,8 +45,13 @@ class JobScreen(WatchScreen):
         if watch_app(self).feed.is_stopping:
             raise CliError(f"{self.doing}: interrupted")
 
-    async def run_job(self, doing: str, job: Callable[[Connection], Value]) -> Value | None:
-        """Return the result of a job; None if it failed, or if another one has not ended: the reason is shown."""
+    async def run_job(
+        self, doing: str, job: Callable[[Connection], Value], system_id: int | None
+    ) -> Value | None:
+        """Return the result of a job on the vehicle with this system id.
+
+        None if it failed, if another vehicle is selected, or if another job has not ended: the reason is shown.
+        """
         if self.doing:
             self.notify(f"{self.doing} has not ended", severity="warning")
             return None
@@ -55,7 +60,7 @@ class JobScreen(WatchScreen):
         feed, unsaved = app.feed, f"{self.mode} job"
         app.unsaved[unsaved] = f"{doing.capitalize()} has not ended."
         try:
-            return await asyncio.wrap_future(feed.submit(job))
+            return await asyncio.wrap_future(feed.submit(job, system_id))
         except (CliError, ConfigError) as error:
             feed.tell(str(error), Severity.ERROR)
             return None

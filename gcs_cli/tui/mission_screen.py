@@ -108,7 +108,7 @@ class MissionScreen(JobScreen):
         if not self.doing:
             app.plans.update(view, current[0] if current else None)
         if not app.plans.loading:
-            self.draft = self.draft.followed(app.plans.plan)
+            self.draft = self.draft.followed(app.plans.plan, app.plans.system_id)
         self._redraw()
 
     def _redraw(self) -> None:
@@ -265,8 +265,12 @@ class MissionScreen(JobScreen):
     @work
     async def action_upload(self) -> None:
         """Check the plan, upload it, and compare the vehicle's with it."""
-        plan = self.draft.to_upload()
-        found = await self.run_job("checking", partial(problems_on_vehicle, plan=plan))
+        plan, draft, system_id = self.draft.to_upload(), self.draft, self._selected_id
+        if draft.is_changed and draft.system_id not in (None, system_id):
+            question = f"The plan of vehicle {draft.system_id} was edited. Upload it to vehicle {system_id}?"
+            if not await self.ask(question, "Upload"):
+                return
+        found = await self.run_job("checking", partial(problems_on_vehicle, plan=plan), system_id)
         if found is None:
             return
         problems, unchecked = found
@@ -279,12 +283,17 @@ class MissionScreen(JobScreen):
         view = watch_app(self).feed.view
         if view.armed and not await self.ask("The vehicle is armed. Replace its mission?", "Replace"):
             return
-        said = await self.run_job("uploading", partial(self._upload, plan=plan))
+        said = await self.run_job("uploading", partial(self._upload, plan=plan), system_id)
         if said is not None:
-            self.draft = self.draft.uploaded() if self.draft.to_upload() == plan else self.draft
+            self.draft = self.draft.uploaded(system_id) if self.draft.to_upload() == plan else self.draft
             watch_app(self).plans.reload()
             watch_app(self).feed.tell(said)
             self._redraw()
+
+    @property
+    def _selected_id(self) -> int | None:
+        identity = watch_app(self).feed.view.identity
+        return None if identity is None else identity.system_id
 
     def _upload(self, connection: Connection, plan: Plan) -> str:
         uploads = Uploads(connection.session, plan, restores=True, interrupted=lambda: self._note(uploads))
@@ -308,7 +317,9 @@ class MissionScreen(JobScreen):
     async def action_verify(self) -> None:
         """Compare the vehicle's plan with the list."""
         plan = self.draft.to_upload()
-        said = await self.run_job("reading back", lambda connection: self._compare(connection, plan))
+        said = await self.run_job(
+            "reading back", lambda connection: self._compare(connection, plan), self._selected_id
+        )
         if said is not None:
             watch_app(self).feed.tell(f"verified: {said}")
 

@@ -36,6 +36,8 @@ class StillFeed(Feed):
         self.time_s = now_s
         self.jobs: list[tuple[Callable[[Connection], Any], Future[Any]]] = []
         """Jobs that screens have submitted; a test sets their results."""
+        self.job_targets: list[int | None] = []
+        """System ids of the vehicles of ``jobs``."""
 
     @property
     def view(self) -> VehicleView:
@@ -57,7 +59,8 @@ class StillFeed(Feed):
     def link_name(self) -> str:
         return "UDP 127.0.0.1:14550"
 
-    def submit(self, job: Callable[[Connection], Any]) -> Future[Any]:
+    def submit(self, job: Callable[[Connection], Any], system_id: int | None = None) -> Future[Any]:
+        self.job_targets.append(system_id)
         self.jobs.append((job, Future()))
         return self.jobs[-1][1]
 

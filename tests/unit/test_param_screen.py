@@ -223,6 +223,20 @@ def test_saved_parameters_load_after_a_question_with_the_differences(tmp_path: P
     drive(story)
 
 
+def test_edit_is_bound_to_the_vehicle_of_the_table():
+    async def story(pilot, app, screen):
+        await pilot.press("down", "enter")
+        await pilot.pause()
+        app.feed.shown = VIEW._replace(identity=VIEW.identity._replace(system_id=7))
+        app.screen.query_one(Input).value = "6"
+        await pilot.press("enter")
+        await pilot.pause()
+        assert screen.doing == "setting MPC_XY_CRUISE"
+        assert app.feed.job_targets[-1] == VIEW.identity.system_id
+
+    drive(story)
+
+
 def test_quit_asks_while_a_download_runs_and_ends_it():
     async def story(pilot, app, screen):
         await pilot.press("u")

@@ -10,11 +10,15 @@ from contextlib import contextmanager
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link
+from flightstack.mavlink.link import Address, Link
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.actions import in_flight, on_vehicle
+from gcs_cli.clients.param_client import ParamClient
+from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import parse_endpoint
+from gcs_cli.link.session import Session
+from gcs_cli.transfers.param_calls import TIMING, change_all
 from gcs_cli.tui.feed import Feed
 from tests.support.fake_vehicle import ARM, FakeVehicle, serve
 
@@ -109,6 +113,34 @@ def test_stop_waits_for_the_end_of_a_job() -> None:
         feed.stop()
         assert ended == [True]
         assert later.cancelled()
+
+
+def test_job_for_another_vehicle_than_the_selected_one_fails() -> None:
+    with fed(FakeVehicle()) as feed:
+        assert feed.submit(lambda connection: connection.session.target[0], 1).result() == 1
+        with pytest.raises(CliError, match="vehicle 2 is no longer selected"):
+            feed.submit(lambda connection: connection.session.target, 2).result()
+
+
+def test_transfer_stays_on_its_vehicle_if_the_selection_moves() -> None:
+    with fed(FakeVehicle()) as feed:
+
+        def job(connection: Connection) -> None:
+            first = connection.session
+            client = ParamClient(Address(*first.target), first.own, TIMING, casts=False)
+            client.start_get("NONE")
+
+            def move(_done: int, _total: int) -> None:
+                connection.fleet.selection = (None, Session(wire=connection.fleet.wire))
+
+            connection.run(client, "a parameter", 0.1, move)
+            assert connection.session is not first
+            assert first._service is None
+            connection.fleet.selection = (None, first)
+            with pytest.raises(CliError, match="vehicle 1 is no longer selected"):
+                change_all(connection, {"NONE": 1.0}, {}, move)
+
+        feed.submit(job).result()
 
 
 def test_an_error_in_a_job_goes_to_its_caller() -> None:
