@@ -323,7 +323,7 @@ class Connection:
         if not self._is_lent:
             self.close()
             return
-        self.fleet.observe = self.fleet.wire.record = None
+        self.fleet.observe = self.fleet.wire.record = self.on_step = None
         self.session.use(None)
         self.fleet.subscribe({})
 
