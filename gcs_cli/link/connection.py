@@ -113,6 +113,8 @@ class Connection:
         if line is None and vehicle is None and not endpoint.listens:
             (vehicle,) = self._line.peers
         self.fleet = Fleet(self._line.peers, vehicle, record, signing, system_id)
+        self.on_step: Callable[[], None] | None = None
+        """Called in every step after the messages were received."""
         self._is_lent = False
         self._server: ShareServer | None = None
         self._share_due_s = math.inf
@@ -167,6 +169,8 @@ class Connection:
         if isinstance(line, SeveralLines) and self.session.peer is not None:
             self.endpoint = line.keep(self.session.peer) or self.endpoint
         self._serve(now_s)
+        if self.on_step is not None:
+            self.on_step()
         self._send()
 
     def share(self) -> None:
@@ -248,8 +252,9 @@ class Connection:
 
         With ``may_lack``, a type of plan that the vehicle does not support counts as empty.
         """
+        session = self.session
         while (answer := call.answer(self.now_s)) is None:
-            self._check_vehicle(name)
+            self._check_vehicle(session, name)
             self.step(self.now_s + _LONGEST_WAIT_S)
         if may_lack and answer.result == MissionResult.UNSUPPORTED:
             return Answer(True)
@@ -270,17 +275,18 @@ class Connection:
 
         ``show`` is called with the transferred units and their total.
         """
-        self.session.use(client)
+        session = self.session
+        session.use(client)
         end_s = None if timeout_s is None else self.now_s + timeout_s
         while client.result is None and (end_s is None or self.now_s < end_s):
-            self._check_vehicle(name)
+            self._check_vehicle(session, name)
             self.step(self.now_s + _PROGRESS_S)
             if show is not None:
                 show(*client.progress)
-        self.session.use(None)
+        session.use(None)
 
-    def _check_vehicle(self, name: str | Callable[[], str]) -> None:
-        view = self.session.view
+    def _check_vehicle(self, session: Session, name: str | Callable[[], str]) -> None:
+        view = session.view
         if view.powered_off or view.lost(self.now_s):
             how = "shut down" if view.powered_off else "was lost"
             raise VehicleLostError(f"{name() if callable(name) else name}: the vehicle {how}")
@@ -317,7 +323,7 @@ class Connection:
         if not self._is_lent:
             self.close()
             return
-        self.fleet.observe = self.fleet.wire.record = None
+        self.fleet.observe = self.fleet.wire.record = self.on_step = None
         self.session.use(None)
         self.fleet.subscribe({})
 

@@ -70,12 +70,18 @@ def change_all(
     present: Mapping[str, Parameter],
     show: Progress | None = None,
 ) -> Changes:
-    """Set the parameters that differ from ``present``; raise CliError if the vehicle does not answer."""
+    """Set the parameters that differ from ``present``.
+
+    Raise CliError if the vehicle does not answer, or if another one is selected meanwhile.
+    """
+    session = connection.session
     changed: list[Parameter] = []
     failures: list[str] = []
     for number, (name, value) in enumerate(wanted.items(), 1):
         if show is not None:
             show(number, len(wanted))
+        if connection.session is not session:
+            raise CliError(f"{name}: vehicle {session.target[0]} is no longer selected")
         if name in present and number_text(present[name].value) == number_text(value):
             continue
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any, ClassVar, Literal
 
@@ -14,10 +14,11 @@ from textual.binding import Binding
 from textual.screen import Screen
 
 from flightstack.core.enums import Severity
+from gcs_cli.actions.action import Action
 from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.order_form import OrderForm
-from gcs_cli.tui.orders import ORDERS, action_of, order_named
+from gcs_cli.tui.orders import ORDERS, action_of, order_named, question_for
 from gcs_cli.tui.palette import Palette, palette_of
 from gcs_cli.tui.plan_fetcher import PlanFetcher
 from gcs_cli.tui.plot_fields import PlotFields
@@ -25,6 +26,7 @@ from gcs_cli.tui.screens import SCREENS
 from gcs_cli.tui.themes import THEMES
 from gcs_cli.tui.vehicle_list import ALL, VehicleList
 from gcs_cli.tui.watch_screen import WatchScreen
+from gcs_cli.vehicle.view_types import VehicleView
 
 REDRAWS_HZ = 8.0
 _ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -104,7 +106,8 @@ class WatchApp(App[None]):
         while self.feed.notices:
             notice = self.feed.notices.popleft()
             self.notify(notice.text, severity=_toast_severity(notice.severity), markup=False)
-        state = (view.identity, view.armed, view.landed_state, len(self.feed.views))
+        targets = [(each.identity, each.armed, each.landed_state) for each in self.feed.targets]
+        state = (view.identity, targets, len(self.feed.views))
         if state != self._state:  # other keys work
             self._state = state
             self.refresh_bindings()
@@ -118,8 +121,7 @@ class WatchApp(App[None]):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Return False for keys that have no effect now."""
         if action == "order":
-            view = self.feed.view
-            return view.identity is not None and order_named(str(parameters[0])).applies(view)
+            return any(map(order_named(str(parameters[0])).applies, self.feed.targets))
         if action in ("vehicles", "next_vehicle"):
             return len(self.feed.views) > 1
         return True
@@ -141,16 +143,36 @@ class WatchApp(App[None]):
     @work(exclusive=True, group="order")
     async def action_order(self, name: str) -> None:
         """Ask for the values of an order, and for its confirmation if it is dangerous; then perform it."""
-        order, view = order_named(name), self.feed.view
+        order = order_named(name)
+        targets = [view for view in self.feed.targets if order.applies(view)]
+        if not targets:
+            return
         values: list[Any] | None = []
         if order.fields:
-            values = await self.push_screen_wait(OrderForm(order, view))
+            values = await self.push_screen_wait(OrderForm(order, targets[0]))
         if values is None:
             return
-        question = order.question(view)
-        if question and not await self.push_screen_wait(Confirm(question, order.title)):
+        await self.perform(order.title, targets, partial(action_of, order, values), order.question)
+
+    async def perform(
+        self,
+        title: str,
+        targets: Sequence[VehicleView],
+        make: Callable[[VehicleView], Action],
+        ask: Callable[[VehicleView], str] = lambda _view: "",
+    ) -> None:
+        """Ask whether to act on ``targets``, and act on them.
+
+        ``targets`` are the states at the key press: a selection that moves meanwhile does not count.
+        ``ask`` returns the question for a vehicle, empty for none.
+        """
+        total = len(self.feed.views) if self.feed.commands_all else 1
+        question = question_for(title, targets, ask, total)
+        if question and not await self.push_screen_wait(Confirm(question, title)):
             return
-        self.feed.act(action_of(order, values, self.feed.view))
+        for view in targets:
+            assert view.identity is not None
+            self.feed.act(make(view), view.identity.system_id)
 
     @work(exclusive=True, group="vehicles")
     async def action_vehicles(self) -> None:

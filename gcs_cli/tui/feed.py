@@ -6,12 +6,14 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from flightstack.core.enums import Severity
 from flightstack.mavlink.link import Message
 from gcs_cli.actions.action import Action
 from gcs_cli.actions.run import ActionRun, Outcome, Result
+from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.session import Session
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
@@ -24,8 +26,6 @@ Value = TypeVar("Value")
 GATHER_S = 0.02
 """Messages are received in batches of this time, except during a job: one wake-up costs as much as one message."""
 _STEP_S = 0.05
-_JOIN_S = 1.0
-"""Longest wait for a job at the end."""
 
 
 class Notice(NamedTuple):
@@ -59,10 +59,11 @@ class Feed:
         self.error: Exception | None = None
         """Error that ended the thread."""
         self._jobs: deque[tuple[Callable[[Connection], Any], Future[Any]]] = deque()
+        self._calls: deque[Callable[[], None]] = deque()
+        """Short calls that run between two steps of the link, during a job too."""
         self._running: dict[int, _Running] = {}
         self._rates_hz: dict[int, float] = dict(ROTORS_AND_TIMING)
         self._stopping = threading.Event()
-        self._order = threading.Event()
         self._thread: threading.Thread | None = None
 
     @property
@@ -77,6 +78,12 @@ class Feed:
         return tuple(sorted((session.view for session in sessions), key=lambda view: view.identity or ()))
 
     @property
+    def targets(self) -> tuple[VehicleView, ...]:
+        """States of the vehicles that actions go to: the selected one, or all."""
+        view = self.view
+        return self.views if self.commands_all else () if view.identity is None else (view,)
+
+    @property
     def now_s(self) -> float:
         """Clock of the connection [s]."""
         return self._connection.now_s
@@ -89,20 +96,34 @@ class Feed:
     def start(self) -> None:
         """Start to receive."""
         self._connection.fleet.observe = self._observe
+        self._connection.on_step = self._serve
         self._connection.fleet.subscribe(self._rates_hz)
+        self._connection.fleet.keep()
         self._thread = threading.Thread(target=self._run, name="link", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; pending jobs are cancelled."""
+        """End the thread after the current job; pending jobs are cancelled.
+
+        A job with progress ends early, and an interrupted upload restores the former plans first.
+        """
         self._stopping.set()
         if self._thread is not None:
-            self._thread.join(_JOIN_S)
+            self._thread.join()
 
-    def submit(self, job: Callable[[Connection], Value]) -> Future[Value]:
-        """Run ``job`` in the thread of the link; messages are received while it waits on the connection."""
+    @property
+    def is_stopping(self) -> bool:
+        """True if the current job has to end."""
+        return self._stopping.is_set()
+
+    def submit(self, job: Callable[[Connection], Value], system_id: int | None = None) -> Future[Value]:
+        """Run ``job`` in the thread of the link; messages are received while it waits on the connection.
+
+        With ``system_id`` it fails with CliError if another vehicle is selected when it begins. The selection changes
+        only between jobs.
+        """
         future: Future[Value] = Future()
-        self._jobs.append((job, future))
+        self._jobs.append((partial(_run_on, system_id, job), future))
         return future
 
     def select(self, system_id: int | None) -> None:
@@ -111,23 +132,18 @@ class Feed:
         if system_id is not None:
             self.submit(lambda connection: connection.fleet.select(system_id))
 
-    def act(self, action: Action) -> None:
-        """Perform ``action``; the answer and the effect become notices and messages.
+    def act(self, action: Action, system_id: int) -> None:
+        """Perform ``action`` on a vehicle, selected or not.
 
-        A new action ends the wait for the effect of the former one.
+        It does not wait for jobs. The answer and the effect become notices and messages. A new action ends the wait
+        for the effect of the former one.
         """
-        self._order.set()
-        self.submit(lambda connection: self._begin(action, connection))
-
-    @property
-    def order_waits(self) -> bool:
-        """True if an action waits for the end of a job."""
-        return self._order.is_set()
+        self._calls.append(partial(self._begin, action, system_id))
 
     def tell(self, text: str, severity: Severity = Severity.NOTICE) -> None:
         """Show a line for a moment, and keep it among the messages."""
         self.notices.append(Notice(text, severity))
-        self.submit(lambda connection: self.messages.say(connection.session.view, text, severity))
+        self._calls.append(lambda: self.messages.say(self.view, text, severity))
 
     def keep_rate(self, message_id: int, rate_hz: float | None) -> None:
         """Request a stream of the screens at this rate from now on; not at all if it is 0, or None for the default."""
@@ -143,18 +159,23 @@ class Feed:
     def _run(self) -> None:
         try:
             while not self._stopping.wait(GATHER_S):
-                while self._jobs:
+                while self._jobs and not self.is_stopping:
                     self._execute(*self._jobs.popleft())
                 self._connection.step(self.now_s + _STEP_S)
-                for view in self.views:
-                    self.messages.follow(view)
-                for system_id in list(self._running):
-                    self._follow(system_id)
         except Exception as error:
             self.error = error
         finally:
             while self._jobs:
                 self._jobs.popleft()[1].cancel()
+
+    def _serve(self) -> None:
+        """Begin the actions, and follow the messages and the effects; after every step of the link, in jobs too."""
+        while self._calls:
+            self._calls.popleft()()
+        for view in self.views:
+            self.messages.follow(view)
+        for system_id in list(self._running):
+            self._follow(system_id)
 
     def _execute(self, job: Callable[[Connection], Any], future: Future[Any]) -> None:
         if not future.set_running_or_notify_cancel():
@@ -164,17 +185,11 @@ class Feed:
         except Exception as error:
             future.set_exception(error)
 
-    def _begin(self, action: Action, connection: Connection) -> None:
-        self._order.clear()
-        if connection.is_recording:
-            self._say(connection.session, f"{action.name}: a recording takes no commands", Severity.WARNING)
+    def _begin(self, action: Action, system_id: int) -> None:
+        session = self._connection.fleet.sessions[system_id]
+        if self._connection.is_recording:
+            self._say(session, f"{action.name}: a recording takes no commands", Severity.WARNING)
             return
-        sessions = connection.fleet.sessions.values() if self.commands_all else [connection.session]
-        for session in sessions:
-            self._begin_one(action, session)
-
-    def _begin_one(self, action: Action, session: Session) -> None:
-        system_id = session.target[0]
         former = self._running.pop(system_id, None)
         if former is not None:
             session.detach(former.run)
@@ -198,6 +213,12 @@ class Feed:
         self.messages.say(session.view, text, severity)
         several = len(self.views) > 1
         self.notices.append(Notice(f"{session.target[0]}: {text}" if several else text, severity))
+
+
+def _run_on(system_id: int | None, job: Callable[[Connection], Value], connection: Connection) -> Value:
+    if system_id not in (None, connection.session.target[0]):
+        raise CliError(f"vehicle {system_id} is no longer selected: select it with v")
+    return job(connection)
 
 
 def result_text(action: Action, result: Result) -> str:

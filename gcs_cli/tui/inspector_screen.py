@@ -157,7 +157,7 @@ class InspectorScreen(WatchScreen):
         values = await self.app.push_screen_wait(OrderForm(order, app.feed.view))
         if values is not None:
             app.feed.keep_rate(number, values[0])
-            app.feed.act(order.make(*values))
+            app.feed.act(order.make(*values), identity.system_id)
 
     def action_search(self) -> None:
         """Open the search field."""

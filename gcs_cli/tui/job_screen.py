@@ -40,29 +40,33 @@ class JobScreen(WatchScreen):
         return f"{self.doing}: {done} of {total}" if total else self.doing
 
     def show_progress(self, done: int, total: int) -> None:
-        """Store the progress of a job; called in the thread of the link."""
+        """Store the progress of a job; raise CliError if the user quits. Called in the thread of the link."""
         self.progress = (done, total)
+        if watch_app(self).feed.is_stopping:
+            raise CliError(f"{self.doing}: interrupted")
 
-    def yield_to_orders(self, done: int, total: int) -> None:
-        """Store the progress; raise CliError if the user has given an order, which must not wait."""
-        self.progress = (done, total)
-        if watch_app(self).feed.order_waits:
-            raise CliError(f"{self.doing}: stopped for an order; update with u")
+    async def run_job(
+        self, doing: str, job: Callable[[Connection], Value], system_id: int | None
+    ) -> Value | None:
+        """Return the result of a job on the vehicle with this system id.
 
-    async def run_job(self, doing: str, job: Callable[[Connection], Value]) -> Value | None:
-        """Return the result of a job; None if it failed, or if another one has not ended: the reason is shown."""
+        None if it failed, if another vehicle is selected, or if another job has not ended: the reason is shown.
+        """
         if self.doing:
             self.notify(f"{self.doing} has not ended", severity="warning")
             return None
         self.doing, self.progress = doing, (0, 0)
-        feed = watch_app(self).feed
+        app = watch_app(self)
+        feed, unsaved = app.feed, f"{self.mode} job"
+        app.unsaved[unsaved] = f"{doing.capitalize()} has not ended."
         try:
-            return await asyncio.wrap_future(feed.submit(job))
+            return await asyncio.wrap_future(feed.submit(job, system_id))
         except (CliError, ConfigError) as error:
             feed.tell(str(error), Severity.ERROR)
             return None
         finally:
             self.doing = ""
+            app.unsaved.pop(unsaved, None)
 
     async def ask(self, question: str, yes: str) -> bool:
         """Return True if the user agrees."""

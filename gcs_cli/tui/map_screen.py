@@ -12,11 +12,11 @@ from textual.widgets import Static
 
 from flightstack.core.contract import Vector3
 from gcs_cli.actions import in_flight
-from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.drawing import watch_app
 from gcs_cli.tui.map_drawing import legend, place_text
 from gcs_cli.tui.map_model import MapModel
 from gcs_cli.tui.map_widget import MapWidget
+from gcs_cli.tui.orders import vehicle_name
 from gcs_cli.tui.plan_fetcher import PlanFetcher
 from gcs_cli.tui.watch_screen import WatchScreen
 from gcs_cli.vehicle.view_types import VehicleView
@@ -135,10 +135,11 @@ class MapScreen(WatchScreen):
             )
             self.notify(reason, severity="warning")
             return
-        feed = watch_app(self).feed
-        who = f"all {len(feed.views)} vehicles" if feed.commands_all else "the vehicle"
-        question = f"Fly {who} to {place_text(frame, place, self.map.scene.home)}\nat the current altitude?"
-        if not await self.app.push_screen_wait(Confirm(question, "Fly there")):
-            return
-        target = frame.to_geo(Vector3(*place, 0.0))
-        feed.act(in_flight.goto(target.latitude_deg, target.longitude_deg))
+        app, target = watch_app(self), frame.to_geo(Vector3(*place, 0.0))
+        where = f"{place_text(frame, place, self.map.scene.home)}\nat the current altitude"
+        await app.perform(
+            "Fly there",
+            app.feed.targets,
+            lambda _view: in_flight.goto(target.latitude_deg, target.longitude_deg),
+            lambda view: f"Fly {vehicle_name(view)} to {where}?",
+        )

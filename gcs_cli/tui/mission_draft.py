@@ -20,19 +20,21 @@ class MissionDraft(NamedTuple):
     past: tuple[Plan, ...] = ()
     """The plans before each edit, oldest first."""
     is_edited: bool = False
+    system_id: int | None = None
+    """The vehicle whose plan was edited."""
 
     @property
     def is_changed(self) -> bool:
         """True if the plan has edits that were not uploaded."""
         return self.is_edited and parts_of(self.plan) != parts_of(self.source)
 
-    def followed(self, vehicle: Plan) -> MissionDraft:
-        """Return the draft after the vehicle's plan was read: that plan, unless the draft is changed."""
+    def followed(self, vehicle: Plan, system_id: int | None) -> MissionDraft:
+        """Return the draft after the plan of this vehicle was read: that plan, unless the draft is changed."""
         if vehicle is self.source:
             return self
         if self.is_changed:
             return self._replace(source=vehicle)
-        return MissionDraft(vehicle, vehicle)
+        return MissionDraft(vehicle, vehicle, system_id=system_id)
 
     def edited(self, items: Items) -> MissionDraft:
         """Return the draft with other mission items."""
@@ -46,9 +48,9 @@ class MissionDraft(NamedTuple):
         """Return the draft before the last edit."""
         return self._replace(plan=self.past[-1], past=self.past[:-1]) if self.past else self
 
-    def uploaded(self) -> MissionDraft:
-        """Return the draft after the vehicle accepted it."""
-        return self._replace(is_edited=False, past=())
+    def uploaded(self, system_id: int | None) -> MissionDraft:
+        """Return the draft after this vehicle accepted it."""
+        return self._replace(is_edited=False, past=(), system_id=system_id)
 
     def to_upload(self) -> Plan:
         """Return the plan without the geofence and rally points that the vehicle has already."""

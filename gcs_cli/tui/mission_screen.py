@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import ClassVar
 
@@ -16,6 +17,7 @@ from flightstack.core.enums import Severity
 from flightstack.core.geodesy import GeoPoint
 from flightstack.plan import MissionItem, Plan
 from gcs_cli.actions import in_flight, in_mission
+from gcs_cli.actions.action import Action
 from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.plans import edit
@@ -38,6 +40,7 @@ from gcs_cli.tui.mission_rows import (
     mission_table,
     summary,
 )
+from gcs_cli.tui.orders import asks_to_start, in_air, vehicle_name
 from gcs_cli.tui.row_list import RowList, title_text
 from gcs_cli.vehicle.view_types import VehicleView
 
@@ -105,7 +108,7 @@ class MissionScreen(JobScreen):
         if not self.doing:
             app.plans.update(view, current[0] if current else None)
         if not app.plans.loading:
-            self.draft = self.draft.followed(app.plans.plan)
+            self.draft = self.draft.followed(app.plans.plan, app.plans.system_id)
         self._redraw()
 
     def _redraw(self) -> None:
@@ -262,8 +265,12 @@ class MissionScreen(JobScreen):
     @work
     async def action_upload(self) -> None:
         """Check the plan, upload it, and compare the vehicle's with it."""
-        plan = self.draft.to_upload()
-        found = await self.run_job("checking", partial(problems_on_vehicle, plan=plan))
+        plan, draft, system_id = self.draft.to_upload(), self.draft, self._selected_id
+        if draft.is_changed and draft.system_id not in (None, system_id):
+            question = f"The plan of vehicle {draft.system_id} was edited. Upload it to vehicle {system_id}?"
+            if not await self.ask(question, "Upload"):
+                return
+        found = await self.run_job("checking", partial(problems_on_vehicle, plan=plan), system_id)
         if found is None:
             return
         problems, unchecked = found
@@ -276,12 +283,17 @@ class MissionScreen(JobScreen):
         view = watch_app(self).feed.view
         if view.armed and not await self.ask("The vehicle is armed. Replace its mission?", "Replace"):
             return
-        said = await self.run_job("uploading", partial(self._upload, plan=plan))
+        said = await self.run_job("uploading", partial(self._upload, plan=plan), system_id)
         if said is not None:
-            self.draft = self.draft.uploaded() if self.draft.to_upload() == plan else self.draft
+            self.draft = self.draft.uploaded(system_id) if self.draft.to_upload() == plan else self.draft
             watch_app(self).plans.reload()
             watch_app(self).feed.tell(said)
             self._redraw()
+
+    @property
+    def _selected_id(self) -> int | None:
+        identity = watch_app(self).feed.view.identity
+        return None if identity is None else identity.system_id
 
     def _upload(self, connection: Connection, plan: Plan) -> str:
         uploads = Uploads(connection.session, plan, restores=True, interrupted=lambda: self._note(uploads))
@@ -290,8 +302,8 @@ class MissionScreen(JobScreen):
         return f"uploaded: {self._compare(connection, plan)}"
 
     def _note(self, uploads: Uploads) -> str:
-        self.show_progress(*uploads.progress)
-        return ""
+        self.progress = uploads.progress
+        return "interrupted" if watch_app(self).feed.is_stopping else ""
 
     def _compare(self, connection: Connection, plan: Plan) -> str:
         """Return the parts that are equal on the vehicle; raise CliError with the differences."""
@@ -305,7 +317,9 @@ class MissionScreen(JobScreen):
     async def action_verify(self) -> None:
         """Compare the vehicle's plan with the list."""
         plan = self.draft.to_upload()
-        said = await self.run_job("reading back", lambda connection: self._compare(connection, plan))
+        said = await self.run_job(
+            "reading back", lambda connection: self._compare(connection, plan), self._selected_id
+        )
         if said is not None:
             watch_app(self).feed.tell(f"verified: {said}")
 
@@ -321,18 +335,31 @@ class MissionScreen(JobScreen):
         """Make the selected item the current one."""
         seq = self.rows.cursor
         name = any_command_name(self.items[seq].command)
-        if watch_app(self).feed.view.armed and not await self.ask(f"Fly to item {seq} ({name})?", "Jump"):
-            return
-        watch_app(self).feed.act(in_mission.jump(seq))
+        await self._perform(
+            "Jump",
+            lambda _view: in_mission.jump(seq),
+            lambda view: f"Fly {vehicle_name(view)} to item {seq} ({name})?" if view.armed else "",
+        )
 
-    def action_pause(self) -> None:
+    @work
+    async def action_pause(self) -> None:
         """Hold the position."""
-        watch_app(self).feed.act(in_mission.pause())
+        await self._perform("Pause", lambda _view: in_mission.pause())
 
     @work
     async def action_start(self) -> None:
         """Start the mission on the ground, or resume it in the air."""
-        if watch_app(self).feed.view.armed:
-            watch_app(self).feed.act(in_mission.resume())
-        elif await self.ask("Start the mission? The vehicle arms and takes off.", "Start"):
-            watch_app(self).feed.act(in_flight.start_mission())
+        await self._perform(
+            "Start",
+            lambda view: in_mission.resume() if in_air(view) else in_flight.start_mission(),
+            asks_to_start,
+        )
+
+    async def _perform(
+        self,
+        title: str,
+        make: Callable[[VehicleView], Action],
+        ask: Callable[[VehicleView], str] = lambda _view: "",
+    ) -> None:
+        app = watch_app(self)
+        await app.perform(title, app.feed.targets, make, ask)

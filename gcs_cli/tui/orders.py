@@ -64,32 +64,50 @@ class Order(NamedTuple):
     in_footer: bool = False
 
 
-def _name(view: VehicleView) -> str:
+def vehicle_name(view: VehicleView) -> str:
+    """Return the type and system id of the vehicle."""
     return "the vehicle" if view.identity is None else f"{view.identity.kind} {view.identity.system_id}"
 
 
-def _in_air(view: VehicleView) -> bool:
+def in_air(view: VehicleView) -> bool:
+    """Return True if the vehicle flies, or does not report that it is on the ground while armed."""
     return view.armed and view.on_ground is not True
 
 
 def _asks_to_arm(view: VehicleView) -> str:
-    return f"Arm {_name(view)}? The rotors start."
+    return f"Arm {vehicle_name(view)}? The rotors start."
 
 
 def _asks_to_disarm(view: VehicleView) -> str:
-    return f"Disarm {_name(view)} in the air? The rotors stop and it falls." if _in_air(view) else ""
+    return f"Disarm {vehicle_name(view)} in the air? The rotors stop and it falls." if in_air(view) else ""
 
 
 def _asks_to_reboot(view: VehicleView) -> str:
-    return f"Reboot {_name(view)}?"
+    return f"Reboot {vehicle_name(view)}?"
 
 
 def _asks_to_terminate(view: VehicleView) -> str:
-    return f"Terminate the flight of {_name(view)}? The rotors stop at once, in the air too."
+    return f"Terminate the flight of {vehicle_name(view)}? The rotors stop at once, in the air too."
 
 
-def _asks_to_start(view: VehicleView) -> str:
-    return "" if view.armed else f"Start the mission? {_name(view).capitalize()} arms and takes off."
+def asks_to_start(view: VehicleView) -> str:
+    """Return the question before the mission starts on the ground."""
+    return "" if in_air(view) else f"Start the mission? {vehicle_name(view).capitalize()} arms and takes off."
+
+
+def question_for(
+    title: str, targets: Sequence[VehicleView], ask: Callable[[VehicleView], str], total: int
+) -> str:
+    """Return the question before an action on ``targets``, of ``total`` vehicles on the link; empty: none.
+
+    ``ask`` returns the question for a single vehicle. An action on several of them is always confirmed.
+    """
+    questions = [question for view in targets if (question := ask(view))]
+    if total == 1:
+        return "\n".join(questions)
+    ids = ", ".join(str(view.identity.system_id) for view in targets if view.identity is not None)
+    count = f"all {total}" if len(targets) == total else f"{len(targets)} of {total}"
+    return "\n".join([f"{title}: {count} vehicles ({ids})?", *questions])
 
 
 _ALTITUDE = Field("altitude", "m above home", smallest=0.1, largest=10_000.0, is_optional=True)
@@ -115,18 +133,18 @@ ORDERS = (
         "Arm and climb to an altitude above home; without one, the vehicle's own",
         in_flight.takeoff,
         (_ALTITUDE._replace(default="5"),),
-        applies=lambda view: not _in_air(view),
+        applies=lambda view: not in_air(view),
         in_footer=True,
     ),
-    Order("hold", "H", "Hold", "Hold the position", in_flight.hold, applies=_in_air, in_footer=True),
-    Order("land", "L", "Land", "Land here", in_flight.land, applies=_in_air, in_footer=True),
+    Order("hold", "H", "Hold", "Hold the position", in_flight.hold, applies=in_air, in_footer=True),
+    Order("land", "L", "Land", "Land here", in_flight.land, applies=in_air, in_footer=True),
     Order(
         "return",
         "R",
         "Return",
         "Return to launch and land",
         in_flight.return_to_launch,
-        applies=_in_air,
+        applies=in_air,
         in_footer=True,
     ),
     Order(
@@ -164,7 +182,7 @@ ORDERS = (
         "Start the mission, or continue it in the air",
         in_flight.start_mission,
         (),
-        _asks_to_start,
+        asks_to_start,
     ),
     Order(
         "mode",
@@ -174,7 +192,15 @@ ORDERS = (
         on_vehicle.select_mode,
         (Field("mode", choices=lambda view: list(on_vehicle.mode_choices(view))),),
     ),
-    Order("sethome", "O", "Set home here", "Make this position home", on_vehicle.set_home),
+    Order(
+        "sethome",
+        "O",
+        "Set home here",
+        "Make this position home",
+        on_vehicle.set_home,
+        (),
+        lambda view: f"Make the present position of {vehicle_name(view)} its home? It returns there.",
+    ),
     Order(
         "inject",
         "F",
@@ -186,7 +212,7 @@ ORDERS = (
             Field("failure", choices=lambda _view: list(on_vehicle.failure_types())),
             Field("instance", "0: all", smallest=0.0, largest=255.0, is_optional=True),
         ),
-        lambda view: f"Inject a failure into {_name(view)}? It may crash.",
+        lambda view: f"Inject a failure into {vehicle_name(view)}? It may crash.",
     ),
     Order("reboot", "B", "Reboot", "Reboot the vehicle", on_vehicle.reboot, (), _asks_to_reboot),
     Order(
@@ -209,5 +235,5 @@ def order_named(name: str) -> Order:
 def action_of(order: Order, values: Sequence[Any], view: VehicleView) -> Action:
     """Return the action; a confirmed disarm in the air is forced."""
     if order.name == "disarm":
-        return on_vehicle.disarm(force=_in_air(view))
+        return on_vehicle.disarm(force=in_air(view))
     return order.make(*values)

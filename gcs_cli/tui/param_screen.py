@@ -220,7 +220,7 @@ class ParamScreen(JobScreen):
     @work
     async def action_update(self) -> None:
         """Download all parameters and their metadata."""
-        found = await self.run_job("downloading the parameters", self._download)
+        found = await self.run_job("downloading the parameters", self._download, self._system_id)
         if found is None:
             self._problem = "no parameters: update with u"
         else:
@@ -229,13 +229,13 @@ class ParamScreen(JobScreen):
             self._take(self._params._replace(parameters=by_name, infos=infos))
 
     def _download(self, connection: Connection) -> tuple[tuple[Parameter, ...], dict[str, ParamInfo]]:
-        parameters = param_calls.fetch_all(connection, self.yield_to_orders)
+        parameters = param_calls.fetch_all(connection, self.show_progress)
         return parameters, param_calls.fetch_metadata(connection)
 
     @work
     async def action_edit(self) -> None:
         """Ask for a value, send it, and show the one that the vehicle confirms."""
-        parameter = self.selected
+        parameter, system_id = self.selected, self._system_id
         if parameter is None:
             return
         info = self._params.infos.get(parameter.name, UNKNOWN)
@@ -245,12 +245,12 @@ class ParamScreen(JobScreen):
         form = EntryForm(title, [entry], lambda texts: parse_param(parameter, info, texts[0]))
         value = await self.app.push_screen_wait(form)
         if value is not None:
-            await self._set(parameter, info, value)
+            await self._set(parameter, info, value, system_id)
 
     @work
     async def action_reset(self) -> None:
         """Set the selected parameter to its default."""
-        parameter = self.selected
+        parameter, system_id = self.selected, self._system_id
         if parameter is None:
             return
         info = self._params.infos.get(parameter.name, UNKNOWN)
@@ -259,12 +259,12 @@ class ParamScreen(JobScreen):
             return
         default = number_text(info.default)
         if await self.ask(f"Reset {parameter.name} = {number_text(parameter.value)} to {default}?", "Reset"):
-            await self._set(parameter, info, info.default)
+            await self._set(parameter, info, info.default, system_id)
 
-    async def _set(self, parameter: Parameter, info: ParamInfo, value: float) -> None:
+    async def _set(self, parameter: Parameter, info: ParamInfo, value: float, system_id: int | None) -> None:
         name = parameter.name
         job = partial(param_calls.change, name=name, value=value)
-        after = await self.run_job(f"setting {name}", job)
+        after = await self.run_job(f"setting {name}", job, system_id)
         if after is not None:
             self._take(self._params.with_parameter(after))
             watch_app(self).feed.tell(change_line(name, parameter.value, after.value, info))
@@ -309,6 +309,7 @@ class ParamScreen(JobScreen):
     @work
     async def action_load(self) -> None:
         """Set the parameters that differ from a file, after a question with the differences."""
+        system_id = self._system_id
         read = await self._read("Load a parameter file")
         if read is None:
             return
@@ -319,7 +320,7 @@ class ParamScreen(JobScreen):
         elif await self.ask(f"{some_of(lines)}\n\nSet them as in {path.name}?", "Set"):
             present = dict(self._params.parameters)
             job = partial(param_calls.change_all, wanted=wanted, present=present, show=self.show_progress)
-            result = await self.run_job(f"loading {path.name}", job)
+            result = await self.run_job(f"loading {path.name}", job, system_id)
             if result is not None:
                 self._say_loaded(path, result, len(wanted))
 

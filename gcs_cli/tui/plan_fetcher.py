@@ -25,8 +25,8 @@ _ID_FIELDS = {
 class Jobs(Protocol):
     """Runs functions in the thread of the link."""
 
-    def submit(self, job: Callable[[Connection], Result]) -> Future[Result]:
-        """Run ``job`` and return its future result."""
+    def submit(self, job: Callable[[Connection], Result], system_id: int | None) -> Future[Result]:
+        """Run ``job`` on this vehicle and return its future result."""
 
 
 class PlanFetcher:
@@ -37,7 +37,8 @@ class PlanFetcher:
         self._seen: dict[MissionType, object] = {}
         self._items: dict[MissionType, tuple[MissionItem, ...]] = {}
         self._loading: tuple[MissionType, Future[tuple[MissionItem, ...]]] | None = None
-        self._system_id: int | None = None
+        self.system_id: int | None = None
+        """The vehicle of ``plan``."""
         self._problems: dict[MissionType, str] = {}
         self.plan = Plan(())
         """The plans that were downloaded; the same object until one changes."""
@@ -65,8 +66,8 @@ class PlanFetcher:
             self._take(*self._loading)
         if view.identity is None or self._loading is not None:
             return
-        if view.identity.system_id != self._system_id:
-            self._system_id = view.identity.system_id
+        if view.identity.system_id != self.system_id:
+            self.system_id = view.identity.system_id
             self._seen.clear()
             self._items.clear()
             self._problems.clear()
@@ -75,7 +76,7 @@ class PlanFetcher:
             state = (getattr(mission_current, field, 0), kind == MissionType.MISSION and view.mission.total)
             if self._seen.get(kind) != state:
                 self._seen[kind] = state
-                self._loading = (kind, self._jobs.submit(partial(_download, kind=kind)))
+                self._loading = (kind, self._jobs.submit(partial(_download, kind=kind), self.system_id))
                 return
 
     def _take(self, kind: MissionType, future: Future[tuple[MissionItem, ...]]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -24,14 +25,19 @@ class StillFeed(Feed):
         self.notices = deque()
         self.actions: list[Action] = []
         """Actions that the user asked for."""
+        self.acted_on: list[int] = []
+        """System ids of the vehicles of ``actions``."""
         self.commands_all = False
         self.others: list[VehicleView] = []
         self.error = None
+        self._stopping = threading.Event()
         self._rates_hz = {}
         self.shown = view
         self.time_s = now_s
         self.jobs: list[tuple[Callable[[Connection], Any], Future[Any]]] = []
         """Jobs that screens have submitted; a test sets their results."""
+        self.job_targets: list[int | None] = []
+        """System ids of the vehicles of ``jobs``."""
 
     @property
     def view(self) -> VehicleView:
@@ -53,16 +59,14 @@ class StillFeed(Feed):
     def link_name(self) -> str:
         return "UDP 127.0.0.1:14550"
 
-    def submit(self, job: Callable[[Connection], Any]) -> Future[Any]:
+    def submit(self, job: Callable[[Connection], Any], system_id: int | None = None) -> Future[Any]:
+        self.job_targets.append(system_id)
         self.jobs.append((job, Future()))
         return self.jobs[-1][1]
 
-    def act(self, action: Action) -> None:
+    def act(self, action: Action, system_id: int) -> None:
         self.actions.append(action)
-
-    @property
-    def order_waits(self) -> bool:
-        return bool(self.actions)
+        self.acted_on.append(system_id)
 
     def tell(self, text: str, severity: Severity = Severity.NOTICE) -> None:
         self.notices.append(Notice(text, severity))

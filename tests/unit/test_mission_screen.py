@@ -101,17 +101,18 @@ def test_parameters_are_said_in_words(fields, text):
 
 def test_draft_follows_the_vehicle_until_it_is_edited():
     first, second = Plan(ITEMS), Plan(ITEMS[:2])
-    draft = MissionDraft().followed(first)
+    draft = MissionDraft().followed(first, 1)
     assert (draft.plan, draft.is_changed) == (first, False)
     edited = draft.edited(ITEMS[:3])
     assert edited.is_changed
-    assert edited.followed(second).plan.items == ITEMS[:3]
+    assert edited.followed(second, 2).plan.items == ITEMS[:3]
+    assert edited.followed(second, 2).system_id == 1
     assert edited.undone().plan == first
     assert not edited.undone().is_changed
-    uploaded = edited.uploaded()
+    uploaded = edited.uploaded(1)
     assert not uploaded.is_changed
-    assert uploaded.followed(first).plan.items == ITEMS[:3]  # the vehicle's new plan is not read yet
-    assert uploaded.followed(second).plan is second
+    assert uploaded.followed(first, 1).plan.items == ITEMS[:3]  # the vehicle's new plan is not read yet
+    assert uploaded.followed(second, 1).plan is second
 
 
 def test_item_form_returns_the_item_it_shows():
@@ -306,5 +307,57 @@ def test_jump_needs_the_mission_of_the_vehicle():
         await pilot.press("d", "j")
         await pilot.pause()
         assert len(app.feed.actions) == 1
+
+    drive(story)
+
+
+def test_start_on_the_ground_asks_although_armed():
+    async def story(pilot, app, screen):
+        await pilot.press("s")
+        await pilot.pause()
+        assert isinstance(app.screen, Confirm)
+        await pilot.press("y")
+        await pilot.pause()
+        assert [action.name for action in app.feed.actions] == ["mission start"]
+
+    drive(story, view=FLYING._replace(landed_state=1))
+
+
+def test_start_in_the_air_resumes_at_once():
+    async def story(pilot, app, screen):
+        await pilot.press("s")
+        await pilot.pause()
+        assert [action.name for action in app.feed.actions] == ["mission resume"]
+
+    drive(story)
+
+
+@pytest.mark.parametrize("key", ["s", "j", "p"])
+def test_mission_orders_to_all_vehicles_ask(key):
+    async def story(pilot, app, screen):
+        app.feed.others.append(FLYING._replace(identity=Identity(7, 1, 2, 12)))
+        app.feed.commands_all = True
+        await pilot.press(key)
+        await pilot.pause()
+        assert "all 2 vehicles (1, 7)?" in "\n".join(shown(app))
+        await pilot.press("y")
+        await pilot.pause()
+        assert app.feed.acted_on == [1, 7]
+
+    drive(story)
+
+
+def test_upload_to_another_vehicle_than_the_edited_one_asks():
+    async def story(pilot, app, screen):
+        await pilot.press("d")
+        app.feed.shown = FLYING._replace(identity=Identity(7, 1, 2, 12))
+        await pilot.press("u")
+        await pilot.pause()
+        assert "The plan of vehicle 1 was edited. Upload it to vehicle 7?" in " ".join(
+            "\n".join(shown(app)).split()
+        )
+        await pilot.press("y")
+        await pilot.pause()
+        assert app.feed.job_targets[-1] == 7
 
     drive(story)

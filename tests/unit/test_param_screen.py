@@ -223,15 +223,36 @@ def test_saved_parameters_load_after_a_question_with_the_differences(tmp_path: P
     drive(story)
 
 
-def test_order_stops_the_download_of_the_parameters():
+def test_edit_is_bound_to_the_vehicle_of_the_table():
+    async def story(pilot, app, screen):
+        await pilot.press("down", "enter")
+        await pilot.pause()
+        app.feed.shown = VIEW._replace(identity=VIEW.identity._replace(system_id=7))
+        app.screen.query_one(Input).value = "6"
+        await pilot.press("enter")
+        await pilot.pause()
+        assert screen.doing == "setting MPC_XY_CRUISE"
+        assert app.feed.job_targets[-1] == VIEW.identity.system_id
+
+    drive(story)
+
+
+def test_quit_asks_while_a_download_runs_and_ends_it():
     async def story(pilot, app, screen):
         await pilot.press("u")
-        screen.doing = "downloading the parameters"
-        screen.yield_to_orders(3, 1400)
+        await pilot.pause()
+        screen.show_progress(3, 1400)
         assert screen.doing_text == "downloading the parameters: 3 of 1400"
-        app.feed.actions.append(None)
-        with pytest.raises(CliError, match="stopped for an order"):
-            screen.yield_to_orders(4, 1400)
+        await pilot.press("q")
+        await pilot.pause()
+        assert isinstance(app.screen, Confirm)
+        assert "Downloading the parameters has not ended." in "\n".join(shown(app))
+        app.feed._stopping.set()
+        with pytest.raises(CliError, match="downloading the parameters: interrupted"):
+            screen.show_progress(4, 1400)
+        app.feed.jobs[-1][1].set_exception(CliError("interrupted", FAILED))
+        await pilot.pause()
+        assert not app.unsaved
 
     drive(story)
 

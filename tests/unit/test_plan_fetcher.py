@@ -24,7 +24,7 @@ class Jobs:
     def __init__(self) -> None:
         self.futures: list[Future[Any]] = []
 
-    def submit(self, _job: Any) -> Future[Any]:
+    def submit(self, _job: Any, _system_id: int | None) -> Future[Any]:
         self.futures.append(Future())
         return self.futures[-1]
 

@@ -136,6 +136,76 @@ def test_a_disarm_on_the_ground_does_not_ask() -> None:
     assert feed.actions[0].facts == {"force": False}
 
 
+OTHER = FULL._replace(identity=Identity(7, 1, 13, 3), mode="GUIDED")
+
+
+def keys(*pressed: str, others: tuple[VehicleView, ...] = (), to_all: bool = False) -> Story:
+    """Return the story of a user at several vehicles."""
+
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.others += others
+        app.feed.commands_all = to_all
+        app.redraw()
+        for key in pressed:
+            await pilot.press(key)
+            await pilot.pause()
+
+    return story
+
+
+@pytest.mark.parametrize("key", ["X", "D"])
+def test_order_goes_to_the_vehicle_of_its_question(key: str) -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        app.feed.others.append(OTHER)
+        await pilot.press(key)
+        await pilot.pause()
+        app.feed.shown = OTHER  # the selection moves while the question waits
+        await pilot.press("y")
+        await pilot.pause()
+
+    assert play(story).acted_on == [1]
+
+
+def test_orders_to_all_vehicles_always_ask_and_name_them() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await keys("L", others=(OTHER,), to_all=True)(app, pilot)
+        assert "Land: all 2 vehicles (1, 7)?" in "\n".join(shown(app))
+        assert not app.feed.actions
+        await pilot.press("y")
+        await pilot.pause()
+
+    assert play(story).acted_on == [1, 7]
+
+
+def test_order_to_all_goes_to_the_vehicles_it_applies_to() -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await keys("R", others=(OTHER,), to_all=True)(app, pilot)
+        assert "Return: 1 of 2 vehicles (7)?" in "\n".join(shown(app))
+        await pilot.press("y")
+        await pilot.pause()
+
+    assert play(story, GROUNDED).acted_on == [7]
+
+
+def test_disarm_of_all_is_forced_only_in_the_air() -> None:
+    landed = OTHER._replace(landed_state=1)
+    feed = play(keys("D", "y", others=(landed,), to_all=True))
+    assert dict(zip(feed.acted_on, [action.facts["force"] for action in feed.actions], strict=True)) == {
+        1: True,
+        7: False,
+    }
+
+
+@pytest.mark.parametrize("key", ["C", "O"])
+def test_order_on_the_ground_asks_although_armed(key: str) -> None:
+    assert asked(play(keys(key, "enter"), FULL._replace(landed_state=1))) == []
+
+
+def test_set_home_asks_in_flight() -> None:
+    assert asked(play(keys("O"))) == []
+    assert asked(play(keys("O", "y"))) == ["set-home"]
+
+
 def test_a_form_asks_for_values_and_names_what_is_wrong() -> None:
     async def story(app: WatchApp, pilot: Pilot) -> None:
         await pilot.press("T")
@@ -251,10 +321,8 @@ def test_a_theme_changes_the_colours_of_drawings() -> None:
 
 
 def test_vehicles_are_listed_selected_and_commanded_together() -> None:
-    other = FULL._replace(identity=Identity(7, 1, 13, 3), mode="GUIDED")
-
     async def story(app: WatchApp, pilot: Pilot) -> None:
-        app.feed.others.append(other)
+        app.feed.others.append(OTHER)
         app.redraw()
         await pilot.pause()
         assert "v Vehicles" in shown(app)[-1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,11 +10,15 @@ from contextlib import contextmanager
 import pytest
 
 from flightstack.mavlink.dialect import mavlink
-from flightstack.mavlink.link import Link
+from flightstack.mavlink.link import Address, Link
 from flightstack.transports.udp import UdpSocket
 from gcs_cli.actions import in_flight, on_vehicle
+from gcs_cli.clients.param_client import ParamClient
+from gcs_cli.errors import CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.endpoint import parse_endpoint
+from gcs_cli.link.session import Session
+from gcs_cli.transfers.param_calls import TIMING, change_all
 from gcs_cli.tui.feed import Feed
 from tests.support.fake_vehicle import ARM, FakeVehicle, serve
 
@@ -48,7 +53,7 @@ def notices(feed: Feed) -> list[str]:
 
 def test_an_action_reports_the_answer_and_the_time_of_its_effect() -> None:
     with fed(FakeVehicle()) as feed:
-        feed.act(on_vehicle.arm())
+        feed.act(on_vehicle.arm(), 1)
         until(lambda: any(text.startswith("armed after ") for text in notices(feed)))
         assert feed.view.armed
         texts = [entry.text for entry in feed.messages.since(0) if entry.is_own]
@@ -57,15 +62,15 @@ def test_an_action_reports_the_answer_and_the_time_of_its_effect() -> None:
 
 def test_a_refusal_gives_the_vehicles_reason() -> None:
     with fed(FakeVehicle(refusals={ARM: "Arming refused: no position"})) as feed:
-        feed.act(on_vehicle.arm())
+        feed.act(on_vehicle.arm(), 1)
         until(lambda: feed.notices)
         assert "no position" in notices(feed)[-1]
 
 
 def test_a_new_action_ends_the_wait_for_the_former_one() -> None:
     with fed(FakeVehicle(ignored={ARM})) as feed:
-        feed.act(on_vehicle.arm())
-        feed.act(in_flight.hold())
+        feed.act(on_vehicle.arm(), 1)
+        feed.act(in_flight.hold(), 1)
         until(lambda: "arm: no longer followed" in notices(feed))
 
 
@@ -78,6 +83,64 @@ def test_a_job_runs_beside_the_reception_of_messages() -> None:
             return 42
 
         assert feed.submit(job).result(HANG_S) == 42
+
+
+def test_order_is_performed_and_followed_during_a_job() -> None:
+    with fed(FakeVehicle()) as feed:
+
+        def job(connection: Connection) -> bool:
+            feed.act(on_vehicle.arm(), 1)
+            return connection.wait_for(lambda: any("armed after" in text for text in notices(feed)), HANG_S)
+
+        assert feed.submit(job).result()
+
+
+def test_stop_waits_for_the_end_of_a_job() -> None:
+    ended = []
+
+    def job(connection: Connection) -> None:
+        begun.set()
+        connection.wait_for(lambda: feed.is_stopping, HANG_S)
+        count = connection.session.view.link.received
+        connection.wait_for(lambda: connection.session.view.link.received > count + 3, HANG_S)
+        ended.append(True)
+
+    begun = threading.Event()
+    with fed(FakeVehicle()) as feed:
+        feed.submit(job)
+        later = feed.submit(job)
+        begun.wait()
+        feed.stop()
+        assert ended == [True]
+        assert later.cancelled()
+
+
+def test_job_for_another_vehicle_than_the_selected_one_fails() -> None:
+    with fed(FakeVehicle()) as feed:
+        assert feed.submit(lambda connection: connection.session.target[0], 1).result() == 1
+        with pytest.raises(CliError, match="vehicle 2 is no longer selected"):
+            feed.submit(lambda connection: connection.session.target, 2).result()
+
+
+def test_transfer_stays_on_its_vehicle_if_the_selection_moves() -> None:
+    with fed(FakeVehicle()) as feed:
+
+        def job(connection: Connection) -> None:
+            first = connection.session
+            client = ParamClient(Address(*first.target), first.own, TIMING, casts=False)
+            client.start_get("NONE")
+
+            def move(_done: int, _total: int) -> None:
+                connection.fleet.selection = (None, Session(wire=connection.fleet.wire))
+
+            connection.run(client, "a parameter", 0.1, move)
+            assert connection.session is not first
+            assert first._service is None
+            connection.fleet.selection = (None, first)
+            with pytest.raises(CliError, match="vehicle 1 is no longer selected"):
+                change_all(connection, {"NONE": 1.0}, {}, move)
+
+        feed.submit(job).result()
 
 
 def test_an_error_in_a_job_goes_to_its_caller() -> None:
@@ -144,10 +207,11 @@ def test_several_vehicles_are_selected_and_commanded_together() -> None:
 
             until(lambda: run() or len(feed.views) == 2)
             assert [view.identity.system_id for view in feed.views if view.identity] == [3, 4]
+            assert feed._connection.fleet.is_kept  # a lost vehicle stays selected
             feed.select(4)
             until(lambda: run() or feed.view.identity[0] == 4)
-            feed.select(None)
-            feed.act(on_vehicle.arm())
+            for number in vehicles:
+                feed.act(on_vehicle.arm(), number)
             until(lambda: run() or all(vehicle.armed for vehicle in vehicles.values()))
         finally:
             feed.stop()
