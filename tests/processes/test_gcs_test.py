@@ -242,5 +242,6 @@ def test_watch_flies_a_changed_controller(folder: Path, monkeypatch: pytest.Monk
     run.wait_for("cannot be loaded: division by zero")
     law.write_text(text)
     run.wait_for("PASS  a")
+    run.wait_for("watching 3 files")
     run.interrupt()
     assert run.end() == 0

@@ -13,13 +13,12 @@ from flightstack.plan import FenceCommand, MissionItem
 from gcs_cli.errors import FAILED, CliError
 from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.confirm import Confirm
-from gcs_cli.tui.map_scene import place_of
+from gcs_cli.tui.map_scene import Place, place_of
 from gcs_cli.tui.map_screen import MapScreen
 from tests.support.map_views import FRAME, VIEW, item
 from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.unit.test_map import Place
 
 pytestmark = pytest.mark.unit
 

@@ -20,6 +20,7 @@ from gcs_cli.tui.app import WatchApp
 from gcs_cli.tui.confirm import Confirm
 from gcs_cli.tui.entry_form import EntryForm
 from gcs_cli.tui.item_form import item_entries, item_of_texts
+from gcs_cli.tui.map_scene import Place
 from gcs_cli.tui.mission_draft import MissionDraft
 from gcs_cli.tui.mission_rows import (
     Progress,
@@ -38,7 +39,6 @@ from tests.support.map_views import HOME, VIEW, item
 from tests.support.pictures import check_picture
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-from tests.unit.test_map import Place
 
 pytestmark = pytest.mark.unit
 
