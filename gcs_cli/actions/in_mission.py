@@ -28,6 +28,8 @@ def resume() -> Action:
     def plan(view: VehicleView) -> tuple[Step, ...]:
         if not view.armed:
             raise NotReadyError("the vehicle is disarmed: use `gcs mission start`")
+        if view.mission.complete:
+            raise NotReadyError("the mission is complete: `gcs mission start` flies it again")
         mode = view.autopilot.role_mode(Role.MISSION, view.vehicle_type)
         if mode is None:
             return start_mission().plan(view)

@@ -9,7 +9,7 @@ from gcs_cli.actions.action import Action, NotReadyError
 from gcs_cli.actions.in_flight import hold
 from gcs_cli.actions.in_mission import jump, pause, resume
 from gcs_cli.autopilots.autopilot import Role
-from gcs_cli.vehicle.view_types import Identity, Mission, Vector, VehicleView
+from gcs_cli.vehicle.view_types import MISSION_COMPLETE, Identity, Mission, Vector, VehicleView
 
 PX4 = Identity(1, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4)
 ARDUPILOT = PX4._replace(autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA)
@@ -59,6 +59,13 @@ def test_jump_is_done_when_the_vehicle_reports_the_item() -> None:
 def test_pause_and_resume_need_a_mission_in_flight(action: Action, view: VehicleView, reason: str) -> None:
     with pytest.raises(NotReadyError, match=reason):
         action.plan(view)
+
+
+def test_a_complete_mission_is_started_again_not_resumed() -> None:
+    view = view_in(Role.HOLD)
+    view = view._replace(mission=view.mission._replace(state=MISSION_COMPLETE))
+    with pytest.raises(NotReadyError, match="the mission is complete: `gcs mission start` flies it again"):
+        resume().plan(view)
 
 
 def test_hold_needs_a_known_speed() -> None:
