@@ -173,11 +173,10 @@ class ReadOrSet:
         if is_probe and self._found is None and self._asked > 1:
             self._probes += 1
             if self._probes >= self._timing.probes:
-                self.result = self._unknown()
-
-    @staticmethod
-    def _unknown() -> ParamFailed:
-        return ParamFailed(_REASONS[1], None, False)
+                reason = (
+                    "the vehicle answers about others, not about this one: it seems to have no such parameter"
+                )
+                self.result = ParamFailed(reason, None, False)
 
     def _is_confirmed(self, parameter: Parameter) -> bool:
         """Return True if the parameter has the wanted value, also if it had it before."""
@@ -201,8 +200,6 @@ class ReadOrSet:
         """Return the failure of an operation without an answer."""
         if self._found is not None:
             return ParamFailed(f"the vehicle keeps {self._found.value:g}", None, False)
-        if self._probes:
-            return self._unknown()
         return ParamFailed(
             f"the vehicle (system {self._vehicle.system}) did not answer about {self._name}", None, True
         )
