@@ -17,6 +17,7 @@ from gcs_cli.link.tlog import decode_records
 from gcs_cli.transfers.plan_files import example_plans
 from tests.support.console_blocks import File, steps
 from tests.support.plugin_run import PLUGIN, load, prepare, run, section
+from tests.support.tools import NIGHTLY
 
 pytest_plugins = ["pytester"]
 
@@ -182,6 +183,7 @@ def test_artifacts_option_takes_a_folder_for_each_test(outside: pytest.Pytester)
     assert all(len(folder.name) < 100 for folder in folders)
 
 
+@pytest.mark.skipif(not NIGHTLY, reason="20 s; parallel workers of real processes are tested each time")
 def test_parallel_workers_write_into_one_directory(outside: pytest.Pytester) -> None:
     outside.makepyfile("""
         import pytest
