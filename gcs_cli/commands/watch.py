@@ -36,7 +36,7 @@ ServeOption = Annotated[
     typer.Option(
         "--serve",
         metavar="HOST:PORT",
-        help=f"Serve the view to browsers, for example at {DEFAULT_SERVED}. Whoever opens it commands the vehicle.",
+        help=f"Serve the view to browsers, for example at {DEFAULT_SERVED}. They can command the vehicle.",
         show_default=False,
         **IN_OUTPUT,
     ),
