@@ -33,6 +33,7 @@ collect_ignore = [] if os.environ.get("NIGHTLY") else ["scenarios/files/long/loo
 TIERS = {
     "unit": "unit",
     "protocol": "protocol",
+    "screens": "screen",
     "scenarios": "flight",
     "parity": "parity",
     "processes": "process",

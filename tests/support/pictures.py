@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-FOLDER = Path(__file__).parents[1] / "unit" / "pictures"
+FOLDER = Path(__file__).parents[1] / "screens" / "pictures"
 
 
 def check_picture(name: str, lines: Sequence[str]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable
 
 import pytest
@@ -15,6 +14,7 @@ from gcs_cli.tui.orders import ORDERS, Field, FieldError
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView
 from tests.support.pictures import check_picture
+from tests.support.pilots import run_story
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
 from tests.support.watch_states import BARE, FULL, flown_history
@@ -27,13 +27,13 @@ def play(story: Story, view: VehicleView = FULL, size: tuple[int, int] = (80, 24
     """Run the application with ``story``; return its feed."""
     feed = StillFeed(view)
 
-    async def run() -> None:
-        app = WatchApp(feed)
-        async with app.run_test(size=size, notifications=True) as pilot:
-            await pilot.pause()
-            await story(app, pilot)
+    app = WatchApp(feed)
 
-    asyncio.run(run())
+    async def begin(pilot: Pilot[None]) -> None:
+        await pilot.pause()
+        await story(app, pilot)
+
+    run_story(app, begin, size=size, notifications=True)
     return feed
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable
 
 import pytest
@@ -17,10 +16,9 @@ from gcs_cli.tui.map_scene import Place, place_of
 from gcs_cli.tui.map_screen import MapScreen
 from tests.support.map_views import FRAME, VIEW, item
 from tests.support.pictures import check_picture
+from tests.support.pilots import run_story
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-
-pytestmark = pytest.mark.unit
 
 MISSION = (item(22), item(16, Place(20.0, 0.0)), item(16, Place(20.0, 30.0)), item(20))
 FENCE = (item(FenceCommand.CIRCLE_EXCLUSION, Place(-10.0, 20.0), param1=8.0),)
@@ -31,24 +29,24 @@ PLANS: tuple[tuple[MissionItem, ...], ...] = (MISSION, FENCE, RALLY)
 def drive(
     story: Callable[[Pilot[None], WatchApp, MapScreen], Awaitable[None]], size=(80, 24), view=VIEW
 ) -> None:
-    async def run() -> None:
-        app = WatchApp(StillFeed(view))
-        async with app.run_test(size=size) as pilot:
-            await pilot.press("2")
-            await pilot.pause()
-            screen = app.screen
-            assert isinstance(screen, MapScreen)
-            for items in PLANS:
-                app.redraws = 0
-                screen.show(view, 10.0)
-                if app.feed.jobs and not app.feed.jobs[-1][1].done():
-                    app.feed.jobs[-1][1].set_result(items)
+    app = WatchApp(StillFeed(view))
+
+    async def begin(pilot: Pilot[None]) -> None:
+        await pilot.press("2")
+        await pilot.pause()
+        screen = app.screen
+        assert isinstance(screen, MapScreen)
+        for items in PLANS:
             app.redraws = 0
             screen.show(view, 10.0)
-            await pilot.pause()
-            await story(pilot, app, screen)
+            if app.feed.jobs and not app.feed.jobs[-1][1].done():
+                app.feed.jobs[-1][1].set_result(items)
+        app.redraws = 0
+        screen.show(view, 10.0)
+        await pilot.pause()
+        await story(pilot, app, screen)
 
-    asyncio.run(run())
+    run_story(app, begin, size=size)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 35), (200, 50)], ids=str)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections.abc import Awaitable, Callable
 
@@ -20,11 +19,10 @@ from gcs_cli.tui.order_form import OrderForm
 from gcs_cli.tui.palette import DARK
 from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture
+from tests.support.pilots import run_story
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
 from tests.support.telemetry_frames import attitude, received
-
-pytestmark = pytest.mark.unit
 
 END_S = 20.0
 HEARTBEAT = received(mavlink.MAVLink_heartbeat_message(2, 12, 129, 0, 4, 3))
@@ -139,17 +137,17 @@ def test_rate_is_requested_as_an_interval(rate_hz, interval_us):
 
 
 def drive(story: Callable[[Pilot[None], WatchApp, InspectorScreen], Awaitable[None]], size=(80, 24)) -> None:
-    async def run() -> None:
-        app = WatchApp(StillFeed(VIEW, END_S, recorded()), "inspector")
-        async with app.run_test(size=size) as pilot:
-            await pilot.pause()
-            assert isinstance(app.screen, InspectorScreen)
-            app.redraws = 0
-            app.screen.show(VIEW, END_S)
-            await pilot.pause()
-            await story(pilot, app, app.screen)
+    app = WatchApp(StillFeed(VIEW, END_S, recorded()), "inspector")
 
-    asyncio.run(run())
+    async def begin(pilot: Pilot[None]) -> None:
+        await pilot.pause()
+        assert isinstance(app.screen, InspectorScreen)
+        app.redraws = 0
+        app.screen.show(VIEW, END_S)
+        await pilot.pause()
+        await story(pilot, app, app.screen)
+
+    run_story(app, begin, size=size)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 35), (200, 50)], ids=str)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -37,10 +36,9 @@ from gcs_cli.tui.palette import DARK
 from gcs_cli.vehicle.view_types import GeoPosition, Identity, Mission
 from tests.support.map_views import HOME, VIEW, item
 from tests.support.pictures import check_picture
+from tests.support.pilots import run_story
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-
-pytestmark = pytest.mark.unit
 
 ITEMS = (
     item(Command.NAV_TAKEOFF),
@@ -163,21 +161,21 @@ def said(app: WatchApp) -> list[str]:
 def drive(
     story: Callable[[Pilot[None], WatchApp, MissionScreen], Awaitable[None]], size=(80, 24), view=FLYING
 ) -> None:
-    async def run() -> None:
-        app = WatchApp(StillFeed(view))
-        async with app.run_test(size=size) as pilot:
-            await pilot.press("3")
-            await pilot.pause()
-            screen = app.screen
-            assert isinstance(screen, MissionScreen)
-            for items in (ITEMS, (), ()):
-                screen.show(view, 10.0)
-                answer(app, items)
-            screen.show(view, 10.0)
-            await pilot.pause()
-            await story(pilot, app, screen)
+    app = WatchApp(StillFeed(view))
 
-    asyncio.run(run())
+    async def begin(pilot: Pilot[None]) -> None:
+        await pilot.press("3")
+        await pilot.pause()
+        screen = app.screen
+        assert isinstance(screen, MissionScreen)
+        for items in (ITEMS, (), ()):
+            screen.show(view, 10.0)
+            answer(app, items)
+        screen.show(view, 10.0)
+        await pilot.pause()
+        await story(pilot, app, screen)
+
+    run_story(app, begin, size=size)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 35), (200, 50)], ids=str)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections.abc import Awaitable, Callable
 
@@ -19,11 +18,10 @@ from gcs_cli.tui.history import History
 from gcs_cli.tui.plot_screen import PlotScreen
 from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture
+from tests.support.pilots import run_story
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
 from tests.support.telemetry_frames import received
-
-pytestmark = pytest.mark.unit
 
 END_S = 60.0
 
@@ -40,20 +38,20 @@ def drive(story: Callable[[Pilot[None], WatchApp, PlotScreen], Awaitable[None]],
     for time_s in np.arange(0.0, END_S, 0.2):
         record(history, float(time_s))
 
-    async def run() -> None:
-        feed = StillFeed(VIEW, END_S)
-        feed.history = history
-        app = WatchApp(feed)
-        async with app.run_test(size=size) as pilot:
-            await pilot.press("4")
-            await pilot.pause()
-            assert isinstance(app.screen, PlotScreen)
-            app.redraws = 0
-            app.screen.show(VIEW, END_S)
-            await pilot.pause()
-            await story(pilot, app, app.screen)
+    feed = StillFeed(VIEW, END_S)
+    feed.history = history
+    app = WatchApp(feed)
 
-    asyncio.run(run())
+    async def begin(pilot: Pilot[None]) -> None:
+        await pilot.press("4")
+        await pilot.pause()
+        assert isinstance(app.screen, PlotScreen)
+        app.redraws = 0
+        app.screen.show(VIEW, END_S)
+        await pilot.pause()
+        await story(pilot, app, app.screen)
+
+    run_story(app, begin, size=size)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 35), (200, 50)], ids=str)
@@ -160,11 +158,11 @@ def test_cleared_plot_says_how_to_add_fields():
 
 
 def test_pause_before_the_first_message_is_harmless():
-    async def run() -> None:
-        app = WatchApp(StillFeed(VIEW))
-        async with app.run_test() as pilot:
-            await pilot.press("4", "space", "left", "enter", "escape", "space")
-            await pilot.pause()
-            assert isinstance(app.screen, PlotScreen)
+    app = WatchApp(StillFeed(VIEW))
 
-    asyncio.run(run())
+    async def begin(pilot: Pilot[None]) -> None:
+        await pilot.press("4", "space", "left", "enter", "escape", "space")
+        await pilot.pause()
+        assert isinstance(app.screen, PlotScreen)
+
+    run_story(app, begin)

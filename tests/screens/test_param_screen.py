@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
@@ -29,10 +28,9 @@ from gcs_cli.tui.param_screen import ParamScreen
 from gcs_cli.vehicle.param_info import ParamInfo
 from tests.support.map_views import VIEW
 from tests.support.pictures import check_picture
+from tests.support.pilots import run_story
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
-
-pytestmark = pytest.mark.unit
 
 INFOS = {
     "MPC_XY_CRUISE": ParamInfo(5.0, 3.0, 20.0, "m/s", "Horizontal speed in missions"),
@@ -120,20 +118,20 @@ def drive(
     values=VALUES,
     infos=INFOS,
 ) -> None:
-    async def run() -> None:
-        app = WatchApp(StillFeed(VIEW))
-        async with app.run_test(size=size) as pilot:
-            await pilot.press("7")
-            await pilot.pause()
-            screen = app.screen
-            assert isinstance(screen, ParamScreen)
-            screen.show(VIEW, 10.0)
-            await pilot.pause()
-            app.feed.jobs[-1][1].set_result((params(values), infos))
-            await pilot.pause()
-            await story(pilot, app, screen)
+    app = WatchApp(StillFeed(VIEW))
 
-    asyncio.run(run())
+    async def begin(pilot: Pilot[None]) -> None:
+        await pilot.press("7")
+        await pilot.pause()
+        screen = app.screen
+        assert isinstance(screen, ParamScreen)
+        screen.show(VIEW, 10.0)
+        await pilot.pause()
+        app.feed.jobs[-1][1].set_result((params(values), infos))
+        await pilot.pause()
+        await story(pilot, app, screen)
+
+    run_story(app, begin, size=size)
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 35), (200, 50)], ids=str)

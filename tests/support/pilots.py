@@ -1,0 +1,55 @@
+"""Stories with applications on Textual that wait for no clock."""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from textual.app import App
+from textual.pilot import Pilot
+
+
+class _SkippingSelector(selectors.DefaultSelector):
+    """A selector that skips the time until the next timer instead of waiting for it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.skipped_s = 0.0
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        if timeout is None:  # no timer runs: another thread is awaited
+            return super().select(None)
+        events = super().select(0)
+        if not events:
+            self.skipped_s += max(timeout, 0.0)
+        return events
+
+
+class _SkippingLoop(asyncio.SelectorEventLoop):
+    def __init__(self) -> None:
+        self._skipping = _SkippingSelector()
+        super().__init__(self._skipping)
+
+    def time(self) -> float:
+        return super().time() + self._skipping.skipped_s
+
+
+def run_story(
+    app: App[Any],
+    story: Callable[[Pilot[None]], Awaitable[None]],
+    size: tuple[int, int] = (80, 24),
+    **options: Any,
+) -> None:
+    """Run ``app`` on an event loop whose timers take no time, and drive it by ``story``.
+
+    Textual's pilot waits at least 20 ms three times for each key; a story has twenty keys.
+    """
+
+    async def run() -> None:
+        async with app.run_test(size=size, **options) as pilot:
+            await story(pilot)
+
+    with asyncio.Runner(loop_factory=_SkippingLoop) as runner:
+        runner.run(run())
