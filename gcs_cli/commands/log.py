@@ -14,6 +14,7 @@ from flightstack.mavlink.files import Entry
 from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.autopilots.registry import autopilot_of
 from gcs_cli.clients.log_client import LogEntry
+from gcs_cli.commands.asking import YesOption, confirm
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
@@ -86,7 +87,7 @@ def download(
 def erase(
     context: typer.Context,
     link: LinkOptions,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    yes: YesOption = False,
 ) -> None:
     """Erase all logs but the one that is being written.
 
@@ -99,8 +100,7 @@ def erase(
         if not before:
             raise CliError("the vehicle has no logs")
         size = size_text(sum(log.size for log in before))
-        if not yes:
-            typer.confirm(f"erase {len(before)} logs of {size} from the vehicle?", abort=True)
+        confirm(f"{len(before)} logs of {size} will be erased from the vehicle", yes, connection)
         left = log_calls.erase_logs(connection, len(before))
     if len(left) == len(before) and len(before) > 1:
         raise CliError(f"the vehicle still has all {len(left)} logs")
