@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.link.perform import request_reached
 from gcs_cli.link.quality import LinkQuality
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.settings import LinkOptions, output_of
@@ -32,6 +33,7 @@ def status(context: typer.Context, link: LinkOptions) -> None:
     with connect_vehicle(context, link, takes_recording=True, in_real_time=False) as connection:
         session = connection.session
         session.subscribe(ROTORS_AND_TIMING)
+        request_reached(connection)
         # most messages come several times a second; values that the vehicle does not send stay unknown
         connection.wait_for(lambda: _is_full(session.view), GATHER_S)
         facts = {**status_facts(session.view), **_link_facts(session.quality)}
