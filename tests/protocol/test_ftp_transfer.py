@@ -106,7 +106,7 @@ def test_directories_are_listed() -> None:
         Ether(FtpServer(VEHICLE, tree()), Station(client, LOSSY)).run(lambda: client.result is not None)
         return client.result.entries if isinstance(client.result, FtpDone) else client.result
 
-    root = ("@MAV_LOG", "@PARAM", "@SYS", "etc", "fs")
+    root = ("@MAV_LOG", "@PARAM", "etc", "fs")
     assert listing("/") == (
         *(Entry(name, None) for name in root),
         Entry("big.bin", 300_000), Entry("empty", 0), Entry("exact", 956),
