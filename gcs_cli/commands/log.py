@@ -79,7 +79,8 @@ def download(
         else:
             log = _chosen(logs, number)
             file = log_calls.file_of(log, logs, files)
-            _download(out, connection, log, file, _path(connection, log, file, output, False), overwrite)
+            path = _path(connection, log, file, output, False)
+            _download(out, connection, log, logs, file, path, overwrite)
 
 
 @app.command()
@@ -129,7 +130,7 @@ def _download_all(
         elif path.is_file() and not overwrite:
             refused.append(str(path))  # a log that has grown since, or another file
         else:
-            _download(out, connection, log, file, path, overwrite)
+            _download(out, connection, log, logs, file, path, overwrite)
     if refused:
         verb = "exists" if len(refused) == 1 else "exist"
         raise CliError(
@@ -139,7 +140,13 @@ def _download_all(
 
 
 def _download(
-    out: Output, connection: Connection, log: LogEntry, file: Entry | None, path: Path, overwrite: bool
+    out: Output,
+    connection: Connection,
+    log: LogEntry,
+    logs: tuple[LogEntry, ...],
+    file: Entry | None,
+    path: Path,
+    overwrite: bool,
 ) -> None:
     check_new(path, overwrite)
     began_s = connection.now_s
@@ -150,8 +157,11 @@ def _download(
     write_bytes_atomically(path, content)
     rate = size_text(len(content) / took_s)
     sentence = f"log {log.log_id}: {size_text(len(content))} written to {path} ({rate}/s)"
+    is_growing = log_calls.is_growing(connection, log, logs)
+    if is_growing:
+        sentence += "; the vehicle is still writing this log: download it again after the flight"
     facts = {"id": log.log_id, "path": str(path), "size_bytes": len(content), "took_s": took_s}
-    out.say("downloaded", sentence, **facts)
+    out.say("downloaded", sentence, **facts, is_growing=is_growing)
 
 
 def _number(text: str) -> int | None:
