@@ -84,7 +84,7 @@ class MissionScreen(JobScreen):
 
     def on_mount(self) -> None:
         """Put the cursor into the table."""
-        self.rows.focus()
+        self.set_focus(self.rows)
 
     @property
     def rows(self) -> RowList:
