@@ -105,7 +105,7 @@ class MissionScreen(JobScreen):
         system_id = None if view.identity is None else view.identity.system_id
         streams = app.feed.history.streams(system_id)
         current = [stream.last for stream in streams if stream.name == "MISSION_CURRENT"]
-        if not self.doing:
+        if not self.is_working:
             app.plans.update(view, current[0] if current else None)
         if not app.plans.loading:
             self.draft = self.draft.followed(app.plans.plan, app.plans.system_id)
