@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from gcs_cli.__main__ import main
 from gcs_cli.commands.registry import (
     FenceGroup,
     GcsGroup,
@@ -19,6 +20,7 @@ from gcs_cli.commands.registry import (
     RallyGroup,
 )
 from gcs_cli.lazy_group import LazyGroup
+from gcs_cli.program import run
 from tests.support.sample_logs import small_tlog
 
 HEAVY = ("numpy", "numba", "scipy", "matplotlib", "pyulog", "pymavlink", "rich", "jinja2", "plotly")
@@ -59,6 +61,22 @@ def output_of(*arguments: str, **environment: str) -> str:
 )
 def test_help_imports_nothing_heavy(words: list[str]) -> None:
     assert f"Usage: {' '.join(['gcs', *words])}" in output_of(*words, "--help")
+
+
+def test_help_of_gcs_imports_no_command_line_library() -> None:
+    code = "import sys, gcs_cli.__main__; gcs_cli.__main__.main(['--help']); assert 'typer' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
+
+
+@pytest.mark.parametrize("columns", ["60", "80", "200"])
+def test_help_of_gcs_fits_the_terminal(
+    columns: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    assert main(["--help"]) == run(["--help"]) == 0
+    printed = capsys.readouterr().out
+    assert printed[: len(printed) // 2] == printed[len(printed) // 2 :]
+    assert max(map(len, printed.splitlines())) < int(columns)
 
 
 @pytest.mark.parametrize(
