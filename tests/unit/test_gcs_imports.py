@@ -64,7 +64,9 @@ def test_help_imports_nothing_heavy(words: list[str]) -> None:
 
 
 def test_help_of_gcs_imports_no_command_line_library() -> None:
-    code = "import sys, gcs_cli.__main__; gcs_cli.__main__.main(['--help']); assert 'typer' not in sys.modules"
+    code = (
+        "import sys, gcs_cli.__main__; gcs_cli.__main__.main(['--help']); assert 'typer' not in sys.modules"
+    )
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 
 
