@@ -14,6 +14,7 @@ from gcs_cli.link.connection import Connection
 from gcs_cli.link.subscription import LOOP_TIMING
 from gcs_cli.settings import JsonOption, LinkOptions, link_options
 from gcs_cli.tables import new_table, table_console
+from gcs_cli.vehicle.numbers import number
 from gcs_cli.vehicle.view_types import LoopTiming
 from gcs_cli.vehicle_link import connect_vehicle
 
@@ -68,8 +69,6 @@ def _show(timing: LoopTiming, as_json: bool) -> None:
 
 def timing_table(timing: LoopTiming) -> Table:
     """Return the timing as a table: times in µs, and in percent of the inner loop's period."""
-    from gcs_cli.tui.panels import number  # noqa: PLC0415  # rich
-
     clock = "lockstep" if timing.lockstep else "real time"
     factor = f", {timing.real_time_factor:.1f}× real time" if timing.real_time_factor else ""
     title = f"inner {number(timing.inner_hz, 0)} Hz, outer {number(timing.outer_hz, 0)} Hz, {clock}{factor}"
