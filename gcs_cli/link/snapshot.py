@@ -1,6 +1,6 @@
 """The present state of the vehicle: requests each message that has not arrived yet once. Sans-IO.
 
-A message that is streamed every two seconds, such as BATTERY_STATUS, would arrive too late for ``gcs status``.
+A message that is streamed once a second, such as SYS_STATUS, would arrive too late for ``gcs status``.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _KNOWN: Mapping[int, Callable[[VehicleView], bool]] = {
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: lambda view: view.geo is not None,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: lambda view: view.landed_state != 0,
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda view: view.mission.current is not None,
-    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: lambda view: view.battery is not None,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: lambda view: view.healthy is not None,  # and battery
     EscStatus.id: lambda view: bool(view.rotor_rpm),
     FS_LOOP_TIMING_ID: lambda view: view.timing is not None,
 }

@@ -6,7 +6,7 @@ import pytest
 
 from flightstack.mavlink.dialect import FS_LOOP_TIMING_ID, EscStatus, mavlink
 from gcs_cli.link.snapshot import Snapshot
-from gcs_cli.vehicle.view_types import Battery, Euler, Identity, Mission, VehicleView
+from gcs_cli.vehicle.view_types import Euler, Identity, Mission, VehicleView
 
 OURS = VehicleView(identity=Identity(7, 1, mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_PX4))
 REQUEST = mavlink.MAV_CMD_REQUEST_MESSAGE
@@ -28,14 +28,14 @@ def test_snapshot_requests_all_missing_messages_once() -> None:
         attitude=Euler(0.0, 0.0, 0.0), position_ned_m=(0.0, 0.0, 0.0), landed_state=1, mission=Mission(0)
     )
     snapshot = Snapshot(lambda: view)
-    battery, geo = mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+    battery, geo = mavlink.MAVLINK_MSG_ID_SYS_STATUS, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
     assert sorted(requested(snapshot)) == sorted([battery, geo, EscStatus.id, FS_LOOP_TIMING_ID])
     assert requested(snapshot) == []
 
 
 @pytest.mark.parametrize(("refusals", "complete"), [(6, False), (7, True)])
 def test_snapshot_does_not_wait_for_refused_messages(refusals: int, complete: bool) -> None:
-    snapshot = Snapshot(lambda: OURS._replace(battery=Battery(1.0, None, None)))
+    snapshot = Snapshot(lambda: OURS._replace(healthy=True))
     assert len(requested(snapshot)) == 7
     for _ in range(refusals):
         snapshot.receive(REFUSED, 0.0)
