@@ -120,7 +120,7 @@ def test_missing_vehicle_is_reported_with_those_that_run(
     running: list[int], advice: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(opening, "running_instances", lambda: running)
-    with Connection(parse_endpoint("udp:127.0.0.1:1"), line=MemoryLine(HERE)) as connection:
-        with pytest.raises(CliError) as raised:
-            connection.wait_for_vehicle(0.0)
+    connection = Connection(parse_endpoint("udp:127.0.0.1:1"), line=MemoryLine(HERE))
+    with connection, pytest.raises(CliError) as raised:
+        connection.wait_for_vehicle(0.0)
     assert str(raised.value) == f"no vehicle sent to UDP 127.0.0.1:1 within 0 s: {advice}"
