@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from flightstack.core.atomic_file import check_new
 from flightstack.plan import PLAN_NAMES, MissionType, Plan
@@ -15,11 +14,11 @@ from flightstack.process.command_line import expand_options, make_app
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.link import calls
-from gcs_cli.plans.drawing import draw, places_of
 from gcs_cli.plans.formats.files import check_suffix, load_any
 from gcs_cli.plans.itinerary import home_of_items, itinerary
 from gcs_cli.plans.table import item_facts, places_table
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
+from gcs_cli.tables import table_console
 from gcs_cli.transfers.plan_files import OPTIONAL_PLAN, AnyPlanArgument
 from gcs_cli.transfers.plan_parts import PlanPart, Uploads, plan_parts
 from gcs_cli.transfers.plan_transfers import complete_upload, say_downloaded, say_uploaded, say_verified
@@ -79,7 +78,9 @@ def make_part_app(kind: MissionType) -> typer.Typer:
             output.say("plan", f"no {name}", part=part.name, items=len(part.items))
             return
         home = home_of_items(part.items, plan.home)
-        console = Console()
+        from gcs_cli.plans.drawing import draw, places_of  # noqa: PLC0415  # NumPy
+
+        console = table_console()
         console.print(places_table(part.items))
         console.print(draw(places_of(plan, itinerary((), home), home), _COLUMNS, _ROWS).text())
 
