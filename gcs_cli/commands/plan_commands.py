@@ -20,6 +20,7 @@ from gcs_cli.plans.formats.files import check_suffix, load_any
 from gcs_cli.plans.itinerary import home_of_items, itinerary
 from gcs_cli.plans.table import item_facts, places_table
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
+from gcs_cli.tables import table_console
 from gcs_cli.transfers.plan_files import OPTIONAL_PLAN, AnyPlanArgument
 from gcs_cli.transfers.plan_parts import Uploads, parts_to_send, plan_parts
 from gcs_cli.transfers.plan_transfers import (
