@@ -20,7 +20,6 @@ from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
 from gcs_cli.transfers import log_calls
-from gcs_cli.tui.transfer_bar import TransferBar
 from gcs_cli.vehicle_link import connect_vehicle
 
 app = make_app(add_completion=False)
@@ -148,6 +147,8 @@ def _download(
     path: Path,
     overwrite: bool,
 ) -> None:
+    from gcs_cli.tui.transfer_bar import TransferBar  # noqa: PLC0415  # rich
+
     check_new(path, overwrite)
     began_s = connection.now_s
     with TransferBar(f"log {log.log_id}") as bar:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.mavlink.param_values import Parameter
@@ -20,6 +19,7 @@ from gcs_cli.link import calls
 from gcs_cli.link.connection import Connection
 from gcs_cli.output import Output
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
+from gcs_cli.tables import table_console
 from gcs_cli.transfers import param_calls
 from gcs_cli.vehicle.param_info import UNKNOWN, ParamInfo, load_parameters, render_parameters
 from gcs_cli.vehicle.param_search import search_parameters
@@ -36,7 +36,6 @@ from gcs_cli.vehicle_link import connect_vehicle
 app = make_app(add_completion=False)
 
 NameArgument = Annotated[str, typer.Argument(metavar="NAME", show_default=False)]
-_WIDE = 200  # columns of a pipe or file
 
 
 @app.command("list")
@@ -250,10 +249,7 @@ def _show(
         for parameter in parameters:
             output.say("parameter", "", **facts(parameter, infos))
         return
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=_WIDE)
-    console.print(parameter_table(parameters, infos, compared))
+    table_console().print(parameter_table(parameters, infos, compared))
 
 
 def _number(text: str) -> float:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from flightstack.core.atomic_file import check_new
 from flightstack.plan import PLAN_NAMES, MissionType, Plan
@@ -17,11 +16,11 @@ from gcs_cli.commands.asking import YesOption, confirm_if_armed
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.fly.processes import Interruption
 from gcs_cli.link import calls
-from gcs_cli.plans.drawing import draw, places_of
 from gcs_cli.plans.formats.files import check_suffix, load_any
 from gcs_cli.plans.itinerary import home_of_items, itinerary
 from gcs_cli.plans.table import item_facts, places_table
 from gcs_cli.settings import LinkOptions, OverwriteOption, output_of
+from gcs_cli.tables import table_console
 from gcs_cli.transfers.plan_files import OPTIONAL_PLAN, AnyPlanArgument
 from gcs_cli.transfers.plan_parts import Uploads, parts_to_send, plan_parts
 from gcs_cli.transfers.plan_transfers import (
@@ -148,7 +147,9 @@ def _add_show(app: typer.Typer, kind: MissionType, text: str) -> None:
             output.say("plan", f"no {part.name}", part=part.name, items=len(part.items))
             return
         home = home_of_items(part.items, plan.home)
-        console = Console()
+        from gcs_cli.plans.drawing import draw, places_of  # noqa: PLC0415  # NumPy
+
+        console = table_console()
         console.print(places_table(part.items))
         console.print(draw(places_of(plan, itinerary((), home), home), _COLUMNS, _ROWS).text())
 

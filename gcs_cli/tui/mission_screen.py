@@ -84,7 +84,7 @@ class MissionScreen(JobScreen):
 
     def on_mount(self) -> None:
         """Put the cursor into the table."""
-        self.rows.focus()
+        self.set_focus(self.rows)
 
     @property
     def rows(self) -> RowList:
@@ -105,7 +105,7 @@ class MissionScreen(JobScreen):
         system_id = None if view.identity is None else view.identity.system_id
         streams = app.feed.history.streams(system_id)
         current = [stream.last for stream in streams if stream.name == "MISSION_CURRENT"]
-        if not self.doing:
+        if not self.is_working:
             app.plans.update(view, current[0] if current else None)
         if not app.plans.loading:
             self.draft = self.draft.followed(app.plans.plan, app.plans.system_id)
@@ -283,11 +283,16 @@ class MissionScreen(JobScreen):
         view = watch_app(self).feed.view
         if view.armed and not await self.ask("The vehicle is armed. Replace its mission?", "Replace"):
             return
-        said = await self.run_job("uploading", partial(self._upload, plan=plan), system_id)
+        uploaded = await self.run_job(
+            "uploading", partial(self._upload, plan=plan), system_id, ends_in_order=True
+        )
+        if uploaded is None:
+            return
+        said = await self.run_job("reading back", partial(self._compare, plan=plan), system_id)
         if said is not None:
             self.draft = self.draft.uploaded(system_id) if self.draft.to_upload() == plan else self.draft
             watch_app(self).plans.reload()
-            watch_app(self).feed.tell(said)
+            watch_app(self).feed.tell(f"uploaded: {said}")
             self._redraw()
 
     @property
@@ -295,11 +300,10 @@ class MissionScreen(JobScreen):
         identity = watch_app(self).feed.view.identity
         return None if identity is None else identity.system_id
 
-    def _upload(self, connection: Connection, plan: Plan) -> str:
+    def _upload(self, connection: Connection, plan: Plan) -> bool:
         uploads = Uploads(connection.session, plan, restores=True, interrupted=lambda: self._note(uploads))
         plan_transfers.complete_upload(connection, uploads, "the edited plan")
-        self.show_progress(0, 0)
-        return f"uploaded: {self._compare(connection, plan)}"
+        return True
 
     def _note(self, uploads: Uploads) -> str:
         self.progress = uploads.progress

@@ -129,13 +129,14 @@ class FakeVehicle:
         return ACCEPTED
 
     def _answer_request(self, number: int) -> None:
-        makers = {
-            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
-            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current,
+        available = {
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status(),
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self._mission_current(),
+            **self._on_request(),
         }
-        if number in makers:
-            self._out.append(makers[number]())
-        self._ack(REQUEST, ACCEPTED if number in makers else UNSUPPORTED)
+        if number in available:
+            self._out.append(available[number])
+        self._ack(REQUEST, ACCEPTED if number in available else UNSUPPORTED)
 
     def _on_file_transfer_protocol(self, message: Any) -> None:
         """Refuse: the vehicle has no files."""

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
-from gcs_cli.__main__ import app
 from gcs_cli.lazy_group import EXAMPLES, LazyGroup
+from gcs_cli.program import app
 
 
 def commands(group: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[str, Any]]:
