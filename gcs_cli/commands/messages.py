@@ -43,10 +43,6 @@ def messages(
     """Print the status texts of the vehicle until Ctrl-C.
 
     A recording's texts are printed at once.
-
-    Examples:
-      gcs messages --level warning
-      gcs --connect flight.tlog messages --json
     """
     if level.lower() not in LEVELS:
         raise CliError(f"messages: --level {level}: choose one of {', '.join(LEVELS)}", USAGE)
