@@ -40,7 +40,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "wait": ("gcs wait ready", "gcs wait 'altitude>10' mode=HOLD", "gcs wait disarmed --timeout 300"),
     "status": ("gcs status", "gcs status --instance 1", "gcs --connect tcp:127.0.0.1:5760 status --json"),
     "watch": ("gcs watch", "gcs watch --screen map", "gcs watch --once"),
-    "messages": ("gcs messages --level warning", "gcs --connect flight.tlog messages --json"),
+    "messages": (
+        "gcs messages --level warning",
+        "gcs messages --past 100 --duration 0",
+        "gcs --connect flight.tlog messages --json",
+    ),
     "listen": (
         "gcs listen",
         "gcs listen ATTITUDE --field roll --field pitch",

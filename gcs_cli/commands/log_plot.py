@@ -37,7 +37,7 @@ def plot(
         list[str],
         typer.Argument(
             metavar="FIELD...",
-            help="topic.field, a part of it that is unique, or a pattern with *.",
+            help="topic, topic.field, a part of it that is unique, or a pattern with *.",
             show_default=False,
         ),
     ],

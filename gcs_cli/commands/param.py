@@ -13,6 +13,7 @@ from flightstack.core.atomic_file import check_new, write_text_atomically
 from flightstack.mavlink.param_values import Parameter
 from flightstack.params.param_file import is_parameter_name
 from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.commands.asking import YesOption, confirm_if_armed
 from gcs_cli.completion import parameter_names
 from gcs_cli.errors import FAILED, USAGE, CliError, VehicleLostError
 from gcs_cli.link import calls
@@ -174,12 +175,17 @@ def reset(
         typer.Argument(metavar="[NAME]...", show_default=False, autocompletion=parameter_names),
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="All parameters.")] = False,
+    yes: YesOption = False,
 ) -> None:
-    """Reset parameters to their defaults."""
+    """Reset parameters to their defaults.
+
+    With --all, if the vehicle is armed, asks first on a terminal; elsewhere it needs --yes.
+    """
     if bool(names) == everything:
         raise CliError("reset: expected names of parameters, or --all", USAGE)
     with connect_vehicle(context, link) as connection:
         if everything:
+            confirm_if_armed(connection, "all its parameters will be reset", yes)
             connection.command(calls.RESET_PARAMETERS, "reset of all parameters")
             output_of(context, link).say("reset", "all parameters have their defaults")
         else:
@@ -215,10 +221,15 @@ def load(
     file: Annotated[
         Path, typer.Argument(help="A file of `gcs param save` or of QGroundControl.", show_default=False)
     ],
+    yes: YesOption = False,
 ) -> None:
-    """Set the parameters that a file has; the others stay as they are."""
+    """Set the parameters that a file has; the others stay as they are.
+
+    If the vehicle is armed, asks first on a terminal; elsewhere it needs --yes.
+    """
     wanted = load_parameters(file)
     with connect_vehicle(context, link) as connection:
+        confirm_if_armed(connection, f"its parameters will be those of {file}", yes)
         present = {parameter.name: parameter for parameter in param_calls.fetch_all(connection)}
         result = param_calls.change_all(connection, wanted, present)
     changed = len(result.changed)

@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 from flightstack.process.command_line import expand_options, make_app
+from gcs_cli.link.perform import request_reached
 from gcs_cli.link.quality import LinkQuality
 from gcs_cli.link.snapshot import Snapshot
 from gcs_cli.settings import LinkOptions, output_of
@@ -32,6 +33,7 @@ def status(context: typer.Context, link: LinkOptions) -> None:
         session = connection.session
         snapshot = Snapshot(lambda: session.view)
         session.attach(snapshot)
+        request_reached(connection)
         connection.wait_for(
             lambda: snapshot.complete, _OF_RECORDING_S if connection.is_recording else GATHER_S
         )

@@ -163,7 +163,7 @@ class InspectorScreen(WatchScreen):
         """Open the search field."""
         search = self.query_one("#search", Input)
         search.display = True
-        search.focus()
+        self.set_focus(search)
 
     def action_clear(self) -> None:
         """Close the search field and show all messages."""

@@ -96,14 +96,14 @@ class MessagesScreen(WatchScreen):
         """Open the search field."""
         search = self.query_one("#search", Input)
         search.display = True
-        search.focus()
+        self.set_focus(search)
 
     def action_clear(self) -> None:
         """Close the search field and show all lines."""
         search = self.query_one("#search", Input)
         search.value = ""
         search.display = False
-        self.query_one("#texts").focus()
+        self.set_focus(self.query_one("#texts"))
 
     def action_end(self) -> None:
         """Scroll to the newest line."""
@@ -116,7 +116,7 @@ class MessagesScreen(WatchScreen):
 
     @on(Input.Submitted, "#search")
     def _chosen(self) -> None:
-        self.query_one("#texts").focus()
+        self.set_focus(self.query_one("#texts"))
 
 
 def _lines(entry: Entry, words: str, several: bool, width: int, colours: Palette) -> list[Text]:

@@ -84,7 +84,7 @@ class ParamScreen(JobScreen):
 
     def on_mount(self) -> None:
         """Put the cursor into the table."""
-        self.rows.focus()
+        self.set_focus(self.rows)
 
     @property
     def rows(self) -> RowList:
@@ -102,7 +102,7 @@ class ParamScreen(JobScreen):
         if not self.query(RowList):  # resumed before it was composed
             return
         system_id = None if view.identity is None else view.identity.system_id
-        if system_id is not None and system_id != self._system_id and not self.doing:
+        if system_id is not None and system_id != self._system_id and not self.is_working:
             self._system_id = system_id
             self._take(ParamList())
             self.action_update()
@@ -190,7 +190,7 @@ class ParamScreen(JobScreen):
         """Open the search field."""
         search = self.query_one("#param-search", Input)
         search.display = True
-        search.focus()
+        self.set_focus(search)
 
     def action_changed_only(self) -> None:
         """Show all parameters, or those that differ."""
@@ -200,7 +200,7 @@ class ParamScreen(JobScreen):
     def action_clear(self) -> None:
         """Close the search field; without one, end the comparison with a file."""
         search = self.query_one("#param-search", Input)
-        self.rows.focus()
+        self.set_focus(self.rows)
         if search.display:
             search.value, search.display = "", False
         elif self._params.file is not None or self._changed_only:
@@ -213,7 +213,7 @@ class ParamScreen(JobScreen):
 
     @on(Input.Submitted, "#param-search")
     def _found(self) -> None:
-        self.rows.focus()
+        self.set_focus(self.rows)
 
     # -- exchange with the vehicle
 

@@ -245,6 +245,21 @@ def test_logs_of_ardupilot_are_named_bin(tmp_path: Path, monkeypatch: pytest.Mon
     assert [path.name for path in tmp_path.iterdir()] == ["log_1.bin"]
 
 
+@pytest.mark.parametrize("cause", ["armed", "grown", "finished"])
+def test_download_of_a_log_that_is_being_written_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cause: str
+) -> None:
+    sizes = iter([3, 9] if cause == "grown" else [3, 3])
+    monkeypatch.setattr(log_calls, "fetch_list", lambda _: (LogEntry(1, next(sizes), 0),))
+    monkeypatch.setattr(log_calls, "fetch_files", lambda _: ())
+    monkeypatch.setattr(log_calls, "fetch_log", lambda *_: b"new")
+    vehicle = FakeVehicle()
+    vehicle.armed = cause == "armed"
+    result = told(vehicle, "log", "download", "-o", tmp_path)
+    assert result.returncode == 0
+    assert ("still writing this log" in result.stdout) == (cause != "finished")
+
+
 def test_a_vehicle_without_geofence_is_downloaded_from() -> None:
     vehicle = FakeVehicle(unknown_types=(1, 2))
     result = told(vehicle, "mission", "download")

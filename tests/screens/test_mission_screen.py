@@ -252,7 +252,9 @@ def test_upload_checks_asks_while_armed_and_reads_back():
         assert "The vehicle is armed" in "\n".join(shown(app))
         await pilot.press("y")
         await pilot.pause()
-        answer(app, "uploaded: mission of 4 items equal")
+        answer(app, True)
+        await pilot.pause()
+        answer(app, "mission of 4 items equal")
         await pilot.pause()
         assert said(app) == ["uploaded: mission of 4 items equal"]
         assert not screen.draft.is_changed

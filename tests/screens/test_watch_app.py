@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 from textual.pilot import Pilot
+from textual.widgets import Input
 
 from flightstack.core.enums import Severity
 from gcs_cli.tui.app import WatchApp
@@ -14,7 +15,7 @@ from gcs_cli.tui.orders import ORDERS, Field, FieldError
 from gcs_cli.tui.screens import SCREENS, ScreenEntry
 from gcs_cli.vehicle.view_types import Identity, VehicleView
 from tests.support.pictures import check_picture
-from tests.support.pilots import run_story
+from tests.support.pilots import run_story, type_ahead
 from tests.support.screens import shown
 from tests.support.still_feed import StillFeed
 from tests.support.watch_states import BARE, FULL, flown_history
@@ -226,6 +227,29 @@ def test_escape_leaves_a_form_without_an_order() -> None:
         await pilot.pause()
         await pilot.press("4", "escape")
         await pilot.pause()
+
+    assert asked(play(story)) == []
+
+
+def test_keys_typed_ahead_reach_the_form_that_opens() -> None:
+    async def story(_app: WatchApp, pilot: Pilot) -> None:
+        await type_ahead(pilot, "T", "backspace", "1", "2", "enter")
+
+    assert [action.facts for action in play(story, GROUNDED).actions] == [{"altitude_m": 12.0}]
+
+
+def test_value_typed_ahead_after_a_refused_one_is_sent() -> None:
+    async def story(_app: WatchApp, pilot: Pilot) -> None:
+        await type_ahead(pilot, "T", *"x", "enter", "backspace", *"7", "enter")
+
+    assert [action.facts for action in play(story, GROUNDED).actions] == [{"altitude_m": 7.0}]
+
+
+@pytest.mark.parametrize("screen", ["5", "6"])
+def test_words_typed_ahead_are_searched_and_command_nothing(screen: str) -> None:
+    async def story(app: WatchApp, pilot: Pilot) -> None:
+        await type_ahead(pilot, screen, "slash", *"LAY")
+        assert app.screen.query_one("#search", Input).value == "LAY"
 
     assert asked(play(story)) == []
 

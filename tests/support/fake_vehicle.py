@@ -138,6 +138,14 @@ class FakeVehicle:
             self._out.append(available[number])
         self._ack(REQUEST, ACCEPTED if number in available else UNSUPPORTED)
 
+    def _on_file_transfer_protocol(self, message: Any) -> None:
+        """Refuse: the vehicle has no files."""
+        request = bytes(message.payload)
+        sequence = int.from_bytes(request[:2], "little") + 1
+        nak = sequence.to_bytes(2, "little") + bytes([0, 129, 1, request[3], 0, 0, 0, 0, 0, 0, 10])
+        sender = message.get_srcSystem(), message.get_srcComponent()
+        self._out.append(mavlink.MAVLink_file_transfer_protocol_message(0, *sender, nak.ljust(251, b"\0")))
+
     def _on_mission_count(self, message: Any) -> None:
         self.plan_type = message.mission_type
         self._uploading, self._expected = [], message.count

@@ -59,7 +59,9 @@ class StillFeed(Feed):
     def link_name(self) -> str:
         return "UDP 127.0.0.1:14550"
 
-    def submit(self, job: Callable[[Connection], Any], system_id: int | None = None) -> Future[Any]:
+    def submit(
+        self, job: Callable[[Connection], Any], system_id: int | None = None, *, ends_in_order: bool = False
+    ) -> Future[Any]:
         self.job_targets.append(system_id)
         self.jobs.append((job, Future()))
         return self.jobs[-1][1]
