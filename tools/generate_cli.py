@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import inspect
 import sys
-import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -22,7 +21,7 @@ import flightstack.__main__
 import gcs_cli.program
 import sim_bridge.__main__
 from flightstack.process.command_line import PANELS, PanelCommand, PanelGroup
-from gcs_cli.lazy_group import EXAMPLES
+from gcs_cli.commands.examples import EXAMPLES
 from tools.generated import ROOT, write_or_check
 
 FOLDER = ROOT / "docs" / "reference"
@@ -135,13 +134,13 @@ def section(
     repeated = [each.names.split()[0] for each in found if each in shared]
     text = inspect.cleandoc(text or (function.__doc__ if function else None) or "").split("\f")[0]
     words = [name] + (["[OPTIONS]"] if any(not each.is_argument for each in found) else [])
-    text, _, examples = text.partition(f"\n\n{EXAMPLES}")
+    examples = EXAMPLES.get(name.partition(" ")[2], ()) if name.startswith("gcs ") else ()
     usage = " ".join(
         words + [each.names for each in found if each.is_argument] + (["COMMAND"] if is_group else [])
     )
     parts = [f"\n{heading} {name}\n\n" if heading else "\n", f"{text}\n\n", f"```text\n{usage}\n```\n"]
     if examples:
-        parts.append(f"\nExamples:\n\n```sh\n{textwrap.dedent(examples).strip()}\n```\n")
+        parts.append("\nExamples:\n\n```sh\n" + "\n".join(examples) + "\n```\n")
     rows = [each for each in found if each not in shared]
     if has_panels:
         rest = [each for each in rows if each.is_argument or not each.panel]

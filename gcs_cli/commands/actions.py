@@ -11,6 +11,7 @@ from flightstack.process.command_line import IN_OUTPUT, expand_options, make_app
 from gcs_cli.actions import in_flight, on_vehicle
 from gcs_cli.actions.action import Action
 from gcs_cli.commands.asking import YesOption, confirm
+from gcs_cli.completion import mode_names
 from gcs_cli.errors import USAGE, CliError
 from gcs_cli.link.connection import Connection
 from gcs_cli.link.perform import ask_modes, perform
@@ -177,7 +178,10 @@ def mode(
     link: LinkOptions,
     options: ActionOptions,
     name: Annotated[
-        str | None, typer.Argument(metavar="MODE", help="Name of the mode; without one, list the modes.")
+        str | None,
+        typer.Argument(
+            metavar="MODE", help="Name of the mode; without one, list the modes.", autocompletion=mode_names
+        ),
     ] = None,
 ) -> None:
     """Select a flight mode, or list the modes of the vehicle."""

@@ -58,11 +58,6 @@ def messages(
 
     First come those that were sent before the command began, which --count does not count. MAVLink repeats no text:
     they are read from a file of the vehicle, which only this flight stack has. A recording's texts are printed at once.
-
-    Examples:
-      gcs messages --level warning
-      gcs messages --past 100 --duration 0
-      gcs --connect flight.tlog messages --json
     """
     if level.lower() not in LEVELS:
         raise CliError(f"messages: --level {level}: choose one of {', '.join(LEVELS)}", USAGE)

@@ -42,11 +42,6 @@ def shell(
 
     Each line is a command without `gcs`; # begins a comment. A script, -c, or standard input that is no terminal ends
     at the first command that fails, with its exit code. A terminal has history and completion; `exit` or Ctrl-D ends.
-
-    Examples:
-      gcs shell
-      gcs shell -c arm -c 'takeoff --alt 5'
-      gcs --system 2 shell checks.gcs
     """
     if script is not None and command:
         raise CliError("shell: give a SCRIPT or -c, not both", USAGE)

@@ -28,12 +28,7 @@ _LANDED = {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}
 @app.command()
 @expand_options
 def status(context: typer.Context, link: LinkOptions) -> None:
-    """Show the state of the vehicle.
-
-    Examples:
-      gcs status
-      gcs --connect tcp:127.0.0.1:5760 status --json
-    """
+    """Show the state of the vehicle."""
     with connect_vehicle(context, link, takes_recording=True, in_real_time=False) as connection:
         session = connection.session
         snapshot = Snapshot(lambda: session.view)

@@ -16,10 +16,15 @@ if TYPE_CHECKING:
 Infos = Mapping[str, ParamInfo]
 
 
+def is_pattern(text: str) -> bool:
+    """Return True if the text has wildcards: ``*``, ``?`` or ``[...]``."""
+    return bool(set(text) & set("*?["))
+
+
 def matching(parameters: Sequence[Parameter], pattern: str) -> list[Parameter]:
     """Return the parameters whose name matches: with ``*`` and ``?`` as a whole, else in any part."""
     wanted = pattern.upper()
-    if not set(wanted) & set("*?["):
+    if not is_pattern(pattern):
         wanted = f"*{wanted}*"
     return [parameter for parameter in parameters if fnmatchcase(parameter.name.upper(), wanted)]
 

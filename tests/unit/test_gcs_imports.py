@@ -81,6 +81,17 @@ def test_help_of_gcs_fits_the_terminal(
     assert max(map(len, printed.splitlines())) < int(columns)
 
 
+def completions(line: str, *, checks: bool = True) -> list[str]:
+    """Return the completions of bash; with ``checks``, nothing heavy is imported for them."""
+    words = {"_GCS_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
+    if checks:
+        return output_of(**words).splitlines()
+    command = [sys.executable, "-m", "gcs_cli"]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=True, env={**os.environ, **words}
+    ).stdout.splitlines()
+
+
 @pytest.mark.parametrize(
     ("line", "completion"),
     [
@@ -93,8 +104,22 @@ def test_help_of_gcs_fits_the_terminal(
     ],
 )
 def test_completion_imports_nothing_heavy(line: str, completion: str) -> None:
-    shell = {"_GCS_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
-    assert completion in output_of(**shell).splitlines()
+    assert completion in completions(line)
+
+
+@pytest.mark.parametrize(
+    ("line", "completion"),
+    [
+        ("gcs param get mpc_xy_cr", "mpc_xy_cruise"),
+        ("gcs param set MPC_XY_CR", "MPC_XY_CRUISE"),
+        ("gcs mode al", "altitude"),
+        ("gcs mode alt_", "alt_hold"),
+        ("gcs listen ATTITUDE_Q", "ATTITUDE_QUATERNION"),
+        ("gcs send command_l", "command_long"),
+    ],
+)
+def test_values_are_completed(line: str, completion: str) -> None:
+    assert completion in completions(line, checks=False)
 
 
 LIBRARIES = (
