@@ -13,6 +13,7 @@ from flightstack.core.enums import Severity
 from flightstack.core.portable_math import yaw_angle
 from flightstack.mavlink.link import Address, Message
 from flightstack.mavlink.param_pack import pack_file
+from flightstack.mavlink.text_file import PastText, pack_texts
 from flightstack.params.metadata import parameters_json
 from flightstack.services.commands.command_server import CommandService
 from flightstack.services.commands.context import VehicleContext
@@ -158,7 +159,13 @@ def file_services(
     has_room: Callable[[Hashable], bool],
 ) -> tuple[Service, Service]:
     """Return the MAVLink FTP server and the log server."""
-    files = vehicle_files(metadata, lambda arguments: pack_file(vehicle.params, arguments), vehicle.logs)
+    texts = vehicle.journal.texts
+
+    def past_texts() -> bytes:
+        return pack_texts(PastText(1e-6 * text.time_us, text.severity, text.text) for text in texts)
+
+    pack = partial(pack_file, vehicle.params)
+    files = vehicle_files(metadata, pack, vehicle.logs, past_texts)
     return (
         FtpServer(own, files, has_room),
         LogServer(own, vehicle.logs, lambda: vehicle.now.status.armed, vehicle.journal.say, has_room),

@@ -58,11 +58,6 @@ def listen(
 
     Without MESSAGE, list every message on the link with its rate and sender, counted for 3 s. Values are printed alone
     with one --field, and with tabs between several. A rate that was requested is set back at the end.
-
-    Examples:
-      gcs listen
-      gcs listen ATTITUDE --field roll --field pitch
-      gcs listen ESC_STATUS --rate 10 --count 5 --json
     """
     output = output_of(context, link)
     fields = tuple(field or ())

@@ -34,6 +34,11 @@ class JobScreen(WatchScreen):
         """Transferred units of the current job and their total; 0: unknown."""
 
     @property
+    def is_working(self) -> bool:
+        """Whether an action of this screen has not ended: a job, or a question that may begin one."""
+        return any(worker.node is self and not worker.is_finished for worker in self.workers)
+
+    @property
     def doing_text(self) -> str:
         """The current job with its progress."""
         done, total = self.progress

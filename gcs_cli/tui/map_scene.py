@@ -12,7 +12,7 @@ from flightstack.core.contract import FloatArray
 from flightstack.core.geodesy import GeoPoint, LocalFrame
 from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import RALLY_POINT, Command, MissionItem, Plan, Rejection
-from flightstack.plan.fence import fence_areas
+from flightstack.plan.fence_areas import fence_areas
 from flightstack.plan.item import is_unset
 from gcs_cli.vehicle.view_types import GeoPosition, VehicleView
 

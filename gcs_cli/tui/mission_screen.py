@@ -24,7 +24,7 @@ from gcs_cli.plans import edit
 from gcs_cli.plans.formats.files import SUFFIXES, load_any, save_any
 from gcs_cli.plans.names import any_command_name
 from gcs_cli.transfers import plan_transfers
-from gcs_cli.transfers.plan_parts import Uploads
+from gcs_cli.transfers.plan_parts import Uploads, parts_to_send
 from gcs_cli.transfers.vehicle_plans import problems_on_vehicle
 from gcs_cli.tui.drawing import watch_app
 from gcs_cli.tui.entry_form import EntryForm
@@ -105,7 +105,7 @@ class MissionScreen(JobScreen):
         system_id = None if view.identity is None else view.identity.system_id
         streams = app.feed.history.streams(system_id)
         current = [stream.last for stream in streams if stream.name == "MISSION_CURRENT"]
-        if not self.doing:
+        if not self.is_working:
             app.plans.update(view, current[0] if current else None)
         if not app.plans.loading:
             self.draft = self.draft.followed(app.plans.plan, app.plans.system_id)
@@ -311,11 +311,11 @@ class MissionScreen(JobScreen):
 
     def _compare(self, connection: Connection, plan: Plan) -> str:
         """Return the parts that are equal on the vehicle; raise CliError with the differences."""
-        differing, equal = plan_transfers.compare_with_vehicle(connection, plan)
-        if differing:
-            lines = [f"{part.name}: {difference.sentence}" for part, difference in differing]
+        compared = plan_transfers.compare_with_vehicle(connection, parts_to_send(plan))
+        lines = [f"{part.name}: {difference.sentence}" for part, found in compared for difference in found]
+        if lines:
             raise CliError(f"the vehicle's plan differs: {some_of(lines)}")
-        return ", ".join(f"{part.name} of {len(part.items)} items equal" for part in equal)
+        return ", ".join(f"{part.name} of {len(part.items)} items equal" for part, _ in compared)
 
     @work
     async def action_verify(self) -> None:

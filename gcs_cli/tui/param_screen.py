@@ -102,7 +102,7 @@ class ParamScreen(JobScreen):
         if not self.query(RowList):  # resumed before it was composed
             return
         system_id = None if view.identity is None else view.identity.system_id
-        if system_id is not None and system_id != self._system_id and not self.doing:
+        if system_id is not None and system_id != self._system_id and not self.is_working:
             self._system_id = system_id
             self._take(ParamList())
             self.action_update()

@@ -63,6 +63,15 @@ def test_messages_prints_texts_up_to_a_severity(tmp_path: Path) -> None:
     )  # fmt: skip
 
 
+def test_messages_begins_with_those_of_before(tmp_path: Path) -> None:
+    with real_vehicle(tmp_path, with_simulator=False) as stack:
+        assert gcs("--connect", stack.link, "arm").returncode == 1
+        past = lines(gcs("--connect", stack.link, "messages", "--duration", "0", "--json"))
+        assert past[-1]["text"] == "Command refused: no valid position and attitude yet"
+        assert (past[-1]["severity"], past[-1]["past"]) == ("warning", True)
+        assert gcs("--connect", stack.link, "messages", "--duration", "0", "--past", "0").stdout == ""
+
+
 def test_messages_ends_after_its_duration(link: str) -> None:
     assert gcs(link, "messages", "--duration", "0.1") == ("", "", 0)
 

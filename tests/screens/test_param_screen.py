@@ -226,6 +226,7 @@ def test_edit_is_bound_to_the_vehicle_of_the_table():
         await pilot.press("down", "enter")
         await pilot.pause()
         app.feed.shown = VIEW._replace(identity=VIEW.identity._replace(system_id=7))
+        screen.show(app.feed.shown, 10.0)
         app.screen.query_one(Input).value = "6"
         await pilot.press("enter")
         await pilot.pause()
