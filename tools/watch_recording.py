@@ -1,6 +1,7 @@
-"""Write the recording of ``gcs watch`` in docs/images: ``python -m tools.watch_recording LINK``, with a vehicle on the ground.
+"""Write the recording of ``gcs watch`` in docs/images: ``python -m tools.watch_recording LINK``.
 
-For example beside ``gcs sim``, after ``gcs mission upload``. Chromium draws the pictures, Pillow joins them.
+The vehicle is on the ground with a mission, for example that of ``gcs sim`` after ``gcs mission upload``. Chromium
+draws the pictures, Pillow joins them.
 """
 
 from __future__ import annotations
