@@ -21,7 +21,7 @@ from gcs_cli.tui.feed import Feed
 from gcs_cli.tui.key_queue import KeyQueue
 from gcs_cli.tui.order_form import OrderForm
 from gcs_cli.tui.orders import ORDERS, action_of, order_named, question_for
-from gcs_cli.tui.palette import Palette, palette_of
+from gcs_cli.tui.palette import Palette, monochrome, palette_of
 from gcs_cli.tui.plan_fetcher import PlanFetcher
 from gcs_cli.tui.plot_fields import PlotFields
 from gcs_cli.tui.screens import SCREENS
@@ -82,6 +82,8 @@ class WatchApp(App[None]):
         """Colours of the current theme."""
         if self._palette is None or self._palette[0] != self.theme:
             colours = palette_of(self.theme_variables, self.current_theme.dark)
+            if self.no_color:
+                colours = monochrome(colours, self.current_theme.dark)
             self._palette = (self.theme, colours)
         return self._palette[1]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from flightstack.transports.udp import UdpSocket
-from tests.support.terminals import Terminal, terminal
+from tests.support.tmux import Terminal, terminal
 from tests.support.vehicle_processes import VehicleProcesses, vehicle
 
 SQUARE = Path(__file__).parents[2] / "missions" / "square.plan"
