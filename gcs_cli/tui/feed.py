@@ -19,6 +19,7 @@ from gcs_cli.link.session import Session
 from gcs_cli.link.subscription import ROTORS_AND_TIMING
 from gcs_cli.tui.history import History
 from gcs_cli.tui.message_log import MessageLog
+from gcs_cli.tui.traffic import Traffic
 from gcs_cli.vehicle.view_types import VehicleView
 
 Value = TypeVar("Value")
@@ -57,6 +58,7 @@ class Feed:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self.history = History()
+        self.traffic = Traffic()
         self.messages = MessageLog()
         self.notices: deque[Notice] = deque(maxlen=20)
         """Lines for the user, which the application takes."""
@@ -161,7 +163,9 @@ class Feed:
         self.submit(lambda connection: connection.fleet.subscribe(self._rates_hz))
 
     def _observe(self, message: Message) -> None:
-        self.history.record(message, self.now_s)
+        now_s = self.now_s
+        self.history.record(message, now_s)
+        self.traffic.record(message, now_s)
 
     def _run(self) -> None:
         try:

@@ -23,6 +23,7 @@ class OrderForm(ModalScreen[list[Any] | None]):
     OrderForm > Vertical { width: 60; max-width: 90%; height: auto; border: round $accent; padding: 0 2;
                            background: $surface; }
     OrderForm Input { margin-bottom: 1; }
+    OrderForm Label { width: 100%; }
     OrderForm .title { text-style: bold; color: $accent; margin-bottom: 1; }
     OrderForm #problem { color: $error; }
     """
