@@ -198,8 +198,9 @@ class GroundHub:
                 frame = bytes(message.get_msgbuf())
                 self._to_forward.extend((other, frame) for other in route.forward)
             if route.local:
-                self._schedule.wake()
-                for service in self._by_type.get(message.get_type(), ()):
+                kind = message.get_type()
+                self._schedule.wake(kind)
+                for service in self._by_type.get(kind, ()):
                     service.receive(message, address, now_s)
 
     # ------------------------------------------------------------------ sending
