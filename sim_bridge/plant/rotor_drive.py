@@ -23,7 +23,8 @@ import math
 
 import numpy as np
 
-from flightstack.core.compiled import compiled, store
+from flightstack.core.array_items import store
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import MAX_ROTORS, FloatArray, Record, RecordArray, Vector3
 from sim_bridge.plant.battery import discharge
 from sim_bridge.plant.integrator import LARGEST_TURN_RAD, next_gust
