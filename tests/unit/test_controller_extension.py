@@ -346,7 +346,5 @@ def test_two_packages_with_one_name_are_not_guessed_between(installed: Path) -> 
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: rival\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(f"[{GROUP}]\nlqr = rival:CONTROLLER\n")
-    with pytest.raises(
-        ConfigError, match="several packages have a controller of this name: lqr-controller, rival"
-    ):
+    with pytest.raises(ConfigError, match="several packages have a controller of this name: my-app, rival"):
         load_controller("lqr")
