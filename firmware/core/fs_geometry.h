@@ -91,32 +91,6 @@ static inline fs_quaternion fs_blend(const fs_quaternion *a, const fs_quaternion
 #define FS_LARGEST_SQUARE FS_LIT(0.1715) /* of the tangent of half an angle up to 45 degrees */
 #define FS_LEAST_LENGTH FS_LIT(1e-30)    /* stands for zero where one divides by a length */
 
-/* Arc tangent of a ratio, divided by it, less one; of the ratio's square up to FS_LARGEST_SQUARE. Chebyshev's nodes. */
-static inline fs_real fs_arc_tangent_series(fs_real square)
-{
-    fs_real sum;
-#ifdef FS_DOUBLE
-    sum = -0.01917454357202133; /* off by 5e-18 at most */
-    sum = sum * square + 0.039229744536612224;
-    sum = sum * square - 0.05085383488842831;
-    sum = sum * square + 0.05858136251906146;
-    sum = sum * square - 0.06664509989818045;
-    sum = sum * square + 0.07692183087342026;
-    sum = sum * square - 0.0909090457366906;
-    sum = sum * square + 0.11111111015146714;
-    sum = sum * square - 0.1428571428466518;
-    sum = sum * square + 0.19999999999995513;
-    sum = sum * square - 0.3333333333333333;
-#else
-    sum = -0.06451597258952992F; /* off by 3e-9 at most */
-    sum = sum * square + 0.10743631627144574F;
-    sum = sum * square - 0.1426394635791234F;
-    sum = sum * square + 0.19999540216937534F;
-    sum = sum * square - 0.3333333176000804F;
-#endif
-    return sum * square;
-}
-
 /* Logarithm of a quaternion of any length: axis times angle [rad], the angle in [0, pi]; zero of the zero. */
 static inline fs_vector3 fs_rotation_vector(const fs_quaternion *q)
 {
@@ -166,9 +140,9 @@ static inline fs_quaternion fs_rotation_over(const fs_vector3 *rates_rad_s, fs_r
         scale = half_dt + half_dt * (square * sine);
     } else {
         const fs_real norm = fs_sqrt(rate_square);
-        const fs_sine_cosine of_half = fs_sin_cos(norm * half_dt);
-        rotation.w = of_half.cosine;
-        scale = of_half.sine / norm;
+        fs_real sine;
+        fs_sin_cos(norm * half_dt, &sine, &rotation.w);
+        scale = sine / norm;
     }
     rotation.x = rates_rad_s->x * scale;
     rotation.y = rates_rad_s->y * scale;

@@ -51,17 +51,16 @@ static fs_real cosine_of_small(fs_real square)
     return FS_LIT(1.0) - (FS_LIT(0.5) * square - square * (square * sum));
 }
 
-fs_sine_cosine fs_sin_cos(fs_real angle_rad)
+void fs_sin_cos(fs_real angle_rad, fs_real *sine_out, fs_real *cosine_out)
 {
-    fs_sine_cosine result;
     fs_real turns, angle, square, sine, cosine;
     uint16_t quadrant;
 
     if (!(fs_abs(angle_rad) <= FS_LARGEST_ANGLE_RAD)) {
         const fs_real infinite = fs_abs(angle_rad) * FS_REAL_MAX;
-        result.sine = infinite - infinite;
-        result.cosine = result.sine;
-        return result;
+        *sine_out = infinite - infinite;
+        *cosine_out = *sine_out;
+        return;
     }
     turns = angle_rad * FS_LIT(0.6366197723675814); /* 2/pi */
     turns = turns < FS_LIT(0.0) ? turns - FS_LIT(0.5) : turns + FS_LIT(0.5);
@@ -73,21 +72,20 @@ fs_sine_cosine fs_sin_cos(fs_real angle_rad)
     cosine = cosine_of_small(square);
     switch (quadrant & 3U) {
     case 0U:
-        result.sine = sine;
-        result.cosine = cosine;
+        *sine_out = sine;
+        *cosine_out = cosine;
         break;
     case 1U:
-        result.sine = cosine;
-        result.cosine = -sine;
+        *sine_out = cosine;
+        *cosine_out = -sine;
         break;
     case 2U:
-        result.sine = -sine;
-        result.cosine = -cosine;
+        *sine_out = -sine;
+        *cosine_out = -cosine;
         break;
     default:
-        result.sine = -cosine;
-        result.cosine = sine;
+        *sine_out = -cosine;
+        *cosine_out = sine;
         break;
     }
-    return result;
 }

@@ -61,7 +61,7 @@ static void derive(fs_loops *loops)
     const fs_setup *setup = &loops->setup;
     const fs_real outer_hz = setup->inner_hz / setup->outer_divisor;
     const uint16_t controller = (uint16_t)setup->controller;
-    fs_sine_cosine max_tilt;
+    fs_real sine, cosine;
 
     if (controller != loops->rates.controller) { /* a law must not begin with another flight's integrals */
         loops->pid_memory.roll = FS_LIT(0.0);
@@ -74,8 +74,8 @@ static void derive(fs_loops *loops)
     loops->rates.outer_dt_s = FS_LIT(1.0) / outer_hz;
     loops->rates.fraction_step = outer_hz / setup->inner_hz;
     loops->position.max_tilt_rad = setup->max_tilt_deg * RADIANS_PER_DEGREE;
-    max_tilt = fs_sin_cos(loops->position.max_tilt_rad);
-    loops->rates.tan_max_tilt = max_tilt.sine / max_tilt.cosine;
+    fs_sin_cos(loops->position.max_tilt_rad, &sine, &cosine);
+    loops->rates.tan_max_tilt = sine / cosine;
     fs_mixer_derive(&loops->mixer, loops->rates.rotors);
     loops->pid.ix_kg_m2 = setup->ix_kg_m2;
     loops->pid.iy_kg_m2 = setup->iy_kg_m2;

@@ -29,7 +29,7 @@ static fs_vector3 horizontal_demand(const fs_position_memory *memory, const fs_v
  * the half angles are -forward / (level + upward) and right / (whole + level). upward is positive, so nothing cancels,
  * and one scale makes sines and cosines of them.
  */
-static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upward, const fs_sine_cosine *half_yaw)
+static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upward, fs_real half_yaw_sine, fs_real half_yaw_cosine)
 {
     const fs_real level_square = forward * forward + upward * upward;
     const fs_real level = fs_sqrt(level_square), whole = fs_sqrt(right * right + level_square);
@@ -40,10 +40,10 @@ static fs_quaternion attitude_along(fs_real forward, fs_real right, fs_real upwa
     const fs_real sin_cos = scaled_right * along, sin_sin = -forward * scaled_right;
     fs_quaternion q;
 
-    q.w = cos_cos * half_yaw->cosine + sin_sin * half_yaw->sine;
-    q.x = sin_cos * half_yaw->cosine - cos_sin * half_yaw->sine;
-    q.y = cos_sin * half_yaw->cosine + sin_cos * half_yaw->sine;
-    q.z = cos_cos * half_yaw->sine - sin_sin * half_yaw->cosine;
+    q.w = cos_cos * half_yaw_cosine + sin_sin * half_yaw_sine;
+    q.x = sin_cos * half_yaw_cosine - cos_sin * half_yaw_sine;
+    q.y = cos_sin * half_yaw_cosine + sin_cos * half_yaw_sine;
+    q.z = cos_cos * half_yaw_sine - sin_sin * half_yaw_cosine;
     return q;
 }
 
@@ -56,15 +56,16 @@ static void target_for(const fs_vector3 *demand, fs_real lift_m_s2, fs_real yaw_
 {
     /* below half the weight the direction of a falling vehicle's thrust would swing about: bound it */
     const fs_real upward = fs_max(lift_m_s2, FS_LIT(0.5) * params->gravity_m_s2);
-    const fs_sine_cosine half = fs_sin_cos(FS_LIT(0.5) * yaw_rad);
-    const fs_real cos_yaw = half.cosine * half.cosine - half.sine * half.sine;
-    const fs_real sin_yaw = FS_LIT(2.0) * half.sine * half.cosine;
+    fs_real half_sine, half_cosine;
+    fs_sin_cos(FS_LIT(0.5) * yaw_rad, &half_sine, &half_cosine);
+    const fs_real cos_yaw = half_cosine * half_cosine - half_sine * half_sine;
+    const fs_real sin_yaw = FS_LIT(2.0) * half_sine * half_cosine;
     const fs_real forward = cos_yaw * demand->x + sin_yaw * demand->y;
     const fs_real right = cos_yaw * demand->y - sin_yaw * demand->x;
     const fs_real cos_tilt = FS_LIT(1.0) - FS_LIT(2.0) * (q->x * q->x + q->y * q->y);
     const fs_real thrust_n = params->mass_kg * lift_m_s2 / fs_max(cos_tilt, FS_LIT(0.5));
 
-    target->attitude = attitude_along(forward, right, upward, &half);
+    target->attitude = attitude_along(forward, right, upward, half_sine, half_cosine);
     target->thrust_n = fs_min(fs_max(thrust_n, params->min_thrust_n), params->max_thrust_n);
 }
 

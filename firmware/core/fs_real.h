@@ -6,6 +6,7 @@
 #ifndef FS_REAL_H
 #define FS_REAL_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 

@@ -68,4 +68,14 @@ typedef struct {
     fs_vector3 torque_frd_n_m;
 } fs_wrench;
 
+/* Inputs of an attitude controller in one tick. */
+typedef struct {
+    fs_quaternion attitude;
+    fs_vector3 rates_frd_rad_s;
+    fs_attitude_reference reference;
+    fs_vector3 error_rad;
+    fs_real relative_rotor_speed_rad_s;
+    fs_vector3 saturation;
+} fs_attitude_inputs;
+
 #endif

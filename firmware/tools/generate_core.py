@@ -10,24 +10,19 @@ import sys
 from pathlib import Path
 
 from flightstack.control.attitude_backstepping import BacksteppingParams
+from flightstack.control.attitude_controller import AttitudeInputs
 from flightstack.control.attitude_pid import PidMemory, PidParams
 from flightstack.control.attitude_reference import ReferenceMemory, ReferenceParams
 from flightstack.control.position_pid import PositionMemory, PositionParams
 from flightstack.core import contract
+from flightstack.firmware.generator.unit import structure
 from flightstack.firmware.numbers import CONTROLLERS, TARGET_NUMBERS, TargetNumber, default_numbers
 from tools.generated import ROOT, write_or_check
 
 CORE = ROOT / "firmware" / "core"
 NOTICE = "/* Generated from Python by firmware/tools/generate_core.py: do not edit. */\n"
-ASCII = {"²": "^2", "³": "^3", "−": "-", "…": "to", "ẋ_d": "x_d'", "ẍ_d": "x_d''"}
 DIGITS = 12
 """Of a default: enough for the loops, and the same on every machine, as the last ones of a pseudo-inverse are not."""
-TYPES = {
-    "float": "fs_real",
-    "Vector3": "fs_vector3",
-    "Quaternion": "fs_quaternion",
-    "AttitudeReference": "fs_attitude_reference",
-}
 CONTRACT_TYPES = {
     contract.Vector3: "fs_vector3",
     contract.Quaternion: "fs_quaternion",
@@ -36,6 +31,7 @@ CONTRACT_TYPES = {
     contract.AttitudeTarget: "fs_attitude_target",
     contract.AttitudeReference: "fs_attitude_reference",
     contract.Wrench: "fs_wrench",
+    AttitudeInputs: "fs_attitude_inputs",
 }
 LAW_TYPES = {
     PositionMemory: "fs_position_memory",
@@ -58,22 +54,6 @@ SETUP = {
 }
 
 
-def struct(kind: type, name: str) -> str:
-    """Return the C structure of a NamedTuple: its fields in order, its docstring's first sentence above."""
-    lines = [f"    {TYPES[text.__forward_arg__]} {field};" for field, text in kind.__annotations__.items()]
-    sentence = plain((kind.__doc__ or "").partition("\n")[0])
-    return "\n".join([f"/* {sentence} */", "typedef struct {", *lines, f"}} {name};\n"])
-
-
-def plain(text: str) -> str:
-    """Return a text in ASCII: not every compiler reads more."""
-    for sign, written in ASCII.items():
-        text = text.replace(sign, written)
-    if not text.isascii():
-        raise ValueError(f"no ASCII for {text!r}")
-    return text
-
-
 def header(guard: str, include: str, body: str) -> str:
     """Return a whole header file."""
     return f"{NOTICE}#ifndef {guard}\n#define {guard}\n\n#include {include}\n\n{body}\n#endif\n"
@@ -88,7 +68,7 @@ def types() -> str:
         "",
         "/* World frame NED, body frame FRD, quaternions Hamilton, scalar first, body to world. SI units. */",
     ]
-    parts += [struct(kind, name) for kind, name in CONTRACT_TYPES.items()]
+    parts += ["\n".join([*structure(kind, name), ""]) for kind, name in CONTRACT_TYPES.items()]
     return header("FS_TYPES_H", '"fs_real.h"', "\n".join(parts))
 
 
@@ -97,7 +77,7 @@ def numbers() -> str:
     parts = [f"#define FS_PARAM_COUNT {len(TARGET_NUMBERS)}U\n"]
     parts += [f"#define FS_CONTROLLER_{law.name.upper()} {index}U" for index, law in enumerate(CONTROLLERS)]
     parts += [f"#define FS_CONTROLLERS {len(CONTROLLERS)}U\n"]
-    parts += [struct(kind, name) for kind, name in LAW_TYPES.items()]
+    parts += ["\n".join([*structure(kind, name), ""]) for kind, name in LAW_TYPES.items()]
     fields = [f"    fs_real {name};{f' /* {text} */' if text else ''}" for name, text in SETUP.items()]
     parts += [
         "/* What several structures are made of, as it was set. */",

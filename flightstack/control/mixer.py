@@ -6,7 +6,7 @@ Operations and their order match ``firmware/core/fs_mixer.c``.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,6 +18,11 @@ UNLIMITED_SPEED_SQUARED = 1e12  # (rad/s)²: finite limit of ideal rotors, never
 ROUNDING = 1.0 / 2**53  # largest relative error of one operation
 WORK_ROWS = 3
 
+PerRotor: TypeAlias = Annotated[FloatArray, "rotors"]
+"""A number for each rotor; the size in C."""
+Work: TypeAlias = Annotated[FloatArray, WORK_ROWS, "rotors"]
+"""Scratch space of the mixer."""
+
 
 class Mixer(NamedTuple):
     """Rotor geometry and limits of n rotors.
@@ -27,15 +32,15 @@ class Mixer(NamedTuple):
     ``low`` and ``high`` (n,) bound Ω²; ``spin`` (n,) is +1 for a rotor that turns clockwise from above.
     """
 
-    allocation: FloatArray
-    effectiveness: FloatArray
-    low: FloatArray
-    high: FloatArray
-    spin: FloatArray
+    allocation: Annotated[FloatArray, "rotors", 4]
+    effectiveness: Annotated[FloatArray, 4, "rotors"]
+    low: PerRotor
+    high: PerRotor
+    spin: PerRotor
     # computed from these by ``derived``
-    middle: FloatArray
+    middle: PerRotor
     """Mean of ``low`` and ``high``, (n,)."""
-    reach: FloatArray
+    reach: PerRotor
     """Distance from ``middle`` to either limit, less a rounding margin, (n,)."""
     is_inverse: float
     """1 if ``effectiveness`` inverts ``allocation`` except for rounding and every rotor adds thrust, else 0."""
@@ -84,7 +89,7 @@ def _is_same(values: FloatArray) -> bool:
 
 
 @compiled
-def _allocate(wrench: Wrench, mixer: Mixer, work: FloatArray) -> tuple[bool, bool]:
+def _allocate(wrench: Wrench, mixer: Mixer, work: Work) -> tuple[bool, bool]:
     """Write each rotor's part of roll and pitch, of yaw, and of roll, pitch and thrust, without limits.
 
     Return two flags: no rotor is near a limit; a rotor is at or beyond a limit even without yaw.
@@ -104,7 +109,7 @@ def _allocate(wrench: Wrench, mixer: Mixer, work: FloatArray) -> tuple[bool, boo
 
 
 @compiled
-def _limit_even(thrust_n: float, mixer: Mixer, work: FloatArray) -> tuple[float, float]:
+def _limit_even(thrust_n: float, mixer: Mixer, work: Work) -> tuple[float, float]:
     """Limit roll and pitch, then thrust, for identical rotors; return the scale of roll and pitch, and the thrust.
 
     The rotors with the largest and the smallest part of roll and pitch determine both.
@@ -126,7 +131,7 @@ def _limit_even(thrust_n: float, mixer: Mixer, work: FloatArray) -> tuple[float,
 
 
 @compiled
-def _yaw_scale(mixer: Mixer, work: FloatArray) -> float:
+def _yaw_scale(mixer: Mixer, work: Work) -> float:
     """Return the share of yaw, in [0, 1], that fits within the limits."""
     turn, lift = work[1], work[2]
     scale = 1.0
@@ -145,7 +150,7 @@ def _signed_root(square: float) -> float:
 
 
 @compiled
-def _largest_scale(base: FloatArray, direction: FloatArray, low: FloatArray, high: FloatArray) -> float:
+def _largest_scale(base: PerRotor, direction: PerRotor, low: PerRotor, high: PerRotor) -> float:
     """Return the largest k in [0, 1] for which low ≤ base + k·direction ≤ high holds for every rotor."""
     scale = 1.0
     for i in range(base.size):
@@ -157,7 +162,7 @@ def _largest_scale(base: FloatArray, direction: FloatArray, low: FloatArray, hig
 
 
 @compiled
-def _fit_roll_pitch(speed_squared: FloatArray, mixer: Mixer) -> float:
+def _fit_roll_pitch(speed_squared: PerRotor, mixer: Mixer) -> float:
     """Scale the roll-pitch part so that some thrust brings it within the limits; return the scale in [0, 1].
 
     Rotor i allows thrusts from (low − b)/a to (high − b)/a, where b is its roll-pitch part and a its Ω² per newton. A
@@ -178,7 +183,7 @@ def _fit_roll_pitch(speed_squared: FloatArray, mixer: Mixer) -> float:
 
 
 @compiled
-def _fit_thrust(base: FloatArray, thrust_n: float, mixer: Mixer) -> float:
+def _fit_thrust(base: PerRotor, thrust_n: float, mixer: Mixer) -> float:
     """Return the thrust nearest to ``thrust_n`` that keeps every rotor, with its roll-pitch part, within its limits."""
     least, most = -math.inf, math.inf
     for i in range(base.size):
@@ -190,7 +195,7 @@ def _fit_thrust(base: FloatArray, thrust_n: float, mixer: Mixer) -> float:
 
 
 @compiled
-def _fit(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: FloatArray) -> Wrench:
+def _fit(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: PerRotor, work: Work) -> Wrench:
     """Mix for rotors that differ, or if effectiveness does not invert allocation."""
     n = mixer.low.size
     base, yaw = work[0], work[1]
@@ -215,7 +220,7 @@ def _fit(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: Floa
 
 
 @compiled
-def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: FloatArray) -> Wrench:
+def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: PerRotor, work: Work) -> Wrench:
     """Write the rotor speeds nearest to ``wrench``; return the wrench that they achieve.
 
     ``rotor_speed_rad_s`` has at least n elements; ``work``, shape (``WORK_ROWS``, n), is scratch space. Torque about
@@ -246,7 +251,7 @@ def mix(wrench: Wrench, mixer: Mixer, rotor_speed_rad_s: FloatArray, work: Float
 
 
 @compiled
-def relative_rotor_speed(rotor_speed_rad_s: FloatArray, spin: FloatArray) -> float:
+def relative_rotor_speed(rotor_speed_rad_s: PerRotor, spin: PerRotor) -> float:
     """Return Ω_r of the paper: counter-clockwise minus clockwise rotor speeds [rad/s]."""
     total = 0.0
     for i in range(spin.size):

@@ -14,16 +14,6 @@
 
 #define ROW 31
 
-/* AttitudeInputs of Python, a row of the samples: the core passes the parts that a law needs. */
-typedef struct {
-    fs_quaternion attitude;
-    fs_vector3 rates_frd_rad_s;
-    fs_attitude_reference reference;
-    fs_vector3 error_rad;
-    fs_real relative_rotor_speed_rad_s;
-    fs_vector3 saturation;
-} fs_attitude_inputs;
-
 uint32_t drive_sizes(uint32_t which)
 {
     const uint32_t sizes[4] = {(uint32_t)sizeof(fs_real), (uint32_t)sizeof(fs_loops), (uint32_t)sizeof(fs_loop_output),
@@ -34,10 +24,8 @@ uint32_t drive_sizes(uint32_t which)
 void drive_math(uint32_t count, const fs_real *y, const fs_real *x, fs_real *sine, fs_real *cosine, fs_real *angle)
 {
     for (uint32_t i = 0; i < count; i++) {
-        const fs_sine_cosine both = fs_sin_cos(x[i]);
         const fs_quaternion q = {x[i], y[i], 0, 0};
-        sine[i] = both.sine;
-        cosine[i] = both.cosine;
+        fs_sin_cos(x[i], &sine[i], &cosine[i]);
         angle[i] = fs_rotation_vector(&q).x;
     }
 }
@@ -47,8 +35,9 @@ void drive_position(uint32_t count, fs_position_memory *memory, const fs_vehicle
                     const fs_real *saturation, fs_attitude_target *target)
 {
     for (uint32_t i = 0; i < count; i++) {
-        const fs_sine_cosine tilt = fs_sin_cos(params[i].max_tilt_rad);
-        fs_position_pid_step(&memory[i], &state[i], &setpoint[i], &params[i], tilt.sine / tilt.cosine, dt_s[i],
+        fs_real sine, cosine;
+        fs_sin_cos(params[i].max_tilt_rad, &sine, &cosine);
+        fs_position_pid_step(&memory[i], &state[i], &setpoint[i], &params[i], sine / cosine, dt_s[i],
                              saturation[i], &target[i]);
     }
 }

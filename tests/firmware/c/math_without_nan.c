@@ -6,15 +6,13 @@
 #include "fs_math.c"
 #undef fs_sin_cos
 
-fs_sine_cosine fs_sin_cos(fs_real angle_rad);
+void fs_sin_cos(fs_real angle_rad, fs_real *sine_out, fs_real *cosine_out);
 
-fs_sine_cosine fs_sin_cos(fs_real angle_rad)
+void fs_sin_cos(fs_real angle_rad, fs_real *sine_out, fs_real *cosine_out)
 {
-    fs_sine_cosine result = ieee_sin_cos(angle_rad);
-
-    if (!fs_is_finite(result.sine)) {
-        result.sine = FS_LIT(0.6);
-        result.cosine = FS_LIT(0.8);
+    ieee_sin_cos(angle_rad, sine_out, cosine_out);
+    if (!fs_is_finite(*sine_out)) {
+        *sine_out = FS_LIT(0.6);
+        *cosine_out = FS_LIT(0.8);
     }
-    return result;
 }

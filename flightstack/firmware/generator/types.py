@@ -1,0 +1,125 @@
+"""Types of the subset, and their names in C."""
+
+from __future__ import annotations
+
+import ast
+import enum
+import sys
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ForwardRef, TypeAlias, get_args, get_origin
+
+from flightstack.core import contract
+from flightstack.firmware.generator.text import snake_case
+
+ROTORS = "rotors"
+"""Symbolic size of an array: the rotors of the vehicle, at most ``MAX_ROTORS``."""
+
+
+class Scalar(enum.Enum):
+    """A number; the value is C's type."""
+
+    REAL = "fs_real"
+    INT = "int32_t"
+    BOOL = "bool"
+    NOTHING = "void"
+
+
+REAL, INT, BOOL, NOTHING = Scalar.REAL, Scalar.INT, Scalar.BOOL, Scalar.NOTHING
+
+
+@dataclass(frozen=True)
+class Record:
+    """A NamedTuple."""
+
+    kind: type
+
+    @property
+    def fields(self) -> dict[str, Type]:
+        """Types of the fields; raise TypeError for one outside the subset."""
+        names = vars(sys.modules[self.kind.__module__])
+        return {name: _resolved(text, names) for name, text in self.kind.__annotations__.items()}
+
+
+@dataclass(frozen=True)
+class Several:
+    """The results of a function that returns a tuple."""
+
+    items: tuple[Type, ...]
+
+
+@dataclass(frozen=True)
+class Array:
+    """An array of floats; a size is a number, ``ROTORS``, or empty if unknown."""
+
+    shape: tuple[int | str, ...]
+
+
+Type: TypeAlias = Scalar | Record | Several | Array
+_PLAIN: dict[Any, Type] = {float: REAL, int: INT, bool: BOOL, None: NOTHING, type(None): NOTHING}
+
+
+def is_record(kind: Any) -> bool:
+    """Return True for a NamedTuple class."""
+    return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
+
+
+def has_rotors(kind: Type) -> bool:
+    """Return True for a record with arrays of one item per rotor: its structure has their number."""
+    return isinstance(kind, Record) and any(
+        isinstance(field, Array) and ROTORS in field.shape for field in kind.fields.values()
+    )
+
+
+def prefix_of(module: str) -> str:
+    """Return the prefix of the C names of a module: ``fs``, or the top-level package of a user."""
+    top = module.partition(".")[0]
+    return "fs" if top == "flightstack" else snake_case(top)
+
+
+def record_name(kind: type) -> str:
+    """Return the C name of a NamedTuple's structure."""
+    return f"{prefix_of(kind.__module__)}_{snake_case(kind.__name__)}"
+
+
+def c_type(kind: Type) -> str:
+    """Return the C type of a number or a record."""
+    return record_name(kind.kind) if isinstance(kind, Record) else kind.value  # type: ignore[union-attr]
+
+
+def c_size(size: int | str) -> str:
+    """Return the size of an array in C."""
+    return "FS_MAX_ROTORS" if size == ROTORS else str(size)
+
+
+def annotated(node: ast.expr, names: Mapping[str, Any]) -> Type:
+    """Return the type of an annotation in the source; raise TypeError outside the subset."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        node = ast.parse(node.value, mode="eval").body
+    try:
+        with_typing = {**vars(typing), **names}
+        return _resolved(eval(compile(ast.Expression(node), "<annotation>", "eval"), with_typing), names)
+    except (NameError, AttributeError) as error:
+        raise TypeError(str(error)) from error
+
+
+def _resolved(value: Any, names: Mapping[str, Any]) -> Type:
+    if value == contract.FloatArray:
+        return Array(("",))
+    if isinstance(value, ForwardRef):
+        value = value.__forward_arg__
+    if isinstance(value, str):
+        return annotated(ast.parse(value, mode="eval").body, names)
+    if is_record(value):
+        return Record(value)
+    if get_origin(value) is tuple:
+        return Several(tuple(_resolved(item, names) for item in get_args(value)))
+    if get_origin(value) is typing.Annotated:
+        _, *shape = get_args(value)
+        if all(size == ROTORS or (isinstance(size, int) and size > 0) for size in shape):
+            return Array(tuple(shape))
+    known = _PLAIN.get(value) if isinstance(value, type | None) else None
+    if known is None:
+        raise TypeError(f"{value!r} has no C type")
+    return known

@@ -1,0 +1,292 @@
+"""C files made of Python modules."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numba
+
+from flightstack.core import portable_math
+from flightstack.firmware.generator.calls import c_prototype
+from flightstack.firmware.generator.law import Function, load, python_function
+from flightstack.firmware.generator.text import ascii_text, comment, fold, identifier, snake_case
+from flightstack.firmware.generator.types import (
+    Array,
+    Record,
+    Several,
+    Type,
+    c_size,
+    c_type,
+    has_rotors,
+    prefix_of,
+    record_name,
+)
+
+WRITTEN_BY_HAND = (portable_math.sin_cos, portable_math.arc_tangent_series)
+"""Functions of firmware/core with polynomials for each precision."""
+_LAW_MATH = re.compile(r"\bfs_(floor|copysign|is_nan|to_int|ldexp|frexp)\(|\bFS_(NAN|INFINITY)\b")
+PROVIDED = {"flightstack.core.contract": "fs_types", "flightstack.control.attitude_controller": "fs_types"}
+"""Modules whose types are in firmware/core."""
+NOTICE = "Generated from Python by flightstack.firmware.generator: do not edit."
+
+
+class Unit:
+    """A C file and its header, made of one Python module."""
+
+    def __init__(self, program: Program, module: str) -> None:
+        self.program, self.module = program, module
+        self.name = unit_name(module)
+        self.functions: list[Function] = []
+        self.includes: set[str] = set()
+        self.records: list[type] = []
+        self._constants: dict[str, str] = {}
+        self._tables: dict[str, list[str]] = {}
+        self.static_names = frozenset(
+            identifier(name.strip("_"))
+            for name, value in vars(__import__("sys").modules[module]).items()
+            if name.startswith("_") and python_function(value) is not None
+        )
+
+    def constant(self, name: str, text: str) -> str:
+        """Return the macro of a constant."""
+        made = f"{prefix_of(self.module)}_{identifier(name).strip('_')}".upper()
+        known = self._constants.setdefault(made, text)
+        if known != text:  # two constants of one name, of different modules
+            made = f"{made}_{len(self._constants)}"
+            self._constants[made] = text
+        return made
+
+    def table(self, name: str, value: Any, shape: tuple[int, ...]) -> str:
+        """Return the name of a constant array."""
+        made = identifier(name).strip("_").lower()
+        sizes = "".join(f"[{size}]" for size in shape)
+        values = value.tolist() if hasattr(value, "tolist") else value
+        self._tables[made] = fold(f"static const fs_real {made}{sizes} = {_braced(values)};")
+        return made
+
+    def require(self, caller: Function, node: ast.AST, target: Any) -> Function:
+        """Return the translation of a function that ``caller`` calls."""
+        callee = self.program.translated(target, caller, node)
+        if callee.module != self.module or callee.python in WRITTEN_BY_HAND:
+            if callee.is_private:
+                raise caller.refusal(
+                    node, "function call", f"private function {callee.name} of another module"
+                )
+            self.includes.add(f"{self.program.header_of(callee)}.h")
+        return callee
+
+    # ------------------------------------------------------------------ text
+
+    def header(self) -> str:
+        """Return the text of the header."""
+        guard = f"{self.name}_h".upper()
+        parts = [*self._head(), f"#ifndef {guard}", f"#define {guard}", ""]
+        parts += [f'#include "{name}"' for name in sorted({"fs_types.h", *self._type_headers()})] + [""]
+        for kind in self.records:
+            parts += [*structure(kind), ""]
+        for function in self.functions:
+            if not function.is_private:
+                parts += [*_description(function), *fold(c_prototype(function) + ";"), ""]
+        return "\n".join([*parts, "#endif", ""])
+
+    def inline(self) -> str:
+        """Return the text of a header with the functions themselves, static inline."""
+        guard = f"{self.name}_h".upper()
+        parts = [
+            *self._head(),
+            f"#ifndef {guard}",
+            f"#define {guard}",
+            "",
+            *self._include_lines({"fs_types.h"}),
+        ]
+        parts += self._definitions()
+        for function in self.functions:
+            parts += [
+                *_description(function),
+                *fold(c_prototype(function, True)),
+                "{",
+                *function.lines,
+                "}",
+                "",
+            ]
+        return "\n".join([*parts, "#endif", ""])
+
+    def source(self) -> str:
+        """Return the text of the C file."""
+        parts = [*self._head(), f'#include "{self.name}.h"', "", *self._include_lines(set())]
+        parts += self._definitions()
+        for function in self.functions:
+            description = _description(function) if function.is_private else comment(function.place)
+            parts += [*description, *fold(c_prototype(function)), "{", *function.lines, "}", ""]
+        return "\n".join(parts)
+
+    def _head(self) -> list[str]:
+        module = __import__("sys").modules[self.module]
+        title = (module.__doc__ or "").strip().partition("\n")[0]
+        where = self.module.replace(".", "/") + ".py"
+        return [f"/* {NOTICE} */", *comment(f"{title} {where}".strip())]
+
+    def _include_lines(self, more: set[str]) -> list[str]:
+        names = {*self.includes, "fs_math.h", *more} - {f"{self.name}.h"}
+        if any(_LAW_MATH.search(line) for function in self.functions for line in function.lines):
+            names = {*names, "fs_law_math.h"}
+        return [*(f'#include "{name}"' for name in sorted(names)), ""]
+
+    def _definitions(self) -> list[str]:
+        parts = [f"#define {name} {text}" for name, text in self._constants.items()]
+        parts += [line for table in self._tables.values() for line in table]
+        return [*parts, ""] if parts else []
+
+    def _type_headers(self) -> set[str]:
+        kinds = [kind for function in self.functions for kind in _types(function)]
+        homes = {self.program.home_of(kind) for kind in kinds}
+        return {f"{home}.h" for home in homes if home and home != self.name}
+
+
+class Program:
+    """Modules translated together."""
+
+    def __init__(
+        self,
+        provided: Mapping[str, str] = PROVIDED,
+        types: Mapping[type, str] | None = None,
+        accepts_plain: bool = False,
+    ) -> None:
+        """Translate without writing the modules of ``provided``, which are in C already: module → header.
+
+        ``types`` has the headers of records that are declared elsewhere. ``accepts_plain`` accepts
+        functions that are not marked @compiled.
+        """
+        self.provided = dict(provided)
+        self.accepts_plain = accepts_plain or bool(numba.config.DISABLE_JIT)  # then nothing is marked
+        self.units: dict[str, Unit] = {}
+        self.types: dict[type, str] = dict(types or {})
+        """Header of each record that is not declared by its unit."""
+        self._functions: dict[Callable[..., Any], Function] = {}
+        self._open: list[Callable[..., Any]] = []
+
+    def add(self, target: Any) -> Function:
+        """Translate a function and all that it calls; raise OutsideSubsetError."""
+        return self.translated(target, None, None)
+
+    def translated(self, target: Any, caller: Function | None, node: ast.AST | None) -> Function:
+        """Return a translated function."""
+        from flightstack.firmware.generator.statements import translate  # noqa: PLC0415
+
+        python = python_function(target)
+        assert python is not None
+        known = self._functions.get(python)
+        if known is not None:
+            return known
+        if python in self._open and caller is not None and node is not None:
+            raise caller.refusal(node, "recursion", f"recursion of {python.__name__}")
+        function = load(target)
+        unit = self.unit(function.module)
+        if python not in WRITTEN_BY_HAND:
+            self._open.append(python)
+            translate(function, unit)
+            self._open.pop()
+            unit.functions.append(function)
+            for kind in _types(function):
+                self._declare(kind, unit)
+        self._functions[python] = function
+        return function
+
+    def unit(self, module: str) -> Unit:
+        """Return the unit of a module."""
+        if module not in self.units:
+            self.units[module] = Unit(self, module)
+        return self.units[module]
+
+    def header_of(self, function: Function) -> str:
+        """Return the header that declares a function, without its ending."""
+        if function.python in WRITTEN_BY_HAND:
+            return "fs_math"
+        return self.provided.get(function.module, self.unit(function.module).name)
+
+    def home_of(self, kind: type) -> str:
+        """Return the header that declares a record."""
+        if kind in self.types:
+            return self.types[kind]
+        return self.provided.get(kind.__module__, unit_name(kind.__module__))
+
+    def _declare(self, kind: type, _: Unit) -> None:
+        if kind in self.types:
+            return
+        home = self.unit(kind.__module__)
+        if kind not in home.records:
+            for inner in _parts(Record(kind)):
+                if inner is not kind:
+                    self._declare(inner, home)
+            home.records.append(kind)
+
+    def written(self) -> list[Unit]:
+        """Return the units to write, those of provided modules left out."""
+        return [
+            unit
+            for module, unit in self.units.items()
+            if module not in self.provided and (unit.functions or unit.records)
+        ]
+
+
+def unit_name(module: str) -> str:
+    """Return the name of the C file of a module."""
+    parts = module.split(".")
+    return f"fs_{snake_case(parts[-1])}" if parts[0] == "flightstack" else "_".join(map(snake_case, parts))
+
+
+def structure(kind: type, name: str = "") -> list[str]:
+    """Return the C structure of a NamedTuple: its fields in order, the first sentence of its docstring above."""
+    record = Record(kind)
+    lines = comment((kind.__doc__ or "").strip().partition("\n")[0])
+    lines.append("typedef struct {")
+    if has_rotors(record):
+        lines.append("    int32_t rotors;")
+    for field, inner in record.fields.items():
+        sizes = "".join(f"[{c_size(size)}]" for size in inner.shape) if isinstance(inner, Array) else ""
+        lines.append(
+            f"    {'fs_real' if isinstance(inner, Array) else c_type(inner)} {identifier(field)}{sizes};"
+        )
+    return [*lines, f"}} {name or record_name(kind)};"]
+
+
+def _parts(kind: Type) -> list[type]:
+    if isinstance(kind, Record):
+        return [*(part for inner in kind.fields.values() for part in _parts(inner)), kind.kind]
+    if isinstance(kind, Several):
+        return [part for inner in kind.items for part in _parts(inner)]
+    return []
+
+
+def _types(function: Function) -> list[type]:
+    kinds = [*(parameter.type for parameter in function.parameters), function.result]
+    return [part for kind in kinds for part in _parts(kind)]
+
+
+def _description(function: Function) -> list[str]:
+    """Return the comment above a function: its docstring and the place of its Python source."""
+    text = ast.get_docstring(function.node) or ""
+    return comment(f"{text}\n\n{function.place}" if "\n" in text else f"{text} {function.place}".strip())
+
+
+def _braced(values: Sequence[Any]) -> str:
+    inner = [f"FS_LIT({value!r})" if isinstance(value, float) else _braced(value) for value in values]
+    return "{" + ", ".join(inner) + "}"
+
+
+def write(units: Sequence[Unit], folder: Path) -> list[Path]:
+    """Write header and C file of each unit to ``folder``; return the C files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for unit in units:
+        (folder / f"{unit.name}.h").write_text(unit.header(), encoding="ascii")
+        (folder / f"{unit.name}.c").write_text(unit.source(), encoding="ascii")
+    return [folder / f"{unit.name}.c" for unit in units]
+
+
+def plain(text: str) -> str:
+    """Return text in ASCII."""
+    return ascii_text(text)
