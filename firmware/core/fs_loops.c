@@ -1,8 +1,7 @@
 #include "fs_loops.h"
 
-#include "fs_attitude_backstepping.h"
-#include "fs_attitude_pid.h"
 #include "fs_attitude_reference.h"
+#include "fs_controllers.h"
 #include "fs_geometry.h"
 #include "fs_math.h"
 #include "fs_params.h"
@@ -11,7 +10,7 @@
 /* What a tick changes if it turns out sound. */
 typedef struct {
     fs_reference_memory reference;
-    fs_pid_memory pid;
+    fs_controller_memory controller;
     fs_saturation saturation;
 } fs_tick;
 
@@ -136,9 +135,7 @@ void fs_loops_reset(fs_loops *loops, const fs_vehicle_state *state)
     loops->reference_memory.p_rad_s = FS_LIT(0.0);
     loops->reference_memory.q_rad_s = FS_LIT(0.0);
     loops->reference_memory.r_rad_s = FS_LIT(0.0);
-    loops->pid_memory.roll = FS_LIT(0.0);
-    loops->pid_memory.pitch = FS_LIT(0.0);
-    loops->pid_memory.yaw = FS_LIT(0.0);
+    fs_controllers_reset(&loops->controller_memory);
     loops->target.attitude = *attitude;
     loops->target.thrust_n = FS_LIT(0.0);
     loops->is_target_sound = target_is_finite(&loops->target);
@@ -158,14 +155,14 @@ static void begin_outer_period(fs_loops *loops)
 /* Run the position loop, or keep its memory and the target as they were. */
 static void outer_loop(fs_loops *loops, const fs_loop_input *input, uint16_t state_is_sound)
 {
-    fs_position_memory memory = loops->position_memory;
+    fs_position_memory memory;
     fs_attitude_target target;
 
     if (!state_is_sound || !setpoint_is_sound(&input->setpoint)) {
         return;
     }
-    fs_position_pid_step(&memory, &input->state, &input->setpoint, &loops->position, loops->rates.tan_max_tilt,
-                         loops->rates.outer_dt_s, loops->saturation.thrust, &target);
+    fs_position_pid_step(&loops->position_memory, &input->state, &input->setpoint, &loops->position,
+                         loops->rates.outer_dt_s, loops->saturation.thrust, &memory, &target);
     if (target_is_finite(&target)) {
         loops->position_memory = memory;
         loops->target = target;
@@ -173,32 +170,49 @@ static void outer_loop(fs_loops *loops, const fs_loop_input *input, uint16_t sta
     }
 }
 
-/* Reference filter and attitude controller, into tick and output. Nonzero: the torque is finite. */
+/* Direction of a difference that the mixer could not follow: -1, 0 or +1. */
+static fs_real direction(fs_real lag)
+{
+    return lag > FS_LIT(0.0) ? FS_LIT(1.0) : (lag < FS_LIT(0.0) ? FS_LIT(-1.0) : FS_LIT(0.0));
+}
+
+/* What the attitude law gets to know, from the reference in the vehicle's body frame. */
+static void gather(const fs_loops *loops, const fs_vehicle_state *state, const fs_attitude_reference *reference,
+                   fs_attitude_inputs *inputs)
+{
+    const fs_vector3 *lag = &loops->saturation.torque;
+    const fs_quaternion inverse = fs_conjugate(&state->attitude);
+    const fs_quaternion turn = fs_quaternion_product(&inverse, &reference->attitude);
+
+    inputs->attitude = state->attitude;
+    inputs->rates_frd_rad_s = state->rates_frd_rad_s;
+    inputs->reference = *reference;
+    inputs->error_rad = fs_rotation_vector(&turn);
+    inputs->relative_rotor_speed_rad_s =
+        fs_relative_rotor_speed(loops->last.rotor_command_rad_s, &loops->mixer, loops->rates.rotors);
+    inputs->saturation.x = direction(lag->x);
+    inputs->saturation.y = direction(lag->y);
+    inputs->saturation.z = direction(lag->z);
+}
+
+/* Reference filter and attitude controller, into tick and output. Nonzero: torque and memory are finite. */
 static uint16_t attitude_loop(const fs_loops *loops, const fs_vehicle_state *state, fs_tick *tick,
                               fs_loop_output *output)
 {
     const fs_quaternion aim = fs_blend(&loops->last_target.attitude, &loops->target.attitude, loops->fraction);
-    fs_attitude_reference *reference = &output->reference;
-    fs_vector3 *torque = &output->wrench.torque_frd_n_m;
-    const fs_vector3 *rates = &state->rates_frd_rad_s;
-    fs_quaternion turn;
-    fs_vector3 error;
+    fs_attitude_reference filtered;
+    fs_attitude_inputs inputs;
+    uint16_t is_memory_finite;
 
-    tick->pid = loops->pid_memory;
     fs_attitude_reference_step(&loops->reference_memory, &aim, &loops->reference, loops->rates.inner_dt_s,
-                               &tick->reference, reference);
-    turn = fs_in_body_frame(reference, &state->attitude);
-    error = fs_rotation_vector(&turn);
-    if (loops->rates.controller == FS_CONTROLLER_PID) {
-        *torque = fs_attitude_pid_step(&tick->pid, &error, rates, reference, &loops->saturation.torque, &loops->pid,
-                                       loops->rates.inner_dt_s);
-    } else {
-        const fs_real relative =
-            fs_relative_rotor_speed(loops->last.rotor_command_rad_s, &loops->mixer, loops->rates.rotors);
-        *torque = fs_attitude_backstepping_step(&error, rates, reference, relative, &loops->backstepping);
-    }
+                               &tick->reference, &filtered);
+    output->reference = fs_in_body_frame(&filtered, &state->attitude);
+    gather(loops, state, &output->reference, &inputs);
+    is_memory_finite =
+        fs_controllers_step(loops->rates.controller, &loops->controller_memory, &inputs, &loops->controller,
+                            loops->rates.inner_dt_s, &tick->controller, &output->wrench.torque_frd_n_m);
     output->wrench.thrust_n = loops->target.thrust_n;
-    return vector_is_finite(torque); /* an unsound integral makes an unsound torque */
+    return (uint16_t)(vector_is_finite(&output->wrench.torque_frd_n_m) & is_memory_finite);
 }
 
 /* Run inner loop and mixer; return 0 and keep the tick, or the status bit that tells why the output is not sound. */
@@ -228,7 +242,7 @@ static uint16_t inner_loop(fs_loops *loops, const fs_vehicle_state *state, uint1
     }
     output->attitude_target = loops->target;
     loops->reference_memory = tick.reference;
-    loops->pid_memory = tick.pid;
+    loops->controller_memory = tick.controller;
     loops->saturation = tick.saturation;
     loops->last = *output;
     return 0U;

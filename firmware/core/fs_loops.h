@@ -47,7 +47,6 @@ typedef struct {
     uint16_t controller, rotors;
     fs_real inner_dt_s, outer_dt_s;
     fs_real fraction_step; /* share of an outer period that an inner tick is */
-    fs_real tan_max_tilt;
 } fs_loop_rates;
 
 typedef struct fs_loops {
@@ -55,14 +54,13 @@ typedef struct fs_loops {
     fs_setup setup;
     fs_position_params position;
     fs_reference_params reference;
-    fs_pid_params pid;
-    fs_backstepping_params backstepping;
+    fs_controller_params controller;
     fs_mixer mixer;
     fs_loop_rates rates;
     /* memories */
     fs_position_memory position_memory;
     fs_reference_memory reference_memory;
-    fs_pid_memory pid_memory;
+    fs_controller_memory controller_memory;
     fs_attitude_target last_target; /* of the outer loop's tick before */
     fs_attitude_target target;
     uint16_t is_target_sound; /* 1: it is finite */

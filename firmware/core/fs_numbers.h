@@ -1,4 +1,4 @@
-/* Generated from Python by firmware/tools/generate_core.py: do not edit. */
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
 #ifndef FS_NUMBERS_H
 #define FS_NUMBERS_H
 
@@ -77,6 +77,11 @@ typedef struct {
     fs_real iz_kg_m2;
 } fs_pid_params;
 
+/* Placeholder: the law has no state, and a memory type needs at least one field. */
+typedef struct {
+    fs_real unused;
+} fs_backstepping_memory;
+
 /* c1 to c6 [1/s] of the paper's Table III, feed-forward of x_d' and x_d'' (0 to 1), and inertias. */
 typedef struct {
     fs_real c1;
@@ -93,6 +98,18 @@ typedef struct {
     fs_real rotor_inertia_kg_m2;
 } fs_backstepping_params;
 
+/* Params of every attitude law. */
+typedef struct {
+    fs_pid_params pid;
+    fs_backstepping_params backstepping;
+} fs_controller_params;
+
+/* Memory of every attitude law. */
+typedef struct {
+    fs_pid_memory pid;
+    fs_backstepping_memory backstepping;
+} fs_controller_memory;
+
 /* What several structures are made of, as it was set. */
 typedef struct {
     fs_real controller; /* index of the attitude law: one of FS_CONTROLLER_* */
@@ -100,7 +117,7 @@ typedef struct {
     fs_real inner_hz; /* rate of the inner loop */
     fs_real outer_divisor; /* the outer loop runs in every so many inner ticks */
     fs_real max_tilt_deg; /* MPC_TILTMAX_AIR */
-    fs_real ix_kg_m2; /* inertias, which every attitude law has a copy of */
+    fs_real ix_kg_m2; /* inertias, which every built-in attitude law has a copy of */
     fs_real iy_kg_m2;
     fs_real iz_kg_m2;
 } fs_setup;

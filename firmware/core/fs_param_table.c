@@ -1,4 +1,4 @@
-/* Generated from Python by firmware/tools/generate_core.py: do not edit. */
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
 #include "fs_param_table.h"
 
 static const fs_param_spec specs[FS_PARAM_COUNT] = {
@@ -156,25 +156,25 @@ fs_real *fs_param_place(fs_loops *loops, uint16_t index)
     case 10U: return &loops->reference.damping;
     case 11U: return &loops->reference.max_rate_rad_s;
     case 12U: return &loops->reference.max_acceleration_rad_s2;
-    case 13U: return &loops->pid.kp_roll;
-    case 14U: return &loops->pid.kp_pitch;
-    case 15U: return &loops->pid.kp_yaw;
-    case 16U: return &loops->pid.ki_roll;
-    case 17U: return &loops->pid.ki_pitch;
-    case 18U: return &loops->pid.ki_yaw;
-    case 19U: return &loops->pid.kd_roll;
-    case 20U: return &loops->pid.kd_pitch;
-    case 21U: return &loops->pid.kd_yaw;
-    case 22U: return &loops->pid.rate_feedforward;
-    case 23U: return &loops->pid.acceleration_feedforward;
-    case 24U: return &loops->backstepping.c1;
-    case 25U: return &loops->backstepping.c2;
-    case 26U: return &loops->backstepping.c3;
-    case 27U: return &loops->backstepping.c4;
-    case 28U: return &loops->backstepping.c5;
-    case 29U: return &loops->backstepping.c6;
-    case 30U: return &loops->backstepping.rate_feedforward;
-    case 31U: return &loops->backstepping.acceleration_feedforward;
+    case 13U: return &loops->controller.pid.kp_roll;
+    case 14U: return &loops->controller.pid.kp_pitch;
+    case 15U: return &loops->controller.pid.kp_yaw;
+    case 16U: return &loops->controller.pid.ki_roll;
+    case 17U: return &loops->controller.pid.ki_pitch;
+    case 18U: return &loops->controller.pid.ki_yaw;
+    case 19U: return &loops->controller.pid.kd_roll;
+    case 20U: return &loops->controller.pid.kd_pitch;
+    case 21U: return &loops->controller.pid.kd_yaw;
+    case 22U: return &loops->controller.pid.rate_feedforward;
+    case 23U: return &loops->controller.pid.acceleration_feedforward;
+    case 24U: return &loops->controller.backstepping.c1;
+    case 25U: return &loops->controller.backstepping.c2;
+    case 26U: return &loops->controller.backstepping.c3;
+    case 27U: return &loops->controller.backstepping.c4;
+    case 28U: return &loops->controller.backstepping.c5;
+    case 29U: return &loops->controller.backstepping.c6;
+    case 30U: return &loops->controller.backstepping.rate_feedforward;
+    case 31U: return &loops->controller.backstepping.acceleration_feedforward;
     case 32U: return &loops->setup.max_tilt_deg;
     case 33U: return &loops->setup.controller;
     case 34U: return &loops->setup.rotors;
@@ -185,7 +185,7 @@ fs_real *fs_param_place(fs_loops *loops, uint16_t index)
     case 39U: return &loops->setup.ix_kg_m2;
     case 40U: return &loops->setup.iy_kg_m2;
     case 41U: return &loops->setup.iz_kg_m2;
-    case 42U: return &loops->backstepping.rotor_inertia_kg_m2;
+    case 42U: return &loops->controller.backstepping.rotor_inertia_kg_m2;
     case 43U: return &loops->mixer.allocation[0][0];
     case 44U: return &loops->mixer.allocation[0][1];
     case 45U: return &loops->mixer.allocation[0][2];
@@ -294,25 +294,25 @@ fs_real fs_param_value(const fs_loops *loops, uint16_t index)
     case 10U: return loops->reference.damping;
     case 11U: return loops->reference.max_rate_rad_s;
     case 12U: return loops->reference.max_acceleration_rad_s2;
-    case 13U: return loops->pid.kp_roll;
-    case 14U: return loops->pid.kp_pitch;
-    case 15U: return loops->pid.kp_yaw;
-    case 16U: return loops->pid.ki_roll;
-    case 17U: return loops->pid.ki_pitch;
-    case 18U: return loops->pid.ki_yaw;
-    case 19U: return loops->pid.kd_roll;
-    case 20U: return loops->pid.kd_pitch;
-    case 21U: return loops->pid.kd_yaw;
-    case 22U: return loops->pid.rate_feedforward;
-    case 23U: return loops->pid.acceleration_feedforward;
-    case 24U: return loops->backstepping.c1;
-    case 25U: return loops->backstepping.c2;
-    case 26U: return loops->backstepping.c3;
-    case 27U: return loops->backstepping.c4;
-    case 28U: return loops->backstepping.c5;
-    case 29U: return loops->backstepping.c6;
-    case 30U: return loops->backstepping.rate_feedforward;
-    case 31U: return loops->backstepping.acceleration_feedforward;
+    case 13U: return loops->controller.pid.kp_roll;
+    case 14U: return loops->controller.pid.kp_pitch;
+    case 15U: return loops->controller.pid.kp_yaw;
+    case 16U: return loops->controller.pid.ki_roll;
+    case 17U: return loops->controller.pid.ki_pitch;
+    case 18U: return loops->controller.pid.ki_yaw;
+    case 19U: return loops->controller.pid.kd_roll;
+    case 20U: return loops->controller.pid.kd_pitch;
+    case 21U: return loops->controller.pid.kd_yaw;
+    case 22U: return loops->controller.pid.rate_feedforward;
+    case 23U: return loops->controller.pid.acceleration_feedforward;
+    case 24U: return loops->controller.backstepping.c1;
+    case 25U: return loops->controller.backstepping.c2;
+    case 26U: return loops->controller.backstepping.c3;
+    case 27U: return loops->controller.backstepping.c4;
+    case 28U: return loops->controller.backstepping.c5;
+    case 29U: return loops->controller.backstepping.c6;
+    case 30U: return loops->controller.backstepping.rate_feedforward;
+    case 31U: return loops->controller.backstepping.acceleration_feedforward;
     case 32U: return loops->setup.max_tilt_deg;
     case 33U: return loops->setup.controller;
     case 34U: return loops->setup.rotors;
@@ -323,7 +323,7 @@ fs_real fs_param_value(const fs_loops *loops, uint16_t index)
     case 39U: return loops->setup.ix_kg_m2;
     case 40U: return loops->setup.iy_kg_m2;
     case 41U: return loops->setup.iz_kg_m2;
-    case 42U: return loops->backstepping.rotor_inertia_kg_m2;
+    case 42U: return loops->controller.backstepping.rotor_inertia_kg_m2;
     case 43U: return loops->mixer.allocation[0][0];
     case 44U: return loops->mixer.allocation[0][1];
     case 45U: return loops->mixer.allocation[0][2];
@@ -419,9 +419,9 @@ fs_real fs_param_value(const fs_loops *loops, uint16_t index)
 fs_real *fs_param_integral(fs_loops *loops, uint16_t index)
 {
     switch (index) {
-    case 16U: return &loops->pid_memory.roll;
-    case 17U: return &loops->pid_memory.pitch;
-    case 18U: return &loops->pid_memory.yaw;
+    case 16U: return &loops->controller_memory.pid.roll;
+    case 17U: return &loops->controller_memory.pid.pitch;
+    case 18U: return &loops->controller_memory.pid.yaw;
     default: return NULL;
     }
 }

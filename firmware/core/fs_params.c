@@ -1,5 +1,6 @@
 #include "fs_params.h"
 
+#include "fs_controllers.h"
 #include "fs_math.h"
 #include "fs_param_table.h"
 
@@ -61,12 +62,9 @@ static void derive(fs_loops *loops)
     const fs_setup *setup = &loops->setup;
     const fs_real outer_hz = setup->inner_hz / setup->outer_divisor;
     const uint16_t controller = (uint16_t)setup->controller;
-    fs_real sine, cosine;
 
     if (controller != loops->rates.controller) { /* a law must not begin with another flight's integrals */
-        loops->pid_memory.roll = FS_LIT(0.0);
-        loops->pid_memory.pitch = FS_LIT(0.0);
-        loops->pid_memory.yaw = FS_LIT(0.0);
+        fs_controllers_reset(&loops->controller_memory);
     }
     loops->rates.controller = controller;
     loops->rates.rotors = (uint16_t)setup->rotors;
@@ -74,15 +72,13 @@ static void derive(fs_loops *loops)
     loops->rates.outer_dt_s = FS_LIT(1.0) / outer_hz;
     loops->rates.fraction_step = outer_hz / setup->inner_hz;
     loops->position.max_tilt_rad = setup->max_tilt_deg * RADIANS_PER_DEGREE;
-    fs_sin_cos(loops->position.max_tilt_rad, &sine, &cosine);
-    loops->rates.tan_max_tilt = sine / cosine;
     fs_mixer_derive(&loops->mixer, loops->rates.rotors);
-    loops->pid.ix_kg_m2 = setup->ix_kg_m2;
-    loops->pid.iy_kg_m2 = setup->iy_kg_m2;
-    loops->pid.iz_kg_m2 = setup->iz_kg_m2;
-    loops->backstepping.ix_kg_m2 = setup->ix_kg_m2;
-    loops->backstepping.iy_kg_m2 = setup->iy_kg_m2;
-    loops->backstepping.iz_kg_m2 = setup->iz_kg_m2;
+    loops->controller.pid.ix_kg_m2 = setup->ix_kg_m2;
+    loops->controller.pid.iy_kg_m2 = setup->iy_kg_m2;
+    loops->controller.pid.iz_kg_m2 = setup->iz_kg_m2;
+    loops->controller.backstepping.ix_kg_m2 = setup->ix_kg_m2;
+    loops->controller.backstepping.iy_kg_m2 = setup->iy_kg_m2;
+    loops->controller.backstepping.iz_kg_m2 = setup->iz_kg_m2;
 }
 
 uint16_t fs_param_set(fs_loops *loops, uint16_t index, fs_real value)

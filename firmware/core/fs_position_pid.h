@@ -1,17 +1,27 @@
-/* Position and altitude control, the outer loop: flightstack/control/position_pid.py. */
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
+/*
+ * Position and altitude control: the outer loop, from a position setpoint to attitude and thrust.
+ * flightstack/control/position_pid.py
+ */
 #ifndef FS_POSITION_PID_H
 #define FS_POSITION_PID_H
 
 #include "fs_numbers.h"
+#include "fs_types.h"
 
 /*
- * Write the attitude and the thrust that accelerate the vehicle along the setpoint, and advance the integrals.
+ * Return the attitude and the thrust that track the setpoint.
  *
- * tan_max_tilt: tangent of params->max_tilt_rad, which changes too seldom to be computed in every tick.
- * thrust_saturation: what the mixer could not follow in the last tick, negative if it made more than demanded.
+ * PID on position in NED with feed-forward; the desired specific force f = a - g is converted to roll and pitch by
+ * inverting eq. 7 (NED signs corrected): theta = atan2(-f_x', -f_z), phi = atan2(f_y', sqrt(f_x'^2 + f_z^2)), f'
+ * in the frame rotated by the yaw setpoint. Thrust is compensated for the present tilt. Integrators hold while
+ * tilt or thrust is at its limit, or while the mixer is saturated in thrust (thrust_saturation: the last tick
+ * achieved more (-1) or less (+1) than demanded).
+ *
+ * position_pid.py:72
  */
-void fs_position_pid_step(fs_position_memory *memory, const fs_vehicle_state *state,
-                          const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real tan_max_tilt,
-                          fs_real dt_s, fs_real thrust_saturation, fs_attitude_target *target);
+void fs_position_pid_step(const fs_position_memory *memory, const fs_vehicle_state *state,
+    const fs_position_setpoint *setpoint, const fs_position_params *params, fs_real dt_s,
+    fs_real thrust_saturation, fs_position_memory *memory_out, fs_attitude_target *target_out);
 
 #endif

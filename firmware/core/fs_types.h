@@ -1,4 +1,4 @@
-/* Generated from Python by firmware/tools/generate_core.py: do not edit. */
+/* Generated from Python by flightstack.firmware.generator: do not edit. */
 #ifndef FS_TYPES_H
 #define FS_TYPES_H
 

@@ -83,14 +83,19 @@ def cached(
     return place
 
 
+def cache_root() -> Path:
+    """Return the folder of compiled firmware."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flightstack" / "firmware"
+
+
 def _folder(state: str) -> Path:
     """Return the folder for a state of the sources; delete the oldest folders."""
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flightstack" / "firmware"
+    base = cache_root()
     folder = base / state
     try:
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)
-        states = sorted(base.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+        states = sorted(base.glob("[0-9a-f]" * 16), key=lambda path: path.stat().st_mtime, reverse=True)
         for old in states[KEPT_STATES:]:
             shutil.rmtree(old, ignore_errors=True)
     except OSError:  # read-only home, or concurrent deletion

@@ -13,11 +13,13 @@ from typing import Any, NamedTuple
 from flightstack.control import attitude_backstepping, attitude_pid
 from flightstack.control.attitude_controller import AttitudeController
 from flightstack.control.attitude_reference import REFERENCE_TUNABLES, ReferenceParams
+from flightstack.control.controller_loading import controller_tunables, fields_of
 from flightstack.control.loop_parameters import TILT, LoopNumbers, loop_numbers, tilt_deg
 from flightstack.control.mixer import mixer_for
 from flightstack.control.position_pid import POSITION_TUNABLES, PositionParams
 from flightstack.core.contract import MAX_ROTORS
 from flightstack.core.errors import ConfigError
+from flightstack.firmware.generator.text import identifier, snake_case
 from flightstack.params.behaviour import SPECS
 from flightstack.params.config import DEFAULT_INNER_HZ, DEFAULT_OUTER_HZ
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
@@ -30,6 +32,8 @@ CONTROLLERS = (attitude_pid.CONTROLLER, attitude_backstepping.CONTROLLER)
 WIDEST = 1e6
 """Range of gains and thrusts on a target. C's table is the same for every vehicle, while Python extends the declared
 ranges for gains files in the paper's units and for heavy vehicles."""
+UNBOUNDED = 1e12
+"""Range of the numbers of a user's controller; the stack checks those that it declares."""
 _STRETCHED = ("POS_Z_", "POS_THR_", "PID_ROLL_", "PID_PITCH_", "PID_YAW_")
 
 
@@ -46,22 +50,51 @@ class TargetNumber(NamedTuple):
     """Member that this gain multiplies, scaled when the gain changes; see ``Tunable.integrates``."""
 
 
-def _tunable(tunable: Tunable, law: str) -> TargetNumber:
+def law_name(controller: AttitudeController) -> str:
+    """Return the name of a controller in C."""
+    return snake_case(controller.name)
+
+
+def with_built_in(controller: AttitudeController) -> tuple[AttitudeController, ...]:
+    """Return the controllers of the firmware that flies a controller: the built-in ones, and it if it is none."""
+    is_built_in = any(controller.name == known.name for known in CONTROLLERS)
+    return CONTROLLERS if is_built_in else (*CONTROLLERS, controller)
+
+
+def _tunable(tunable: Tunable, law: str, memory: str) -> TargetNumber:
     stretched = tunable.name.startswith(_STRETCHED)
-    integral = f"{law}_memory.{tunable.integrates}" if tunable.integrates else ""
-    place, high = f"{law}.{tunable.field}", WIDEST if stretched else tunable.high
+    integral = f"{memory}.{identifier(tunable.integrates)}" if tunable.integrates else ""
+    place, high = f"{law}.{identifier(tunable.field)}", WIDEST if stretched else tunable.high
     return TargetNumber(tunable.name, place, tunable.low, high, integral=integral)
 
 
-def _tunables() -> Iterator[TargetNumber]:
-    laws = {
-        "position": POSITION_TUNABLES,
-        "reference": REFERENCE_TUNABLES,
-        **{controller.name: controller.tunables or () for controller in CONTROLLERS},
-    }
-    for law, tunables in laws.items():
+def _controller_numbers(controller: AttitudeController) -> Iterator[TargetNumber]:
+    """Declare every field of a controller's parameters; those of a user's are bounded by the stack alone."""
+    law, memory = f"controller.{law_name(controller)}", f"controller_memory.{law_name(controller)}"
+    if controller in CONTROLLERS:
+        for tunable in controller.tunables or ():
+            yield _tunable(tunable, law, memory)
+        return
+    for tunable in all_tunables(controller):
+        yield _tunable(tunable, law, memory)._replace(low=-UNBOUNDED, high=UNBOUNDED)
+
+
+def all_tunables(controller: AttitudeController) -> tuple[Tunable, ...]:
+    """Return the declarations of all fields of a user's controller: FS_LAW_3 is the fourth, if it has none."""
+    tunables = controller_tunables(controller)
+    known = {tunable.field for tunable in tunables}
+    rest = [
+        Tunable(field, f"FS_LAW_{index}", -UNBOUNDED, UNBOUNDED, "", "")
+        for index, field in enumerate(fields_of(controller.params_type))
+        if field not in known
+    ]
+    return (*tunables, *rest)
+
+
+def _loop_tunables() -> Iterator[TargetNumber]:
+    for law, tunables in (("position", POSITION_TUNABLES), ("reference", REFERENCE_TUNABLES)):
         for tunable in tunables:
-            yield _tunable(tunable, law)
+            yield _tunable(tunable, law, f"{law}_memory")
 
 
 def _mixer_numbers() -> Iterator[TargetNumber]:
@@ -77,10 +110,8 @@ def _mixer_numbers() -> Iterator[TargetNumber]:
             yield TargetNumber(f"FS_{name}_{rotor}", f"mixer.{field}[{rotor}]", -limit, limit)
 
 
-TARGET_NUMBERS: tuple[TargetNumber, ...] = (
-    *_tunables(),
+_QUANTITIES = (
     TargetNumber(TILT, "setup.max_tilt_deg", SPECS[TILT].low, SPECS[TILT].high),
-    TargetNumber("FS_CTRL", "setup.controller", 0.0, len(CONTROLLERS) - 1.0, is_whole=True),
     TargetNumber("FS_ROTORS", "setup.rotors", 4.0, MAX_ROTORS, is_whole=True),
     TargetNumber("FS_INNER_HZ", "setup.inner_hz", 1.0, 20e3),
     TargetNumber("FS_OUTER_DIV", "setup.outer_divisor", 1.0, 20e3, is_whole=True),
@@ -89,10 +120,20 @@ TARGET_NUMBERS: tuple[TargetNumber, ...] = (
     TargetNumber("FS_IX", "setup.ix_kg_m2", 1e-8, 1e4),
     TargetNumber("FS_IY", "setup.iy_kg_m2", 1e-8, 1e4),
     TargetNumber("FS_IZ", "setup.iz_kg_m2", 1e-8, 1e4),
-    TargetNumber("FS_JR", "backstepping.rotor_inertia_kg_m2", 0.0, 1.0),
+    TargetNumber("FS_JR", "controller.backstepping.rotor_inertia_kg_m2", 0.0, 1.0),
     *_mixer_numbers(),
 )
-"""All numbers of a target, in the order of its table."""
+
+
+def declared(controllers: Sequence[AttitudeController]) -> tuple[TargetNumber, ...]:
+    """Return all numbers of a target with these controllers, in the order of its table."""
+    laws = [number for controller in controllers for number in _controller_numbers(controller)]
+    index = TargetNumber("FS_CTRL", "setup.controller", 0.0, len(controllers) - 1.0, is_whole=True)
+    return (*_loop_tunables(), *laws, _QUANTITIES[0], index, *_QUANTITIES[1:])
+
+
+TARGET_NUMBERS = declared(CONTROLLERS)
+"""Numbers of a target with the built-in controllers."""
 
 
 def target_numbers(
@@ -105,13 +146,10 @@ def target_numbers(
 ) -> dict[str, float]:
     """Return the numbers that make a target's loops equal to ``PythonLoops`` with the same arguments.
 
-    Gains of the inactive controller are not included. Raise ConfigError if the controller does not exist in C or a
-    number is out of the target's range.
+    Gains of the other controllers are not included. Raise ConfigError if a number is out of the target's range.
     """
-    names = [known.name for known in CONTROLLERS]
-    if controller.name not in names:
-        known = ", ".join(names)
-        raise ConfigError("--controller", controller.name, f"exists in Python only; available in C: {known}")
+    controllers = with_built_in(controller)
+    names = [known.name for known in controllers]
     values = _loop_values(loop_numbers(vehicle, controller, gains, max_tilt_rad), controller)
     ix, iy, iz = vehicle.inertia_kg_m2
     values |= {
@@ -128,12 +166,12 @@ def target_numbers(
         "FS_JR": vehicle.mean_rotor_inertia_kg_m2,
         **_mixer_values(vehicle),
     }
-    _check_ranges(values)
+    _check_ranges(values, declared(controllers))
     return values
 
 
-def _check_ranges(values: Mapping[str, float]) -> None:
-    for number in TARGET_NUMBERS:
+def _check_ranges(values: Mapping[str, float], numbers: Sequence[TargetNumber]) -> None:
+    for number in numbers:
         value = values.get(number.name, number.low)
         if not number.low <= value <= number.high:
             limits = f"{number.low:g} to {number.high:g}"
@@ -146,13 +184,17 @@ def _loop_values(numbers: LoopNumbers, controller: AttitudeController) -> dict[s
     of_laws: tuple[tuple[Sequence[Tunable], type, Any], ...] = (
         (POSITION_TUNABLES, PositionParams, numbers.position),
         (REFERENCE_TUNABLES, ReferenceParams, numbers.reference),
-        (controller.tunables or (), controller.params_type, numbers.controller),
+        (_law_tunables(controller), controller.params_type, numbers.controller),
     )
     values: dict[str, float] = {}
     for tunables, params_type, array in of_laws:
         fields: Mapping[str, float] = dict(zip(params_type._fields, array.tolist(), strict=True))  # type: ignore[attr-defined]
         values |= {tunable.name: fields[tunable.field] for tunable in tunables}
     return values
+
+
+def _law_tunables(controller: AttitudeController) -> Sequence[Tunable]:
+    return controller.tunables or () if controller in CONTROLLERS else all_tunables(controller)
 
 
 def _mixer_values(vehicle: Vehicle) -> dict[str, float]:
@@ -168,12 +210,12 @@ def _mixer_values(vehicle: Vehicle) -> dict[str, float]:
     return values
 
 
-def default_numbers() -> dict[str, float]:
+def default_numbers(controllers: Sequence[AttitudeController] = CONTROLLERS) -> dict[str, float]:
     """Return a target's initial numbers: default vehicle, gains and rates, with the gains of all controllers."""
     vehicle, values = load_vehicle(DEFAULT_VEHICLE), dict[str, float]()
     divisor = round(DEFAULT_INNER_HZ / DEFAULT_OUTER_HZ)
     tilt_rad = math.radians(SPECS[TILT].default)
-    for controller in reversed(CONTROLLERS):  # the first one is active
+    for controller in reversed(controllers):  # the first one is active
         gains = open_gains(DEFAULT_GAINS)
         values |= target_numbers(vehicle, controller, gains, tilt_rad, DEFAULT_INNER_HZ, divisor)
     return values

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 PORTABLE = ("core", "mavlink", "app")
@@ -11,8 +14,24 @@ HASH_SIZE = 8
 """Bytes of the hash in FS_PIL_IDENTITY."""
 
 
+_root: ContextVar[Path | None] = ContextVar("firmware_root", default=None)
+
+
+@contextmanager
+def using_firmware(root: Path) -> Iterator[None]:
+    """Use the firmware in another folder, with a user's controller, within the context."""
+    token = _root.set(root)
+    try:
+        yield
+    finally:
+        _root.reset(token)
+
+
 def firmware_root() -> Path:
-    """Return the folder ``firmware``: in an installed package, else in the repository."""
+    """Return the folder ``firmware``: of ``using_firmware``, in an installed package, or in the repository."""
+    chosen = _root.get()
+    if chosen is not None:
+        return chosen
     here = Path(__file__).resolve().parent
     packaged = here / "c"
     return packaged if packaged.is_dir() else here.parents[1] / "firmware"

@@ -11,6 +11,7 @@ from flightstack.core.errors import INSTALL_FIRMWARE, ConfigError, WrongFirmware
 from flightstack.firmware.build import BuildError, host_library, host_program
 from flightstack.firmware.c_loops import CLoops, HostLoops, LoopsSetup
 from flightstack.firmware.choice import DEFAULT_BAUD, EMULATED, PYTHON, SERIAL, C, LoopsChoice, parse_loops
+from flightstack.firmware.law_tree import firmware_for
 from flightstack.firmware.pil_client import DEFAULT_TIMING, PilTiming
 from flightstack.firmware.target_loops import TargetLoops
 from flightstack.transports.byte_link import ByteLink, LineError
@@ -91,9 +92,10 @@ def make_loops(loops: str, setup: LoopsSetup, lockstep: bool = True) -> ControlB
         )
     numbers = setup.numbers()
     try:
-        if choice.kind == C:
-            return CLoops(loops, HostLoops(host_library(), numbers), setup)
-        return CLoops(loops, connect(open_link(choice), numbers, timing_of(choice)), setup)
+        with firmware_for(setup.controller):
+            if choice.kind == C:
+                return CLoops(loops, HostLoops(host_library(), numbers), setup)
+            return CLoops(loops, connect(open_link(choice), numbers, timing_of(choice)), setup)
     except (BuildError, LineError, WrongFirmwareError) as error:
         raise ConfigError("--loops", loops, str(error).removeprefix(f"{choice.device}: ")) from error
 

@@ -16,6 +16,7 @@ from flightstack.control.controller_loading import load_controller
 from flightstack.control.loop_parameters import loop_numbers
 from flightstack.firmware.c_loops import LoopsSetup
 from flightstack.firmware.choice import PYTHON, parse_loops
+from flightstack.firmware.law_tree import law_tree
 from flightstack.firmware.targets import make_loops
 from flightstack.flight_log.flight_log import vehicle_fields
 from flightstack.flight_log.recorder import FlightRecorder, OpenLog
@@ -119,6 +120,7 @@ def check(config: StackConfig) -> None:
     setup = _loops_setup(config, rates(config.inner_hz, config.outer_hz))
     if parse_loops(config.loops).kind != PYTHON:
         setup.numbers()
+        law_tree(setup.controller)
     numbers = loop_numbers(setup.vehicle, setup.controller, setup.gains, setup.max_tilt_rad)
     read_parameters(config, numbers.specs)
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from flightstack.control.controller_loading import load_controller
 from flightstack.firmware.build import BuildError, host_library
 from flightstack.firmware.choice import EMULATED, HOST, SERIAL, C, LoopsChoice, parse_loops
-from flightstack.firmware.numbers import CONTROLLERS
+from flightstack.firmware.law_tree import firmware_for
 from flightstack.firmware.targets import open_link
 from flightstack.transports.byte_link import LineError
 from gcs_cli.errors import USAGE, CliError
@@ -38,12 +39,11 @@ def checked_target(text: str, more: tuple[str, ...] = (), flag: str = "--target"
 
 
 def check_there(target: LoopsChoice, controller: str) -> None:
-    """Raise CliError (usage) if the controller is not available in C, or if the target does not open."""
-    if controller not in (known.name for known in CONTROLLERS):
-        raise CliError(f"--controller {controller}: exists in Python only: choose pid or backstepping", USAGE)
+    """Raise CliError (usage) if the target does not open, ConfigError if the controller has no C."""
     try:
-        host_library()
-        open_link(target).close()
+        with firmware_for(load_controller(controller)):
+            host_library()
+            open_link(target).close()
     except (BuildError, LineError) as error:
         raise CliError(str(error), USAGE) from None
 

@@ -8,9 +8,17 @@ import pytest
 
 from flightstack.control.controller_loading import load_controller
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.numbers import TARGET_NUMBERS, default_numbers, target_numbers
+from flightstack.firmware.numbers import (
+    TARGET_NUMBERS,
+    declared,
+    default_numbers,
+    target_numbers,
+    with_built_in,
+)
 from flightstack.params.gains_file import open_gains
+from flightstack.params.tunable import Tunable
 from flightstack.params.vehicle import load_vehicle
+from tests.support.plugin_site import example_module
 from tests.support.rotor_sets import multirotor, ring
 
 NAMES = {number.name for number in TARGET_NUMBERS}
@@ -40,10 +48,22 @@ def test_the_defaults_are_of_every_law() -> None:
     assert default_numbers().keys() == NAMES
 
 
-def test_a_law_without_c_is_refused_by_name() -> None:
-    stranger = load_controller("pid")._replace(name="lqr")
-    with pytest.raises(ConfigError, match="exists in Python only; available in C: pid, backstepping"):
-        target_numbers(ring(4), stranger, open_gains("tuned"), 0.6, 500.0, 5)
+def test_user_controller_gives_every_field_of_its_parameters() -> None:
+    controller = example_module().CONTROLLER
+    values = target_numbers(ring(4), controller, open_gains("tuned"), 0.6, 500.0, 5)
+    numbers = {number.name: number.place for number in declared(with_built_in(controller))}
+    assert values["FS_CTRL"] == 2.0
+    for field in controller.params_type._fields:
+        (name,) = (name for name, place in numbers.items() if place == f"controller.lqr.{field}")
+        assert name in values
+
+
+def test_undeclared_field_of_a_user_controller_has_a_number() -> None:
+    tunable = Tunable("rate_roll", "LQR_ROLL_RATE", 0.0, 1e3, "1/s", "gain")
+    controller = example_module().CONTROLLER._replace(tunables=(tunable,))
+    values = target_numbers(ring(4), controller, open_gains("tuned"), 0.6, 500.0, 5)
+    assert values["LQR_ROLL_RATE"] > 0.0
+    assert [values[f"FS_LAW_{index}"] for index in (6, 7, 8)] == list(ring(4).inertia_kg_m2)
 
 
 def test_a_number_beyond_the_target_is_refused_with_its_range() -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,26 +21,10 @@ from flightstack.guidance.trajectory import setpoint_of, trajectory_step
 from flightstack.params.vehicle import load_vehicle
 from tests.parity.generated_laws import LAWS
 from tests.support.generated_c import CFunction, Vectors, compile_program, differences, in_python
+from tests.support.plugin_site import example_module
 from tests.support.rotor_sets import ring
 
 COUNT = 150
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "mission_tests" / "lqr_controller.py"
-
-
-@cache
-def lqr_step() -> Any:
-    """Return the step of the tutorial's controller."""
-    spec = importlib.util.spec_from_file_location("lqr_controller", EXAMPLE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    import sys  # noqa: PLC0415
-
-    sys.modules["lqr_controller"] = module
-    spec.loader.exec_module(module)
-    return module.step
-
-
 OWN: dict[str, Callable[..., Any]] = {
     "PID": attitude_pid_step,
     "backstepping": attitude_backstepping_step,
@@ -61,7 +43,7 @@ OWN: dict[str, Callable[..., Any]] = {
     "logarithm": portable_math.log,
     "distance": portable_math.distance,
 }
-EVERY = {**OWN, **LAWS, "LQR": lqr_step()}
+EVERY = {**OWN, **LAWS, "LQR": example_module().step}
 
 
 class Built:

@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
+import sys
 import tomllib
 from pathlib import Path
+from types import ModuleType
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / "examples" / "mission_tests"
 GROUP = "flightstack.attitude_controllers"
+
+
+def example_module() -> ModuleType:
+    """Import the example's module, without an installation."""
+    spec = importlib.util.spec_from_file_location("lqr_controller", EXAMPLE / "lqr_controller.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["lqr_controller"] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 def install(site: Path, project: Path = EXAMPLE) -> Path:

@@ -35,10 +35,8 @@ void drive_position(uint32_t count, fs_position_memory *memory, const fs_vehicle
                     const fs_real *saturation, fs_attitude_target *target)
 {
     for (uint32_t i = 0; i < count; i++) {
-        fs_real sine, cosine;
-        fs_sin_cos(params[i].max_tilt_rad, &sine, &cosine);
-        fs_position_pid_step(&memory[i], &state[i], &setpoint[i], &params[i], sine / cosine, dt_s[i],
-                             saturation[i], &target[i]);
+        const fs_position_memory before = memory[i];
+        fs_position_pid_step(&before, &state[i], &setpoint[i], &params[i], dt_s[i], saturation[i], &memory[i], &target[i]);
     }
 }
 
@@ -49,9 +47,11 @@ void drive_reference(uint32_t count, fs_reference_memory *memory, const fs_quate
     for (uint32_t i = 0; i < count; i++) {
         const fs_quaternion target = fs_blend(&from[i], &to[i], fraction[i]);
         const fs_quaternion inverse = fs_conjugate(&attitude[i]);
+        const fs_reference_memory before = memory[i];
+        fs_attitude_reference filtered;
         fs_quaternion turn;
-        fs_attitude_reference_step(&memory[i], &target, &params[i], dt_s[i], &memory[i], &reference[i]);
-        fs_in_body_frame(&reference[i], &attitude[i]);
+        fs_attitude_reference_step(&before, &target, &params[i], dt_s[i], &memory[i], &filtered);
+        reference[i] = fs_in_body_frame(&filtered, &attitude[i]);
         turn = fs_quaternion_product(&inverse, &reference[i].attitude);
         error[i] = fs_rotation_vector(&turn);
     }
@@ -61,9 +61,8 @@ void drive_pid(uint32_t count, fs_pid_memory *memory, const fs_attitude_inputs *
                const fs_real *dt_s, fs_vector3 *torque)
 {
     for (uint32_t i = 0; i < count; i++) {
-        const fs_attitude_inputs *in = &inputs[i];
-        torque[i] = fs_attitude_pid_step(&memory[i], &in->error_rad, &in->rates_frd_rad_s, &in->reference,
-                                         &in->saturation, &params[i], dt_s[i]);
+        const fs_pid_memory before = memory[i];
+        fs_attitude_pid_step(&before, &inputs[i], &params[i], dt_s[i], &memory[i], &torque[i]);
     }
 }
 
@@ -71,9 +70,9 @@ void drive_backstepping(uint32_t count, const fs_attitude_inputs *inputs, const 
                         fs_vector3 *torque)
 {
     for (uint32_t i = 0; i < count; i++) {
-        const fs_attitude_inputs *in = &inputs[i];
-        torque[i] = fs_attitude_backstepping_step(&in->error_rad, &in->rates_frd_rad_s, &in->reference,
-                                                  in->relative_rotor_speed_rad_s, &params[i]);
+        const fs_backstepping_memory before = {0};
+        fs_backstepping_memory after;
+        fs_attitude_backstepping_step(&before, &inputs[i], &params[i], 0, &after, &torque[i]);
     }
 }
 
@@ -181,15 +180,15 @@ fs_real drive_get(const fs_loops *loops, uint32_t index)
 
 fs_real drive_integral(const fs_loops *loops, uint32_t axis)
 {
-    const fs_real integrals[3] = {loops->pid_memory.roll, loops->pid_memory.pitch, loops->pid_memory.yaw};
+    const fs_real integrals[3] = {loops->controller_memory.pid.roll, loops->controller_memory.pid.pitch, loops->controller_memory.pid.yaw};
     return integrals[axis];
 }
 
 void drive_set_integral(fs_loops *loops, fs_real value)
 {
-    loops->pid_memory.roll = value;
-    loops->pid_memory.pitch = value;
-    loops->pid_memory.yaw = value;
+    loops->controller_memory.pid.roll = value;
+    loops->controller_memory.pid.pitch = value;
+    loops->controller_memory.pid.yaw = value;
 }
 
 /* Write which of the ticks the outer loop is due in. */

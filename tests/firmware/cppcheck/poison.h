@@ -8,6 +8,7 @@
 #pragma GCC system_header /* no word about macros among what is poisoned */
 
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -15,7 +16,7 @@
 /* There are none on a C28x, whose smallest integer has 16 bits, or no two targets agree on their size. */
 #pragma GCC poison int8_t uint8_t int_least8_t uint_least8_t int_fast8_t uint_fast8_t int_fast16_t uint_fast16_t
 #pragma GCC poison int64_t uint64_t intptr_t uintptr_t intmax_t uintmax_t ptrdiff_t wchar_t
-#pragma GCC poison short int long signed unsigned _Bool bool
+#pragma GCC poison short int long signed unsigned
 
 /* double has 32 bits on an AVR and 64 elsewhere; what a target has no instruction for costs hundreds. */
 #pragma GCC poison double
