@@ -8,19 +8,39 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import subprocess
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from flightstack.control.attitude_controller import AttitudeController
+from flightstack.control.controller_loading import load_controller
 from flightstack.core.errors import ConfigError
-from flightstack.firmware.build import cache_root
+from flightstack.firmware.build import COMPILE_LIMIT_S, EXACT, BuildError, cache_root, host_compiler
 from flightstack.firmware.numbers import CONTROLLERS, law_name, with_built_in
 from flightstack.firmware.sources import firmware_root, source_hash, using_firmware
 
 _LAW_MATH = "fs_law_math.h"
+_GENERAL = frozenset(
+    ("fs_attitude_reference.c", "fs_position_pid.c", "fs_attitude_pid.c", "fs_attitude_backstepping.c")
+)
+"""Generated files that are the same for every controller."""
 _KEPT = 8
+WARNINGS = (
+    "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion", "-Wdouble-promotion", "-Wshadow",
+    "-Wstrict-prototypes", "-Wmissing-prototypes", "-Wundef", "-Wvla", "-Wcast-qual", "-Wpointer-arith",
+)  # fmt: skip
+
+
+def controller_named(name: str) -> AttitudeController:
+    """Return the installed attitude controller ``name``; raise ConfigError if it is missing or broken."""
+    return load_controller(name)
+
+
+def is_built_in(controller: AttitudeController) -> bool:
+    """Return True if the installation's firmware has the controller."""
+    return any(controller.name == known.name for known in CONTROLLERS)
 
 
 def generated_files(controller: AttitudeController) -> dict[str, str]:
@@ -37,14 +57,39 @@ def generated_files(controller: AttitudeController) -> dict[str, str]:
     return texts
 
 
+def generated_names(controller: AttitudeController) -> set[str]:
+    """Return the names of the files that the installation's firmware does not have."""
+    core = firmware_root() / "core"
+    return {name for name in generated_files(controller) if not (core / name).exists()}
+
+
 def write_tree(controller: AttitudeController, folder: Path) -> Path:
-    """Write the whole firmware with this controller to ``folder``; return it. Raise ConfigError, OSError."""
+    """Write the whole firmware with this controller to ``folder``; return it. Raise ConfigError, OSError.
+
+    The generated files are compiled once, with all warnings as errors.
+    """
     texts = generated_files(controller)
     ignored = shutil.ignore_patterns("__pycache__", "*.pyc", "build")
     shutil.copytree(firmware_root(), folder, ignore=ignored, dirs_exist_ok=True)
     for name, text in texts.items():
         (folder / "core" / name).write_text(text, encoding="ascii")
+    laws = sorted(name for name in texts if name.endswith(".c") and name not in _GENERAL)
+    _compile_strictly(controller, [folder / "core" / name for name in laws])
     return folder
+
+
+def _compile_strictly(controller: AttitudeController, sources: list[Path]) -> None:
+    """Raise ConfigError if a compiler of this machine has a warning for the generated files."""
+    try:
+        command = [*host_compiler().command, *EXACT, *WARNINGS, "-fsyntax-only", *map(str, sources)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=COMPILE_LIMIT_S)
+    except (BuildError, OSError, subprocess.TimeoutExpired) as error:
+        raise ConfigError("--controller", controller.name, f"its C cannot be compiled: {error}") from None
+    if done.returncode != 0:
+        said = next((line for line in done.stderr.splitlines() if "error" in line), "no message")
+        raise ConfigError(
+            "--controller", controller.name, f"its C does not compile without a warning: {said}"
+        )
 
 
 def law_tree(controller: AttitudeController) -> Path:
@@ -52,7 +97,7 @@ def law_tree(controller: AttitudeController) -> Path:
 
     Raise ConfigError if the controller's law is outside the generator's subset.
     """
-    if any(controller.name == known.name for known in CONTROLLERS):
+    if is_built_in(controller):
         return firmware_root()
     digest = hashlib.sha256(source_hash())
     for name, text in sorted(generated_files(controller).items()):

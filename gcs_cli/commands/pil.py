@@ -74,6 +74,23 @@ def replay(
 
 
 @app.command()
+def generate(
+    controller: Annotated[
+        str, typer.Option("--controller", metavar="NAME", help="An installed attitude controller.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="DIR", help="Directory.  [default: build/firmware-<name>]"),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write the firmware with a controller of your own, as C for a board."""
+    from gcs_cli.pil.pil_commands import run_generate
+
+    run_generate(controller, out, as_json)
+
+
+@app.command()
 def doctor(
     port: Annotated[
         str | None,

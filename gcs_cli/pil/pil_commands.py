@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.console import Console
 
+from flightstack.firmware.law_tree import controller_named, generated_names, is_built_in, write_tree
 from gcs_cli.errors import FAILED, USAGE, CliError
 from gcs_cli.fly.fly_display import FlyConsole
 from gcs_cli.fly.fly_flags import FlyOptions, ResultOptions, RunOptions
@@ -46,6 +47,26 @@ def run_replay(
     write_outcome(folder, outcome)
     _show(outcome, folder, console, chosen)
     _check_verdict(outcome, fail_over)
+
+
+def run_generate(name: str, out: Path | None, as_json: bool) -> None:
+    """Write the firmware with a controller's law and name its files; raise CliError, ConfigError."""
+    controller = controller_named(name)
+    if is_built_in(controller):
+        raise CliError(f"--controller {name}: the firmware has it already", USAGE)
+    folder = out or Path("build") / f"firmware-{name}"
+    try:
+        write_tree(controller, folder)
+    except OSError as error:
+        raise CliError(f"{folder}: cannot be written: {error.strerror}", USAGE) from None
+    step = sorted(generated_names(controller))
+    if as_json:
+        print(json.dumps({"controller": name, "directory": str(folder), "files": step}), flush=True)
+        return
+    console = FlyConsole(highlight=False)
+    console.print(f"firmware with {name}: {folder}/", markup=False, highlight=False, soft_wrap=True)
+    for file in step:
+        console.print(f"  core/{file}", markup=False, highlight=False, soft_wrap=True)
 
 
 def run_doctor(

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from flightstack.control.controller_loading import load_controller
 from flightstack.core.contract import FloatArray
 from flightstack.core.errors import ConfigError, TargetError
 from flightstack.firmware.c_loops import CLoops, LoopsSetup
 from flightstack.firmware.choice import PYTHON, SERIAL, LoopsChoice
+from flightstack.firmware.law_tree import controller_named
 from flightstack.firmware.targets import finish_loops, make_loops
 from flightstack.params.gains_file import DEFAULT_GAINS, open_gains
 from flightstack.params.vehicle import Vehicle, load_vehicle
@@ -79,7 +79,7 @@ def _setup(flight: FlightSamples, log: Path, vehicle: str | None) -> LoopsSetup:
         raise ConfigError(log, "", f"cannot be replayed: it does not say its {error.args[0]}") from error
     return LoopsSetup(
         _vehicle(flight, log, vehicle),
-        load_controller(name),
+        controller_named(name),
         open_gains(DEFAULT_GAINS),  # each gain is a parameter, and the values of the log replace them
         math.radians(tilt_deg),
         inner_hz,

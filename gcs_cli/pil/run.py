@@ -64,7 +64,9 @@ def run(
     A flight that fails ends the run; the flights until then are compared.
     """
     choice = checked_target(target)
-    check_there(choice, options.controller)
+    tree = check_there(choice, options.controller)
+    if tree is not None:
+        console.print(f"C    of {options.controller}: {tree}", markup=False, highlight=False, soft_wrap=True)
     folder = make_pil_directory(options.plan_path.stem, out, overwrite)
     flights: dict[str, Flown] = {}
     problem = None

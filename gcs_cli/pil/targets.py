@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from flightstack.control.controller_loading import load_controller
+from pathlib import Path
+
 from flightstack.firmware.build import BuildError, host_library
 from flightstack.firmware.choice import EMULATED, HOST, SERIAL, C, LoopsChoice, parse_loops
-from flightstack.firmware.law_tree import firmware_for
+from flightstack.firmware.law_tree import controller_named, firmware_for, is_built_in
 from flightstack.firmware.targets import open_link
 from flightstack.transports.byte_link import LineError
 from gcs_cli.errors import USAGE, CliError
@@ -38,12 +39,17 @@ def checked_target(text: str, more: tuple[str, ...] = (), flag: str = "--target"
     return parse_loops(text, flag)
 
 
-def check_there(target: LoopsChoice, controller: str) -> None:
-    """Raise CliError (usage) if the target does not open, ConfigError if the controller has no C."""
+def check_there(target: LoopsChoice, controller: str) -> Path | None:
+    """Return the folder of the firmware that was generated for a user's controller.
+
+    Raise CliError (usage) if the target does not open, ConfigError if the controller has no C.
+    """
+    law = controller_named(controller)
     try:
-        with firmware_for(load_controller(controller)):
+        with firmware_for(law) as tree:
             host_library()
             open_link(target).close()
+            return None if is_built_in(law) else tree
     except (BuildError, LineError) as error:
         raise CliError(str(error), USAGE) from None
 

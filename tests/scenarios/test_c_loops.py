@@ -20,6 +20,7 @@ from tests.firmware.app_support import Target
 from tests.parity.recorded_loops import record
 from tests.support.lossy_line import LineFaults, LossyLine
 from tests.support.plan_items import item
+from tests.support.plugin_site import example_module
 
 SPEEDS = np.zeros(8, np.float32)
 
@@ -160,12 +161,16 @@ def test_other_loops_are_refused_in_one_sentence(word: str, sentence: str) -> No
         build(StackConfig(loops=word), lambda: None)
 
 
-def test_a_controller_of_python_alone_cannot_fly_in_c(monkeypatch) -> None:
-    from tests.support.failing_controller import CONTROLLER  # noqa: PLC0415
-
-    monkeypatch.setattr("flightstack.process.assembly.load_controller", lambda _: CONTROLLER)
-    with pytest.raises(ConfigError, match="exists in Python only; available in C: pid, backstepping"):
-        build(StackConfig(loops="c"), lambda: None)
+def test_user_controller_flies_in_generated_c(monkeypatch) -> None:
+    controller = example_module().CONTROLLER
+    monkeypatch.setattr("flightstack.process.assembly.load_controller", lambda _: controller)
+    in_c, in_python = (flown(loops=loops, controller="lqr") for loops in ("c", "python"))
+    assert in_c.reached == in_python.reached == [0, 1, 2, 3, 4, 5]
+    assert in_c.state.position_ned_m == pytest.approx(in_python.state.position_ned_m, abs=1e-4)  # 1e-6 seen
+    loops = in_c.engine.stack.loops
+    assert loops.get_parameter("LQR_ANGLE_ROLL") == pytest.approx(200.0)
+    loops.set_parameter("LQR_ANGLE_ROLL", 150.0)
+    assert loops.get_parameter("LQR_ANGLE_ROLL") == 150.0
 
 
 def test_without_a_compiler_one_sentence_says_what_to_do(monkeypatch) -> None:

@@ -65,14 +65,15 @@ def core_files(controllers: Sequence[AttitudeController]) -> dict[str, str]:
     """Return the text of every generated file of ``core`` by name; raise OutsideSubsetError, ConfigError."""
     numbers = declared(controllers)
     check_names(numbers)
+    program = law_program(controllers)
     texts = {
         "fs_types.h": types(),
         "fs_numbers.h": numbers_header(controllers, len(numbers)),
         "fs_param_table.c": table(numbers, default_numbers(controllers)),
         "fs_controllers.h": controllers_header(),
-        "fs_controllers.c": controllers_source(controllers),
+        "fs_controllers.c": controllers_source(controllers, program),
     }
-    for unit in law_program(controllers).written():
+    for unit in program.written():
         if unit.module in INLINE:
             texts[f"{unit.name}.h"] = unit.inline()
         else:
@@ -151,9 +152,8 @@ def controllers_header() -> str:
     return header("FS_CONTROLLERS_H", '"fs_numbers.h"', "\n".join(body))
 
 
-def controllers_source(controllers: Sequence[AttitudeController]) -> str:
+def controllers_source(controllers: Sequence[AttitudeController], program: Program) -> str:
     """Return fs_controllers.c: a table of the attitude laws."""
-    program = law_program(controllers)
     headers = {f"{program.header_of(program.add(controller.step))}.h" for controller in controllers}
     parts = [NOTICE.strip(), '#include "fs_controllers.h"', ""]
     parts += [*(f'#include "{name}"' for name in sorted({*headers, "fs_math.h"})), ""]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import enum
+import functools
 import sys
 import typing
 from collections.abc import Mapping
@@ -38,8 +39,7 @@ class Record:
     @property
     def fields(self) -> dict[str, Type]:
         """Types of the fields; raise TypeError for one outside the subset."""
-        names = vars(sys.modules[self.kind.__module__])
-        return {name: _resolved(text, names) for name, text in self.kind.__annotations__.items()}
+        return _fields(self.kind)
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,14 @@ class Array:
 
 
 Type: TypeAlias = Scalar | Record | Several | Array
+
+
+@functools.cache
+def _fields(kind: type) -> dict[str, Type]:
+    names = vars(sys.modules[kind.__module__])
+    return {name: _resolved(text, names) for name, text in kind.__annotations__.items()}
+
+
 _PLAIN: dict[Any, Type] = {float: REAL, int: INT, bool: BOOL, None: NOTHING, type(None): NOTHING}
 
 
