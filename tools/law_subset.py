@@ -1,0 +1,60 @@
+"""The page of docs/reference about C generated from control laws, with the table of refused constructs."""
+
+from __future__ import annotations
+
+from flightstack.firmware.generator.subset import ADVICE
+
+HEAD = """\
+# C from a control law
+
+{note}
+
+`--loops c`, `host`, `emulated` and `serial:DEVICE`, and `gcs pil`, fly a
+[controller of your own](../tutorials/controller.md) in C: the firmware's sources are copied to
+`~/.cache/flightstack/firmware/laws/<name>-<hash>`, the law is written into `core` there, compiled with all warnings as
+errors, and built for the target. `gcs pil generate --controller NAME` writes the same folder to
+`build/firmware-<name>`, for a board. With `double` the C has the bits of Python.
+
+## Subset
+
+Functions marked `@compiled`, with annotations. Types come from annotations and NamedTuples.
+
+| Python | C |
+|---|---|
+| `float`, `int`, `bool` | `fs_real` (float on a target), `int32_t`, `bool` |
+| NamedTuple | `struct`, by `const` pointer; prefix `fs_`, or the name of your package |
+| `Annotated[FloatArray, 3, 4]`; `np.zeros(3)` | array of that size; local array |
+| array or nested tuple of floats of a module | `static const` table |
+| `Annotated[FloatArray, "rotors"]` | array of `FS_MAX_ROTORS` with the number of rotors beside it |
+| one result; several results | value; pointers `<name>_out`, none of them to an argument |
+| `a = state.attitude` | pointer, if neither changes |
+| assignment to a parameter `x` | variable `new_x` |
+| constant of a module | `#define` with the prefix; π is `FS_PI` |
+| `if`, conditional expression, `and`, `or`, `not`, chained comparison | the same |
+| `for i in range(…)`, `break`, `continue` | `for`; bounds are constants, sizes of arrays, variables of outer loops |
+| `min`, `max` | `fs_min`, `fs_max`: the first unless a later one is beyond it |
+| `abs`, `math.sqrt`, `isfinite`, `isnan`, `floor`, `copysign`, `ldexp`, `frexp` | `fs_…`, equal on every processor |
+| functions of `flightstack.core.portable_math` and `geometry` | generated along |
+| `_private` function | `static` |
+| docstring, comments | comments, in ASCII; each function names its line of Python |
+
+Division by zero gives infinity or NaN, as in compiled Python. `math.floor` of NaN stays NaN. `int` of a float saturates at
+2³¹ in C.
+
+## Refused
+
+A construct outside the subset is refused with file, line and advice:
+
+```text
+gcs: --controller: lqr: has no C: lqr_controller.py:40: power: write `x * x`, or `exp(y * log(x))` of …
+```
+
+| construct | instead |
+|---|---|
+"""
+
+
+def subset_page(note: str) -> str:
+    """Return the page."""
+    rows = (f"| {construct} | {advice.replace('|', chr(92) + '|')} |" for construct, advice in ADVICE.items())
+    return HEAD.replace("{note}", note) + "\n".join(rows) + "\n"
