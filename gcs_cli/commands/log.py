@@ -169,7 +169,8 @@ def _chosen(logs: tuple[LogEntry, ...], number: int | None) -> LogEntry:
     for log in logs:
         if log.log_id == number:
             return log
-    first, last = logs[0].log_id, logs[-1].log_id
+    numbers = [log.log_id for log in logs]
+    first, last = min(numbers), max(numbers)
     raise CliError(f"no log {number}: the vehicle has {first} to {last}", FAILED)
 
 
