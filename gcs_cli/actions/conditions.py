@@ -90,6 +90,13 @@ def _ready_text(view: VehicleView) -> str:
     return f"pre-arm check {check}, position {'known' if view.has_position else 'unknown'}"
 
 
+def _mission_text(view: VehicleView) -> str:
+    item = view.mission.item_text
+    if not view.mission.is_end_unknown or view.armed:
+        return item or "no mission"
+    return f"{item}, and the vehicle does not report whether it was flown before"
+
+
 def is_ready(view: VehicleView) -> bool:
     """Return True if the vehicle can be armed and flown: its pre-arm check passes, and it has a position.
 
@@ -104,7 +111,7 @@ STATES: Mapping[str, tuple[Callable[[VehicleView], bool], Callable[[VehicleView]
     "landed": (lambda view: view.on_ground is True, _landed_text),
     "in-air": (lambda view: view.landed_state == 2, _landed_text),
     "ready": (is_ready, _ready_text),
-    "complete": (lambda view: view.mission.complete, lambda view: view.mission.item_text or "no mission"),
+    "complete": (lambda view: view.mission.complete, _mission_text),
 }
 """Conditions of one word."""
 
