@@ -18,6 +18,8 @@ app = make_app(add_completion=False)
 
 GATHER_S = 0.5
 """Longest wait for the values after the first heartbeat; a vehicle may not send all of them."""
+SLOW_S = 1.2
+"""The same for those that every autopilot sends, PX4 some of them once a second."""
 
 
 @app.command()
@@ -33,7 +35,8 @@ def status(context: typer.Context, link: LinkOptions) -> None:
         session = connection.session
         session.subscribe(ROTORS_AND_TIMING)
         # most messages come several times a second; values that the vehicle does not send stay unknown
-        connection.wait_for(lambda: _is_full(session.view), GATHER_S)
+        if not connection.wait_for(lambda: _is_full(session.view), GATHER_S):
+            connection.wait_for(lambda: _has_state(session.view), SLOW_S - GATHER_S)
         facts = {**status_facts(session.view), **_link_facts(session.quality)}
     lines = [f"{name:<20} {_shown(value)}" for name, value in facts.items()]
     output_of(context, link).say("status", "\n".join(lines), **facts)
@@ -47,16 +50,14 @@ def _link_facts(quality: LinkQuality) -> dict[str, Any]:
     }
 
 
-def _is_full(view: VehicleView) -> bool:
-    known = (
-        view.attitude,
-        view.position_ned_m,
-        view.geo,
-        view.mission.current,
-        view.timing,
-        view.rotor_rpm or None,
-    )
+def _has_state(view: VehicleView) -> bool:
+    known = (view.attitude, view.geo, view.mission.current, view.healthy)
     return all(part is not None for part in known) and view.landed_state != 0
+
+
+def _is_full(view: VehicleView) -> bool:
+    extra = (view.position_ned_m, view.timing, view.rotor_rpm or None)
+    return _has_state(view) and all(part is not None for part in extra)
 
 
 def status_facts(view: VehicleView) -> dict[str, Any]:
@@ -66,6 +67,7 @@ def status_facts(view: VehicleView) -> dict[str, Any]:
     return {
         "system": None if view.identity is None else view.identity.system_id,
         "type": None if view.identity is None else view.identity.kind,
+        "autopilot": None if view.identity is None else view.autopilot.name,
         "mode": view.mode,
         "armed": view.armed,
         "landed": {1: "on ground", 2: "in air", 3: "taking off", 4: "landing"}.get(view.landed_state),
@@ -76,10 +78,11 @@ def status_facts(view: VehicleView) -> dict[str, Any]:
         "latitude_deg": None if geo is None else geo.latitude_deg,
         "longitude_deg": None if geo is None else geo.longitude_deg,
         "altitude_m": None if geo is None else geo.altitude_m,
+        "relative_altitude_m": view.relative_altitude_m,
         "mission_current": view.mission.current,
         "mission_total": view.mission.total,
         "mission_reached": view.mission.reached,
-        "mission_complete": view.mission.complete,
+        "mission_complete": None if view.mission.is_end_unknown else view.mission.complete,
         "battery_remaining": None if battery is None else battery.remaining,
         "rotor_rpm": list(view.rotor_rpm),
         "inner_hz": None if timing is None else timing.inner_hz,
