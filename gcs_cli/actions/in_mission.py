@@ -53,7 +53,7 @@ def jump(seq: int) -> Action:
             Step(
                 "mission jump",
                 common_commands.set_mission_current(number),
-                lambda view: view.mission.current == number,
+                lambda view: view.mission.current == seq,
                 f"does not report item {seq} as the current one",
                 instead=lambda *target: mavlink.MAVLink_mission_set_current_message(*target, number),
             ),

@@ -102,6 +102,7 @@ def erase(
         if not yes:
             typer.confirm(f"erase {len(before)} logs of {size} from the vehicle?", abort=True)
         left = log_calls.erase_logs(connection, len(before))
+    left = log_calls.kept_logs(before, left)
     if len(left) == len(before) and len(before) > 1:
         raise CliError(f"the vehicle still has all {len(left)} logs")
     count = len(before) - len(left)

@@ -39,6 +39,12 @@ def oldest_first(logs: tuple[LogEntry, ...]) -> tuple[LogEntry, ...]:
     )
 
 
+def kept_logs(before: tuple[LogEntry, ...], after: tuple[LogEntry, ...]) -> tuple[LogEntry, ...]:
+    """Return the logs that an erase has left; a smaller one of the same number began since, as on ArduPilot."""
+    sizes = {log.log_id: log.size for log in before}
+    return tuple(log for log in after if log.size >= sizes.get(log.log_id, log.size + 1))
+
+
 def erase_logs(connection: Connection, before: int) -> tuple[LogEntry, ...]:
     """Erase the ``before`` logs of the vehicle; return those that are left; raise CliError."""
     client = _log_client(connection)

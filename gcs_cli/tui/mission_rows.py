@@ -49,10 +49,9 @@ def mission_table(plan: Plan, home: GeoPoint | None) -> MissionTable:
 
 
 def mission_progress(table: MissionTable, view: VehicleView) -> Progress:
-    """Return the progress that the vehicle reports, numbered as the items of the table."""
-    first = int(view.autopilot.mission_begins_with_home)
+    """Return the progress that the vehicle reports in items of the table."""
     current, reached = (
-        None if number is None or not 0 <= number - first < len(table.items) else number - first
+        None if number is None or number >= len(table.items) else number
         for number in (view.mission.current, view.mission.reached)
     )
     stop = None if current is None else table.stops.get(current)

@@ -284,21 +284,28 @@ def _extended_state(view: VehicleView, message: Any, _now_s: float) -> VehicleVi
     return view._replace(landed_state=message.landed_state)
 
 
+def _plan_number(view: VehicleView, seq: int) -> int | None:
+    """Return the number in the plan of an item of the vehicle's mission; None for the home of ArduPilot."""
+    number = seq - view.autopilot.mission_begins_with_home
+    return number if number >= 0 else None
+
+
 def _mission_current(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     total = None if message.total == _NO_NUMBER else message.total
     state = message.mission_state or None
     reached = view.mission.reached
     if total is not None and reached is not None and reached >= total:
         reached = None  # of a former mission
-    mission = view.mission._replace(current=message.seq, total=total, reached=reached, state=state)
+    current = _plan_number(view, message.seq) or 0
+    mission = view.mission._replace(current=current, total=total, reached=reached, state=state)
     if not mission.is_at_last:
         mission = mission._replace(flies_last=False, has_ended=False)
     return view._replace(mission=mission)
 
 
 def _item_reached(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    mission = view.mission._replace(reached=message.seq)
-    is_last = message.seq + 1 == mission.total
+    mission = view.mission._replace(reached=_plan_number(view, message.seq))
+    is_last = mission.reached is not None and mission.reached + 1 == mission.total
     return view._replace(mission=mission._replace(has_ended=mission.has_ended or is_last))
 
 
@@ -318,7 +325,12 @@ def _with_rotors(view: VehicleView, first: int, speeds_rpm: Iterable[float]) -> 
 
 
 def _esc_telemetry(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    """ArduPilot's ESC_TELEMETRY_1_TO_4 and the like: the speeds of four rotors, the first one in the name."""
+    """ArduPilot's ESC_TELEMETRY_1_TO_4 and the like: the speeds of four rotors, the first one in the name.
+
+    An ESC that draws current at no speed does not measure it, as in ArduPilot's simulation.
+    """
+    if any(message.current) and not any(message.rpm):
+        return view._replace(rotor_rpm=())
     first = int(message.get_type().split("_")[2]) - 1
     return _with_rotors(view, first, message.rpm)
 

@@ -85,7 +85,7 @@ class Setpoint(NamedTuple):
 
 
 class Mission(NamedTuple):
-    """Mission progress. ``reached`` is the last item reached; ``state`` is a MISSION_STATE."""
+    """Mission progress, in numbers of the plan. ``reached`` is the last item reached, ``state`` a MISSION_STATE."""
 
     current: int | None = None
     total: int | None = None

@@ -11,7 +11,7 @@ from flightstack.mavlink.link import Address, Link, Message
 from flightstack.services.logs.log_server import LogServer
 from flightstack.transports.memory import LOSSLESS, Conditions
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
-from gcs_cli.transfers.log_calls import oldest_first
+from gcs_cli.transfers.log_calls import kept_logs, oldest_first
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station, content
 from tests.support.tools import NIGHTLY
 
@@ -255,6 +255,12 @@ def test_logs_are_ordered_by_time_because_px4_numbers_them_in_no_order() -> None
     assert [log.log_id for log in oldest_first(logs)] == [2, 0, 1]
     unknown = (*logs, LogEntry(3, 9, 0))
     assert oldest_first(unknown) == unknown
+
+
+def test_log_that_begins_after_an_erase_was_not_left_by_it() -> None:
+    before = (LogEntry(1, 500, 0), LogEntry(2, 900, 0))
+    assert kept_logs(before, (LogEntry(1, 0, 0),)) == ()
+    assert kept_logs(before, (LogEntry(2, 950, 0), LogEntry(3, 10, 0))) == (LogEntry(2, 950, 0),)
 
 
 def erased(vehicle: Vehicle, conditions: Conditions = LOSSLESS, seed: int = 0) -> LogDone | LogFailed | None:

@@ -10,7 +10,6 @@ import pytest
 from textual.pilot import Pilot
 from textual.widgets import Input
 
-from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Command, Frame, Plan
 from gcs_cli.actions.in_mission import jump
 from gcs_cli.errors import FAILED, CliError
@@ -65,11 +64,6 @@ def test_distance_to_go_is_from_the_vehicle_in_flight_and_from_the_start_before(
     assert seconds == pytest.approx(5.0 + 15.0, abs=0.01)
     assert to_go(TABLE, 3, Progress()) == (TABLE.stops[3].distance_m, TABLE.stops[3].time_s)
     assert summary(TABLE, progress) == "item 1 of 5 items, 86 m and 0:38 to go"
-
-
-def test_progress_of_a_mission_that_begins_with_home_is_one_item_less():
-    view = FLYING._replace(identity=Identity(1, 1, 2, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA))
-    assert mission_progress(TABLE, view)[:2] == (0, None)
 
 
 @pytest.mark.parametrize("width", [78, 118, 198])

@@ -57,8 +57,13 @@ def test_arducopter_reports_its_state(arducopter: list[VehicleView]) -> None:
     assert view.estimator.healthy
     assert view.wind_ned_m_s is not None
     assert view.battery is not None
-    assert len(view.rotor_rpm) == 4
-    assert view.mission.reached == 3
+    assert view.rotor_rpm == ()  # 0.8 A and no speed
+
+
+def test_arducopter_mission_is_counted_without_its_home(arducopter: list[VehicleView]) -> None:
+    missions = [view.mission for view in arducopter]
+    assert (missions[-1].current, missions[-1].total, missions[-1].reached) == (3, 4, 2)
+    assert min(mission.current for mission in missions if mission.current is not None) == 0
 
 
 def test_arducopter_can_arm_once_its_filter_has_a_position(arducopter: list[VehicleView]) -> None:
