@@ -15,6 +15,9 @@ from hypothesis import settings
 # the dialect of version 1, whose messages cannot be signed
 os.environ.setdefault("MAVLINK20", "1")
 
+# the matrices of the tests are small: a second thread of BLAS waits actively, which costs four times the CPU time
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # a shell that runs the tests in its background lets them, and all that they start, ignore Ctrl-C: no test of
 # Ctrl-C could pass
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

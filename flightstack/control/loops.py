@@ -24,6 +24,7 @@ from flightstack.control.position_pid import (
     PositionParams,
     position_pid_step,
 )
+from flightstack.core.array_items import as_tuple, store
 from flightstack.core.arrays import (
     achieved_wrench,
     attitude_target,
@@ -34,7 +35,7 @@ from flightstack.core.arrays import (
     store_wrenches,
     vehicle_state,
 )
-from flightstack.core.compiled import as_tuple, compiled, direct, specialise, store
+from flightstack.core.compiled import compiled, direct, specialise
 from flightstack.core.contract import (
     ATTITUDE_TARGET_SIZE,
     MAX_ROTORS,

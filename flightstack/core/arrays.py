@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from flightstack.core.compiled import compiled, store
+from flightstack.core.array_items import store
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import (
     AttitudeTarget,
     FloatArray,

@@ -18,14 +18,14 @@ from types import FunctionType
 from typing import Any, ClassVar, TypeVar
 
 import numba
-import numpy as np
+from numba.core.caching import FunctionCache
 from numba.core.registry import CPUDispatcher
-from numba.extending import overload, register_jitable
+from numba.extending import register_jitable
 from numba.np import linalg
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from flightstack.core import portable_math
 from flightstack.core.kernel_cache import directory, is_own
+from flightstack.core.kernel_compiler import KernelCompiler, PartCache, PartCompiler
 
 
 def _import_without_scipy() -> None:
@@ -48,7 +48,7 @@ specialised: dict[tuple[Callable[..., Any], str], Callable[..., Any]] = {}
 """Kernels made by ``specialise`` in this process, by template and key."""
 
 for _function in portable_math.FUNCTIONS:
-    register_jitable(error_model="numpy", no_cfunc_wrapper=True)(_function)
+    register_jitable(error_model="numpy", no_cfunc_wrapper=True, pipeline_class=PartCompiler)(_function)
 
 
 class _Kernel(CPUDispatcher):  # type: ignore[misc]  # Numba has no types
@@ -57,23 +57,24 @@ class _Kernel(CPUDispatcher):  # type: ignore[misc]  # Numba has no types
     _OPTIONS: ClassVar = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
     def __init__(self, function: Callable[..., Any], modules: frozenset[str]) -> None:
-        super().__init__(function, targetoptions=self._OPTIONS)
+        super().__init__(function, targetoptions=self._OPTIONS, pipeline_class=KernelCompiler)
         self._modules = modules
-        self._enable_cache(self)
+        self._enable_cache(self, FunctionCache)
 
-    def _enable_cache(self, dispatcher: CPUDispatcher) -> None:
+    def _enable_cache(self, dispatcher: CPUDispatcher, cache: type[FunctionCache]) -> None:
         if not is_own(self.py_func.__module__):
             return
         if "NUMBA_CACHE_DIR" not in os.environ:  # Numba reads this setting for each function
             numba.config.CACHE_DIR = str(directory(self._modules, numba.__version__))
-        dispatcher.enable_caching()
+        dispatcher._cache = cache(dispatcher.py_func)
 
     @cached_property
     def part(self) -> CPUDispatcher:
-        """The same function without the wrapper for Python, which takes a quarter of the time to compile."""
+        """The same function without machine code and without the wrapper for Python."""
         copy = _renamed(self.py_func, "part", self.py_func.__globals__)
-        part = CPUDispatcher(copy, targetoptions={**self._OPTIONS, "no_cpython_wrapper": True})
-        self._enable_cache(part)  # under the name of the copy
+        options = {**self._OPTIONS, "no_cpython_wrapper": True}
+        part = CPUDispatcher(copy, targetoptions=options, pipeline_class=PartCompiler)
+        self._enable_cache(part, PartCache)  # under the name of the copy
         return part
 
     @property
@@ -143,26 +144,3 @@ def specialise(template: Callable[..., Any], key: str, **names: Any) -> Callable
     modules = {getattr(value, "__module__", None) or template.__module__ for value in names.values()}
     specialised[template, key] = _compile(copy, frozenset(filter(is_own, {copy.__module__, *modules})))
     return specialised[template, key]
-
-
-def as_tuple(array: Any, count: int) -> Any:
-    """Return the first ``count`` (a constant) values of a float64 array as a tuple."""
-    return tuple(array[:count].tolist())
-
-
-@overload(as_tuple, prefer_literal=True, jit_options={"no_cfunc_wrapper": True})
-def _as_tuple(array, count):  # type: ignore[no-untyped-def]  # Numba compares both signatures with annotations
-    if isinstance(count, numba.types.Literal):
-        return lambda array, count: to_fixed_tuple(array, count)  # noqa: PLW0108  # Numba compares the names too
-    return None
-
-
-@compiled
-def store(out: np.ndarray[Any, np.dtype[np.float64]], values: Any) -> None:
-    """Write a flat tuple or an array of floats to the start of ``out``.
-
-    Items are written one by one because ``out[:] = values`` takes Numba two seconds to compile, for the message about
-    shapes that do not match.
-    """
-    for index in range(len(values)):
-        out[index] = values[index]

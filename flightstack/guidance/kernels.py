@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from flightstack.core.array_items import as_tuple, store
 from flightstack.core.arrays import (
     attitude_target,
     position_setpoint,
@@ -13,7 +14,7 @@ from flightstack.core.arrays import (
     store_position_setpoint,
     vehicle_state,
 )
-from flightstack.core.compiled import as_tuple, compiled, store
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import (
     AttitudeTarget,
     FloatArray,

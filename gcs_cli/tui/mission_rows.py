@@ -49,7 +49,9 @@ def mission_table(plan: Plan, home: GeoPoint | None) -> MissionTable:
 
 
 def mission_progress(table: MissionTable, view: VehicleView) -> Progress:
-    """Return the progress that the vehicle reports in items of the table."""
+    """Return the progress that the vehicle reports, numbered as the items of the table."""
+    if view.mission.complete:
+        return Progress(reached=len(table.items) - 1)
     current, reached = (
         None if number is None or number >= len(table.items) else number
         for number in (view.mission.current, view.mission.reached)

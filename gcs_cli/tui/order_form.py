@@ -24,6 +24,7 @@ class OrderForm(ModalScreen[list[Any] | None]):
                            background: $surface; }
     OrderForm Label { width: 1fr; }
     OrderForm Input { margin-bottom: 1; }
+    OrderForm Label { width: 100%; }
     OrderForm .title { text-style: bold; color: $accent; margin-bottom: 1; }
     OrderForm #problem { color: $error; }
     """
@@ -51,7 +52,7 @@ class OrderForm(ModalScreen[list[Any] | None]):
 
     def on_mount(self) -> None:
         """Put the cursor into the first field."""
-        self.query(Input).first().focus()
+        self.set_focus(self.query(Input).first())
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Go to the next field; after the last one end with the values, or show what is wrong."""
@@ -65,7 +66,7 @@ class OrderForm(ModalScreen[list[Any] | None]):
                 values.append(field.parse(entered.value, self._view))
             except FieldError as error:
                 self.query_one("#problem", Label).update(str(error))
-                entered.focus()
+                self.set_focus(entered)
                 return
         self.dismiss(values)
 

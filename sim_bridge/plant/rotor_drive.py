@@ -23,13 +23,14 @@ import math
 
 import numpy as np
 
-from flightstack.core.compiled import compiled, store
+from flightstack.core.array_items import store
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import MAX_ROTORS, FloatArray, Record, RecordArray, Vector3
 from sim_bridge.plant.battery import discharge
 from sim_bridge.plant.integrator import LARGEST_TURN_RAD, next_gust
 from sim_bridge.plant.layout import CONTACT, DIVERGED
 from sim_bridge.plant.near_ground import thrust_ratio, wind_share
-from sim_bridge.plant.rigid import after_step, rotation
+from sim_bridge.plant.rigid import Rotation, after_step, rotation
 from sim_bridge.plant.rotors import drive_acceleration, half_step, take_commands
 
 _LARGEST = 1e9  # of the sum of the state: MuJoCo resets larger states
@@ -140,6 +141,24 @@ def _write_drive_torques(
 
 
 @compiled
+def _force_on_frame(x: FloatArray, r: Rotation, m: Record, share: float) -> Vector3:
+    """Return drag and external force NED [N], with this share of the mean wind."""
+    n, e, d = r
+    wind, gust, push, drag = m["wind"], m["gust"], m["force"], m["drag"]
+    vn = x[3] - share * wind[0] - gust[0]
+    ve = x[4] - share * wind[1] - gust[1]
+    vd = x[5] - share * wind[2] - gust[2]
+    fx = -drag[0] * (n.x * vn + e.x * ve + d.x * vd)
+    fy = -drag[1] * (n.y * vn + e.y * ve + d.y * vd)
+    fz = -drag[2] * (n.z * vn + e.z * ve + d.z * vd)
+    return Vector3(
+        n.x * fx + n.y * fy + n.z * fz + push[0],
+        e.x * fx + e.y * fy + e.z * fz + push[1],
+        d.x * fx + d.y * fy + d.z * fz + push[2],
+    )
+
+
+@compiled
 def apply_forces(
     memory: RecordArray, drive: RecordArray, stage: int, bias: FloatArray, contact: FloatArray,
     applied: FloatArray, on_body: FloatArray,
@@ -151,21 +170,12 @@ def apply_forces(
     """
     m, d = memory[0], drive[0]
     x, rotors, when = m["stage"], m["rotor_count"], (stage + 1) // 2
-    n, e, z = rotation(x)
-    wind, gust, push, torque, air_drag = m["wind"], m["gust"], m["force"], m["torque"], m["drag"]
-    blow, lift = 1.0, 1.0  # share of the mean wind, thrust over that far from the ground
+    r, torque = rotation(x), m["torque"]
+    n, e, z = r
+    share, lift = 1.0, 1.0  # of the mean wind; thrust over that far from the ground
     if m["alters_air"] != 0:
-        blow, lift = wind_share(m, x[2]), thrust_ratio(m, x[2], z.z)
-    vn = x[3] - blow * wind[0] - gust[0]
-    ve = x[4] - blow * wind[1] - gust[1]
-    vd = x[5] - blow * wind[2] - gust[2]
-    # drag in body axes, then with the external force in the world
-    fx = -air_drag[0] * (n.x * vn + e.x * ve + z.x * vd)
-    fy = -air_drag[1] * (n.y * vn + e.y * ve + z.y * vd)
-    fz = -air_drag[2] * (n.z * vn + e.z * ve + z.z * vd)
-    north = n.x * fx + n.y * fy + n.z * fz + push[0]
-    east = e.x * fx + e.y * fy + e.z * fz + push[1]
-    down = z.x * fx + z.y * fy + z.z * fz + push[2]
+        share, lift = wind_share(m, x[2]), thrust_ratio(m, x[2], z.z)
+    north, east, down = _force_on_frame(x, r, m, share)
     applied[0], applied[1], applied[2] = north, -east, -down
     applied[3], applied[4], applied[5] = torque[0], -torque[1], -torque[2]
     tx, ty, tz = torque[0], torque[1], torque[2]

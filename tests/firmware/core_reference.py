@@ -20,8 +20,8 @@ from flightstack.control.attitude_reference import (
 )
 from flightstack.control.mixer import WORK_ROWS, mix, relative_rotor_speed
 from flightstack.control.position_pid import PositionMemory, PositionParams, position_pid_step
+from flightstack.core.array_items import as_tuple, store
 from flightstack.core.arrays import position_setpoint, vehicle_state
-from flightstack.core.compiled import as_tuple, store
 from flightstack.core.contract import AttitudeReference, Quaternion, Vector3, Wrench
 from flightstack.core.geometry import blend, conjugate, quaternion_product, rotation_vector
 

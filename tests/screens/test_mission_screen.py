@@ -10,6 +10,7 @@ import pytest
 from textual.pilot import Pilot
 from textual.widgets import Input
 
+from flightstack.mavlink.dialect import mavlink
 from flightstack.plan import Command, Frame, Plan
 from gcs_cli.actions.in_mission import jump
 from gcs_cli.errors import FAILED, CliError
@@ -64,6 +65,13 @@ def test_distance_to_go_is_from_the_vehicle_in_flight_and_from_the_start_before(
     assert seconds == pytest.approx(5.0 + 15.0, abs=0.01)
     assert to_go(TABLE, 3, Progress()) == (TABLE.stops[3].distance_m, TABLE.stops[3].time_s)
     assert summary(TABLE, progress) == "item 1 of 5 items, 86 m and 0:38 to go"
+
+
+def test_all_items_of_a_complete_mission_are_reached():
+    view = FLYING._replace(mission=FLYING.mission._replace(state=mavlink.MISSION_STATE_COMPLETE))
+    progress = mission_progress(TABLE, view)
+    columns = mission_columns(118, in_flight=False)
+    assert [mission_row(TABLE, seq, progress, columns, DARK).plain[0] for seq in range(5)] == ["✓"] * 5
 
 
 @pytest.mark.parametrize("width", [78, 118, 198])
@@ -246,7 +254,9 @@ def test_upload_checks_asks_while_armed_and_reads_back():
         assert "The vehicle is armed" in "\n".join(shown(app))
         await pilot.press("y")
         await pilot.pause()
-        answer(app, "uploaded: mission of 4 items equal")
+        answer(app, True)
+        await pilot.pause()
+        answer(app, "mission of 4 items equal")
         await pilot.pause()
         assert said(app) == ["uploaded: mission of 4 items equal"]
         assert not screen.draft.is_changed

@@ -1,4 +1,4 @@
-"""The example controller, installed without a network."""
+"""The example of a controller, installed without a network."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-EXAMPLE = ROOT / "tests" / "support" / "example_controller"
+EXAMPLE = ROOT / "examples" / "mission_tests"
 GROUP = "flightstack.attitude_controllers"
 
 

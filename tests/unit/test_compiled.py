@@ -14,16 +14,22 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from numba.core import event
 
 from flightstack.control.mixer import mix
 from flightstack.core import compiled as module
-from flightstack.core import kernel_cache
-from flightstack.core.compiled import as_tuple, compiled, direct, specialise, store
+from flightstack.core import geometry, kernel_cache
+from flightstack.core.array_items import as_tuple, store
+from flightstack.core.compiled import compiled, direct, specialise
+from flightstack.core.contract import Quaternion
+from flightstack.core.geometry import quaternion_product
 from flightstack.core.kernel_cache import is_own
+from flightstack.core.portable_math import tan
 from sim_bridge.plant.integrator import advance_kernel
 
 inner = None  # bound by ``specialise``
 FACTOR = 0.0
+JIT = pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
 TEMPLATES = ("inner_kernel", "_advance", "_slope_at")
 """Functions that ``specialise`` compiles."""
 
@@ -237,7 +243,18 @@ def test_no_kernel_assigns_an_array_to_a_slice() -> None:
     assert [found for path in sources for found in assigned_slices(path)] == []
 
 
-@pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="nothing is compiled")
+def test_store_converts_and_follows_strides() -> None:
+    @compiled
+    def fill(out: np.ndarray, values: np.ndarray) -> None:  # type: ignore[type-arg]
+        store(out, (1, 2.5, True))
+        store(out[3:], values[::2])
+
+    out = np.zeros(10)[::2]
+    fill(out, np.array([4.0, 9.0, 5.0]))
+    assert out.tolist() == [1.0, 2.5, 1.0, 4.0, 5.0]
+
+
+@JIT
 def test_kernels_call_parts_without_a_wrapper_for_python() -> None:
     @compiled
     def used(x: float) -> float:
@@ -249,6 +266,55 @@ def test_kernels_call_parts_without_a_wrapper_for_python() -> None:
 
     assert using(1.0) == 2.0
     assert used.overloads == {}
-    assert len(used.part.overloads) == 1
+    (part,) = used.part.overloads.values()
+    assert part.library.get_pointer_to_function(part.fndesc.llvm_func_name) == 0
     assert used(2.0) == 3.0
     assert gc.isenabled()
+
+
+@JIT
+def test_cached_part_is_included_in_another_kernel() -> None:
+    loaded = module._Kernel(quaternion_product.py_func, frozenset({geometry.__name__}))
+
+    @compiled
+    def square(a: Quaternion) -> Quaternion:
+        return loaded(a, a)
+
+    turn = Quaternion(0.0, 1.0, 0.0, 0.0)
+    quaternion_product.part.compile((numba.typeof(turn), numba.typeof(turn)))  # writes the cache
+    assert square(turn) == (-1.0, 0.0, 0.0, 0.0)
+    assert sum(loaded.part.stats.cache_hits.values()) == 1
+
+
+@JIT
+def test_kernel_and_part_share_the_functions_that_they_call() -> None:
+    class Listener(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: event.Event) -> None:
+            compilations.append(event.data["dispatcher"].py_func.__name__)
+
+        def on_end(self, event: event.Event) -> None: ...
+
+    @compiled
+    def used(x: np.float32) -> float:
+        return tan(x)
+
+    @compiled
+    def using(x: np.float32) -> float:
+        return tan(x) - used(x)
+
+    compilations: list[str] = []
+    with event.install_listener("numba:compile", Listener()):
+        assert using(np.float32(0.5)) == 0.0
+    assert compilations.count("used__part") == compilations.count("tan") == compilations.count("sin_cos") == 1
+
+
+@JIT
+def test_operators_of_floats_and_integers_have_numbas_types() -> None:
+    @compiled
+    def results(x: float, n: int) -> tuple[float, float, int, bool]:
+        return x * x, x / n, n * n, x < n
+
+    assert results(3.0, 2) == (9.0, 1.5, 4, False)
+    (signature,) = results.nopython_signatures
+    kinds = (numba.float64, numba.float64, numba.int64, numba.boolean)
+    assert signature.return_type == numba.types.Tuple(kinds)

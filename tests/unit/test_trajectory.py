@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightstack.core.compiled import as_tuple, compiled, store
+from flightstack.core.array_items import as_tuple, store
+from flightstack.core.compiled import compiled
 from flightstack.core.contract import FloatArray
 from flightstack.guidance.params import guidance_params
 from flightstack.guidance.trajectory import (

@@ -8,7 +8,7 @@ WEATHER = {"vehicle": "x_quad", "wind": (5.0, 0.0), "gust": 2.0}
 
 
 def test_square_in_calm_air(sitl):
-    flight = sitl.fly("square", vehicle="x_quad", controller="pd")
+    flight = sitl.fly("square", vehicle="x_quad", controller="lqr")
     assert flight.completed
     assert flight.max_error_m < 0.1
     assert flight.always("abs(roll_deg) < 35 and abs(pitch_deg) < 35").margin > 10
@@ -16,7 +16,7 @@ def test_square_in_calm_air(sitl):
 
 @pytest.mark.parametrize("seed", [3, 4])
 def test_gusts_disturb_it_no_more_than_pid(sitl, seed):
-    own = sitl.fly("square", controller="pd", seed=seed, **WEATHER)
+    own = sitl.fly("square", controller="lqr", seed=seed, **WEATHER)
     pid = sitl.fly("square", controller="pid", seed=seed, **WEATHER)
     assert own.completed
     assert own.rms_error_m < 1.1 * pid.rms_error_m
@@ -24,7 +24,7 @@ def test_gusts_disturb_it_no_more_than_pid(sitl, seed):
 
 
 def test_weak_rotor_is_held(sitl):
-    world = sitl(vehicle="x_quad", controller="pd")
+    world = sitl(vehicle="x_quad", controller="lqr")
     world.takeoff(5.0)
     world.run_until("altitude_m > 4.8", timeout_s=10)
     world.fault("rotor 2 efficiency 0.8", for_s=3.0)

@@ -1,0 +1,142 @@
+"""Numba's compiler with less work: functions that kernels call are neither optimised nor turned into machine code.
+
+A kernel includes the LLVM code of all functions that it calls. Numba optimises that code and makes machine code of it
+for each function as well as for the kernel, because Python may call the function too. Here Python calls kernels only.
+"""
+
+from __future__ import annotations
+
+import operator
+from types import SimpleNamespace
+from typing import Any
+
+from llvmlite.binding import parse_bitcode  # type: ignore[import-untyped]
+from numba.core import types
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, CompileResult, Flags
+from numba.core.typing.templates import AbstractTemplate, Signature, infer_global, signature
+
+_DEFAULTS = {name: option.default for name, option in Flags.options.items()}
+_NO_ENVIRONMENT = SimpleNamespace(set_env=lambda name, environment: None)
+
+
+class _Flags(Flags):  # type: ignore[misc]  # Numba has no types
+    """Compiler flags, which Numba compares for each operator and call.
+
+    A function called by compiled code does not depend on the wrapper of its caller: without this flag, Numba finds it
+    again instead of compiling it twice.
+    """
+
+    def values(self) -> dict[str, Any]:
+        return {**_DEFAULTS, **self._values, "no_cpython_wrapper": True}
+
+
+class KernelCompiler(Compiler):  # type: ignore[misc]
+    """Compiles a function that Python calls."""
+
+    def __init__(
+        self,
+        typingctx: Any,
+        targetctx: Any,
+        library: Any,
+        args: Any,
+        return_type: Any,
+        flags: Flags,
+        locals: Any,
+    ) -> None:
+        super().__init__(typingctx, targetctx, library, args, return_type, _Flags(flags), locals)
+
+
+class PartCompiler(KernelCompiler):
+    """Compiles a function that compiled functions call."""
+
+    def define_pipelines(self) -> Any:
+        """Return Numba's passes, which fill the library given here."""
+        self.state.library = _PartLibrary(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        return super().define_pipelines()
+
+
+class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """LLVM code of a function and of those that it calls, for the kernels that include it."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    @property
+    def codegen(self) -> Any:
+        """Setter of the function's environment, which is part of the machine code."""
+        return _NO_ENVIRONMENT
+
+    def serialize_using_object_code(self) -> Any:
+        """Return name and LLVM code."""
+        return self.name, self._get_module_for_linking().as_bitcode()
+
+    @classmethod
+    def load(cls, codegen: Any, name: str, bitcode: bytes) -> _PartLibrary:
+        """Return a library from its serialised form."""
+        library = cls(codegen, name)
+        library._final_module = library._shared_module = parse_bitcode(bitcode)
+        library._finalize_final_module()
+        return library
+
+
+class _PartCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+    def rebuild(self, target_context: Any, payload: Any) -> CompileResult:
+        """Return the result of a compilation as ``CompileResult._rebuild`` does, but without machine code."""
+        serialised, description, environment, function_signature, object_mode, lifted, annotation, *rest = (
+            payload
+        )
+        reload_init, environments = rest
+        for reload in reload_init:
+            reload()
+        library = _PartLibrary.load(target_context.codegen(), *serialised)
+        return CompileResult(
+            target_context=target_context,
+            typing_context=target_context.typing_context,
+            library=library,
+            environment=environment,
+            entry_point=target_context.get_executable(library, description, environment),
+            fndesc=description,
+            type_annotation=annotation,
+            signature=function_signature,
+            objectmode=object_mode,
+            lifted=lifted,
+            typing_error=None,
+            call_helper=None,
+            metadata=None,
+            reload_init=reload_init,
+            referenced_envs=environments,
+        )
+
+
+class PartCache(FunctionCache):  # type: ignore[misc]
+    """Cache on disk of functions that compiled functions call."""
+
+    _impl_class = _PartCacheImpl
+
+
+class _FloatOperator(AbstractTemplate):  # type: ignore[misc]
+    """Type of an operator with two floats, found before Numba asks NumPy for a matching ufunc."""
+
+    metadata = {"target": "cpu"}  # noqa: RUF012  # sorts it before those for all targets
+    result: Any = types.float64
+
+    def generic(self, args: tuple[Any, ...], kws: dict[str, Any]) -> Signature | None:
+        if kws or args != (types.float64, types.float64):
+            return None
+        return signature(self.result, *args)
+
+
+class _FloatComparison(_FloatOperator):
+    result = types.boolean
+
+
+for _operator in (operator.add, operator.sub, operator.mul, operator.truediv):
+    infer_global(_operator)(_FloatOperator)
+for _operator in (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne):
+    infer_global(_operator)(_FloatComparison)
