@@ -92,5 +92,6 @@ ARDUPILOT = Autopilot(
     mission_begins_with_home=True,
     replaces_plans_at_once=False,
     stores_items_exactly=False,
+    is_silent_without_logs=False,
     log_suffix=".bin",
 )

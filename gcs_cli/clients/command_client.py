@@ -148,6 +148,32 @@ class CommandClient:
         self._deadline_s = None
 
 
+class RepeatedMessage:
+    """Sends a message that has no answer, and repeats it, because it may be lost."""
+
+    result: None = None
+    """Always unknown: the caller observes the effect."""
+
+    def __init__(self, message: Message, now_s: float, period_s: float = 1.0) -> None:
+        self._message = message
+        self._due_s = now_s
+        self._period_s = period_s
+
+    def receive(self, message: Message, now_s: float) -> None:
+        """Ignore ``message``."""
+
+    def poll(self, now_s: float) -> list[Message]:
+        """Return the message if it is due."""
+        if now_s < self._due_s:
+            return []
+        self._due_s = now_s + self._period_s
+        return [self._message]
+
+    def next_deadline(self) -> float:
+        """Return the time of the next repetition."""
+        return self._due_s
+
+
 def _result_name(result: int) -> str:
     entry = mavlink.enums["MAV_RESULT"].get(result)
     return entry.name if entry else f"MAV_RESULT {result}"

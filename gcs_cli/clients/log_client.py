@@ -59,10 +59,14 @@ class LogFailed(NamedTuple):
 
 
 class LogClient:
-    """One operation at a time with one vehicle."""
+    """One operation at a time with one vehicle.
 
-    def __init__(self, vehicle: Address) -> None:
+    A vehicle that ``is_silent_without_logs`` answers no request for a list while it has none.
+    """
+
+    def __init__(self, vehicle: Address, *, is_silent_without_logs: bool = False) -> None:
         self.vehicle = vehicle
+        self._is_silent_without_logs = is_silent_without_logs
         self.result: LogDone | LogFailed | None = None
         self._outbox: list[Message] = []
         self._entries: dict[int, LogEntry] = {}
@@ -136,9 +140,7 @@ class LogClient:
         if self.result is None and self._retry_s is not None and now_s >= self._retry_s:
             self._progress_s = min(self._progress_s, now_s)
             if now_s - self._progress_s >= SILENCE_S:
-                self._end(
-                    LogFailed(f"the vehicle (system {self.vehicle.system}) does not answer", silent=True)
-                )
+                self._end(self._of_silence())
             elif self._file is not None:
                 self._ask_for_data(self._file, now_s)
             else:
@@ -151,6 +153,11 @@ class LogClient:
         if self._outbox:
             return -math.inf
         return None if self.result is not None else self._retry_s
+
+    def _of_silence(self) -> LogDone | LogFailed:
+        if self._is_silent_without_logs and self._file is None and not self._entries:
+            return LogDone()
+        return LogFailed(f"the vehicle (system {self.vehicle.system}) does not answer", silent=True)
 
     # -- list
 

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from flightstack.core.portable_math import euler_angles
-from flightstack.mavlink.dialect import mavlink
+from flightstack.mavlink.dialect import NAME_IN_VERSION, mavlink
+from gcs_cli.autopilots.autopilot import Role
 from gcs_cli.vehicle.status_texts import add_piece, without_stale_piece
 from gcs_cli.vehicle.view_types import (
     AvailableMode,
@@ -104,14 +105,32 @@ def _euler(q: Any) -> Euler | None:
 
 def _heartbeat(view: VehicleView, message: Any, now_s: float) -> VehicleView:
     armed = bool(message.base_mode & _ARMED)
+    mode = mode_name(view, message.custom_mode)
     return view._replace(
         last_heartbeat_s=now_s,
-        mode=mode_name(view, message.custom_mode),
+        mode=mode,
         custom_mode=message.custom_mode,
+        mission=_mission_flown(view, mode, armed),
         armed=armed,
         ever_armed=view.ever_armed or armed,
         system_status=message.system_status,
     )
+
+
+def _mission_flown(view: VehicleView, mode: str, armed: bool) -> Mission:
+    """Return the mission with what a heartbeat shows of its end, for a vehicle that reports no state of the mission.
+
+    PX4 does not report a final return as reached: it changes the mode as soon as that item is the current one.
+    """
+    mission, roles = view.mission, view.autopilot.roles
+    if armed and not view.armed:
+        return mission._replace(flies_last=False, has_ended=False)
+    if armed and mission.is_at_last and mode == roles.get(Role.MISSION):
+        return mission._replace(flies_last=True)
+    has_landed = view.armed and not armed and view.mode == roles.get(Role.RETURN)
+    if has_landed and mission.is_at_last and not mission.flies_last:
+        return mission._replace(has_ended=True)
+    return mission
 
 
 def mode_name(view: VehicleView, custom_mode: int) -> str:
@@ -265,17 +284,29 @@ def _extended_state(view: VehicleView, message: Any, _now_s: float) -> VehicleVi
     return view._replace(landed_state=message.landed_state)
 
 
+def _plan_number(view: VehicleView, seq: int) -> int | None:
+    """Return the number in the plan of an item of the vehicle's mission; None for the home of ArduPilot."""
+    number = seq - view.autopilot.mission_begins_with_home
+    return number if number >= 0 else None
+
+
 def _mission_current(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     total = None if message.total == _NO_NUMBER else message.total
     state = message.mission_state or None
     reached = view.mission.reached
     if total is not None and reached is not None and reached >= total:
         reached = None  # of a former mission
-    return view._replace(mission=Mission(message.seq, total, reached, state))
+    current = _plan_number(view, message.seq) or 0
+    mission = view.mission._replace(current=current, total=total, reached=reached, state=state)
+    if not mission.is_at_last:
+        mission = mission._replace(flies_last=False, has_ended=False)
+    return view._replace(mission=mission)
 
 
 def _item_reached(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    return view._replace(mission=view.mission._replace(reached=message.seq))
+    mission = view.mission._replace(reached=_plan_number(view, message.seq))
+    is_last = mission.reached is not None and mission.reached + 1 == mission.total
+    return view._replace(mission=mission._replace(has_ended=mission.has_ended or is_last))
 
 
 def _rotors(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
@@ -294,7 +325,12 @@ def _with_rotors(view: VehicleView, first: int, speeds_rpm: Iterable[float]) -> 
 
 
 def _esc_telemetry(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
-    """ArduPilot's ESC_TELEMETRY_1_TO_4 and the like: the speeds of four rotors, the first one in the name."""
+    """ArduPilot's ESC_TELEMETRY_1_TO_4 and the like: the speeds of four rotors, the first one in the name.
+
+    An ESC that draws current at no speed does not measure it, as in ArduPilot's simulation.
+    """
+    if any(message.current) and not any(message.rpm):
+        return view._replace(rotor_rpm=())
     first = int(message.get_type().split("_")[2]) - 1
     return _with_rotors(view, first, message.rpm)
 
@@ -307,12 +343,17 @@ def _loop_timing(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return view._replace(timing=timing)
 
 
+def _version(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
+    return view._replace(is_own=list(message.flight_custom_version) == NAME_IN_VERSION)
+
+
 def _system_time(view: VehicleView, message: Any, _now_s: float) -> VehicleView:
     return view._replace(time_s=message.time_boot_ms / 1e3)
 
 
 _FOLDS: dict[str, Callable[[VehicleView, Any, float], VehicleView]] = {
     "HEARTBEAT": _heartbeat,
+    "AUTOPILOT_VERSION": _version,
     "AVAILABLE_MODES": _available_mode,
     "SYS_STATUS": _system,
     "BATTERY_STATUS": _battery,

@@ -85,17 +85,32 @@ class Setpoint(NamedTuple):
 
 
 class Mission(NamedTuple):
-    """Mission progress. ``reached`` is the last item reached; ``state`` is a MISSION_STATE."""
+    """Mission progress, in numbers of the plan. ``reached`` is the last item reached, ``state`` a MISSION_STATE."""
 
     current: int | None = None
     total: int | None = None
     reached: int | None = None
     state: int | None = None
+    """None if the vehicle does not report it, as PX4."""
+    flies_last: bool = False
+    """True once the vehicle was in its mission mode at the last item, in this flight."""
+    has_ended: bool = False
+    """True once the vehicle has reached the last item in this flight, or has landed after it."""
+
+    @property
+    def is_at_last(self) -> bool:
+        """True if the last item is the current one."""
+        return self.current is not None and bool(self.total) and self.current + 1 == self.total
 
     @property
     def complete(self) -> bool:
-        """True if the vehicle reports the mission as complete."""
-        return self.state == MISSION_COMPLETE
+        """True if the vehicle reports the mission as complete, or, if it reports no state, has flown its last item."""
+        return self.state == MISSION_COMPLETE or (self.state is None and self.has_ended and self.is_at_last)
+
+    @property
+    def is_end_unknown(self) -> bool:
+        """True at the last item of a vehicle that reports no state and was not observed to fly it."""
+        return self.state is None and self.is_at_last and not self.has_ended
 
     @property
     def item_text(self) -> str:
@@ -239,6 +254,8 @@ class VehicleView(NamedTuple):
     armed: bool = False
     ever_armed: bool = False
     system_status: int = 0
+    is_own: bool | None = None
+    """True for the vehicle of this project, False for others; None until AUTOPILOT_VERSION is received."""
     landed_state: int = 0
     healthy: bool | None = None
     """True if all sensors are healthy; in a simulation: if the simulator's state is received."""

@@ -11,6 +11,7 @@ from flightstack.mavlink.link import Address, Link, Message
 from flightstack.services.logs.log_server import LogServer
 from flightstack.transports.memory import LOSSLESS, Conditions
 from gcs_cli.clients.log_client import LogClient, LogDone, LogEntry, LogFailed
+from gcs_cli.transfers.log_calls import kept_logs, oldest_first
 from tests.protocol.file_harness import GCS, LOSSY, VEHICLE, Ether, MemoryLogs, Station, content
 from tests.support.tools import NIGHTLY
 
@@ -228,6 +229,38 @@ def test_log_list_of_px4_ends_with_the_last_id(seed: int) -> None:
     vehicle = Vehicle()
     vehicle.server = Px4Server(VEHICLE, vehicle.store, lambda: False, lambda *_: None)
     assert listed(vehicle, LOSSY if seed else LOSSLESS, seed) == (0, 1, 2, 3)
+
+
+def test_silence_without_logs_is_an_empty_list_as_of_px4() -> None:
+    for start in (LogClient.start_list, lambda client: client.start_erase(3)):
+        client = LogClient(VEHICLE, is_silent_without_logs=True)
+        start(client)
+        for tenth in range(100):
+            client.poll(tenth / 10)
+        assert client.result == LogDone()
+
+
+def test_silence_in_a_list_that_has_begun_is_no_empty_list() -> None:
+    client = LogClient(VEHICLE, is_silent_without_logs=True)
+    client.start_list()
+    client.poll(0.0)
+    client.receive(as_received(mavlink.MAVLink_log_entry_message(0, 3, 2, 0, 9)), 0.1)
+    for tenth in range(2, 100):
+        client.poll(tenth / 10)
+    assert isinstance(client.result, LogFailed)
+
+
+def test_logs_are_ordered_by_time_because_px4_numbers_them_in_no_order() -> None:
+    logs = tuple(LogEntry(number, 9, time_s) for number, time_s in enumerate((50, 70, 40)))
+    assert [log.log_id for log in oldest_first(logs)] == [2, 0, 1]
+    unknown = (*logs, LogEntry(3, 9, 0))
+    assert oldest_first(unknown) == unknown
+
+
+def test_log_that_begins_after_an_erase_was_not_left_by_it() -> None:
+    before = (LogEntry(1, 500, 0), LogEntry(2, 900, 0))
+    assert kept_logs(before, (LogEntry(1, 0, 0),)) == ()
+    assert kept_logs(before, (LogEntry(2, 950, 0), LogEntry(3, 10, 0))) == (LogEntry(2, 950, 0),)
 
 
 def erased(vehicle: Vehicle, conditions: Conditions = LOSSLESS, seed: int = 0) -> LogDone | LogFailed | None:

@@ -45,7 +45,7 @@ def test_jump_is_done_when_the_vehicle_reports_the_item() -> None:
         assert step.command.params == (float(number),)
         assert step.effect is not None
         assert not step.effect(view)
-        assert step.effect(view._replace(mission=Mission(current=number)))
+        assert step.effect(view._replace(mission=Mission(current=3)))
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ f2471861, its first 2.5 s whole and its flight thinned.
 from __future__ import annotations
 
 import lzma
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -57,8 +59,13 @@ def test_arducopter_reports_its_state(arducopter: list[VehicleView]) -> None:
     assert view.estimator.healthy
     assert view.wind_ned_m_s is not None
     assert view.battery is not None
-    assert len(view.rotor_rpm) == 4
-    assert view.mission.reached == 3
+    assert view.rotor_rpm == ()  # 0.8 A and no speed
+
+
+def test_arducopter_mission_is_counted_without_its_home(arducopter: list[VehicleView]) -> None:
+    missions = [view.mission for view in arducopter]
+    assert (missions[-1].current, missions[-1].total, missions[-1].reached) == (3, 4, 2)
+    assert min(mission.current for mission in missions if mission.current is not None) == 0
 
 
 def test_arducopter_can_arm_once_its_filter_has_a_position(arducopter: list[VehicleView]) -> None:
@@ -113,3 +120,14 @@ def test_messages_unknown_to_the_dialect_do_not_count_as_lost() -> None:
     link = views("px4_sih_start")[-1].link
     assert link.received > 1500
     assert link.lost == 0
+
+
+def test_recording_of_ardupilot_is_read_with_its_dialect() -> None:
+    content = lzma.decompress((DATA / "arducopter_flight.tlog.xz").read_bytes())
+    script = (
+        "import sys; from gcs_cli.logs.tlog_reader import read_tlog; "
+        "log = read_tlog(sys.stdin.buffer.read(), 'a.tlog'); "
+        "print(log.unknown, sorted({topic.name for topic in log.topics} & {'WIND', 'ESC_TELEMETRY_1_TO_4'}))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], input=content, capture_output=True, check=True)
+    assert done.stdout.decode().strip() == "0 ['ESC_TELEMETRY_1_TO_4', 'WIND']"
